@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Equally spaced instants at any rate from micro-hertz, without accumulated drift.
+#pragma once
+
+#include <cstdint>
+
+#include "hal.hpp"
+
+namespace versavis::firmware {
+
+/// Tick k lies at origin + floor(k * 10^15 / rate_uhz) ns: the remainder of the period is carried (Bresenham).
+class Grid {
+   public:
+    Grid() = default;
+    Grid(Nanoseconds origin, std::uint32_t rate_uhz)
+        : next_(origin), rate_uhz_(rate_uhz), whole_(ns_uhz / rate_uhz), remainder_(ns_uhz % rate_uhz) {}
+
+    Nanoseconds next() const { return next_; }
+    std::uint64_t tick() const { return tick_; }
+    Nanoseconds period() const { return whole_; }
+
+    void advance() {
+        ++tick_;
+        next_ += whole_;
+        carry_ += remainder_;
+        if (carry_ >= rate_uhz_) {
+            carry_ -= rate_uhz_;
+            ++next_;
+        }
+    }
+
+   private:
+    static constexpr std::int64_t ns_uhz = 1'000'000'000'000'000;
+
+    Nanoseconds next_ = 0;
+    std::uint64_t tick_ = 0;
+    std::int64_t rate_uhz_ = 1;
+    Nanoseconds whole_ = 0;
+    std::int64_t remainder_ = 0;
+    std::int64_t carry_ = 0;
+};
+
+}  // namespace versavis::firmware

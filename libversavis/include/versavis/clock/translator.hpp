@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Board time to published stamps, for all threads: envelope filter, output clock and epoch in one place.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+
+#include "versavis/clock/envelope_filter.hpp"
+#include "versavis/clock/output_clock.hpp"
+
+namespace versavis::clock {
+
+/// An instant in all the clocks that are published, and how good it is.
+struct Stamp {
+    OutputTime output;
+    HostTime host;
+    std::uint32_t sigma_ns = 0;
+    std::uint32_t epoch = 0;
+    ClockState state = ClockState::init;
+};
+
+/// What the status document says of the clock.
+struct ClockReport {
+    ClockState state = ClockState::init;
+    OutputClockKind output = OutputClockKind::realtime;
+    Duration sigma;
+    Duration bound;  ///< no error can be larger than this, whatever the asymmetry of the link
+    Duration residual;
+    Duration round_trip;
+    Duration smallest_round_trip;
+    Duration output_minus_host;
+    double skew_ppm = 0;
+    double skew_sigma_ppm = 0;
+    std::uint64_t exchanges = 0;
+    std::uint64_t restarts = 0;
+    std::uint32_t epoch = 0;
+    std::uint32_t output_steps = 0;
+};
+
+/// Thread-safe.
+class Translator {
+   public:
+    explicit Translator(OutputClock output) : output_(output) {}
+
+    /// The board began a new life: what was known of its clock is void, and a new epoch begins.
+    void board_restarted();
+
+    void add(const Exchange& exchange);
+
+    /// None before the first exchange.
+    std::optional<Stamp> translate(BoardTime board);
+
+    /// Host time alone, without reading the output clock.
+    std::optional<HostEstimate> to_host(BoardTime board) const;
+
+    /// Stamp of an instant that was seen on the host clock, not by the board.
+    Stamp translate(HostTime host, Duration sigma);
+
+    ClockReport report();
+
+   private:
+    std::uint32_t epoch() const { return board_lives_ + output_.steps(); }
+
+    mutable std::mutex mutex_;
+    EnvelopeFilter filter_;
+    OutputClock output_;
+    std::uint32_t board_lives_ = 0;
+};
+
+}  // namespace versavis::clock

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The byte layout of a shared-memory ring, as docs/shm-layout.md fixes it for every language.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+namespace versavis::ring {
+
+inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
+inline constexpr std::uint32_t abi_major = 1;
+inline constexpr std::uint32_t abi_minor = 0;
+inline constexpr std::size_t page_size = 4096;
+inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's generation
+inline constexpr std::size_t metadata_words = 12;
+inline constexpr std::size_t metadata_size = metadata_words * 8;
+inline constexpr std::uint32_t no_slot = 0xFFFFFFFFU;  ///< the item lies in the descriptor alone
+
+using Metadata = std::array<std::uint64_t, metadata_words>;
+
+enum class StreamKind : std::uint32_t { frames = 1, imu = 2, events = 3, status = 4 };
+
+enum class WriterState : std::uint32_t { live = 1, closed = 2, superseded = 3 };
+
+/// Header page. Words that change lie on cache lines of their own.
+struct Header {
+    std::atomic<std::uint64_t> magic;  ///< stored last: what is read after it is complete
+    std::uint32_t abi_major;
+    std::uint32_t abi_minor;
+    std::uint64_t total_size;
+    std::uint64_t generation;  ///< random: tells this segment from the one before it
+    std::uint8_t boot_id[16];
+    std::uint32_t writer_pid;
+    StreamKind kind;
+    std::uint64_t writer_start_ticks;  ///< field 22 of /proc/<pid>/stat
+    std::uint32_t descriptor_count;    ///< a power of two
+    std::uint32_t slot_count;
+    std::uint64_t slot_size;  ///< bytes of payload, a multiple of the page size
+    std::uint64_t descriptors_at;
+    std::uint64_t generations_at;
+    std::uint64_t slots_at;
+    char name[64];  ///< zero-terminated
+
+    alignas(128) std::atomic<std::uint64_t> head;       ///< items published since creation
+    alignas(128) std::atomic<std::uint32_t> wake;       ///< futex word: bumped at each publication and state change
+    alignas(128) std::atomic<std::uint32_t> state;      ///< WriterState
+    alignas(128) std::atomic<std::int64_t> heartbeat_ns;  ///< host time of the writer's last sign of life
+};
+
+/// One published item. Item n lies in descriptor n % descriptor_count.
+struct alignas(128) Descriptor {
+    std::atomic<std::uint64_t> sequence;         ///< 2n + 2 once item n is complete, 2n + 1 while it is written
+    std::atomic<std::uint64_t> slot_generation;  ///< the slot's generation word when published
+    std::atomic<std::uint64_t> length_and_slot;  ///< length << 32 | slot
+    std::atomic<std::int64_t> output_time_ns;
+    std::array<std::atomic<std::uint64_t>, metadata_words> metadata;
+};
+
+static_assert(offsetof(Header, total_size) == 16 && offsetof(Header, boot_id) == 32);
+static_assert(offsetof(Header, writer_pid) == 48 && offsetof(Header, kind) == 52);
+static_assert(offsetof(Header, writer_start_ticks) == 56 && offsetof(Header, descriptor_count) == 64);
+static_assert(offsetof(Header, slot_size) == 72 && offsetof(Header, descriptors_at) == 80);
+static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104);
+static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
+static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
+static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128 && offsetof(Descriptor, metadata) == 32);
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<std::uint32_t>::is_always_lock_free);
+
+}  // namespace versavis::ring

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the rings of an instance of the service lie.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace versavis {
+
+/// Name of the instance meant when none is given: $VERSAVIS_INSTANCE, else "default".
+std::string default_instance();
+
+/// /dev/shm/versavis/<instance>
+std::filesystem::path instance_directory(const std::string& instance);
+
+/// /dev/shm/versavis/<instance>/<stream>
+std::filesystem::path stream_path(const std::string& instance, const std::string& stream);
+
+}  // namespace versavis

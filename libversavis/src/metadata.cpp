@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/metadata.hpp"
+
+namespace versavis {
+
+const char* to_string(StampKind kind) {
+    switch (kind) {
+        case StampKind::measured_middle: return "measured";
+        case StampKind::predicted_middle: return "predicted";
+        case StampKind::trigger_edge: return "trigger";
+        case StampKind::arrival: return "arrival";
+    }
+    return "unknown";
+}
+
+const char* to_string(EventKind kind) {
+    switch (kind) {
+        case EventKind::trigger_without_frame: return "trigger_without_frame";
+        case EventKind::frame_without_trigger: return "frame_without_trigger";
+        case EventKind::trigger_skipped: return "trigger_skipped";
+        case EventKind::stray_edge: return "stray_edge";
+        case EventKind::output_late: return "output_late";
+        case EventKind::board_connected: return "board_connected";
+        case EventKind::board_lost: return "board_lost";
+        case EventKind::camera_connected: return "camera_connected";
+        case EventKind::camera_lost: return "camera_lost";
+        case EventKind::pairing_locked: return "pairing_locked";
+        case EventKind::pairing_slipped: return "pairing_slipped";
+        case EventKind::edge_overflow: return "edge_overflow";
+    }
+    return "unknown";
+}
+
+const char* to_string(EventReason reason) {
+    switch (reason) {
+        case EventReason::none: return "none";
+        case EventReason::frame_incomplete: return "frame_incomplete";
+        case EventReason::frame_missing: return "frame_missing";
+        case EventReason::exposure_missing: return "exposure_missing";
+        case EventReason::unproved: return "unproved";
+        case EventReason::mismatch: return "mismatch";
+        case EventReason::no_buffer: return "no_buffer";
+        case EventReason::no_clock: return "no_clock";
+        case EventReason::wrong_size: return "wrong_size";
+        case EventReason::reset: return "reset";
+        case EventReason::trigger_ignored: return "trigger_ignored";
+    }
+    return "unknown";
+}
+
+}  // namespace versavis

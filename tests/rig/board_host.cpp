@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board_host.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <random>
+#include <system_error>
+
+namespace versavis::rig {
+
+namespace {
+
+constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is seen after that
+
+}  // namespace
+
+Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario, const std::string& socket_path,
+                                                       HostTime zero, const Motion& motion, GroundTruth& truth,
+                                                       std::vector<GigeCamera*> cameras) {
+    sockaddr_un self{};
+    self.sun_family = AF_UNIX;
+    if (socket_path.size() >= sizeof self.sun_path) return failure(socket_path, "the socket's path is too long");
+    std::memcpy(self.sun_path, socket_path.c_str(), socket_path.size() + 1);
+    ::unlink(socket_path.c_str());
+    const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (::bind(listener, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 || ::listen(listener, 1) != 0) {
+        const std::string reason = std::generic_category().message(errno);
+        ::close(listener);
+        return failure(socket_path, fmt::format("cannot listen: {}", reason), "choose another with --socket");
+    }
+    return std::unique_ptr<BoardHost>(
+        new BoardHost(scenario, socket_path, zero, motion, truth, std::move(cameras), listener));
+}
+
+BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
+                     GroundTruth& truth, std::vector<GigeCamera*> cameras, int listener)
+    : serial_(scenario.board.serial),
+      seed_(scenario.seed),
+      clock_errors_(scenario.board.clock),
+      imu_name_(scenario.imu),
+      socket_path_(std::move(socket_path)),
+      imu_(motion),
+      truth_(truth),
+      cameras_(std::move(cameras)),
+      listener_(listener) {
+    boot({}, clock_errors_, zero);
+    thread_ = std::thread([this] { run(); });
+}
+
+BoardHost::~BoardHost() {
+    stop_ = true;
+    thread_.join();
+    drop_host();
+    ::close(listener_);
+    ::unlink(socket_path_.c_str());
+}
+
+void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero) {
+    ++life_;
+    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)());
+    serial_.copy(identity.serial, sizeof identity.serial - 1);
+    clock_ = std::make_unique<SkewedClock>(zero, clock);
+    levels_ = 0;
+    imu_samples_ = 0;
+    std::fill(std::begin(pulses_), std::end(pulses_), 0);
+    firmware::Surroundings surroundings;
+    surroundings.outputs_changed = [this](auto at, auto levels) { outputs_changed(at, levels); };
+    surroundings.imu_burst = [this](auto at, auto transmitted, auto received) {
+        const HostTime instant = clock_->host(at);
+        imu_.burst(instant, transmitted, received);
+        truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++, instant});
+    };
+    surroundings.reboot = [this](bool) { reset(); };
+    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings));
+    board_->run_until(board_now());
+}
+
+void BoardHost::restart() {
+    drop_host();
+    ClockErrors from_zero = clock_errors_;
+    from_zero.offset_ns = 0;
+    boot({0, wire::ResetCause::software, {}}, from_zero, host_now());
+}
+
+void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t levels) {
+    const std::uint32_t changed = levels ^ levels_;
+    levels_ = levels;
+    const HostTime instant = clock_->host(at);
+    for (GigeCamera* camera : cameras_) {
+        const unsigned output = camera->settings().output;
+        if ((changed >> output & 1U) == 0) continue;
+        const bool level = (levels >> output & 1U) != 0;
+        if (level) ++pulses_[output];
+        const auto interval = camera->trigger_line(level, {life_, pulses_[output], instant});
+        if (!interval) continue;
+        const auto input = static_cast<std::uint8_t>(output);
+        board_->schedule_edge({clock_->device_ns(interval->first), input, true});
+        board_->schedule_edge({clock_->device_ns(interval->second), input, false});
+    }
+}
+
+void BoardHost::run() {
+    while (!stop_) {
+        if (reset_pending_.exchange(false)) restart();
+        board_->run_until(board_now());
+        exchange_bytes();
+        const HostTime wake = clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
+        wait(std::min(wake, host_now() + longest_wait));
+    }
+}
+
+void BoardHost::wait(HostTime until) const {
+    const std::int64_t left_ns = std::max<std::int64_t>(0, (until - host_now()).ns);
+    const timespec timeout{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
+    pollfd readable{host_ >= 0 ? host_ : listener_, POLLIN, 0};
+    ::ppoll(&readable, 1, &timeout, nullptr);
+}
+
+void BoardHost::accept_host() {
+    if (host_ < 0) host_ = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+}
+
+void BoardHost::drop_host() {
+    if (host_ >= 0) ::close(host_);
+    host_ = -1;
+}
+
+void BoardHost::exchange_bytes() {
+    accept_host();
+    if (host_ < 0) {
+        board_->consume(board_->transmitted().size());
+        return;
+    }
+    std::uint8_t buffer[4096];
+    ssize_t size = 0;
+    while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0) {
+        const firmware::Nanoseconds at = board_now();
+        board_->receive({buffer, static_cast<std::size_t>(size)}, at);
+        board_->run_until(at);
+    }
+    if (size == 0 || errno != EAGAIN) return drop_host();
+    const auto out = board_->transmitted();
+    const ssize_t sent = out.empty() ? 0 : ::send(host_, out.data(), out.size(), MSG_NOSIGNAL);
+    if (sent > 0) board_->consume(static_cast<std::size_t>(sent));
+}
+
+}  // namespace versavis::rig

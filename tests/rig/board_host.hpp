@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the firmware in real time behind a unix socket, wired to the emulated cameras and the IMU.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gige_camera.hpp"
+#include "imu_device.hpp"
+#include "native_board.hpp"
+
+namespace versavis::rig {
+
+class BoardHost {
+   public:
+    /// Error: the socket cannot be made.
+    static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario, const std::string& socket_path,
+                                                       HostTime zero, const Motion& motion, GroundTruth& truth,
+                                                       std::vector<GigeCamera*> cameras);
+    ~BoardHost();
+    BoardHost(const BoardHost&) = delete;
+    BoardHost& operator=(const BoardHost&) = delete;
+
+    /// The board starts anew as soon as it can. From any thread.
+    void reset() { reset_pending_ = true; }
+
+   private:
+    BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
+              GroundTruth& truth, std::vector<GigeCamera*> cameras, int listener);
+
+    void run();
+    void boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero);
+    void restart();
+    void wait(HostTime until) const;
+    void exchange_bytes();
+    void accept_host();
+    void drop_host();
+    void outputs_changed(firmware::Nanoseconds at, std::uint32_t levels);
+    firmware::Nanoseconds board_now() const { return clock_->device_ns(host_now()); }
+
+    std::string serial_;
+    std::uint64_t seed_;
+    ClockErrors clock_errors_;
+    std::string imu_name_;
+    std::string socket_path_;
+    ImuDevice imu_;
+    GroundTruth& truth_;
+    std::vector<GigeCamera*> cameras_;
+    int listener_;
+    int host_ = -1;
+
+    std::unique_ptr<SkewedClock> clock_;
+    std::unique_ptr<firmware::NativeBoard> board_;
+    std::uint64_t life_ = 0;
+    std::uint32_t levels_ = 0;
+    std::uint64_t pulses_[firmware::camera_count] = {};
+    std::uint64_t imu_samples_ = 0;
+    std::atomic<bool> reset_pending_{false};
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace versavis::rig

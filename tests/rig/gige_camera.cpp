@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gige_camera.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <system_error>
+
+namespace versavis::rig {
+
+namespace {
+
+constexpr std::uint16_t gvcp_port = 3956;
+constexpr std::uint8_t gvcp_key = 0x42;
+constexpr std::uint8_t acknowledge_wanted = 0x01;
+constexpr std::size_t discovery_size = 0xF8;
+constexpr std::size_t most_memory = 512;
+constexpr int poll_ms = 20;
+
+enum Command : std::uint16_t {
+    discovery = 0x0002,
+    packet_resend = 0x0040,
+    read_register = 0x0080,
+    write_register_command = 0x0082,
+    read_memory = 0x0084,
+    write_memory = 0x0086,
+};
+
+enum Status : std::uint16_t {
+    success = 0x0000,
+    not_implemented = 0x8001,
+    invalid_parameter = 0x8002,
+    invalid_address = 0x8003,
+    access_denied = 0x8006,
+};
+
+std::uint32_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
+    return std::uint32_t{bytes[at]} << 24U | std::uint32_t{bytes[at + 1]} << 16U | std::uint32_t{bytes[at + 2]} << 8U |
+           bytes[at + 3];
+}
+
+std::uint16_t half(std::span<const std::uint8_t> bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] << 8U | bytes[at + 1]);
+}
+
+void put_word(std::vector<std::uint8_t>& out, std::uint32_t value) {
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) out.push_back(static_cast<std::uint8_t>(value >> shift));
+}
+
+void put_half(std::vector<std::uint8_t>& out, std::uint16_t value) {
+    out.push_back(static_cast<std::uint8_t>(value >> 8U));
+    out.push_back(static_cast<std::uint8_t>(value));
+}
+
+bool same(const sockaddr_in& a, const sockaddr_in& b) {
+    return a.sin_addr.s_addr == b.sin_addr.s_addr && a.sin_port == b.sin_port;
+}
+
+std::vector<Fault> faults_of(const Scenario& scenario, const std::string& camera) {
+    std::vector<Fault> faults;
+    std::copy_if(scenario.faults.begin(), scenario.faults.end(), std::back_inserter(faults),
+                 [&](const Fault& fault) { return fault.camera == camera; });
+    return faults;
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenario, const CameraScenario& settings,
+                                                         HostTime zero, const Motion& motion, GroundTruth& truth) {
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_in self{};
+    self.sin_family = AF_INET;
+    self.sin_port = htons(gvcp_port);
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+    if (inet_pton(AF_INET, settings.address.c_str(), &self.sin_addr) != 1 ||
+        ::bind(socket, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0) {
+        const std::string reason = std::generic_category().message(errno);
+        ::close(socket);
+        return failure(fmt::format("camera {}", settings.name),
+                       fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
+                       "is another rig running? use other addresses of 127.0.0.0/8");
+    }
+    return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, motion, truth, socket));
+}
+
+GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,
+                       GroundTruth& truth, int socket)
+    : settings_(settings),
+      faults_(faults_of(scenario, settings.name)),
+      zero_(zero),
+      motion_(motion),
+      truth_(truth),
+      clock_(zero, settings.clock),
+      registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
+                  settings.exposure_us, settings.exposure_swing > 0}),
+      wall_(settings.width, settings.height, scenario.seed),
+      transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
+      socket_(socket) {
+    configure_stream();
+    server_ = std::thread([this] { serve(); });
+}
+
+GigeCamera::~GigeCamera() {
+    stop_ = true;
+    server_.join();
+    ::close(socket_);
+}
+
+void GigeCamera::serve() {
+    std::uint8_t buffer[2048];
+    while (!stop_) {
+        pollfd readable{socket_, POLLIN, 0};
+        ::poll(&readable, 1, poll_ms);
+        if (!muted() && power_cycle_pending_.exchange(false)) power_cycle();
+        if ((readable.revents & POLLIN) != 0) {
+            sockaddr_in from{};
+            socklen_t from_size = sizeof from;
+            const ssize_t size =
+                ::recvfrom(socket_, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &from_size);
+            if (size >= 8 && !muted()) handle({buffer, static_cast<std::size_t>(size)}, from);
+        }
+        const Duration silence = host_now() - last_contact_;
+        if (controller_.sin_port != 0 && silence > milliseconds(registers_.value(reg_heartbeat_ms))) lose_controller();
+        free_run(host_now());
+    }
+}
+
+void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in& from) {
+    if (packet[0] != gvcp_key || packet.size() < 8U + half(packet, 4)) return;
+    const std::uint16_t command = half(packet, 2);
+    if (same(from, controller_)) last_contact_ = host_now();
+    std::uint16_t status = success;
+    const std::vector<std::uint8_t> body = answer(command, packet.subspan(8, half(packet, 4)), from, status);
+    if ((packet[1] & acknowledge_wanted) == 0) return;
+    std::vector<std::uint8_t> reply;
+    put_half(reply, status);
+    put_half(reply, static_cast<std::uint16_t>(command + 1));
+    put_half(reply, static_cast<std::uint16_t>(body.size()));
+    put_half(reply, half(packet, 6));
+    reply.insert(reply.end(), body.begin(), body.end());
+    ::sendto(socket_, reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from), sizeof from);
+}
+
+std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command, std::span<const std::uint8_t> body,
+                                             const sockaddr_in& from, std::uint16_t& status) {
+    std::vector<std::uint8_t> out;
+    switch (command) {
+        case discovery:
+            out.resize(discovery_size);
+            registers_.read(0, out);
+            break;
+        case read_register:
+            for (std::size_t at = 0; at + 4 <= body.size(); at += 4) {
+                std::uint32_t value = 0;
+                if (!registers_.read(word(body, at), value)) status = invalid_address;
+                put_word(out, value);
+            }
+            break;
+        case write_register_command: {
+            std::uint16_t done = 0;
+            for (std::size_t at = 0; at + 8 <= body.size() && status == success; at += 8, ++done)
+                status = write_register(word(body, at), word(body, at + 4), from);
+            put_half(out, 0);
+            put_half(out, done);
+            break;
+        }
+        case read_memory: {
+            const std::size_t size = body.size() >= 8 ? half(body, 6) : 0;
+            if (size == 0 || size > most_memory) {
+                status = invalid_parameter;
+                break;
+            }
+            out.resize(4 + size);
+            std::copy_n(body.begin(), 4, out.begin());
+            if (!registers_.read(word(body, 0), std::span(out).subspan(4))) status = invalid_address;
+            break;
+        }
+        case write_memory:
+            if (body.size() % 4 != 0 || body.size() < 8) status = invalid_parameter;
+            for (std::size_t at = 4; at + 4 <= body.size() && status == success; at += 4)
+                status = write_register(word(body, 0) + static_cast<std::uint32_t>(at - 4), word(body, at), from);
+            put_half(out, 0);
+            put_half(out, static_cast<std::uint16_t>(body.size() - 4));
+            break;
+        case packet_resend:
+            if (body.size() >= 12)
+                transmitter_.resend(half(body, 2), word(body, 4) & 0xFFFFFFU, word(body, 8) & 0xFFFFFFU);
+            break;
+        default: status = not_implemented;
+    }
+    return out;
+}
+
+bool GigeCamera::in_control(const sockaddr_in& from) const {
+    return registers_.value(reg_control_privilege) != 0 && same(from, controller_);
+}
+
+std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t value, const sockaddr_in& from) {
+    if (address == reg_control_privilege) {
+        const bool taken = registers_.value(reg_control_privilege) != 0 && !same(from, controller_);
+        if (taken) return access_denied;
+        controller_ = value != 0 ? from : sockaddr_in{};
+        last_contact_ = host_now();
+        if (value == 0) stop_acquisition();
+    } else if (!in_control(from)) {
+        return access_denied;
+    }
+    if (address == reg_stream_packet_size) value = std::clamp<std::uint32_t>(value & 0xFFFFU, 256, 16000) & ~3U;
+    if (!registers_.write(address, value)) return invalid_address;
+    switch (address) {
+        case reg_stream_port:
+        case reg_stream_packet_size:
+        case reg_stream_address: configure_stream(); break;
+        case reg_fire_test_packet: transmitter_.send_test_packet(); break;
+        case reg_acquisition_start: start_acquisition(); break;
+        case reg_acquisition_stop: stop_acquisition(); break;
+        case reg_trigger_software:
+            if (registers_.value(reg_trigger_source) == 0) expose(host_now(), nullptr);
+            break;
+        default: break;
+    }
+    return success;
+}
+
+void GigeCamera::configure_stream() {
+    StreamSettings settings;
+    settings.destination.sin_family = AF_INET;
+    settings.destination.sin_port = htons(static_cast<std::uint16_t>(registers_.value(reg_stream_port)));
+    settings.destination.sin_addr.s_addr = htonl(registers_.value(reg_stream_address));
+    settings.packet_size = registers_.value(reg_stream_packet_size);
+    transmitter_.configure(settings);
+    registers_.write(reg_stream_source_port, std::uint32_t{transmitter_.source_port()});
+}
+
+void GigeCamera::start_acquisition() {
+    const std::lock_guard lock(mutex_);
+    acquiring_ = true;
+    block_id_ = 0;
+    free_run_next_ = host_now();
+}
+
+void GigeCamera::stop_acquisition() {
+    {
+        const std::lock_guard lock(mutex_);
+        acquiring_ = false;
+    }
+    transmitter_.clear();
+}
+
+void GigeCamera::lose_controller() {
+    registers_.write(reg_control_privilege, std::uint32_t{0});
+    controller_ = {};
+    stop_acquisition();
+}
+
+void GigeCamera::power_cycle() {
+    stop_acquisition();
+    registers_.reset();
+    controller_ = {};
+    configure_stream();
+}
+
+void GigeCamera::free_run(HostTime now) {
+    HostTime next;
+    {
+        const std::lock_guard lock(mutex_);
+        if (!acquiring_ || registers_.value(reg_trigger_mode) != 0 || now < free_run_next_) return;
+        next = free_run_next_;
+        const double rate = std::max(0.1F, registers_.real(reg_frame_rate));
+        free_run_next_ = std::max(now, free_run_next_ + Duration{std::llround(1e9 / rate)});
+    }
+    expose(next, nullptr);
+}
+
+std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level, const TriggerPulse& pulse) {
+    const bool falling = registers_.value(reg_trigger_activation) == 1;
+    if (level == falling) return std::nullopt;
+    std::optional<Interval> interval;
+    const bool listens = registers_.value(reg_trigger_mode) == 1 && registers_.value(reg_trigger_source) == 1;
+    if (listens && !muted()) interval = expose(pulse.at, &pulse);
+    truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at, interval.has_value()});
+    return interval;
+}
+
+Duration GigeCamera::exposure_at(HostTime at) const {
+    double exposure_us = static_cast<double>(registers_.real(reg_exposure_time));
+    if (registers_.value(reg_exposure_auto) != 0) {
+        const double seconds = static_cast<double>((at - zero_).ns) * 1e-9;
+        const double phase = 2 * 3.14159265358979 * seconds / settings_.exposure_swing_s;
+        exposure_us *= 1 + settings_.exposure_swing * std::sin(phase);
+    }
+    return Duration{std::llround(exposure_us * 1e3)};
+}
+
+const Fault* GigeCamera::active_fault(FaultKind kind) const {
+    for (const Fault& fault : faults_)
+        if (fault.kind == kind && exposures_ >= fault.at_exposure && exposures_ < fault.at_exposure + fault.count)
+            return &fault;
+    return nullptr;
+}
+
+/// Faults that take the whole camera away begin with their exposure.
+void GigeCamera::apply_outages() {
+    const Fault* mute = active_fault(FaultKind::camera_mute);
+    const Fault* reboot = active_fault(FaultKind::camera_reboot);
+    const Fault* outage = reboot != nullptr ? reboot : mute;
+    if (outage == nullptr) return;
+    const HostTime until = host_now() + Duration{std::llround(outage->seconds * 1e9)};
+    muted_until_ns_ = until.ns;
+    transmitter_.mute(until);
+    if (reboot != nullptr) power_cycle_pending_ = true;
+}
+
+/// An exposure, if the camera can take the trigger now. Counts it, and queues its frame.
+std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const TriggerPulse* pulse) {
+    StreamFrame frame;
+    TrueExposure truth;
+    {
+        const std::lock_guard lock(mutex_);
+        if (!acquiring_ || trigger < busy_until_) return std::nullopt;
+        ++exposures_;
+        if (active_fault(FaultKind::ignore_trigger) != nullptr) return std::nullopt;
+        apply_outages();
+        block_id_ = static_cast<std::uint16_t>(block_id_ == 0xFFFF ? 1 : block_id_ + 1);
+        truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
+        truth.end = truth.start + exposure_at(trigger);
+        busy_until_ = truth.end;
+        frame.block_id = block_id_;
+        frame.serial = exposures_;
+        if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;
+    }
+    if (on_exposure) on_exposure(exposures_);
+    truth.camera = settings_.name;
+    truth.board_life = pulse != nullptr ? pulse->board_life : 0;
+    truth.trigger = pulse != nullptr ? pulse->trigger : 0;
+    truth.serial = exposures_;
+    truth.block_id = frame.block_id;
+    if (frame.serial == 0) {
+        truth_.add(truth);
+        return Interval{truth.start, truth.end};
+    }
+    frame.camera_time_ns = static_cast<std::uint64_t>(clock_.device_ns(truth.start));
+    frame.width = settings_.width;
+    frame.height = settings_.height;
+    frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));
+    frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};
+    frame.done = [this, truth](bool sent) mutable {
+        truth.sent = sent;
+        truth_.add(truth);
+    };
+    transmitter_.send(std::move(frame));
+    return Interval{truth.start, truth.end};
+}
+
+}  // namespace versavis::rig

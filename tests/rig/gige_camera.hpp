@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// An emulated GigE Vision camera: control server, trigger input, exposure line, frames.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gige_registers.hpp"
+#include "ground_truth.hpp"
+#include "gvsp_transmitter.hpp"
+#include "scenario.hpp"
+#include "scene.hpp"
+#include "skewed_clock.hpp"
+
+namespace versavis::rig {
+
+/// Where a trigger pulse came from.
+struct TriggerPulse {
+    std::uint64_t board_life = 0;
+    std::uint64_t trigger = 0;
+    HostTime at;
+};
+
+class GigeCamera {
+   public:
+    using Interval = std::pair<HostTime, HostTime>;
+
+    /// Binds the control port. Error: the address is not there or taken.
+    static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario, const CameraScenario& settings,
+                                                        HostTime zero, const Motion& motion, GroundTruth& truth);
+    ~GigeCamera();
+    GigeCamera(const GigeCamera&) = delete;
+    GigeCamera& operator=(const GigeCamera&) = delete;
+
+    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it exposes.
+    std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse);
+
+    /// Called with the number of each exposure since the rig's start, for the faults of other parts.
+    std::function<void(std::uint64_t exposure)> on_exposure;
+
+    const CameraScenario& settings() const { return settings_; }
+
+   private:
+    GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,
+               GroundTruth& truth, int socket);
+
+    void serve();
+    void handle(std::span<const std::uint8_t> packet, const sockaddr_in& from);
+    std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body, const sockaddr_in& from,
+                                     std::uint16_t& status);
+    std::uint16_t write_register(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
+    bool in_control(const sockaddr_in& from) const;
+    void lose_controller();
+    void start_acquisition();
+    void stop_acquisition();
+    void configure_stream();
+    void power_cycle();
+    void free_run(HostTime now);
+    bool muted() const { return host_now().ns < muted_until_ns_.load(); }
+
+    std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
+    Duration exposure_at(HostTime at) const;
+    const Fault* active_fault(FaultKind kind) const;
+    void apply_outages();
+
+    CameraScenario settings_;
+    std::vector<Fault> faults_;
+    HostTime zero_;
+    const Motion& motion_;
+    GroundTruth& truth_;
+    SkewedClock clock_;
+    GigeRegisters registers_;
+    Wall wall_;
+    GvspTransmitter transmitter_;
+
+    std::mutex mutex_;  ///< guards what follows, down to free_run_next_
+    bool acquiring_ = false;
+    std::uint16_t block_id_ = 0;
+    std::uint64_t exposures_ = 0;
+    HostTime busy_until_;
+    HostTime free_run_next_;
+
+    sockaddr_in controller_{};  ///< used by the server thread only
+    HostTime last_contact_;
+    std::atomic<std::int64_t> muted_until_ns_{INT64_MIN};
+    std::atomic<bool> power_cycle_pending_{false};
+    std::atomic<bool> stop_{false};
+    int socket_;
+    std::thread server_;
+};
+
+}  // namespace versavis::rig

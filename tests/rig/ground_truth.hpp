@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What really happened in the rig, as JSON lines; all times are CLOCK_MONOTONIC_RAW in nanoseconds.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "versavis/error.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::rig {
+
+struct TrueTrigger {
+    std::string camera;
+    std::uint64_t board_life = 0;
+    std::uint64_t trigger = 0;  ///< pulses on this camera's line in this life of the board
+    HostTime at;
+    bool taken = false;  ///< false: the camera did not expose
+};
+
+struct TrueExposure {
+    std::string camera;
+    std::uint64_t board_life = 0;
+    std::uint64_t trigger = 0;  ///< 0: free run
+    std::uint64_t serial = 0;   ///< stands in the first pixels of the frame
+    std::uint64_t block_id = 0;
+    HostTime start;
+    HostTime end;
+    bool sent = false;
+};
+
+struct TrueImuSample {
+    std::string imu;
+    std::uint64_t board_life = 0;
+    std::uint64_t number = 0;
+    HostTime at;
+};
+
+/// Thread-safe. Each record is one line, written at once.
+class GroundTruth {
+   public:
+    /// Empty path: nothing is written.
+    static Expected<std::unique_ptr<GroundTruth>> create(const std::string& path);
+
+    void add(const TrueTrigger& trigger);
+    void add(const TrueExposure& exposure);
+    void add(const TrueImuSample& sample);
+
+   private:
+    void write(const std::string& line);
+
+    std::mutex mutex_;
+    std::ofstream file_;
+};
+
+}  // namespace versavis::rig

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Sends frames as GigE Vision stream packets, paced like a real link, and sends lost packets again on request.
+#pragma once
+
+#include <netinet/in.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <random>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "versavis/time.hpp"
+
+namespace versavis::rig {
+
+struct StreamFrame {
+    std::uint16_t block_id = 0;
+    std::uint64_t camera_time_ns = 0;
+    std::uint64_t serial = 0;
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter
+    HostTime due;                          ///< when the first packet leaves
+    std::function<void(bool sent)> done;
+};
+
+struct StreamSettings {
+    sockaddr_in destination{};
+    std::uint32_t packet_size = 1500;  ///< IP and UDP headers included
+};
+
+/// Thread-safe.
+class GvspTransmitter {
+   public:
+    GvspTransmitter(const std::string& address, double link_mbps, double packet_loss, std::uint64_t seed);
+    ~GvspTransmitter();
+
+    void configure(const StreamSettings& settings);
+
+    /// UDP port that the packets come from.
+    std::uint16_t source_port() const;
+
+    /// Queues a frame; when too many wait already it is dropped, as a camera with a full buffer does.
+    void send(StreamFrame frame);
+
+    /// Packets `first` to `last` of a frame that was sent a short while ago.
+    void resend(std::uint16_t block_id, std::uint32_t first, std::uint32_t last);
+
+    /// One packet of the full size, for the host to see what passes.
+    void send_test_packet();
+
+    /// Drops what waits.
+    void clear();
+
+    /// Nothing leaves before `until`.
+    void mute(HostTime until);
+
+   private:
+    void run();
+    void transmit(const StreamFrame& frame, const StreamSettings& settings);
+    void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first, std::uint32_t last,
+                      bool lossy);
+    bool muted() const;
+
+    int socket_;
+    double link_mbps_;
+    double packet_loss_;
+    std::mt19937_64 random_;
+    mutable std::mutex mutex_;
+    std::condition_variable wake_;
+    StreamSettings settings_;
+    std::deque<StreamFrame> queue_;
+    std::deque<StreamFrame> sent_;
+    HostTime muted_until_;
+    bool stop_ = false;
+    std::thread thread_;
+};
+
+}  // namespace versavis::rig

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "judge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "scene.hpp"
+#include "versavis/clock/output_clock.hpp"
+#include "versavis/stream.hpp"
+
+namespace versavis::rig {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double lost_tolerated = 0.01;
+constexpr std::int64_t imu_mismatch_ns = 500'000;  // a tenth of the period at 200 Hz
+
+/// One published stamp, brought back to host time, and what it claims to be of.
+struct Published {
+    std::uint64_t key;      ///< frames: serial from the pixels; IMU: sample number
+    std::uint64_t trigger;  ///< frames only
+    std::int64_t host_ns;
+};
+
+struct Recording {
+    std::vector<Published> items;
+    std::uint64_t unreadable = 0;  ///< overtaken before the mark was read
+    std::uint64_t skipped = 0;     ///< lost by this reader
+};
+
+/// Streams of the scenario, read side by side.
+class Recorder {
+   public:
+    Recorder(const Scenario& scenario, const std::string& instance, clock::OutputClock clock)
+        : instance_(instance), clock_(std::move(clock)) {
+        for (const CameraScenario& camera : scenario.cameras) frames_[camera.name];
+        imu_name_ = scenario.imu;
+    }
+
+    void poll() {
+        for (auto& [name, stream] : frames_) {
+            if (!open(name, stream)) continue;
+            for (auto item = stream->next(); item.found != Found::nothing && item.found != Found::gone;
+                 item = stream->next())
+                take(name, *stream, item);
+        }
+        if (!open(imu_name_, imu_)) return;
+        for (auto item = imu_->next(); item.found != Found::nothing && item.found != Found::gone; item = imu_->next())
+            take(item);
+    }
+
+    bool complete() const {
+        return imu_ && recordings_.size() == frames_.size() + 1 &&
+               std::none_of(recordings_.begin(), recordings_.end(), [](auto& r) { return r.second.items.empty(); });
+    }
+
+    std::map<std::string, Recording>& recordings() { return recordings_; }
+    void clear() { recordings_.clear(); }
+
+    std::string missing() const {
+        std::string names;
+        for (const auto& [name, stream] : frames_)
+            if (recordings_.count(name) == 0) names += " " + name;
+        if (recordings_.count(imu_name_) == 0) names += " " + imu_name_;
+        return names;
+    }
+
+   private:
+    template <class S>
+    bool open(const std::string& name, std::optional<S>& stream) {
+        if (stream) return true;
+        if (auto opened = S::open(name, instance_)) stream.emplace(std::move(*opened));
+        return stream.has_value();
+    }
+
+    std::int64_t to_host_ns(OutputTime time) { return time.ns - clock_.offset().ns; }
+
+    void take(const std::string& name, const FrameStream& stream, const Received<FrameMetadata>& item) {
+        Recording& recording = recordings_[name];
+        if (item.found == Found::lost) recording.skipped += item.lost;
+        if (item.found != Found::item) return;
+        FrameMark mark{};
+        if (item.payload_size >= sizeof mark) std::memcpy(&mark, item.payload, sizeof mark);
+        if (!stream.intact(item))
+            ++recording.unreadable;
+        else
+            recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0, item.data.trigger,
+                                       to_host_ns(item.time)});
+    }
+
+    void take(const Received<ImuMetadata>& item) {
+        Recording& recording = recordings_[imu_name_];
+        if (item.found == Found::lost) recording.skipped += item.lost;
+        if (item.found == Found::item) recording.items.push_back({item.data.number, 0, to_host_ns(item.time)});
+    }
+
+    std::string instance_;
+    clock::OutputClock clock_;
+    std::map<std::string, std::optional<FrameStream>> frames_;
+    std::string imu_name_;
+    std::optional<ImuStream> imu_;
+    std::map<std::string, Recording> recordings_;
+};
+
+struct TrueFrame {
+    std::uint64_t trigger;
+    std::int64_t middle_ns;
+    bool sent;
+};
+
+struct Truth {
+    std::map<std::string, std::map<std::uint64_t, TrueFrame>> frames;  ///< by camera and serial
+    std::multimap<std::uint64_t, std::int64_t> imu;                    ///< by number, of all lives of the board
+};
+
+Expected<Truth> load_truth(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) return failure(path, "the ground truth cannot be read");
+    Truth truth;
+    for (std::string line; std::getline(file, line);) {
+        const json record = json::parse(line, nullptr, false);
+        if (record.is_discarded()) continue;  // the last line may still be being written
+        if (record["type"] == "exposure") {
+            const std::int64_t start = record["start_ns"];
+            const std::int64_t end = record["end_ns"];
+            truth.frames[record["camera"]][record["serial"]] = {record["trigger"], start + (end - start) / 2,
+                                                                record["sent"]};
+        } else if (record["type"] == "imu") {
+            truth.imu.emplace(record["number"].get<std::uint64_t>(), record["at_ns"].get<std::int64_t>());
+        }
+    }
+    return truth;
+}
+
+void summarise(std::vector<double>& errors, StreamVerdict& verdict) {
+    if (errors.empty()) return;
+    std::sort(errors.begin(), errors.end());
+    const auto quantile = [&](double q) { return errors[static_cast<std::size_t>(q * (errors.size() - 1))]; };
+    verdict.error_p50_ns = quantile(0.5);
+    verdict.error_p99_ns = quantile(0.99);
+    verdict.error_max_ns = errors.back();
+}
+
+double rate(const Recording& recording) {
+    if (recording.items.size() < 2) return 0;
+    const auto span = static_cast<double>(recording.items.back().host_ns - recording.items.front().host_ns);
+    return static_cast<double>(recording.items.size() - 1) / span * 1e9;
+}
+
+StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint64_t, TrueFrame>& truth) {
+    StreamVerdict verdict;
+    verdict.items = recording.items.size();
+    verdict.rate_hz = rate(recording);
+    std::vector<double> errors;
+    std::set<std::uint64_t> seen;
+    for (const Published& item : recording.items) {
+        const auto found = truth.find(item.key);
+        if (found == truth.end() || found->second.trigger != item.trigger || !seen.insert(item.key).second)
+            ++verdict.wrong_pairs;
+        else
+            errors.push_back(std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)));
+    }
+    summarise(errors, verdict);
+    if (seen.empty()) return verdict;
+    for (auto it = truth.find(*seen.begin()); it != truth.end() && it->first <= *seen.rbegin(); ++it)
+        if (it->second.sent && seen.count(it->first) == 0) ++verdict.lost;
+    return verdict;
+}
+
+StreamVerdict judge_imu(const Recording& recording, const Truth& truth) {
+    StreamVerdict verdict;
+    verdict.items = recording.items.size();
+    verdict.rate_hz = rate(recording);
+    std::vector<double> errors;
+    for (const Published& item : recording.items) {
+        double best = 1e18;
+        const auto [begin, end] = truth.imu.equal_range(item.key);
+        for (auto it = begin; it != end; ++it) best = std::min(best, std::abs(static_cast<double>(item.host_ns - it->second)));
+        if (best > imu_mismatch_ns)
+            ++verdict.wrong_pairs;
+        else
+            errors.push_back(best);
+    }
+    summarise(errors, verdict);
+    for (std::size_t i = 1; i < recording.items.size(); ++i)
+        if (recording.items[i].key > recording.items[i - 1].key)
+            verdict.lost += recording.items[i].key - recording.items[i - 1].key - 1;
+    return verdict;
+}
+
+/// Counters of the status document that only the service knows.
+json read_status(const std::string& instance) {
+    auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
+    if (!stream) return {};
+    std::string text;
+    for (auto item = stream->next(); item.found == Found::item || item.found == Found::lost; item = stream->next()) {
+        if (item.found != Found::item) continue;
+        std::string copy(item.payload_size, '\0');
+        if (stream->copy(item, reinterpret_cast<std::byte*>(copy.data()))) text = copy;
+    }
+    return json::parse(text, nullptr, false);
+}
+
+std::uint64_t withheld(const json& status, const std::string& camera) {
+    if (!status.is_object()) return 0;
+    for (const json& entry : status.value("cameras", json::array()))
+        if (entry.value("name", "") == camera) return entry.value("frames_without_trigger", std::uint64_t{0});
+    return 0;
+}
+
+Expected<> record(Recorder& recorder, const JudgeSettings& settings, double& recorded_s) {
+    const HostTime begin = host_now();
+    HostTime flowing;
+    std::int64_t seconds_reported = 0;
+    for (;;) {
+        recorder.poll();
+        const HostTime now = host_now();
+        if (flowing.ns == 0 && recorder.complete()) {
+            recorder.clear();
+            flowing = now;
+        }
+        if (flowing.ns == 0 && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
+            return failure(settings.instance, "these streams did not begin in time:" + recorder.missing(),
+                           "see 'versavis status' and the service's log");
+        recorded_s = flowing.ns == 0 ? 0 : static_cast<double>((now - flowing).ns) * 1e-9;
+        if (recorded_s >= settings.seconds || (settings.stop_requested && settings.stop_requested())) return {};
+        if ((now - begin).ns / 1'000'000'000 > seconds_reported) {
+            seconds_reported = (now - begin).ns / 1'000'000'000;
+            if (settings.on_second) settings.on_second();
+        }
+        const timespec pause{0, 5'000'000};
+        nanosleep(&pause, nullptr);
+    }
+}
+
+void complain(Verdict& verdict) {
+    for (const auto& [name, stream] : verdict.streams) {
+        if (stream.items == 0) verdict.complaints.push_back(name + ": nothing was published");
+        if (stream.wrong_pairs != 0)
+            verdict.complaints.push_back(fmt::format("{}: {} items carry a wrong stamp", name, stream.wrong_pairs));
+        if (static_cast<double>(stream.lost) > lost_tolerated * static_cast<double>(stream.items))
+            verdict.complaints.push_back(fmt::format("{}: {} of {} were lost", name, stream.lost, stream.items));
+    }
+    verdict.ok = verdict.complaints.empty();
+}
+
+}  // namespace
+
+Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings) {
+    auto clock = clock::OutputClock::create(clock::OutputClockKind::realtime);
+    if (!clock) return tl::unexpected(clock.error());
+    Recorder recorder(scenario, settings.instance, std::move(*clock));
+    Verdict verdict;
+    if (auto recorded = record(recorder, settings, verdict.seconds); !recorded)
+        return tl::unexpected(recorded.error());
+    auto truth = load_truth(settings.truth_path);
+    if (!truth) return tl::unexpected(truth.error());
+    const json status = read_status(settings.instance);
+    for (const CameraScenario& camera : scenario.cameras) {
+        StreamVerdict stream = judge_frames(recorder.recordings()[camera.name], truth->frames[camera.name]);
+        stream.unpaired = withheld(status, camera.name);
+        verdict.streams[camera.name] = stream;
+    }
+    verdict.streams[scenario.imu] = judge_imu(recorder.recordings()[scenario.imu], *truth);
+    complain(verdict);
+    return verdict;
+}
+
+std::string to_json(const Verdict& verdict) {
+    json streams = json::object();
+    for (const auto& [name, s] : verdict.streams)
+        streams[name] = {{"items", s.items},
+                         {"rate_hz", std::round(s.rate_hz * 1000) / 1000},
+                         {"lost", s.lost},
+                         {"unpaired", s.unpaired},
+                         {"wrong_pairs", s.wrong_pairs},
+                         {"stamp_error_ns", {{"p50", s.error_p50_ns}, {"p99", s.error_p99_ns}, {"max", s.error_max_ns}}}};
+    const json document{{"ok", verdict.ok}, {"seconds", std::round(verdict.seconds * 100) / 100}, {"streams", streams}};
+    return document.dump();
+}
+
+std::string to_table(const Verdict& verdict) {
+    std::string out = fmt::format("{:<8} {:>8} {:>9} {:>6} {:>9} {:>12} {:>30}\n", "stream", "items", "rate/Hz", "lost",
+                                  "unpaired", "wrong pairs", "clock error p50/p99/max, us");
+    for (const auto& [name, s] : verdict.streams)
+        out += fmt::format("{:<8} {:>8} {:>9.3f} {:>6} {:>9} {:>12} {:>30}\n", name, s.items, s.rate_hz, s.lost,
+                           s.unpaired, s.wrong_pairs,
+                           fmt::format("{:.1f} / {:.1f} / {:.1f}", s.error_p50_ns / 1e3, s.error_p99_ns / 1e3,
+                                       s.error_max_ns / 1e3));
+    for (const std::string& complaint : verdict.complaints) out += complaint + "\n";
+    return out + (verdict.ok ? fmt::format("ok: {:.1f} s, every stamp belongs to its item\n", verdict.seconds)
+                             : std::string("FAILED\n"));
+}
+
+}  // namespace versavis::rig

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Holds what the service published against what was true in the rig.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "scenario.hpp"
+#include "versavis/error.hpp"
+
+namespace versavis::rig {
+
+struct StreamVerdict {
+    std::uint64_t items = 0;
+    double rate_hz = 0;
+    std::uint64_t lost = 0;         ///< happened and was sent between the first and the last item, but not published
+    std::uint64_t unpaired = 0;     ///< frames that the service received and withheld
+    std::uint64_t wrong_pairs = 0;  ///< published with the stamp of another exposure or sample
+    double error_p50_ns = 0;
+    double error_p99_ns = 0;
+    double error_max_ns = 0;
+};
+
+struct Verdict {
+    bool ok = false;
+    double seconds = 0;
+    std::map<std::string, StreamVerdict> streams;
+    std::vector<std::string> complaints;
+};
+
+struct JudgeSettings {
+    std::string instance;
+    std::string truth_path;
+    double seconds = 10;
+    double start_timeout_s = 30;
+    std::function<void()> on_second;       ///< called about once a second while it records
+    std::function<bool()> stop_requested;  ///< ends the recording early
+};
+
+/// Records the streams of `scenario` for the time given, counted from when all of them flow, then compares.
+/// Error: a stream did not begin in time, or the ground truth cannot be read.
+Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings);
+
+std::string to_json(const Verdict& verdict);
+std::string to_table(const Verdict& verdict);
+
+}  // namespace versavis::rig

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "rig.hpp"
+
+namespace versavis::rig {
+
+Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::string& socket_path,
+                                          const std::string& truth_path) {
+    const HostTime zero = host_now();
+    std::unique_ptr<Rig> rig(new Rig(zero));
+    auto truth = GroundTruth::create(truth_path);
+    if (!truth) return tl::unexpected(truth.error());
+    rig->truth_ = std::move(*truth);
+    std::vector<GigeCamera*> wired;
+    for (const CameraScenario& settings : scenario.cameras) {
+        auto camera = GigeCamera::create(scenario, settings, zero, rig->motion_, *rig->truth_);
+        if (!camera) return tl::unexpected(camera.error());
+        wired.push_back(camera->get());
+        rig->cameras_.push_back(std::move(*camera));
+    }
+    auto board = BoardHost::create(scenario, socket_path, zero, rig->motion_, *rig->truth_, wired);
+    if (!board) return tl::unexpected(board.error());
+    rig->board_ = std::move(*board);
+    for (const Fault& fault : scenario.faults) {
+        if (fault.kind != FaultKind::board_reset) continue;
+        for (GigeCamera* camera : wired)
+            if (camera->settings().name == fault.camera)
+                camera->on_exposure = [host = rig->board_.get(), at = fault.at_exposure](std::uint64_t exposure) {
+                    if (exposure == at) host->reset();
+                };
+    }
+    return rig;
+}
+
+}  // namespace versavis::rig

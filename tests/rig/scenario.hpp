@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What is in the rig and what fails when, from a TOML file (docs/rig.md).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "skewed_clock.hpp"
+#include "versavis/error.hpp"
+
+namespace versavis::rig {
+
+struct BoardScenario {
+    std::string serial = "RIG0001";
+    ClockErrors clock{5'000'000'000, 25.0, 0.002};
+};
+
+struct CameraScenario {
+    std::string name;
+    std::string address;       ///< loopback address that the camera answers on
+    unsigned output = 0;       ///< board output that triggers it, and input that its exposure line leads to
+    std::string serial;
+    std::uint32_t width = 1920;
+    std::uint32_t height = 1200;
+    double exposure_us = 3000;
+    double exposure_swing = 0;      ///< auto exposure follows a brightness that varies by this fraction ...
+    double exposure_swing_s = 7;    ///< ... with this period
+    double trigger_latency_us = 20;
+    double readout_us = 2000;       ///< end of exposure to first packet
+    double link_mbps = 1000;        ///< packets leave at this pace; 0: as fast as they can
+    double packet_loss = 0;         ///< fraction
+    ClockErrors clock{1'000'000'000, -40.0, 0};
+};
+
+enum class FaultKind {
+    drop_frame,      ///< the exposure happens, no packet leaves
+    ignore_trigger,  ///< the camera does not expose
+    camera_mute,     ///< no answer and no packet for `seconds`
+    camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
+    board_reset,     ///< the board starts anew with another nonce; `camera` names whose exposures count
+};
+
+struct Fault {
+    FaultKind kind = FaultKind::drop_frame;
+    std::string camera;
+    std::uint64_t at_exposure = 0;  ///< happens with this exposure of the camera, counted since the rig's start
+    std::uint64_t count = 1;        ///< that many exposures in a row
+    double seconds = 1;
+};
+
+struct Scenario {
+    std::uint64_t seed = 1;
+    BoardScenario board;
+    std::string imu = "imu0";
+    std::vector<CameraScenario> cameras;
+    std::vector<Fault> faults;
+};
+
+/// Errors name line and column.
+Expected<Scenario> load_scenario(const std::string& path);
+
+}  // namespace versavis::rig

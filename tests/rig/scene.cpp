@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::rig {
+
+namespace {
+
+constexpr double amplitude_rad = 0.2;
+constexpr double nodding_rad_s = 2 * 3.14159265358979 * 0.5;
+
+double seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
+
+/// A hash of two cell coordinates: brightness that looks random and is the same in each run.
+std::uint8_t cell_brightness(std::uint64_t x, std::uint64_t y, std::uint64_t seed) {
+    std::uint64_t h = seed * 0x9E3779B97F4A7C15U + x * 0xC2B2AE3D27D4EB4FU + y * 0x165667B19E3779F9U;
+    h ^= h >> 29U;
+    h *= 0xBF58476D1CE4E5B9U;
+    return static_cast<std::uint8_t>(h >> 56U);
+}
+
+}  // namespace
+
+double Motion::pitch_rad(HostTime at) const { return amplitude_rad * std::sin(nodding_rad_s * seconds(at - zero_)); }
+
+double Motion::pitch_rate_rad_s(HostTime at) const {
+    return amplitude_rad * nodding_rad_s * std::cos(nodding_rad_s * seconds(at - zero_));
+}
+
+Wall::Wall(std::uint32_t width, std::uint32_t height, std::uint64_t seed)
+    : width_(width), height_(height), pixels_(std::size_t{width} * height * 2) {
+    constexpr std::uint32_t cell = 24;
+    for (std::uint32_t y = 0; y < 2 * height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            pixels_[std::size_t{y} * width + x] = cell_brightness(x / cell, y / cell, seed);
+}
+
+std::span<const std::uint8_t> Wall::view(double pitch_rad) const {
+    const double centre = height_ / 2.0;
+    const double row = std::clamp(centre * (1 + pitch_rad / 0.5), 0.0, static_cast<double>(height_));
+    const std::size_t size = std::size_t{width_} * height_;
+    return std::span(pixels_).subspan(static_cast<std::size_t>(std::lround(row)) * width_, size);
+}
+
+}  // namespace versavis::rig

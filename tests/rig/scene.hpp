@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The one scene that cameras and IMU see: the rig nods, so that the image moves and the gyro turns.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "versavis/time.hpp"
+
+namespace versavis::rig {
+
+/// First bytes of each frame's pixels, so that a test knows which exposure it looks at.
+struct FrameMark {
+    static constexpr std::uint64_t expected_magic = 0x4B52414D47495256;  // "VRIGMARK"
+    std::uint64_t magic;
+    std::uint64_t serial;
+};
+
+class Motion {
+   public:
+    explicit Motion(HostTime zero) : zero_(zero) {}
+
+    double pitch_rad(HostTime at) const;
+    double pitch_rate_rad_s(HostTime at) const;
+
+   private:
+    HostTime zero_;
+};
+
+/// A textured wall, rendered once and twice as high as the image: a view of it needs no copying.
+class Wall {
+   public:
+    Wall(std::uint32_t width, std::uint32_t height, std::uint64_t seed);
+
+    /// Pixels (8 bit, row by row) that a camera sees at `pitch_rad`.
+    std::span<const std::uint8_t> view(double pitch_rad) const;
+
+   private:
+    std::uint32_t width_;
+    std::uint32_t height_;
+    std::vector<std::uint8_t> pixels_;
+};
+
+}  // namespace versavis::rig
