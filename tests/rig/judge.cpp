@@ -23,6 +23,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double lost_tolerated = 0.01;
+constexpr Duration start_pattern_time = milliseconds(1500);  // with its gaps, a rate would be low
 constexpr std::int64_t imu_mismatch_ns = 500'000;  // a tenth of the period at 200 Hz
 
 /// One published stamp, brought back to host time, and what it claims to be of.
@@ -220,22 +221,24 @@ std::uint64_t withheld(const json& status, const std::string& camera) {
 
 Expected<> record(Recorder& recorder, const JudgeSettings& settings, double& recorded_s) {
     const HostTime begin = host_now();
-    HostTime flowing;
-    std::int64_t seconds_reported = 0;
+    std::optional<HostTime> flowing;
+    std::optional<HostTime> recording;
+    HostTime next_report = begin + seconds(1);
     for (;;) {
         recorder.poll();
         const HostTime now = host_now();
-        if (flowing.ns == 0 && recorder.complete()) {
-            recorder.clear();
-            flowing = now;
-        }
-        if (flowing.ns == 0 && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
+        if (!flowing && recorder.complete()) flowing = now;
+        if (!flowing && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
             return failure(settings.instance, "these streams did not begin in time:" + recorder.missing(),
                            "see 'versavis status' and the service's log");
-        recorded_s = flowing.ns == 0 ? 0 : static_cast<double>((now - flowing).ns) * 1e-9;
+        if (flowing && !recording && now - *flowing > start_pattern_time) {
+            recorder.clear();
+            recording = now;
+        }
+        recorded_s = recording ? static_cast<double>((now - *recording).ns) * 1e-9 : 0;
         if (recorded_s >= settings.seconds || (settings.stop_requested && settings.stop_requested())) return {};
-        if ((now - begin).ns / 1'000'000'000 > seconds_reported) {
-            seconds_reported = (now - begin).ns / 1'000'000'000;
+        if (now >= next_report) {
+            next_report = next_report + seconds(1);
             if (settings.on_second) settings.on_second();
         }
         const timespec pause{0, 5'000'000};

@@ -93,7 +93,7 @@ double EnvelopeFilter::measurement_variance(std::int64_t sum_ns) const {
     const auto sum = static_cast<double>(sum_ns);
     const bool early = slots_ <= early_slots || (reference_ - started_).ns < early_ns;
     if (early) return sum * sum / 12;
-    const double bound = sum - static_cast<double>(smallest_sum()) + sum_uncertainty();
+    const double bound = sum - static_cast<double>(smallest_sum_ns_) + sum_uncertainty();
     return asymmetry_floor_ns * asymmetry_floor_ns + bound * bound / 12;
 }
 
@@ -132,12 +132,8 @@ void EnvelopeFilter::restart_if_outliers_agree(double innovation_ns, double devi
 void EnvelopeFilter::remember(BoardTime at, std::int64_t sum_ns) {
     sums_.push_back({at, sum_ns});
     while ((at - sums_.front().at).ns > window_ns) sums_.pop_front();
-}
-
-std::int64_t EnvelopeFilter::smallest_sum() const {
-    std::int64_t smallest = sums_.empty() ? 0 : INT64_MAX;
-    for (const SlotSum& slot : sums_) smallest = std::min(smallest, slot.sum_ns);
-    return smallest;
+    const auto smaller = [](const SlotSum& a, const SlotSum& b) { return a.sum_ns < b.sum_ns; };
+    smallest_sum_ns_ = std::min_element(sums_.begin(), sums_.end(), smaller)->sum_ns;
 }
 
 double EnvelopeFilter::sum_uncertainty() const {
@@ -164,7 +160,8 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     HostEstimate estimate;
     if (!initialised()) return estimate;
     const double dt = to_seconds(board - reference_);
-    const double variance = covariance_(0, 0) + 2 * dt * covariance_(0, 1) + dt * dt * covariance_(1, 1) +
+    const double asymmetry = static_cast<double>(smallest_sum_ns_) / 6;
+    const double variance = asymmetry * asymmetry + covariance_(0, 0) + 2 * dt * covariance_(0, 1) + dt * dt * covariance_(1, 1) +
                             skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
     estimate.time = {predicted_ns(board)};
     estimate.sigma = {std::llround(std::sqrt(std::max(variance, 1.0)))};

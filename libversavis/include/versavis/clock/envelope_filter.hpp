@@ -30,7 +30,8 @@ struct HostEstimate {
 /// Method: within a slot that grows from one exchange to 8 s, the smallest delay residual of each direction is kept;
 /// their half difference measures the offset error, their sum bounds it (|error| <= sum / 2), and the excess of the
 /// sum over its minimum in a window says how much this measurement is worth. No measurement is ever gated out: a
-/// surprising one counts less, and four that agree restart the filter.
+/// surprising one counts less, and four that agree restart the filter. What no stamp can show, the asymmetry of the
+/// shortest delays, is part of sigma: its bound, half of their sum, counts as three sigma.
 /// A pure function of the exchanges it was given.
 class EnvelopeFilter {
    public:
@@ -47,7 +48,7 @@ class EnvelopeFilter {
     double skew_sigma_ppm() const;
     Duration last_residual() const { return last_residual_; }
     Duration last_round_trip() const { return last_round_trip_; }
-    Duration smallest_round_trip() const { return {smallest_sum()}; }
+    Duration smallest_round_trip() const { return {smallest_sum_ns_}; }
     BoardTime last_contact() const { return last_contact_; }
 
    private:
@@ -69,7 +70,6 @@ class EnvelopeFilter {
     double measurement_variance(std::int64_t sum_ns) const;
     void remember(BoardTime at, std::int64_t sum_ns);
     void restart_if_outliers_agree(double innovation_ns, double deviation);
-    std::int64_t smallest_sum() const;
     double sum_uncertainty() const;
     double unexplained_variance(double explained) const;
 
@@ -84,6 +84,7 @@ class EnvelopeFilter {
     BoardTime last_contact_;
     Slot slot_;
     std::deque<SlotSum> sums_;           ///< of the last ten minutes
+    std::int64_t smallest_sum_ns_ = 0;
     std::deque<double> innovations_;     ///< of the last slots, absolute
     double outlier_mean_ns_ = 0;
     int outliers_ = 0;

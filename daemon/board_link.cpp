@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board_link.hpp"
+
+#include <cstring>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr Duration retry_interval = milliseconds(300);
+constexpr Duration answer_timeout = milliseconds(1000);
+constexpr Duration silence_limit = seconds(3);  // the board reports its health every second
+constexpr Duration request_timeout = milliseconds(500);
+constexpr unsigned exchanges_to_start = 4;
+constexpr Duration longest_read = milliseconds(100);
+
+const char* field_name(wire::ConfigurationField field) {
+    using Field = wire::ConfigurationField;
+    switch (field) {
+        case Field::none: return "";
+        case Field::rate: return "rate_hz";
+        case Field::pulse: return "pulse_us";
+        case Field::latency: return "latency_us";
+        case Field::gap: return "gap_us";
+        case Field::exposure: return "exposure_us";
+        case Field::max_exposure: return "max_exposure_us";
+        case Field::phase: return "phase_us";
+        case Field::imu_kind: return "imu.model";
+        case Field::imu_rate: return "imu.rate_hz";
+    }
+    return "";
+}
+
+std::string text(const char* padded, std::size_t capacity) { return {padded, strnlen(padded, capacity)}; }
+
+}  // namespace
+
+const char* to_string(BoardState state) {
+    switch (state) {
+        case BoardState::absent: return "absent";
+        case BoardState::handshake: return "handshake";
+        case BoardState::running: return "running";
+        case BoardState::incompatible: return "incompatible";
+        case BoardState::refused: return "refused";
+    }
+    return "unknown";
+}
+
+BoardLink::BoardLink(OpenStream open, const wire::Configuration& configuration, double exchange_rate_hz,
+                     clock::Translator& translator, BoardListener& listener)
+    : open_(std::move(open)),
+      configuration_(configuration),
+      exchange_interval_{static_cast<std::int64_t>(1e9 / exchange_rate_hz)},
+      translator_(translator),
+      listener_(listener) {}
+
+BoardLink::~BoardLink() { stop(); }
+
+void BoardLink::start() {
+    thread_ = std::thread([this] { run(); });
+}
+
+void BoardLink::stop() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+}
+
+bool BoardLink::pause(Duration duration) const {
+    const HostTime end = host_now() + duration;
+    while (!stop_ && host_now() < end) {
+        const timespec step{0, 20'000'000};
+        nanosleep(&step, nullptr);
+    }
+    return !stop_;
+}
+
+void BoardLink::set_state(BoardState state, const std::string& hint) {
+    const std::lock_guard lock(report_mutex_);
+    if (report_.state != state || report_.hint != hint) {
+        log(state == BoardState::running || state == BoardState::handshake ? LogLevel::info : LogLevel::warning, "board",
+            "{}{}{}", to_string(state), hint.empty() ? "" : ": ", hint);
+        report_.since = host_now();
+    }
+    report_.state = state;
+    report_.hint = hint;
+}
+
+BoardReport BoardLink::report() const {
+    const std::lock_guard lock(report_mutex_);
+    return report_;
+}
+
+void BoardLink::run() {
+    set_state(BoardState::absent, "looking for it");
+    do {
+        auto stream = open_();
+        if (!stream) {
+            set_state(BoardState::absent, stream.error().message());
+            continue;
+        }
+        {
+            const std::lock_guard lock(send_mutex_);
+            stream_ = std::move(*stream);
+            host_nonce_ = random_();
+            host_sequence_ = 0;
+        }
+        const auto ended = serve();
+        if (connected_) listener_.board_lost();
+        connected_ = false;
+        if (ended) send(wire::Stop{0xFF, {}});  // asked to stop: leave no camera triggered
+        {
+            const std::lock_guard lock(send_mutex_);
+            stream_.reset();
+        }
+        const BoardState state = report().state;
+        const bool explained = state == BoardState::incompatible || state == BoardState::refused;
+        if (!ended && !explained) set_state(BoardState::absent, ended.error().message());
+    } while (pause(retry_interval));
+}
+
+/// One connection, from hello to its end. A value: the link was asked to stop.
+Expected<> BoardLink::serve() {
+    set_state(BoardState::handshake, "");
+    if (auto done = handshake(); !done) return done;
+    if (auto done = configure(); !done) return done;
+    if (auto done = synchronise(); !done) return done;
+    set_state(BoardState::running, "");
+    connected_ = true;
+    listener_.board_connected();
+    while (!stop_) {
+        const HostTime now = host_now();
+        if (now - last_packet_ > silence_limit) return failure("board", "it fell silent", "check cable and power");
+        if (now >= next_request_)
+            if (auto sent = request_clock(); !sent) return sent;
+        if (auto done = read(std::min(longest_read, std::max(next_request_ - host_now(), microseconds(100)))); !done)
+            return done;
+        if (!greeted_) return failure("board", "it was reset");
+    }
+    return {};
+}
+
+Expected<> BoardLink::handshake() {
+    decoder_ = {};
+    greeted_ = false;
+    // A delimiter first: whatever an earlier connection left unfinished ends here.
+    const std::uint8_t delimiter = 0;
+    if (auto sent = stream_->write({&delimiter, 1}); !sent) return sent;
+    for (int attempt = 0; attempt < 5 && !greeted_; ++attempt) {
+        if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}}); !sent) return sent;
+        auto done = read_until([this] { return greeted_; }, answer_timeout / 4, "does not answer");
+        if (!done && attempt == 4) return done;
+    }
+    if (hello_.major != wire::protocol_major) {
+        set_state(BoardState::incompatible, fmt::format("it speaks protocol {}.{}, this service {}.{}: update its firmware",
+                                                        hello_.major, hello_.minor, wire::protocol_major,
+                                                        wire::protocol_minor));
+        return failure("board", "incompatible protocol");
+    }
+    const std::lock_guard lock(report_mutex_);
+    report_.serial = text(hello_.serial, sizeof hello_.serial);
+    report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
+    report_.nonce = nonce_;
+    ++report_.connections;
+    return {};
+}
+
+Expected<> BoardLink::configure() {
+    answered_ = false;
+    ++configuration_.id;
+    if (auto sent = send(configuration_); !sent) return sent;
+    if (auto done = read_until([this] { return answered_; }, answer_timeout, "does not take its configuration"); !done)
+        return done;
+    if (answer_.status == wire::ConfigurationStatus::taken) return {};
+    set_state(BoardState::refused,
+              fmt::format("it refuses '{}' of output {}: allowed are {} to {} (ns, micro-hertz); change the configuration",
+                          field_name(answer_.field), answer_.camera, answer_.minimum, answer_.maximum));
+    return failure("board", "refuses its configuration");
+}
+
+/// A few exchanges in a row, so that the first frame can be stamped.
+Expected<> BoardLink::synchronise() {
+    exchanges_ = 0;
+    request_open_ = false;
+    while (exchanges_ < exchanges_to_start) {
+        const unsigned before = exchanges_;
+        if (auto sent = request_clock(); !sent) return sent;
+        if (auto done = read_until([&] { return exchanges_ > before; }, answer_timeout, "does not answer clock requests");
+            !done)
+            return done;
+    }
+    plan_next_request();
+    return {};
+}
+
+Expected<> BoardLink::read_until(const std::function<bool()>& done, Duration timeout, const char* what) {
+    const HostTime deadline = host_now() + timeout;
+    while (!done()) {
+        const Duration left = deadline - host_now();
+        if (left.ns <= 0 || stop_) return failure("board", what, "check cable, power and firmware");
+        if (auto result = read(std::min(left, longest_read)); !result) return result;
+    }
+    return {};
+}
+
+Expected<> BoardLink::read(Duration timeout) {
+    auto chunk = stream_->read(timeout);
+    if (!chunk) return tl::unexpected(chunk.error());
+    if (chunk->bytes.empty()) return {};
+    decoder_.feed(chunk->bytes.data(), chunk->bytes.size(),
+                  [&](const wire::Packet& packet) { take(packet, chunk->received); });
+    const std::lock_guard lock(report_mutex_);
+    report_.malformed = decoder_.errors();
+    return {};
+}
+
+void BoardLink::take(const wire::Packet& packet, HostTime received) {
+    last_packet_ = received;
+    if (packet.read(hello_)) {
+        greeted_ = true;
+        nonce_ = packet.header.nonce;
+        next_sequence_ = packet.header.sequence + 1;
+        // Every connection begins an epoch: nothing proves that the board ran on in between, but its nonce.
+        if (nonce_ != last_life_) translator_.board_restarted();
+        last_life_ = nonce_;
+        return;
+    }
+    if (!greeted_) return;
+    if (packet.header.nonce != nonce_) {
+        greeted_ = false;
+        return;
+    }
+    count_losses(packet.header);
+    wire::Exposure exposure{};
+    wire::ImuSample sample{};
+    wire::Event event{};
+    wire::ClockAnswer answer{};
+    wire::Health health{};
+    wire::Log line{};
+    if (packet.read(exposure)) return listener_.exposure(exposure);
+    if (packet.read(sample)) return listener_.imu_sample(sample);
+    if (packet.read(event)) return listener_.board_event(event);
+    if (packet.read(answer)) return take_answer(answer, received);
+    if (packet.read(line)) return log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
+    if (packet.read(answer_)) {
+        answered_ = answer_.id == configuration_.id;
+        return;
+    }
+    if (packet.read(health)) {
+        const std::lock_guard lock(report_mutex_);
+        report_.health = health;
+    }
+}
+
+void BoardLink::count_losses(const wire::Header& header) {
+    const std::uint32_t lost = header.sequence - next_sequence_;
+    next_sequence_ = header.sequence + 1;
+    const std::lock_guard lock(report_mutex_);
+    ++report_.packets;
+    report_.lost_packets += lost;
+}
+
+Expected<> BoardLink::request_clock() {
+    request_open_ = true;
+    wire::ClockRequest request{};
+    request.id = ++request_id_;
+    plan_next_request();
+    request_sent_ = host_now();
+    return send(request);
+}
+
+/// Dithered, so that the requests do not beat with the schedule of the bus.
+void BoardLink::plan_next_request() {
+    std::uniform_real_distribution<> dither(0.75, 1.25);
+    next_request_ = host_now() + Duration{static_cast<std::int64_t>(dither(random_) * static_cast<double>(exchange_interval_.ns))};
+}
+
+void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {
+    if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout) return;
+    request_open_ = false;
+    translator_.add({request_sent_, {answer.received_ns}, {answer.sent_ns}, received});
+    ++exchanges_;
+}
+
+template <class T>
+Expected<> BoardLink::send(const T& message) {
+    const std::lock_guard lock(send_mutex_);
+    if (!stream_) return failure("board", "is not connected");
+    wire::Frame frame{};
+    wire::encode(message, host_nonce_, host_sequence_++, frame);
+    return stream_->write({frame.bytes, frame.size});
+}
+
+void BoardLink::start_cameras(std::uint8_t mask, bool pattern) {
+    wire::Start message{};
+    message.cameras = mask;
+    message.flags = pattern ? std::uint8_t{wire::start_pattern} : std::uint8_t{0};
+    // A failed write shows in the link's own thread, too, which then begins anew.
+    static_cast<void>(send(message));
+}
+
+void BoardLink::stop_cameras(std::uint8_t mask) { static_cast<void>(send(wire::Stop{mask, {}})); }
+
+}  // namespace versavis::daemon

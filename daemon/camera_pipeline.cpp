@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr std::uint32_t descriptor_floor = 64;
+constexpr Duration arrival_sigma = milliseconds(5);  // how long frames take after their exposure is not known at all
+
+std::uint32_t power_of_two(std::uint32_t at_least) {
+    std::uint32_t value = descriptor_floor;
+    while (value < at_least) value *= 2;
+    return value;
+}
+
+Duration from_us(double us) { return {std::llround(us * 1e3)}; }
+
+pairing::Limits limits_of(const CameraConfiguration& configuration) {
+    pairing::Limits limits;
+    limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
+    return limits;
+}
+
+}  // namespace
+
+CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
+                               clock::Translator& translator, EventJournal& events)
+    : configuration_(configuration),
+      index_(index),
+      translator_(translator),
+      events_(events),
+      pairing_(limits_of(configuration), *this),
+      last_exposure_(from_us(configuration.exposure_us)) {}
+
+Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::uint64_t payload_size) {
+    const std::lock_guard lock(mutex_);
+    if (ring_ && ring_->slot_size() >= payload_size) return {};
+    ring::Shape shape;
+    shape.name = configuration_.name;
+    shape.kind = ring::StreamKind::frames;
+    shape.slot_count = configuration_.slots;
+    shape.slot_size = payload_size;
+    shape.descriptor_count = power_of_two(2 * configuration_.slots);
+    pairing_.reset();
+    auto ring = ring::Writer::create(directory, shape);
+    if (!ring) return tl::unexpected(ring.error());
+    ring_.emplace(std::move(*ring));
+    return {};
+}
+
+std::optional<std::uint32_t> CameraPipeline::acquire() {
+    const std::lock_guard lock(mutex_);
+    return ring_->acquire();
+}
+
+std::byte* CameraPipeline::slot_data(std::uint32_t slot) {
+    const std::lock_guard lock(mutex_);
+    return ring_->slot_data(slot);
+}
+
+void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id) {
+    const std::lock_guard lock(mutex_);
+    ring_->abandon(slot);
+    if (reason == EventReason::none) return;
+    ++report_.incomplete;
+    journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
+}
+
+void CameraPipeline::add(const pairing::Arrival& arrival) {
+    const std::lock_guard lock(mutex_);
+    ++report_.received;
+    report_.last_frame = arrival.arrived;
+    unanswered_ = 0;
+    if (triggered())
+        pairing_.add(arrival);
+    else
+        publish_free_run(arrival);
+}
+
+void CameraPipeline::add(const wire::Exposure& record) {
+    const std::lock_guard lock(mutex_);
+    ++report_.triggers;
+    ++unanswered_;
+    pairing::Exposure exposure = complete(record);
+    const auto end = translator_.to_host(exposure.end);
+    if (!end) return exposure_unpaired(exposure, EventReason::no_clock);
+    exposure.end_on_host = end->time;
+    pairing_.add(exposure);
+}
+
+/// Fills in what the board did not see, and says so by the kind of the stamp.
+pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
+    pairing::Exposure exposure;
+    exposure.trigger = record.trigger;
+    exposure.tick = record.tick;
+    const bool started = record.start_ns != wire::no_time;
+    const bool ended = record.end_ns != wire::no_time;
+    const bool strobe = (record.flags & wire::exposure_no_strobe) == 0;
+    exposure.exposed = started || !strobe;
+    exposure.start = started ? BoardTime{record.start_ns} : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);
+    exposure.end = ended ? BoardTime{record.end_ns} : exposure.start + last_exposure_;
+    if (started && ended && strobe) {
+        exposure.kind = StampKind::measured_middle;
+        last_exposure_ = exposure.end - exposure.start;
+    } else {
+        exposure.kind = started && strobe ? StampKind::predicted_middle : StampKind::trigger_edge;
+    }
+    return exposure;
+}
+
+/// What the kind of stamp adds to the clock's error: an end that was not seen may be anywhere.
+Duration CameraPipeline::kind_sigma(const pairing::Exposure& exposure) const {
+    if (exposure.kind == StampKind::measured_middle) return {};
+    return (exposure.end - exposure.start) / 2 + microseconds(100);
+}
+
+void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
+    const BoardTime instant = middle(exposure.start, exposure.end);
+    auto stamp = translator_.translate(instant);
+    if (!stamp) return frame_unpaired(arrival, EventReason::no_clock);
+    const double sigma = std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind_sigma(exposure).ns));
+    stamp->sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
+    FrameMetadata metadata{};
+    metadata.trigger = exposure.trigger;
+    metadata.tick = static_cast<std::uint32_t>(exposure.tick);
+    metadata.board_time = instant;
+    if (exposure.kind == StampKind::measured_middle) metadata.exposure = exposure.end - exposure.start;
+    metadata.flags = static_cast<std::uint32_t>(exposure.kind);
+    publish(arrival, *stamp, metadata);
+}
+
+void CameraPipeline::publish_free_run(const pairing::Arrival& arrival) {
+    FrameMetadata metadata{};
+    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival);
+    publish(arrival, translator_.translate(arrival.arrived, arrival_sigma), metadata);
+}
+
+void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp, FrameMetadata metadata) {
+    metadata.block_id = arrival.block_id;
+    metadata.host_time = stamp.host;
+    metadata.arrival = arrival.arrived;
+    metadata.camera_time = arrival.camera_time;
+    metadata.sigma_ns = triggered() ? stamp.sigma_ns : sigma_unknown;
+    metadata.width = arrival.width;
+    metadata.height = arrival.height;
+    metadata.stride = arrival.height == 0 ? 0 : arrival.size / arrival.height;
+    metadata.pixel_format = arrival.pixel_format;
+    metadata.epoch = stamp.epoch;
+    ++report_.published;
+    const OutputTime time = guard_.guard(stamp, metadata.flags);
+    ring_->publish(arrival.slot, arrival.size, time, pack(metadata));
+}
+
+void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason) {
+    ring_->abandon(arrival.slot);
+    ++report_.frames_without_trigger;
+    journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(arrival.block_id));
+}
+
+void CameraPipeline::exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) {
+    ++report_.triggers_without_frame;
+    journal(EventKind::trigger_without_frame, reason, static_cast<std::int64_t>(exposure.trigger), exposure.start);
+}
+
+void CameraPipeline::locked(const pairing::Exposure& first) {
+    ++report_.locks;
+    log(LogLevel::info, configuration_.name, "paired: frames are verified from trigger {} on", first.trigger);
+    journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger), first.start);
+}
+
+void CameraPipeline::slipped(const pairing::Arrival& at) {
+    ++report_.slips;
+    log(LogLevel::warning, configuration_.name, "pairing slipped at block {}: frames are withheld until it is proved again",
+        at.block_id);
+    journal(EventKind::pairing_slipped, EventReason::mismatch, static_cast<std::int64_t>(at.block_id));
+}
+
+void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t value, std::optional<BoardTime> at) {
+    events_.add({kind, reason, index_, configuration_.name, value, at});
+}
+
+void CameraPipeline::reset() {
+    const std::lock_guard lock(mutex_);
+    pairing_.reset();
+    unanswered_ = 0;
+}
+
+bool CameraPipeline::advance(HostTime now) {
+    const std::lock_guard lock(mutex_);
+    if (ring_) ring_->heartbeat(now);
+    if (!triggered()) return false;
+    pairing_.advance(now);
+    if (!pairing_.wants_pattern()) return false;
+    pairing_.pattern_requested();
+    return true;
+}
+
+std::uint64_t CameraPipeline::unanswered_triggers() {
+    const std::lock_guard lock(mutex_);
+    return unanswered_;
+}
+
+PipelineReport CameraPipeline::report() {
+    const std::lock_guard lock(mutex_);
+    report_.pairing = pairing_.state();
+    return report_;
+}
+
+std::uint64_t CameraPipeline::items() {
+    const std::lock_guard lock(mutex_);
+    return ring_ ? ring_->head() : 0;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "configuration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "versavis/toml/table_reader.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr double longest_us = 1e7;
+constexpr unsigned spare_slots = 8;  // frames that wait for proof, and the newest that readers still want
+
+bool valid_name(const std::string& name) {
+    const auto allowed = [](char c) { return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-'; };
+    return !name.empty() && name.size() < 32 && std::all_of(name.begin(), name.end(), allowed);
+}
+
+/// Names become file names and must be unique.
+class Names {
+   public:
+    void check(TableReader& reader, const std::string& name) {
+        if (!valid_name(name))
+            reader.fail("name", fmt::format("'{}' is no name", name), "use up to 31 letters, digits, '_' and '-'");
+        if (!taken_.insert(name).second) reader.fail("name", fmt::format("the name '{}' is taken", name));
+    }
+
+   private:
+    std::set<std::string> taken_{"events", "status"};
+};
+
+void read_board(TableReader& reader, BoardConfiguration& board) {
+    reader.read("link", board.link);
+    reader.read("serial", board.serial);
+    reader.read("usb_vendor", board.usb_vendor, 0, 0xFFFF);
+    reader.read("usb_product", board.usb_product, 0, 0xFFFF);
+    if (board.link != "usb" && board.link.rfind("unix:", 0) != 0)
+        reader.fail("link", fmt::format("'{}' is no link", board.link), "use \"usb\" or \"unix:/path/of/socket\"");
+}
+
+void read_clock(TableReader& reader, ClockConfiguration& clock) {
+    using clock::OutputClockKind;
+    reader.choose<OutputClockKind>("output", clock.output,
+                                   {{"realtime", OutputClockKind::realtime},
+                                    {"tai", OutputClockKind::tai},
+                                    {"monotonic_raw", OutputClockKind::monotonic_raw}});
+    reader.read("exchange_rate_hz", clock.exchange_rate_hz, 1, 100);
+}
+
+void read_features(TomlFile& file, const toml::table& table, CameraConfiguration& camera) {
+    for (const auto& [key, node] : table) {
+        std::ostringstream text;
+        if (const auto* string = node.as_string())
+            text << string->get();
+        else if (node.is_number() || node.is_boolean())
+            text << toml::node_view(node);
+        else
+            file.fail(node, fmt::format("feature '{}' must be a text, a number, true or false", key.str()));
+        camera.features.emplace_back(key.str(), text.str());
+    }
+}
+
+void read_trigger(TableReader& reader, CameraConfiguration& camera) {
+    reader.choose<TriggerSource>("trigger", camera.trigger,
+                                 {{"board", TriggerSource::board}, {"free", TriggerSource::free_run}});
+    reader.read("output", camera.output, 0, wire::camera_count - 1);
+    reader.read("rate_hz", camera.rate_hz, 0.1, 1000);
+    const double period_us = 1e6 / camera.rate_hz;
+    reader.read("phase_us", camera.phase_us, 0, std::nextafter(period_us, 0));
+    reader.read("exposure_us", camera.exposure_us, 0, longest_us);
+    reader.read("max_exposure_us", camera.max_exposure_us, 1, longest_us);
+    if (camera.max_exposure_us == 0) camera.max_exposure_us = period_us;
+    reader.read("latency_us", camera.latency_us, 0, 1e5);
+    reader.read("gap_us", camera.gap_us, 0, std::nextafter(period_us, 0));
+    camera.pulse_us = std::min(camera.pulse_us, period_us / 4);
+    reader.read("pulse_us", camera.pulse_us, 1, std::min(1e4, period_us / 2));
+    reader.read("trigger_inverted", camera.trigger_inverted);
+    reader.choose<Strobe>("strobe", camera.strobe,
+                          {{"active_high", Strobe::active_high}, {"active_low", Strobe::active_low}, {"none", Strobe::none}});
+    reader.read("trigger_line", camera.trigger_line);
+    reader.read("strobe_line", camera.strobe_line);
+}
+
+CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
+    CameraConfiguration camera;
+    reader.read("name", camera.name);
+    reader.read("device", camera.device);
+    read_trigger(reader, camera);
+    reader.read("buffers", camera.buffers, 2, 64);
+    camera.slots = std::max(camera.slots, camera.buffers + spare_slots);
+    reader.read("slots", camera.slots, camera.buffers + spare_slots, 1024);
+    reader.read("packet_size", camera.packet_size, 576, 16000);
+    reader.choose<ReceiveMode>("receive", camera.receive,
+                               {{"socket", ReceiveMode::socket}, {"packet", ReceiveMode::packet}});
+    reader.read("latest_arrival_ms", camera.latest_arrival_ms, 1, 60000);
+    if (const toml::table* features = reader.table("features")) read_features(file, *features, camera);
+    if (camera.device.empty())
+        reader.fail("device", "a camera needs a 'device'",
+                    "give its IP address, serial number or full name; arv-tool-0.8 lists them");
+    return camera;
+}
+
+ImuConfiguration read_imu(TableReader& reader) {
+    ImuConfiguration imu;
+    std::string model = "adis16448b";
+    reader.read("name", imu.name);
+    reader.read("model", model);
+    reader.read("rate_hz", imu.rate_hz, 1, 1000);
+    imu.model = imu::find_model(model);
+    if (imu.model == nullptr) reader.fail("model", fmt::format("the IMU model '{}' is not known", model));
+    return imu;
+}
+
+void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cameras) {
+    std::set<unsigned> taken;
+    for (const CameraConfiguration& camera : cameras)
+        if (camera.trigger == TriggerSource::board && !taken.insert(camera.output).second)
+            top.fail("camera", fmt::format("camera '{}' uses output {}, which is taken", camera.name, camera.output),
+                     "give each triggered camera an 'output' of its own, 0 to 3");
+}
+
+std::uint32_t micro_hertz(double hertz) { return static_cast<std::uint32_t>(std::llround(hertz * 1e6)); }
+std::uint32_t short_ns(double us) { return static_cast<std::uint32_t>(std::llround(us * 1e3)); }
+
+wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
+    wire::CameraConfiguration out{};
+    out.flags = wire::camera_enabled;
+    if (camera.trigger_inverted) out.flags |= wire::camera_trigger_inverted;
+    if (camera.strobe == Strobe::active_low) out.flags |= wire::camera_strobe_inverted;
+    if (camera.strobe == Strobe::none) out.flags |= wire::camera_no_strobe;
+    out.rate_uhz = micro_hertz(camera.rate_hz);
+    out.phase_ns = short_ns(camera.phase_us);
+    out.pulse_ns = short_ns(camera.pulse_us);
+    out.latency_ns = short_ns(camera.latency_us);
+    out.gap_ns = short_ns(camera.gap_us);
+    out.exposure_ns = std::llround(camera.exposure_us * 1e3);
+    out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);
+    return out;
+}
+
+}  // namespace
+
+Expected<Configuration> load_configuration(const std::string& path) {
+    const auto root = parse_toml(path);
+    if (!root) return tl::unexpected(root.error());
+    TomlFile file{path, "docs/configuration.md"};
+    Configuration configuration;
+    Names names;
+    TableReader top(file, *root);
+    top.read("instance", configuration.instance);
+    if (!valid_name(configuration.instance)) top.fail("instance", "'instance' must be a name of letters and digits");
+    top.choose<LogLevel>("log_level", configuration.log_level,
+                         {{"error", LogLevel::error}, {"warning", LogLevel::warning}, {"info", LogLevel::info}, {"debug", LogLevel::debug}});
+    if (const toml::table* table = top.table("board")) {
+        TableReader reader(file, *table);
+        read_board(reader, configuration.board);
+        reader.finish();
+    }
+    if (const toml::table* table = top.table("clock")) {
+        TableReader reader(file, *table);
+        read_clock(reader, configuration.clock);
+        reader.finish();
+    }
+    for (const toml::table* table : top.tables("camera")) {
+        TableReader reader(file, *table);
+        configuration.cameras.push_back(read_camera(file, reader));
+        names.check(reader, configuration.cameras.back().name);
+        reader.finish();
+    }
+    for (const toml::table* table : top.tables("imu")) {
+        TableReader reader(file, *table);
+        configuration.imus.push_back(read_imu(reader));
+        names.check(reader, configuration.imus.back().name);
+        reader.finish();
+    }
+    if (configuration.imus.size() > 1) top.fail("imu", "the board has one IMU port", "remove the other [[imu]] tables");
+    check_outputs(top, configuration.cameras);
+    top.finish();
+    if (!file.result) return tl::unexpected(file.result.error());
+    return configuration;
+}
+
+wire::Configuration board_configuration(const Configuration& configuration) {
+    wire::Configuration out{};
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.trigger == TriggerSource::board) out.cameras[camera.output] = board_camera(camera);
+    if (!configuration.imus.empty()) {
+        out.imu.kind = configuration.imus[0].model->kind;
+        out.imu.rate_uhz = micro_hertz(configuration.imus[0].rate_hz);
+    }
+    return out;
+}
+
+}  // namespace versavis::daemon

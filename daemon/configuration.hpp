@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The service's configuration: one TOML file, every key documented in docs/configuration.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "log.hpp"
+#include "versavis/clock/output_clock.hpp"
+#include "versavis/error.hpp"
+#include "versavis/imu/imu_model.hpp"
+#include "versavis/time.hpp"
+#include "versavis/wire/messages.hpp"
+
+namespace versavis::daemon {
+
+struct BoardConfiguration {
+    std::string link = "usb";  ///< "usb" or "unix:PATH"
+    std::string serial;        ///< empty: any
+    std::uint16_t usb_vendor = 0x1209;
+    std::uint16_t usb_product = 0x5653;
+};
+
+struct ClockConfiguration {
+    clock::OutputClockKind output = clock::OutputClockKind::realtime;
+    double exchange_rate_hz = 10;
+};
+
+enum class TriggerSource { board, free_run };
+enum class Strobe { active_high, active_low, none };
+enum class ReceiveMode { socket, packet };
+
+struct CameraConfiguration {
+    std::string name;
+    std::string device;  ///< what Aravis finds it by: address, serial number or full name
+    TriggerSource trigger = TriggerSource::board;
+    unsigned output = 0;
+    double rate_hz = 20;
+    double phase_us = 0;
+    double exposure_us = 3000;
+    double max_exposure_us = 0;  ///< 0: the period
+    double latency_us = 0;
+    double gap_us = 0;
+    double pulse_us = 100;
+    bool trigger_inverted = false;
+    Strobe strobe = Strobe::active_high;
+    std::string trigger_line = "Line0";
+    std::string strobe_line = "Line1";
+    unsigned slots = 16;
+    unsigned buffers = 6;
+    unsigned packet_size = 0;  ///< 0: the largest that passes
+    ReceiveMode receive = ReceiveMode::socket;
+    double latest_arrival_ms = 500;
+    std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
+};
+
+struct ImuConfiguration {
+    std::string name = "imu0";
+    const imu::ImuModel* model = nullptr;
+    double rate_hz = 200;
+};
+
+struct Configuration {
+    std::string instance = "default";
+    LogLevel log_level = LogLevel::info;
+    BoardConfiguration board;
+    ClockConfiguration clock;
+    std::vector<CameraConfiguration> cameras;
+    std::vector<ImuConfiguration> imus;
+};
+
+/// Errors name file, line and column, and the cure.
+Expected<Configuration> load_configuration(const std::string& path);
+
+/// What the board is told.
+wire::Configuration board_configuration(const Configuration& configuration);
+
+}  // namespace versavis::daemon

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "service.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "versavis/ring/path.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr Duration status_interval = milliseconds(500);
+constexpr std::uint64_t status_size = 64 * 1024;
+constexpr std::uint32_t status_slots = 8;
+constexpr std::uint32_t imu_items = 16384;  // 16 s at 1 kHz
+constexpr std::uint32_t event_items = 4096;
+
+}  // namespace
+
+Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
+    auto output = clock::OutputClock::create(configuration.clock.output);
+    if (!output) return tl::unexpected(output.error());
+    auto directory = ring::OwnedDirectory::claim(instance_directory(configuration.instance));
+    if (!directory) return tl::unexpected(directory.error());
+    ring::Shape shape{"status", ring::StreamKind::status, status_slots, status_slots, status_size};
+    auto status_ring = ring::Writer::create(directory->path(), shape);
+    if (!status_ring) return tl::unexpected(status_ring.error());
+    std::unique_ptr<Service> service(
+        new Service(configuration, std::move(*directory), std::move(*output), std::move(*status_ring)));
+    if (auto made = service->make_parts(); !made) return tl::unexpected(made.error());
+    return service;
+}
+
+Service::Service(const Configuration& configuration, ring::OwnedDirectory directory, clock::OutputClock output,
+                 ring::Writer status_ring)
+    : configuration_(configuration),
+      directory_(std::move(directory)),
+      translator_(std::move(output)),
+      status_ring_(std::move(status_ring)),
+      started_(host_now()) {}
+
+Expected<> Service::make_parts() {
+    auto event_ring = ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
+    if (!event_ring) return tl::unexpected(event_ring.error());
+    events_ = std::make_unique<EventJournal>(std::move(*event_ring), translator_);
+    for (const ImuConfiguration& imu : configuration_.imus) {
+        auto ring = ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
+        if (!ring) return tl::unexpected(ring.error());
+        imu_ = std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_);
+    }
+    for (const CameraConfiguration& camera : configuration_.cameras) add_camera(camera);
+    BoardListener& self = *this;
+    board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
+                                         board_configuration(configuration_), configuration_.clock.exchange_rate_hz,
+                                         translator_, self);
+    return {};
+}
+
+void Service::add_camera(const CameraConfiguration& configuration) {
+    CameraUnit unit;
+    unit.configuration = configuration;
+    const auto index = static_cast<std::uint32_t>(cameras_.size());
+    unit.pipeline = std::make_unique<CameraPipeline>(configuration, index, translator_, *events_);
+    CameraPipeline* pipeline = unit.pipeline.get();
+    Camera::Hooks hooks;
+    hooks.streaming = [this, pipeline, index, name = configuration.name] {
+        events_->add({EventKind::camera_connected, EventReason::none, index, name});
+        if (pipeline->triggered()) board_->start_cameras(pipeline->board_mask(), true);
+    };
+    hooks.lost = [this, pipeline, index, name = configuration.name] {
+        if (pipeline->triggered()) board_->stop_cameras(pipeline->board_mask());
+        events_->add({EventKind::camera_lost, EventReason::none, index, name});
+    };
+    unit.camera = std::make_unique<Camera>(configuration, directory_.path(), *pipeline, std::move(hooks));
+    cameras_.push_back(std::move(unit));
+}
+
+void Service::start() {
+    const bool board_needed = imu_ || std::any_of(cameras_.begin(), cameras_.end(), [](const CameraUnit& unit) {
+                                  return unit.pipeline->triggered();
+                              });
+    if (board_needed) board_->start();
+    for (CameraUnit& unit : cameras_) unit.camera->start();
+    directory_.remove_strangers();  // readers of streams that are no longer configured learn that they are gone
+}
+
+Service::~Service() {
+    for (CameraUnit& unit : cameras_) unit.camera->stop();
+    if (board_) board_->stop();
+}
+
+Service::CameraUnit* Service::camera_at(unsigned output) {
+    for (CameraUnit& unit : cameras_)
+        if (unit.pipeline->triggered() && unit.configuration.output == output) return &unit;
+    return nullptr;
+}
+
+void Service::board_connected() {
+    events_->add({EventKind::board_connected, EventReason::none, 0, "board", board_->report().nonce});
+    if (imu_) imu_->board_connected();
+    for (CameraUnit& unit : cameras_) {
+        if (!unit.pipeline->triggered()) continue;
+        unit.pipeline->reset();
+        if (unit.camera->streaming()) board_->start_cameras(unit.pipeline->board_mask(), true);
+    }
+}
+
+void Service::board_lost() { events_->add({EventKind::board_lost, EventReason::none, 0, "board"}); }
+
+void Service::exposure(const wire::Exposure& record) {
+    if (CameraUnit* unit = camera_at(record.camera)) unit->pipeline->add(record);
+}
+
+void Service::imu_sample(const wire::ImuSample& sample) {
+    if (imu_) imu_->add(sample);
+}
+
+void Service::board_event(const wire::Event& event) {
+    const auto kind = [&] {
+        switch (event.kind) {
+            case wire::EventKind::trigger_skipped: return EventKind::trigger_skipped;
+            case wire::EventKind::stray_edge: return EventKind::stray_edge;
+            case wire::EventKind::output_late: return EventKind::output_late;
+            case wire::EventKind::edge_overflow: return EventKind::edge_overflow;
+        }
+        return EventKind{};
+    }();
+    const CameraUnit* unit = camera_at(event.source);
+    events_->add({kind, EventReason::none, event.source, unit != nullptr ? unit->configuration.name : "board", event.value,
+                  BoardTime{event.time_ns}});
+}
+
+void Service::tick() {
+    const HostTime now = host_now();
+    for (CameraUnit& unit : cameras_)
+        if (unit.pipeline->advance(now) && unit.camera->streaming())
+            board_->start_cameras(unit.pipeline->board_mask(), true);
+    if (imu_) imu_->heartbeat(now);
+    events_->heartbeat(now);
+    status_ring_.heartbeat(now);
+    if (now >= next_status_) publish_status(now);
+}
+
+std::vector<StreamStatus> Service::stream_status(HostTime now) {
+    std::vector<StreamStatus> streams;
+    const auto add = [&](const std::string& name, const char* kind, std::uint64_t items) {
+        auto& [before, at] = last_items_[name];
+        const double seconds = static_cast<double>((now - at).ns) * 1e-9;
+        streams.push_back({name, kind, items, at.ns == 0 ? 0 : static_cast<double>(items - std::min(items, before)) / seconds});
+        before = items;
+        at = now;
+    };
+    for (CameraUnit& unit : cameras_) add(unit.configuration.name, "frames", unit.pipeline->items());
+    if (imu_) add(imu_->report().name, "imu", imu_->report().published);
+    add("events", "events", events_->items());
+    add("status", "status", status_ring_.head());
+    return streams;
+}
+
+void Service::publish_status(HostTime now) {
+    next_status_ = now + status_interval;
+    Status status;
+    status.instance = configuration_.instance;
+    status.started = started_;
+    status.now = now;
+    status.board_needed = imu_ != nullptr;
+    status.board = board_->report();
+    status.clock = translator_.report();
+    for (CameraUnit& unit : cameras_) {
+        status.board_needed = status.board_needed || unit.pipeline->triggered();
+        status.cameras.push_back(
+            {unit.configuration.name, unit.pipeline->triggered(), unit.camera->report(), unit.pipeline->report()});
+    }
+    if (imu_) status.imus.push_back(imu_->report());
+    status.streams = stream_status(now);
+    health_ = daemon::health(status);
+    const std::string document = to_json(status);
+    const auto slot = status_ring_.acquire();
+    if (!slot) return;
+    const std::size_t size = std::min<std::size_t>(document.size(), status_ring_.slot_size());
+    std::memcpy(status_ring_.slot_data(*slot), document.data(), size);
+    const clock::Stamp stamp = translator_.translate(now, microseconds(1));
+    status_ring_.publish(*slot, static_cast<std::uint32_t>(size), stamp.output, {});
+}
+
+}  // namespace versavis::daemon

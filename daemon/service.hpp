@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole service: board link, cameras and IMU wired to their rings.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "board_link.hpp"
+#include "camera.hpp"
+#include "camera_pipeline.hpp"
+#include "configuration.hpp"
+#include "event_journal.hpp"
+#include "imu_pipeline.hpp"
+#include "status.hpp"
+#include "versavis/ring/directory.hpp"
+
+namespace versavis::daemon {
+
+class Service final : private BoardListener {
+   public:
+    /// Errors: the instance is served by another process, the rings cannot be made, the output clock is not set.
+    static Expected<std::unique_ptr<Service>> create(const Configuration& configuration);
+    ~Service() override;
+    Service(const Service&) = delete;
+    Service& operator=(const Service&) = delete;
+
+    void start();
+
+    /// Bounded waits and heartbeats; call it every 50 ms or so.
+    void tick();
+
+    /// "ok", "starting" or "degraded", as of the last status document.
+    const std::string& health() const { return health_; }
+
+    static constexpr Duration tick_interval = milliseconds(50);
+
+   private:
+    struct CameraUnit {
+        CameraConfiguration configuration;
+        std::unique_ptr<CameraPipeline> pipeline;
+        std::unique_ptr<Camera> camera;
+    };
+
+    Service(const Configuration& configuration, ring::OwnedDirectory directory, clock::OutputClock output,
+            ring::Writer status_ring);
+
+    Expected<> make_parts();
+    void add_camera(const CameraConfiguration& configuration);
+    void publish_status(HostTime now);
+    std::vector<StreamStatus> stream_status(HostTime now);
+    CameraUnit* camera_at(unsigned output);
+
+    void board_connected() override;
+    void board_lost() override;
+    void exposure(const wire::Exposure& record) override;
+    void imu_sample(const wire::ImuSample& sample) override;
+    void board_event(const wire::Event& event) override;
+
+    Configuration configuration_;
+    ring::OwnedDirectory directory_;
+    clock::Translator translator_;
+    ring::Writer status_ring_;
+    std::unique_ptr<EventJournal> events_;
+    std::unique_ptr<ImuPipeline> imu_;
+    std::vector<CameraUnit> cameras_;
+    std::unique_ptr<BoardLink> board_;
+    HostTime started_;
+    HostTime next_status_;
+    std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
+    std::string health_ = "starting";
+};
+
+}  // namespace versavis::daemon

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "status.hpp"
+
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+namespace versavis::daemon {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int schema = 1;
+constexpr Duration grace = seconds(5);
+
+bool delivers(const CameraStatus& camera) {
+    if (camera.camera.state != CameraState::streaming) return false;
+    return !camera.triggered || camera.pipeline.pairing == pairing::State::locked;
+}
+
+json board_json(const BoardReport& board) {
+    return {{"state", to_string(board.state)},
+            {"since_ns", board.since.ns},
+            {"hint", board.hint},
+            {"serial", board.serial},
+            {"firmware", board.firmware},
+            {"nonce", board.nonce},
+            {"connections", board.connections},
+            {"packets", board.packets},
+            {"lost_packets", board.lost_packets},
+            {"malformed_packets", board.malformed},
+            {"dropped_by_board", board.health.dropped_packets},
+            {"late_outputs", board.health.late_outputs},
+            {"lost_edges", board.health.lost_edges},
+            {"imu_errors", board.health.imu_errors}};
+}
+
+json clock_json(const clock::ClockReport& clock) {
+    return {{"state", clock::to_string(clock.state)},
+            {"output", clock::to_string(clock.output)},
+            {"sigma_ns", clock.sigma.ns},
+            {"bound_ns", clock.bound.ns},
+            {"residual_ns", clock.residual.ns},
+            {"round_trip_ns", clock.round_trip.ns},
+            {"smallest_round_trip_ns", clock.smallest_round_trip.ns},
+            {"skew_ppm", clock.skew_ppm},
+            {"skew_sigma_ppm", clock.skew_sigma_ppm},
+            {"exchanges", clock.exchanges},
+            {"restarts", clock.restarts},
+            {"epoch", clock.epoch},
+            {"output_minus_host_ns", clock.output_minus_host.ns},
+            {"output_steps", clock.output_steps}};
+}
+
+json camera_json(const CameraStatus& status) {
+    const auto& [name, triggered, camera, pipeline] = status;
+    return {{"name", name},
+            {"state", to_string(camera.state)},
+            {"since_ns", camera.since.ns},
+            {"hint", camera.hint},
+            {"trigger", triggered ? "board" : "free"},
+            {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
+            {"model", camera.model},
+            {"serial", camera.serial},
+            {"packet_size", camera.packet_size},
+            {"connections", camera.connections},
+            {"frames_received", pipeline.received},
+            {"frames_incomplete", pipeline.incomplete},
+            {"frames_published", pipeline.published},
+            {"frames_without_trigger", pipeline.frames_without_trigger},
+            {"triggers", pipeline.triggers},
+            {"triggers_without_frame", pipeline.triggers_without_frame},
+            {"locks", pipeline.locks},
+            {"slips", pipeline.slips},
+            {"last_frame_ns", pipeline.last_frame.ns}};
+}
+
+}  // namespace
+
+std::string health(const Status& status) {
+    bool ok = !status.board_needed || (status.board.state == BoardState::running &&
+                                       status.clock.state == clock::ClockState::locked);
+    for (const CameraStatus& camera : status.cameras) ok = ok && delivers(camera);
+    if (ok) return "ok";
+    return status.now - status.started < grace ? "starting" : "degraded";
+}
+
+std::string to_json(const Status& status) {
+    json cameras = json::array();
+    for (const CameraStatus& camera : status.cameras) cameras.push_back(camera_json(camera));
+    json imus = json::array();
+    for (const ImuReport& imu : status.imus)
+        imus.push_back({{"name", imu.name},
+                        {"model", imu.model},
+                        {"published", imu.published},
+                        {"lost", imu.lost},
+                        {"no_clock", imu.no_clock},
+                        {"faulty", imu.faulty}});
+    json streams = json::array();
+    for (const StreamStatus& stream : status.streams)
+        streams.push_back({{"name", stream.name}, {"kind", stream.kind}, {"items", stream.items}, {"rate_hz", stream.rate_hz}});
+    const json document{{"schema", schema},
+                        {"instance", status.instance},
+                        {"pid", ::getpid()},
+                        {"started_ns", status.started.ns},
+                        {"host_time_ns", status.now.ns},
+                        {"health", health(status)},
+                        {"board", board_json(status.board)},
+                        {"clock", clock_json(status.clock)},
+                        {"cameras", cameras},
+                        {"imus", imus},
+                        {"streams", streams}};
+    // Names from devices may hold anything; what is no UTF-8 is replaced.
+    return document.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The status document (docs/status.md) from the reports of the parts.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "board_link.hpp"
+#include "camera.hpp"
+#include "camera_pipeline.hpp"
+#include "imu_pipeline.hpp"
+#include "versavis/clock/translator.hpp"
+
+namespace versavis::daemon {
+
+struct CameraStatus {
+    std::string name;
+    bool triggered = true;
+    CameraReport camera;
+    PipelineReport pipeline;
+};
+
+struct StreamStatus {
+    std::string name;
+    std::string kind;
+    std::uint64_t items = 0;
+    double rate_hz = 0;  ///< over the last interval
+};
+
+struct Status {
+    std::string instance;
+    HostTime started;
+    HostTime now;
+    bool board_needed = true;
+    BoardReport board;
+    clock::ClockReport clock;
+    std::vector<CameraStatus> cameras;
+    std::vector<ImuReport> imus;
+    std::vector<StreamStatus> streams;
+};
+
+/// "ok", "starting" or "degraded": whether all that is configured delivers proved data.
+std::string health(const Status& status);
+
+std::string to_json(const Status& status);
+
+}  // namespace versavis::daemon
