@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// versavis: looks at what the service does and publishes.
+#include <fmt/format.h>
+#include <signal.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "list.hpp"
+#include "snapshot.hpp"
+#include "status_document.hpp"
+#include "status_view.hpp"
+#include "tail.hpp"
+#include "versavis/ring/path.hpp"
+
+namespace {
+
+using namespace versavis;
+
+volatile sig_atomic_t stop_requested = 0;
+
+int fail(const Error& error) {
+    fmt::print(stderr, "versavis: {}\n", error.message());
+    return EX_UNAVAILABLE;
+}
+
+/// 0: all is well; 1: it runs, but not all delivers; 69: it does not run.
+int show_status(const std::string& instance, bool json) {
+    const auto status = client::read_status(instance);
+    if (!status) return fail(status.error());
+    fmt::print("{}", json ? status->dump() + "\n" : client::status_text(*status));
+    std::fflush(stdout);
+    return status->value("health", "") == "ok" ? EX_OK : EXIT_FAILURE;
+}
+
+int watch_status(const std::string& instance, bool json) {
+    int code = EX_OK;
+    while (stop_requested == 0) {
+        if (isatty(STDOUT_FILENO) != 0 && !json) fmt::print("\x1b[H\x1b[J");
+        code = show_status(instance, json);
+        const timespec interval{1, 0};
+        nanosleep(&interval, nullptr);  // a signal ends it early
+    }
+    return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
+    CLI::App app{"Looks at the VersaVIS service: its state, its streams, their items"};
+    app.require_subcommand(1);
+    app.set_version_flag("--version", VERSAVIS_VERSION);
+    std::string instance = default_instance();
+    app.add_option("--instance", instance, "Instance of the service")->capture_default_str();
+    app.fallthrough();
+    bool json = false;
+
+    bool watch = false;
+    auto* status = app.add_subcommand("status", "State of board, clock, cameras and streams; exit code 0: all well, 1: not all delivers, 69: not running");
+    status->add_flag("--watch", watch, "Show it again every second");
+    status->add_flag("--json", json, "The status document itself (docs/status.md)");
+
+    auto* list = app.add_subcommand("list", "The streams that can be read");
+    list->add_flag("--json", json, "As a JSON array");
+
+    client::TailSettings tail;
+    auto* tail_command = app.add_subcommand("tail", "Print a stream as it comes, one line per item");
+    tail_command->add_option("stream", tail.stream, "Name of the stream")->required();
+    tail_command->add_option("-n,--count", tail.count, "Stop after that many items");
+    tail_command->add_flag("--json", json, "One JSON object per line");
+
+    std::string stream;
+    std::string output;
+    double timeout_s = 5;
+    auto* snapshot = app.add_subcommand("snapshot", "Write the next frame of a stream to a PNG file");
+    snapshot->add_option("stream", stream, "Name of the stream")->required();
+    snapshot->add_option("-o,--output", output, "File to write")->required();
+    snapshot->add_option("--timeout", timeout_s, "Seconds to wait for a frame")->check(CLI::PositiveNumber)->capture_default_str();
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? EX_OK : EX_USAGE;
+    }
+    if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
+    if (*list) {
+        const auto text = client::list_streams(instance, json);
+        if (!text) return fail(text.error());
+        fmt::print("{}", *text);
+        return EX_OK;
+    }
+    if (*tail_command) {
+        tail.instance = instance;
+        tail.json = json;
+        tail.stop = [] { return stop_requested != 0; };
+        const auto done = client::tail(tail);
+        return done ? EX_OK : fail(done.error());
+    }
+    const auto written = client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
+    if (!written) return fail(written.error());
+    fmt::print("{}\n", *written);
+    return EX_OK;
+}

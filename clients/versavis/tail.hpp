@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Prints a stream as it comes, one line per item.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "versavis/error.hpp"
+
+namespace versavis::client {
+
+struct TailSettings {
+    std::string instance;
+    std::string stream;
+    std::uint64_t count = 0;  ///< items to print; 0: until stopped
+    bool json = false;
+    std::function<bool()> stop;
+};
+
+/// Error: no such stream.
+Expected<> tail(const TailSettings& settings);
+
+}  // namespace versavis::client

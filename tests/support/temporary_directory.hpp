@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A directory that is gone with its owner.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+namespace versavis::test {
+
+class TemporaryDirectory {
+   public:
+    /// Below `parent`; rings want one in shared memory.
+    explicit TemporaryDirectory(const std::string& parent = "/tmp") {
+        std::string name = parent + "/versavis-test-XXXXXX";
+        if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory below " + parent);
+        path_ = name;
+    }
+    ~TemporaryDirectory() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    TemporaryDirectory(const TemporaryDirectory&) = delete;
+    TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
+
+    const std::filesystem::path& path() const { return path_; }
+
+    /// Writes a file and returns its path.
+    std::string write(const std::string& name, const std::string& text) const {
+        std::ofstream(path_ / name) << text;
+        return (path_ / name).string();
+    }
+
+   private:
+    std::filesystem::path path_;
+};
+
+}  // namespace versavis::test

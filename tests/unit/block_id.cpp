@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/pairing/block_id.hpp"
+
+#include <catch2/catch.hpp>
+
+using versavis::pairing::BlockIdUnwrapper;
+
+TEST_CASE("block_id: 16-bit ids go on after 65535, without a zero") {
+    BlockIdUnwrapper ids;
+    std::uint64_t expected = 0;
+    for (int lap = 0; lap < 3; ++lap)
+        for (std::uint64_t id = 1; id <= 65535; ++id) REQUIRE(ids.unwrap(id) == ++expected);
+}
+
+TEST_CASE("block_id: gaps over the wrap, late ones and any first number") {
+    BlockIdUnwrapper ids;
+    CHECK(ids.unwrap(65530) == 65530);
+    CHECK(ids.unwrap(3) == 65538);
+    CHECK(ids.unwrap(65535) == 65535);
+    CHECK(ids.unwrap(4) == 65539);
+}
+
+TEST_CASE("block_id: long ids stay as they are") {
+    BlockIdUnwrapper ids;
+    for (const std::uint64_t id : {65534ULL, 65535ULL, 65536ULL, 65537ULL, 1ULL << 40U}) CHECK(ids.unwrap(id) == id);
+}

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/ring/directory.hpp"
+
+#include <sys/stat.h>
+
+#include <catch2/catch.hpp>
+
+#include "../support/temporary_directory.hpp"
+#include "versavis/ring/reader.hpp"
+#include "versavis/ring/writer.hpp"
+
+using namespace versavis;
+using namespace versavis::ring;
+
+TEST_CASE("directory: one owner at a time, readable for its group only") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    {
+        auto first = OwnedDirectory::claim(path);
+        REQUIRE(first);
+        struct stat info {};
+        REQUIRE(stat(path.c_str(), &info) == 0);
+        CHECK((info.st_mode & 0777U) == 0750U);
+        CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("another versavisd"));
+    }
+    CHECK(OwnedDirectory::claim(path));
+}
+
+TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
+    test::TemporaryDirectory parent("/dev/shm");
+    auto directory = OwnedDirectory::claim(parent.path() / "instance");
+    REQUIRE(directory);
+    auto own = Writer::create(directory->path(), {"own", StreamKind::events, 8});
+    REQUIRE(own);
+    // A copy is a segment whose writer never closed it; another process id makes it a stranger's.
+    const auto stranger = directory->path() / "stranger";
+    std::filesystem::copy_file(directory->path() / "own", stranger);
+    {
+        std::fstream file(stranger, std::ios::in | std::ios::out | std::ios::binary);
+        const std::uint32_t pid = 1;
+        file.seekp(offsetof(Header, writer_pid)).write(reinterpret_cast<const char*>(&pid), sizeof pid);
+    }
+    auto reader = Reader::open(stranger);
+    REQUIRE(reader);
+    directory->remove_strangers();
+    CHECK(std::filesystem::exists(directory->path() / "own"));
+    CHECK_FALSE(std::filesystem::exists(stranger));
+    CHECK(reader->next().found == Found::gone);
+}

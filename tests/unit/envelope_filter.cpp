@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/clock/envelope_filter.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <vector>
+
+using namespace versavis;
+using namespace versavis::clock;
+
+namespace {
+
+/// A board whose clock is off by a constant skew, behind a link of random delays; all in exact virtual time.
+class Link {
+   public:
+    Link(double skew_ppm, std::uint64_t seed) : skew_ppm_(skew_ppm), random_(seed) {}
+
+    BoardTime board(HostTime host) const {
+        return {offset_ + host.ns + std::llround(static_cast<double>(host.ns) * skew_ppm_ * 1e-6)};
+    }
+
+    /// Shortest delay 50 us in each direction, exponential tail, now and then several milliseconds.
+    Duration delay() {
+        const double tail = std::exponential_distribution<>(1.0 / 40e3)(random_);
+        const bool burst = std::uniform_real_distribution<>(0, 1)(random_) < 0.02;
+        return {50'000 + std::llround(tail) + (burst ? 5'000'000 : 0)};
+    }
+
+    Exchange exchange(HostTime at) {
+        const HostTime received = at + delay();
+        const HostTime answered = received + microseconds(10);
+        return {at, board(received), board(answered), answered + delay()};
+    }
+
+    void jump(Duration by) { offset_ += by.ns; }
+
+   private:
+    std::int64_t offset_ = 123'456'789'000;
+    double skew_ppm_;
+    std::mt19937_64 random_;
+};
+
+double error_ns(const EnvelopeFilter& filter, const Link& link, HostTime host) {
+    return static_cast<double>((filter.translate(link.board(host)).time - host).ns);
+}
+
+}  // namespace
+
+TEST_CASE("envelope_filter: nothing is known before the first exchange, and bounded after it") {
+    EnvelopeFilter filter;
+    CHECK_FALSE(filter.initialised());
+    CHECK(filter.translate({5}).state == ClockState::init);
+    Link link(30, 1);
+    const Exchange exchange = link.exchange(HostTime{1'000'000'000});
+    filter.add(exchange);
+    CHECK(filter.initialised());
+    CHECK(std::abs(error_ns(filter, link, exchange.arrived)) <= static_cast<double>(filter.last_round_trip().ns) / 2);
+    CHECK(filter.translate(exchange.answered).state == ClockState::converging);
+}
+
+TEST_CASE("envelope_filter: follows skewed clocks through delays with heavy tails") {
+    const double skew = GENERATE(-100.0, 0.0, 40.0);
+    const std::uint64_t seed = GENERATE(1U, 2U, 3U);
+    EnvelopeFilter filter;
+    Link link(skew, seed);
+    std::vector<double> errors;
+    for (HostTime t{1'000'000'000}; t.ns < 120'000'000'000; t = t + milliseconds(100)) {
+        filter.add(link.exchange(t));
+        if (t.ns > 10'000'000'000) errors.push_back(std::abs(error_ns(filter, link, t)));
+    }
+    std::sort(errors.begin(), errors.end());
+    CHECK(errors[errors.size() * 99 / 100] < 20e3);
+    CHECK(filter.skew_ppm() == Approx(-skew).margin(0.5));
+    const auto now = filter.translate(filter.last_contact());
+    CHECK(now.state == ClockState::locked);
+    CHECK(now.sigma < microseconds(40));
+    CHECK(filter.restarts() == 0);
+}
+
+TEST_CASE("envelope_filter: sigma grows without contact, and says so") {
+    EnvelopeFilter filter;
+    Link link(20, 4);
+    for (HostTime t{0}; t.ns < 20'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
+    const BoardTime last = filter.last_contact();
+    const auto at_once = filter.translate(last);
+    const auto after_10_s = filter.translate(last + seconds(10));
+    const auto after_60_s = filter.translate(last + seconds(60));
+    CHECK(after_10_s.state == ClockState::holdover);
+    CHECK(at_once.sigma < after_10_s.sigma);
+    CHECK(after_10_s.sigma < after_60_s.sigma);
+    CHECK(std::abs(error_ns(filter, link, HostTime{80'000'000'000})) < 5.0 * static_cast<double>(after_60_s.sigma.ns));
+}
+
+TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {
+    EnvelopeFilter filter;
+    Link link(20, 5);
+    HostTime t{0};
+    for (; t.ns < 30'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
+    link.jump(GENERATE(milliseconds(3), -milliseconds(700)));
+    const HostTime stepped = t;
+    for (; t < stepped + seconds(60); t = t + milliseconds(100)) filter.add(link.exchange(t));
+    CHECK(std::abs(error_ns(filter, link, t)) < 100e3);
+    CHECK(filter.restarts() >= 1);
+}
+
+TEST_CASE("envelope_filter: an exchange that took no time is not believed") {
+    EnvelopeFilter filter;
+    filter.add({{1000}, {500}, {2500}, {1500}});
+    CHECK_FALSE(filter.initialised());
+}

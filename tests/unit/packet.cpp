@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/wire/packet.hpp"
+
+#include <rapidcheck.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+using namespace versavis::wire;
+using Bytes = std::vector<std::uint8_t>;
+
+namespace {
+
+template <class T>
+Bytes encoded(const T& message, std::uint32_t nonce, std::uint32_t sequence) {
+    Frame frame{};
+    encode(message, nonce, sequence, frame);
+    return {frame.bytes, frame.bytes + frame.size};
+}
+
+std::vector<Header> decoded(Decoder& decoder, const Bytes& bytes) {
+    std::vector<Header> headers;
+    decoder.feed(bytes.data(), bytes.size(), [&](const Packet& packet) { headers.push_back(packet.header); });
+    return headers;
+}
+
+Exposure example_exposure() {
+    Exposure exposure{};
+    exposure.camera = 1;
+    exposure.flags = exposure_measured;
+    exposure.trigger = 7;
+    exposure.tick = 9;
+    exposure.trigger_ns = 1'000'000'000;
+    exposure.start_ns = 1'000'020'000;
+    exposure.end_ns = 1'003'020'000;
+    return exposure;
+}
+
+std::string hex(const Bytes& bytes) {
+    std::ostringstream out;
+    for (const std::uint8_t byte : bytes) out << std::hex << (byte >> 4U) << (byte & 15U);
+    return out.str();
+}
+
+/// The line "name: bytes" of the test vectors in the protocol document.
+std::string documented(const std::string& name) {
+    std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/wire-protocol.md");
+    for (std::string line; std::getline(document, line);)
+        if (line.rfind(name + ": ", 0) == 0) return line.substr(name.size() + 2);
+    return "not in the document";
+}
+
+}  // namespace
+
+TEST_CASE("packet: the test vectors of the document") {
+    CHECK(hex(encoded(HostHello{protocol_major, protocol_minor, {}}, 0x11223344, 0)) == documented("host-hello"));
+    CHECK(hex(encoded(example_exposure(), 0xA1B2C3D4, 5)) == documented("exposure"));
+    CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
+    CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) == documented("clock-answer"));
+}
+
+TEST_CASE("packet: comes back as it was sent") {
+    Decoder decoder;
+    Exposure out{};
+    const Bytes bytes = encoded(example_exposure(), 1, 2);
+    decoder.feed(bytes.data(), bytes.size(), [&](const Packet& packet) {
+        CHECK(packet.header.nonce == 1);
+        CHECK(packet.header.sequence == 2);
+        HostHello hello{};
+        CHECK_FALSE(packet.read(hello));
+        CHECK(packet.read(out));
+    });
+    CHECK(out.end_ns == 1'003'020'000);
+    CHECK(decoder.errors() == 0);
+}
+
+TEST_CASE("packet: each corrupted bit is noticed") {
+    const Bytes good = encoded(example_exposure(), 1, 2);
+    for (std::size_t bit = 0; bit < (good.size() - 1) * 8; ++bit) {
+        Bytes bad = good;
+        bad[bit / 8] = static_cast<std::uint8_t>(bad[bit / 8] ^ (1U << (bit % 8)));
+        Decoder decoder;
+        CHECK(decoded(decoder, bad).empty());
+    }
+}
+
+TEST_CASE("packet: a packet after rubbish is found, and the rubbish counted") {
+    CHECK(rc::check([](const Bytes& rubbish) {
+        Decoder decoder;
+        decoded(decoder, rubbish);
+        decoded(decoder, {0});
+        const auto headers = decoded(decoder, encoded(example_exposure(), 1, 2));
+        RC_ASSERT(headers.size() == 1);
+        RC_ASSERT(headers[0].type == Type::exposure);
+    }));
+    Decoder decoder;
+    decoded(decoder, Bytes(5000, 1));
+    decoded(decoder, {0});
+    CHECK(decoder.errors() == 1);
+}
+
+TEST_CASE("packet: an unknown type is passed on, a known one of the wrong size is not") {
+    std::uint8_t raw[sizeof(Header) + 3 + crc_size] = {0x70};
+    const auto send = [&](std::uint8_t type) {
+        raw[0] = type;
+        const std::uint32_t crc = crc32(raw, sizeof raw - crc_size);
+        std::memcpy(raw + sizeof raw - crc_size, &crc, crc_size);
+        Bytes bytes(cobs_bound(sizeof raw));
+        bytes.resize(cobs_encode(raw, sizeof raw, bytes.data()));
+        bytes.push_back(0);
+        return bytes;
+    };
+    Decoder decoder;
+    CHECK(decoded(decoder, send(0x70)).size() == 1);
+    CHECK(decoded(decoder, send(static_cast<std::uint8_t>(Type::exposure))).empty());
+    CHECK(decoder.errors() == 1);
+}

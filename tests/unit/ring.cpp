@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <catch2/catch.hpp>
+#include <atomic>
+#include <cstring>
+#include <thread>
+
+#include "../support/temporary_directory.hpp"
+#include "versavis/ring/reader.hpp"
+#include "versavis/ring/writer.hpp"
+
+using namespace versavis;
+using namespace versavis::ring;
+
+namespace {
+
+struct Fixture {
+    test::TemporaryDirectory directory{"/dev/shm"};
+
+    Writer inline_writer(std::uint64_t first_item = 0) {
+        return *Writer::create(directory.path(), {"numbers", StreamKind::events, 8, 0, 0, first_item});
+    }
+    Writer frame_writer(std::uint32_t slots = 4) {
+        return *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, slots, 5000});
+    }
+    Reader reader(const std::string& name, Reader::From from = Reader::From::newest) {
+        auto opened = Reader::open(directory.path() / name, from);
+        REQUIRE(opened);
+        return std::move(*opened);
+    }
+};
+
+void publish(Writer& writer, std::uint64_t value) { writer.publish(OutputTime{static_cast<std::int64_t>(value)}, {value}); }
+
+void publish_frame(Writer& writer, std::uint8_t fill) {
+    const auto slot = writer.acquire();
+    REQUIRE(slot);
+    std::memset(writer.slot_data(*slot), fill, 5000);
+    writer.publish(*slot, 5000, OutputTime{fill}, {fill});
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
+    Writer writer = inline_writer();
+    Reader reader = this->reader("numbers");
+    CHECK(reader.next().found == Found::nothing);
+    for (std::uint64_t i = 1; i <= 3; ++i) publish(writer, i);
+    for (std::uint64_t i = 1; i <= 3; ++i) {
+        const Item item = reader.next();
+        REQUIRE(item.found == Found::item);
+        CHECK(item.metadata[0] == i);
+        CHECK(item.time.ns == static_cast<std::int64_t>(i));
+        CHECK(item.number == i - 1);
+    }
+    CHECK(reader.next().found == Found::nothing);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: a lapped reader is told how much it lost and goes on half a ring back") {
+    const std::uint64_t start = GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
+    Writer writer = inline_writer(start);
+    Reader reader = this->reader("numbers");
+    for (std::uint64_t i = 0; i < 20; ++i) publish(writer, i);
+    const Item lost = reader.next();
+    REQUIRE(lost.found == Found::lost);
+    CHECK(lost.lost == 16);
+    CHECK(reader.next().metadata[0] == 16);
+    CHECK(reader.next().metadata[0] == 17);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: payloads are read in place and by copy") {
+    Writer writer = frame_writer();
+    Reader reader = this->reader("frames");
+    publish_frame(writer, 7);
+    const Item item = reader.next();
+    REQUIRE(item.found == Found::item);
+    REQUIRE(item.payload_size == 5000);
+    CHECK(static_cast<int>(item.payload[4999]) == 7);
+    CHECK(reader.intact(item));
+    std::vector<std::byte> copy(item.payload_size);
+    CHECK(reader.copy(item, copy.data()));
+    CHECK(std::all_of(copy.begin(), copy.end(), [](std::byte b) { return b == std::byte{7}; }));
+}
+
+TEST_CASE_METHOD(Fixture, "ring: a payload that the writer took back is not intact") {
+    Writer writer = frame_writer(2);
+    Reader reader = this->reader("frames");
+    publish_frame(writer, 1);
+    const Item item = reader.next();
+    REQUIRE(item.found == Found::item);
+    publish_frame(writer, 2);
+    CHECK(reader.intact(item));  // the other slot
+    const auto slot = writer.acquire();
+    CHECK_FALSE(reader.intact(item));
+    std::vector<std::byte> copy(item.payload_size);
+    CHECK_FALSE(reader.copy(item, copy.data()));
+    writer.abandon(*slot);
+    CHECK_FALSE(reader.intact(item));
+}
+
+TEST_CASE_METHOD(Fixture, "ring: items whose slot is gone count as lost") {
+    Writer writer = frame_writer(2);
+    Reader reader = this->reader("frames");
+    for (std::uint8_t i = 1; i <= 4; ++i) publish_frame(writer, i);
+    const Item lost = reader.next();
+    REQUIRE(lost.found == Found::lost);
+    const Item item = reader.next();
+    REQUIRE(item.found == Found::item);
+    CHECK(item.number == lost.lost);
+    CHECK(static_cast<std::uint64_t>(item.payload[0]) == item.number + 1);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: slots are handed out until none is left; the oldest goes first, abandoned ones before it") {
+    Writer writer = frame_writer(3);
+    const auto a = writer.acquire();
+    const auto b = writer.acquire();
+    const auto c = writer.acquire();
+    REQUIRE((a && b && c));
+    CHECK_FALSE(writer.acquire());
+    writer.publish(*b, 1, {}, {});
+    writer.publish(*a, 1, {}, {});
+    writer.abandon(*c);
+    CHECK(*writer.acquire() == *c);
+    CHECK(*writer.acquire() == *b);
+    CHECK(*writer.acquire() == *a);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: a reader sees the restart of its writer, and one that is gone for good") {
+    auto first = std::make_unique<Writer>(inline_writer());
+    Reader reader = this->reader("numbers");
+    publish(*first, 1);
+    {
+        Writer second = inline_writer();
+        publish(second, 100);
+        first.reset();  // must not take the name away from its successor
+        CHECK(reader.next().metadata[0] == 1);
+        CHECK(reader.next().found == Found::restarted);
+        const Item item = reader.next();
+        REQUIRE(item.found == Found::item);
+        CHECK(item.metadata[0] == 100);
+    }
+    CHECK(reader.next().found == Found::gone);
+    CHECK(reader.wait(milliseconds(1)).found == Found::gone);
+    CHECK_FALSE(reader.writer_alive());
+    Writer third = inline_writer();
+    publish(third, 200);
+    CHECK(reader.next().found == Found::restarted);
+    CHECK(reader.next().metadata[0] == 200);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: a waiting reader is woken [threads]", "[threads]") {
+    Writer writer = inline_writer();
+    Reader reader = this->reader("numbers");
+    std::atomic<bool> ready{false};
+    Item item;
+    std::thread waiting([&] {
+        ready = true;
+        item = reader.wait(seconds(20));
+    });
+    while (!ready) std::this_thread::yield();
+    publish(writer, 5);
+    waiting.join();
+    CHECK(item.found == Found::item);
+    CHECK(item.metadata[0] == 5);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: a reader that races with the writer never takes torn data [threads]", "[threads]") {
+    Writer writer = *Writer::create(directory.path(), {"race", StreamKind::frames, 4, 3, 4096});
+    Reader reader = this->reader("race");
+    constexpr std::uint64_t last = 20000;
+    std::atomic<bool> done{false};
+    std::thread writing([&] {
+        for (std::uint64_t i = 1; i <= last; ++i) {
+            const auto slot = writer.acquire();
+            auto* words = reinterpret_cast<std::atomic<std::uint64_t>*>(writer.slot_data(*slot));
+            for (std::size_t w = 0; w < 512; ++w) words[w].store(i, std::memory_order_relaxed);
+            Metadata metadata;
+            metadata.fill(i);
+            writer.publish(*slot, 4096, OutputTime{static_cast<std::int64_t>(i)}, metadata);
+        }
+        done = true;
+    });
+    std::uint64_t good = 0;
+    std::uint64_t newest = 0;
+    std::vector<std::uint64_t> copy(512);
+    while (newest < last && !(done && reader.head() != last)) {
+        const Item item = reader.next();
+        if (item.found != Found::item) continue;
+        for (const std::uint64_t word : item.metadata) REQUIRE(word == item.metadata[0]);
+        REQUIRE(item.time.ns == static_cast<std::int64_t>(item.metadata[0]));
+        REQUIRE(item.metadata[0] > newest);
+        newest = item.metadata[0];
+        if (!reader.copy(item, reinterpret_cast<std::byte*>(copy.data()))) continue;
+        ++good;
+        for (const std::uint64_t word : copy) REQUIRE(word == newest);
+    }
+    writing.join();
+    CHECK(good > 0);
+}
+
+TEST_CASE_METHOD(Fixture, "ring: what is no ring is refused with a reason") {
+    Writer writer = inline_writer();
+    const auto error = [&](const std::string& name) { return Reader::open(directory.path() / name).error().message(); };
+    CHECK_THAT(error("absent"), Catch::Contains("no such stream"));
+    directory.write("short", "x");
+    CHECK_THAT(error("short"), Catch::Contains("not a VersaVIS ring"));
+    directory.write("empty", "");
+    CHECK_FALSE(Reader::open(directory.path() / "empty"));
+    std::filesystem::copy_file(directory.path() / "numbers", directory.path() / "damaged");
+    {
+        std::fstream file(directory.path() / "damaged", std::ios::in | std::ios::out | std::ios::binary);
+        const std::uint64_t far = 1ULL << 40U;
+        file.seekp(offsetof(Header, descriptors_at)).write(reinterpret_cast<const char*>(&far), sizeof far);
+    }
+    CHECK_THAT(error("damaged"), Catch::Contains("damaged header"));
+    std::filesystem::copy_file(directory.path() / "numbers", directory.path() / "newer");
+    {
+        std::fstream file(directory.path() / "newer", std::ios::in | std::ios::out | std::ios::binary);
+        const std::uint32_t version = 2;
+        file.seekp(offsetof(Header, abi_major)).write(reinterpret_cast<const char*>(&version), sizeof version);
+    }
+    CHECK_THAT(error("newer"), Catch::Contains("layout version 2, this program reads version 1"));
+}
+
+TEST_CASE_METHOD(Fixture, "ring: the directory's owner must own the segment") {
+    if (geteuid() != 0) return;  // only root can give files away
+    Writer writer = inline_writer();
+    REQUIRE(chown((directory.path() / "numbers").c_str(), 12345, 12345) == 0);
+    CHECK_THAT(Reader::open(directory.path() / "numbers").error().message(), Catch::Contains("does not belong"));
+}
+
+TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
+    CHECK_FALSE(Writer::create(directory.path(), {"odd", StreamKind::events, 7}));
+    CHECK_FALSE(Writer::create(directory.path(), {"", StreamKind::events, 8}));
+    CHECK_FALSE(Writer::create(directory.path() / "absent", {"name", StreamKind::events, 8}));
+    const auto huge = Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
+    REQUIRE_FALSE(huge);
+    CHECK_THAT(huge.error().message(), Catch::Contains("/dev/shm"));
+    CHECK(std::filesystem::is_empty(directory.path()));
+}
