@@ -22,6 +22,7 @@ Duration from_us(double us) { return {std::llround(us * 1e3)}; }
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
     limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
+    limits.pattern_duration = from_us((wire::start_pattern_length + 2) * 1e6 / configuration.rate_hz);
     return limits;
 }
 
@@ -186,6 +187,7 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
     pairing_.reset();
+    pairing_.pattern_requested(host_now());  // the start that follows brings one
     unanswered_ = 0;
 }
 
@@ -194,8 +196,8 @@ bool CameraPipeline::advance(HostTime now) {
     if (ring_) ring_->heartbeat(now);
     if (!triggered()) return false;
     pairing_.advance(now);
-    if (!pairing_.wants_pattern()) return false;
-    pairing_.pattern_requested();
+    if (!pairing_.wants_pattern(now)) return false;
+    pairing_.pattern_requested(now);
     return true;
 }
 

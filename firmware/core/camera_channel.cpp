@@ -66,7 +66,8 @@ Nanoseconds CameraChannel::busy_until(Nanoseconds now) const {
     const Flight& newest = flights_[flight_count_ - 1];
     const bool started = newest.record.start_ns != wire::no_time;
     const Nanoseconds start = started ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
-    return max(start + newest.expected, started ? now : INT64_MIN);
+    const Nanoseconds end = start + newest.expected;
+    return started && end < now ? INT64_MAX / 2 : end;  // overdue: it may last for any time
 }
 
 void CameraChannel::decide(Nanoseconds now) {

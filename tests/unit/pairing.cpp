@@ -33,7 +33,9 @@ class World : public Outcome {
         : period_ns_(1e9 / rate_hz), drift_ppm_(drift_ppm), faults_(std::move(faults)), block_id_(first_block_id - 1) {}
 
     void run(std::uint64_t ticks) {
-        Pairing pairing({}, *this);
+        Limits limits;
+        limits.pattern_duration = {static_cast<std::int64_t>(22 * period_ns_)};
+        Pairing pairing(limits, *this);
         pairing_ = &pairing;
         for (std::uint64_t i = 0; i < faults_.stale_frames; ++i) deliver_stale(i);
         std::uint64_t pattern_tick = 0;
@@ -41,8 +43,8 @@ class World : public Outcome {
             const HostTime now{static_cast<std::int64_t>(1e9 + static_cast<double>(tick) * period_ns_)};
             deliver_until(now);
             pairing.advance(now);
-            if (pairing.wants_pattern()) {
-                pairing.pattern_requested();
+            if (pairing.wants_pattern(now)) {
+                pairing.pattern_requested(now);
                 pattern_tick = 0;
                 ++patterns;
             }
@@ -90,7 +92,8 @@ class World : public Outcome {
         exposure.end_on_host = end;
         exposure.exposed = !ignored || !faults_.strobe_wired;
         const Duration record_delay = faults_.record_late.count(pulse_) != 0 ? milliseconds(100) : microseconds(500);
-        if (faults_.record_lost.count(pulse_) == 0) queue_.push({end + record_delay, ++order_, false, exposure, {}});
+        record_at_ = std::max(record_at_, end + record_delay);  // the link keeps the order: later records wait, too
+        if (faults_.record_lost.count(pulse_) == 0) queue_.push({record_at_, ++order_, false, exposure, {}});
         if (pulse_ == faults_.ids_restart_at) block_id_ = 0;
         if (!ignored || faults_.ids_count_ignored) ++block_id_;
         if (ignored || faults_.frame_lost.count(pulse_) != 0) return;
@@ -152,6 +155,7 @@ class World : public Outcome {
     Pairing* pairing_ = nullptr;
     std::mt19937_64 random_{1};
     std::priority_queue<Message> queue_;
+    HostTime record_at_;
     std::uint64_t order_ = 0;
     std::uint64_t pulse_ = 0;
     std::uint64_t block_id_;
@@ -262,7 +266,7 @@ TEST_CASE("pairing: ids that begin anew are a slip that camera time repairs") {
 }
 
 TEST_CASE("pairing: random faults, many seeds: never a wrong pair, always locked again") {
-    for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
         std::mt19937_64 random(seed);
         const auto some = [&](std::uint64_t most) {
             std::set<std::uint64_t> pulses;
@@ -283,6 +287,6 @@ TEST_CASE("pairing: random faults, many seeds: never a wrong pair, always locked
         INFO("seed " << seed);
         CHECK(world.wrong == 0);
         CHECK(world.final_state == State::locked);
-        CHECK(world.published > world.sent * 2 / 3);
+        CHECK(world.published > world.sent / 2);
     }
 }

@@ -33,29 +33,49 @@ bool Pairing::arrival_possible(const Arrival& arrival, const Exposure& exposure)
     return after_end >= limits_.earliest_arrival && after_end <= limits_.latest_arrival;
 }
 
-/// Cameras count either every trigger or only those that they took: both counts are possible.
-bool Pairing::step_possible(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const {
-    if (to_trigger <= from_trigger) return false;
+/// How many faults it takes that ids step by `id_step` between these triggers. Cameras count either every trigger or
+/// only those that they took: both counts are right.
+unsigned Pairing::step_faults(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const {
+    if (to_trigger <= from_trigger || id_step == 0 || id_step > to_trigger - from_trigger) return faults_to_refute;
     std::uint64_t taken = 1;
     for (const Record& record : exposures_)
         if (record.exposure.trigger > from_trigger && record.exposure.trigger < to_trigger && record.exposure.exposed)
             ++taken;
-    // A record that was lost on the way counts as a trigger that may have been taken.
-    return id_step >= taken && id_step <= to_trigger - from_trigger;
+    return static_cast<unsigned>(taken > id_step ? taken - id_step : 0);
 }
 
-const Pairing::Record* Pairing::nearest(BoardTime start) const {
-    const Record* best = nullptr;
-    for (const Record& record : exposures_)
-        if (best == nullptr ||
-            absolute(record.exposure.start - start) < absolute(best->exposure.start - start))
-            best = &record;
-    return best;
+/// Index of the first exposure that starts after `start`.
+std::size_t Pairing::first_after(BoardTime start) const {
+    const auto later = [](BoardTime time, const Record& record) { return time < record.exposure.start; };
+    return static_cast<std::size_t>(std::upper_bound(exposures_.begin(), exposures_.end(), start, later) -
+                                    exposures_.begin());
+}
+
+/// The exposure that starts within the tolerance of `start`; null when there is none.
+const Pairing::Record* Pairing::near(BoardTime start) const {
+    const std::size_t after = first_after(start);
+    for (const std::size_t i : {after - 1, after})
+        if (i < exposures_.size() && absolute(exposures_[i].exposure.start - start).ns <= tolerance_ns())
+            return &exposures_[i];
+    return nullptr;
+}
+
+/// True when an exposure whose record never came may have started about then.
+bool Pairing::record_lost_near(BoardTime start) const {
+    const std::size_t after = first_after(start);
+    if (after == exposures_.size()) return false;
+    if (after > 0) return exposures_[after].exposure.trigger > exposures_[after - 1].exposure.trigger + 1;
+    return last_ && exposures_[after].exposure.trigger > last_->trigger + 1;
 }
 
 void Pairing::add(const Exposure& exposure) {
-    if (!exposures_.empty())
-        smallest_gap_ns_ = std::min(smallest_gap_ns_, (exposure.start - exposures_.back().exposure.start).ns);
+    if (!exposures_.empty()) {
+        const Exposure& before = exposures_.back().exposure;
+        // Records come in order; one that does not is of another life of the board, and belongs to no frame here.
+        if (exposure.trigger <= before.trigger || exposure.start <= before.start)
+            return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
+        smallest_gap_ns_ = std::min(smallest_gap_ns_, (exposure.start - before.start).ns);
+    }
     exposures_.push_back({exposure});
     if (exposures_.size() > exposures_kept)
         drop_oldest_exposure(state_ == State::searching ? EventReason::unproved : EventReason::frame_missing);
@@ -81,33 +101,56 @@ void Pairing::process() {
     }
 }
 
-/// The triggers of the waiting frames when the last of them belongs to `last`; none when something contradicts it.
-std::optional<std::vector<std::uint64_t>> Pairing::alignment(const Record& last) const {
-    const std::int64_t difference = frame_time_ns(arrivals_.back()) - last.exposure.start.ns;
-    std::vector<std::uint64_t> triggers;
-    for (std::size_t i = 0; i < arrivals_.size(); ++i) {
-        const BoardTime start{frame_time_ns(arrivals_[i]) - difference};
-        const Record* record = nearest(start);
-        if (record == nullptr || absolute(record->exposure.start - start).ns > tolerance_ns()) return std::nullopt;
-        if (!arrival_possible(arrivals_[i], record->exposure)) return std::nullopt;
+/// What must have gone wrong if the frames' clock differs from the board's by `difference_ns`. None: it cannot be.
+std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) const {
+    Alignment alignment;
+    std::uint64_t last_trigger = 0;
+    std::uint64_t last_id = 0;
+    for (const Arrival& arrival : arrivals_) {
+        const BoardTime start{frame_time_ns(arrival) - difference_ns};
+        const Record* record = near(start);
+        if (record == nullptr) {
+            if (!record_lost_near(start)) return std::nullopt;  // no pulse was sent then
+            alignment.unknown = true;
+            continue;
+        }
+        if (!arrival_possible(arrival, record->exposure)) return std::nullopt;
         const std::uint64_t trigger = record->exposure.trigger;
-        if (i > 0 && !step_possible(arrivals_[i].block_id - arrivals_[i - 1].block_id, triggers.back(), trigger))
-            return std::nullopt;
-        triggers.push_back(trigger);
+        if (last_trigger != 0) alignment.faults += step_faults(arrival.block_id - last_id, last_trigger, trigger);
+        last_trigger = trigger;
+        last_id = arrival.block_id;
+        alignment.triggers.push_back(trigger);
     }
-    return triggers;
+    return alignment;
 }
 
+/// Differences of the clocks that bring some frame and some exposure together.
+std::vector<std::int64_t> Pairing::candidate_differences() const {
+    std::vector<std::int64_t> differences;
+    for (const Arrival& arrival : arrivals_)
+        for (const Record& record : exposures_)
+            if (arrival_possible(arrival, record.exposure))
+                differences.push_back(frame_time_ns(arrival) - record.exposure.start.ns);
+    std::sort(differences.begin(), differences.end());
+    const auto same = [this](std::int64_t a, std::int64_t b) { return b - a < tolerance_ns() / 2; };
+    differences.erase(std::unique(differences.begin(), differences.end(), same), differences.end());
+    return differences;
+}
+
+/// Locks when one alignment needs no fault to explain it, and each other one at least two.
 void Pairing::search() {
     if (arrivals_.size() < frames_for_proof || exposures_.size() < frames_for_proof) return;
-    std::optional<std::vector<std::uint64_t>> found;
-    for (const Record& candidate : exposures_) {
-        auto triggers = alignment(candidate);
-        if (!triggers) continue;
-        if (found) return;  // two explanations are none
-        found = std::move(triggers);
+    // An exposure whose record is still on its way could explain the frames, too.
+    const HostTime records_complete = exposures_.back().exposure.end_on_host + Duration{smallest_gap_ns_ / 4 * 3};
+    if (arrivals_.back().arrived > records_complete) return;
+    std::optional<Alignment> found;
+    for (const std::int64_t difference : candidate_differences()) {
+        auto alignment = align(difference);
+        if (!alignment || alignment->faults >= faults_to_refute) continue;
+        if (alignment->faults > 0 || alignment->unknown || found) return;
+        found = std::move(alignment);
     }
-    if (found) accept_alignment(*found);
+    if (found) accept_alignment(found->triggers);
 }
 
 void Pairing::accept_alignment(const std::vector<std::uint64_t>& triggers) {
@@ -124,11 +167,10 @@ bool Pairing::match_front() {
     const Arrival arrival = arrivals_.front();
     const BoardTime start = expected_start(arrival);
     if (exposures_.empty() || (start - exposures_.back().exposure.start).ns > tolerance_ns()) return false;
-    const Record* record = nearest(start);
-    if (absolute(record->exposure.start - start).ns <= tolerance_ns() && !record->used &&
-        arrival_possible(arrival, record->exposure)) {
+    const Record* record = near(start);
+    if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
         decide_front(record->exposure);
-    } else if (record_lost_near(start)) {
+    } else if (record == nullptr && record_lost_near(start)) {
         drop_front(EventReason::exposure_missing);
     } else {
         // Camera time leads nowhere: what was known of the camera's clock is void.
@@ -143,7 +185,7 @@ bool Pairing::match_front() {
 /// The front frame is of this exposure by time; publish it only if the ids say the same.
 void Pairing::decide_front(const Exposure& exposure) {
     const Arrival arrival = arrivals_.front();
-    const bool agrees = step_possible(arrival.block_id - last_->block_id, last_->trigger, exposure.trigger);
+    const bool agrees = step_faults(arrival.block_id - last_->block_id, last_->trigger, exposure.trigger) == 0;
     if (state_ == State::locked && agrees) return pair_front(exposure.trigger);
     if (state_ == State::locked) slip(arrival);
     agreeing_ = agrees ? agreeing_ + 1 : 0;
@@ -161,14 +203,14 @@ BoardTime Pairing::expected_start(const Arrival& arrival) const {
     return undrifted - Duration{std::llround(drift_ * static_cast<double>((undrifted - last_->start).ns))};
 }
 
-/// True when the trigger numbers on both sides of `start` are not neighbours: the record between them was lost.
-bool Pairing::record_lost_near(BoardTime start) const {
-    std::uint64_t before = last_->trigger;
-    for (const Record& record : exposures_) {
-        if (record.exposure.start > start) return record.exposure.trigger > before + 1;
-        before = record.exposure.trigger;
-    }
-    return false;
+/// Once the pattern is over and every exposure of it is too old for a frame to come.
+bool Pairing::wants_pattern(HostTime now) const {
+    return state_ == State::searching && fruitless_ >= pattern_patience && now > next_pattern_;
+}
+
+void Pairing::pattern_requested(HostTime now) {
+    next_pattern_ = now + limits_.pattern_duration + limits_.latest_arrival;
+    fruitless_ = 0;
 }
 
 void Pairing::slip(const Arrival& arrival) {

@@ -50,7 +50,8 @@ struct Limits {
     Duration earliest_arrival = milliseconds(-5);  ///< after the end of exposure; negative: error of translation
     Duration latest_arrival = milliseconds(500);   ///< after the end of exposure
     Duration exposure_wait = milliseconds(250);    ///< how long a frame waits for its exposure's record
-    std::size_t frames_held = 4;                   ///< most frames that wait for proof
+    Duration pattern_duration = seconds(1);        ///< how long the board's start pattern takes
+    std::size_t frames_held = 6;                   ///< most frames that wait for proof
 };
 
 enum class State {
@@ -62,8 +63,8 @@ const char* to_string(State state);
 
 /// Method. A frame belongs to the exposure whose start differs from the frame's camera time by the tracked difference
 /// of the two clocks; the step of block ids must agree with the number of exposures since the last pair, and the
-/// arrival must lie in its window. The difference of the clocks is found from an irregular sequence of gaps: the only
-/// alignment of the last frames with the exposures that contradicts nothing, if there is exactly one.
+/// arrival must lie in its window. The difference of the clocks is found from an irregular sequence of gaps: it is the
+/// alignment of the last frames with the exposures that needs no fault to explain it, if every other needs two.
 /// Not thread-safe. Times only enter through the arguments.
 class Pairing {
    public:
@@ -81,8 +82,8 @@ class Pairing {
     State state() const { return state_; }
 
     /// True when regular triggers cannot lead to a lock: the board should repeat its start pattern.
-    bool wants_pattern() const { return state_ == State::searching && fruitless_ >= pattern_patience; }
-    void pattern_requested() { fruitless_ = 0; }
+    bool wants_pattern(HostTime now) const;
+    void pattern_requested(HostTime now);
 
     std::size_t waiting_frames() const { return arrivals_.size(); }
     bool camera_clock_used() const { return camera_clock_; }
@@ -90,12 +91,18 @@ class Pairing {
    private:
     static constexpr int pattern_patience = 8;
     static constexpr std::size_t frames_for_proof = 4;
+    static constexpr unsigned faults_to_refute = 2;
     static constexpr int frames_to_relock = 3;
     static constexpr std::size_t exposures_kept = 128;
 
     struct Record {
         Exposure exposure;
         bool used = false;
+    };
+    struct Alignment {
+        std::vector<std::uint64_t> triggers;  ///< of the waiting frames
+        unsigned faults = 0;                  ///< ignored triggers that nobody saw, which it takes
+        bool unknown = false;                 ///< a frame falls where a record was lost: neither proved nor refuted
     };
     struct Pair {  ///< the newest accepted match
         std::int64_t difference_ns;  ///< camera time - board time
@@ -108,16 +115,18 @@ class Pairing {
     /// Twice this is half the way between neighbouring exposures.
     std::int64_t tolerance_ns() const { return smallest_gap_ns_ / 4; }
     bool arrival_possible(const Arrival& arrival, const Exposure& exposure) const;
-    bool step_possible(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const;
-    const Record* nearest(BoardTime start) const;
-    std::optional<std::vector<std::uint64_t>> alignment(const Record& last) const;
+    unsigned step_faults(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const;
+    std::size_t first_after(BoardTime start) const;
+    const Record* near(BoardTime start) const;
+    bool record_lost_near(BoardTime start) const;
+    std::optional<Alignment> align(std::int64_t difference_ns) const;
+    std::vector<std::int64_t> candidate_differences() const;
     void search();
     void accept_alignment(const std::vector<std::uint64_t>& triggers);
     void process();
     bool match_front();
     void decide_front(const Exposure& exposure);
     BoardTime expected_start(const Arrival& arrival) const;
-    bool record_lost_near(BoardTime start) const;
     void track(const Arrival& arrival, const Exposure& exposure);
     void slip(const Arrival& arrival);
     void pair_front(std::uint64_t trigger);
@@ -134,7 +143,8 @@ class Pairing {
     std::int64_t smallest_gap_ns_ = INT64_MAX;
     double drift_ = 0;  ///< camera clock against board clock, relative
     bool camera_clock_ = true;
-    int fruitless_ = 0;
+    int fruitless_ = 0;       ///< frames that came during the search
+    HostTime next_pattern_;   ///< two patterns within one arrival window could be taken for each other
     int agreeing_ = 0;
 };
 
