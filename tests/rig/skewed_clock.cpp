@@ -14,7 +14,7 @@ std::int64_t SkewedClock::device_ns(HostTime host) const {
 
 HostTime SkewedClock::host(std::int64_t device) const {
     HostTime guess = zero_ + Duration{device - errors_.offset_ns};
-    for (int i = 0; i < 4; ++i) guess = guess + Duration{device - device_ns(guess)};  // contracts by the skew: 1e-4
+    for (int i = 0; i < 8; ++i) guess = guess + Duration{device - device_ns(guess)};  // contracts by the skew: 1e-3 at most
     return guess;
 }
 

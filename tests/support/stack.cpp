@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stack.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <stdexcept>
+
+namespace versavis::test {
+
+Stack::Stack(const StackSettings& settings) : settings_(settings) {
+    std::string scenario = "imu = \"imu0\"\n";
+    std::string configuration = fmt::format("instance = \"{}\"\n[board]\nlink = \"unix:{}\"\n", settings.name, socket_path());
+    for (unsigned i = 0; i < settings.cameras; ++i) {
+        const std::string address = fmt::format("127.0.{}.{}", settings.subnet, i + 2);
+        scenario += fmt::format("[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = 320\nheight = 240\n{2}\n",
+                                i, address, settings.camera_scenario);
+        configuration += fmt::format(
+            "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nrate_hz = {2}\nlatency_us = 20\n"
+            "packet_size = 9000\n{3}\n",
+            i, address, settings.rate_hz, settings.camera_extra);
+    }
+    configuration += "[[imu]]\nname = \"imu0\"\n";
+    scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);
+    configuration_path_ = directory_.write("versavis.toml", configuration);
+    auto loaded = rig::load_scenario(scenario_path_);
+    if (!loaded) throw std::runtime_error(loaded.error().message());
+    scenario_ = *loaded;
+}
+
+Stack::~Stack() {
+    if (service_) service_->terminate();
+    std::error_code ignored;
+    std::filesystem::remove_all(instance_directory(settings_.name), ignored);
+}
+
+void Stack::start_rig() {
+    rig_ = std::make_unique<Process>(
+        std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket", socket_path(), "--truth", truth_path()},
+        log_path("rig.log"));
+    if (!rig_->wait_for_output("rig ready", seconds(20))) throw std::runtime_error("rig: " + rig_->output());
+}
+
+void Stack::start_service() {
+    service_ = std::make_unique<Process>(std::vector<std::string>{program("versavisd"), "--config", configuration_path_},
+                                         log_path("versavisd.log"));
+    if (!service_->wait_for_output("serving instance", seconds(20))) throw std::runtime_error("service: " + service_->output());
+}
+
+void Stack::kill_service() {
+    service_->signal(SIGKILL);
+    service_->wait(seconds(10));
+}
+
+nlohmann::json Stack::wait_for_status(const std::function<bool(const nlohmann::json&)>& condition, Duration timeout) {
+    const HostTime deadline = host_now() + timeout;
+    auto stream = wait_for_stream<StatusStream>("status", settings_.name);
+    nlohmann::json document;
+    while (host_now() < deadline) {
+        const auto item = stream.wait(milliseconds(500));
+        if (item.found != Found::item) continue;
+        std::string text(item.payload_size, '\0');
+        if (!stream.copy(item, reinterpret_cast<std::byte*>(text.data()))) continue;
+        document = nlohmann::json::parse(text);
+        if (condition(document)) return document;
+    }
+    throw std::runtime_error("no such status in time; the last one: " + document.dump(1) + "\n" + service_->output());
+}
+
+int Stack::tool(const std::vector<std::string>& arguments, std::string* output) const {
+    std::vector<std::string> all{program("versavis"), "--instance", settings_.name};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return run(all, log_path("versavis.log"), output);
+}
+
+}  // namespace versavis::test

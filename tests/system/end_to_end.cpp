@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Rig, service and readers as processes, over the real protocols, held against the rig's ground truth.
+#include <signal.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+
+#include "../support/stack.hpp"
+#include "judge.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+
+rig::Verdict judge(const Stack& stack, double seconds) {
+    rig::JudgeSettings settings;
+    settings.instance = stack.instance();
+    settings.truth_path = stack.truth_path();
+    settings.seconds = seconds;
+    auto verdict = rig::judge(stack.scenario(), settings);
+    if (!verdict) FAIL(verdict.error().message());
+    INFO(rig::to_table(*verdict));
+    for (const auto& [name, stream] : verdict->streams) {
+        CHECK(stream.wrong_pairs == 0);
+        CHECK(stream.items > 0);
+    }
+    return *verdict;
+}
+
+/// Reads on until `condition` is true of an item; throws when none comes in time.
+template <class S, class Condition>
+auto read_until(S& stream, Condition condition, Duration timeout = seconds(30)) {
+    const HostTime deadline = host_now() + timeout;
+    while (host_now() < deadline) {
+        auto item = stream.wait(milliseconds(200));
+        if (condition(item)) return item;
+    }
+    throw std::runtime_error("nothing of the kind came in time");
+}
+
+bool is_item(const ring::Item& item) { return item.found == Found::item; }
+
+}  // namespace
+
+TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item") {
+    Stack stack({"e2e", 10, 2, 20, "exposure_us = 4000\nexposure_swing = 0.5\nexposure_swing_s = 3", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    const rig::Verdict verdict = judge(stack, 8);
+    CHECK(verdict.ok);
+    for (const auto& name : {"cam0", "cam1"}) {
+        CHECK(verdict.streams.at(name).lost == 0);
+        CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(0.2));
+    }
+    CHECK(verdict.streams.at("imu0").rate_hz == Approx(200).margin(2));
+
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["board"]["lost_packets"] == 0);
+    std::string output;
+    CHECK(stack.tool({"status"}, &output) == 0);
+    CHECK_THAT(output, Catch::Contains("pairing locked"));
+    CHECK(stack.tool({"list"}, &output) == 0);
+    for (const auto* name : {"cam0", "cam1", "imu0", "events", "status"}) CHECK_THAT(output, Catch::Contains(name));
+    CHECK(stack.tool({"tail", "cam0", "-n", "3", "--json"}, &output) == 0);
+    CHECK_THAT(output, Catch::Contains("\"kind\":\"measured\""));
+    CHECK(stack.tool({"tail", "imu0", "-n", "3"}, &output) == 0);
+    CHECK_THAT(output, Catch::Contains("gyro_rad_s"));
+    const std::string image = stack.log_path("image.png");
+    CHECK(stack.tool({"snapshot", "cam0", "-o", image}, &output) == 0);
+    std::ifstream png(image, std::ios::binary);
+    std::string magic(8, '\0');
+    png.read(magic.data(), 8);
+    CHECK(magic == "\x89PNG\r\n\x1a\n");
+
+    CHECK(stack.service().terminate() == 0);
+    CHECK_THAT(stack.service().output(), !Catch::Contains("CRITICAL"));
+    CHECK(stack.tool({"status"}, &output) == 69);
+    CHECK_FALSE(std::filesystem::exists(stream_path("e2e", "cam0")));
+}
+
+TEST_CASE("end to end: both cameras' frames of one tick carry the same time") {
+    Stack stack({"sync", 11, 2, 25, "exposure_us = 2000", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    auto left = wait_for_stream<FrameStream>("cam0", "sync");
+    auto right = wait_for_stream<FrameStream>("cam1", "sync");
+    const auto a = read_until(left, is_item);
+    const auto b = read_until(right, [&](const auto& item) { return is_item(item) && item.data.tick >= a.data.tick; });
+    const auto c = read_until(left, [&](const auto& item) { return is_item(item) && item.data.tick >= b.data.tick; });
+    REQUIRE(c.data.tick == b.data.tick);
+    CHECK(absolute(c.data.board_time - b.data.board_time) <= microseconds(1));
+}
+
+TEST_CASE("end to end: a reader that is killed disturbs nobody, and comes back") {
+    Stack stack({"reader", 12, 1, 50, "", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    for (int round = 0; round < 3; ++round) {
+        Process reader({program("versavis"), "--instance", "reader", "tail", "cam0"}, stack.log_path("reader.log"));
+        REQUIRE(reader.wait_for_output("trigger=", seconds(10)));
+        reader.signal(SIGKILL);
+        CHECK(reader.wait(seconds(10)) == 128 + SIGKILL);
+    }
+    CHECK(judge(stack, 2).ok);
+}
+
+TEST_CASE("end to end: the service is killed and started again while a reader waits") {
+    Stack stack({"killed", 13, 1, 20, "", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    auto stream = wait_for_stream<FrameStream>("cam0", "killed");
+    read_until(stream, is_item);
+    stack.kill_service();
+    read_until(stream, [](const auto& item) { return item.found == Found::gone; });
+    std::string output;
+    CHECK(stack.tool({"status"}, &output) == 69);
+    CHECK_THAT(output, Catch::Contains("died or hangs"));
+    stack.start_service();
+    read_until(stream, [](const auto& item) { return item.found == Found::restarted; });
+    const auto frame = read_until(stream, is_item);
+    CHECK(frame.data.stamp_kind() == StampKind::measured_middle);
+    CHECK(judge(stack, 2).ok);
+}
+
+TEST_CASE("end to end: a camera that stops answering is named, the other goes on, and it comes back") {
+    Stack stack({"mute", 14, 2, 20, "", "[[fault]]\nkind = \"camera_mute\"\ncamera = \"cam1\"\nat_exposure = 60\nseconds = 4\n", ""});
+    stack.start_rig();
+    stack.start_service();
+    const auto broken = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][1]["state"] == "silent" || s["cameras"][1]["state"] == "failed";
+    });
+    CHECK(broken["health"] == "degraded");
+    CHECK(broken["cameras"][0]["state"] == "streaming");
+    CHECK(broken["cameras"][0]["pairing"] == "locked");
+    CHECK(broken["cameras"][1]["hint"].template get<std::string>().size() > 10);
+    std::string output;
+    CHECK(stack.tool({"status"}, &output) == 1);
+    const auto again = stack.wait_for_status(healthy, seconds(60));
+    CHECK(again["cameras"][1]["connections"] >= 2);
+    CHECK(again["cameras"][0]["connections"] == 1);
+    judge(stack, 2);
+}
+
+TEST_CASE("end to end: a camera that reboots is set up anew") {
+    Stack stack({"reboot", 15, 1, 20, "", "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam0\"\nat_exposure = 60\nseconds = 1\n", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status([](const auto& s) { return s["cameras"][0]["connections"] >= 2; }, seconds(60));
+    stack.wait_for_status(healthy, seconds(60));
+    judge(stack, 2);
+}
+
+TEST_CASE("end to end: a board that resets begins a new epoch") {
+    Stack stack({"reset", 16, 2, 20, "", "[[fault]]\nkind = \"board_reset\"\ncamera = \"cam0\"\nat_exposure = 60\n", ""});
+    stack.start_rig();
+    stack.start_service();
+    auto stream = wait_for_stream<FrameStream>("cam0", "reset");
+    const auto first = read_until(stream, is_item);
+    const auto later = read_until(stream, [&](const auto& item) { return is_item(item) && item.data.epoch != first.data.epoch; });
+    CHECK(later.data.epoch == first.data.epoch + 1);
+    CHECK(later.time > first.time);
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["board"]["connections"] == 2);
+    CHECK(status["cameras"][0]["connections"] == 1);
+    judge(stack, 2);
+}
+
+TEST_CASE("end to end: lost frames and ignored triggers are records, and shift nothing") {
+    Stack stack({"faults", 17, 1, 20, "",
+                 "[[fault]]\nkind = \"drop_frame\"\ncamera = \"cam0\"\nat_exposure = 40\ncount = 2\n"
+                 "[[fault]]\nkind = \"ignore_trigger\"\ncamera = \"cam0\"\nat_exposure = 50\n", ""});
+    stack.start_rig();
+    stack.start_service();
+    auto events = wait_for_stream<EventStream>("events", "faults");
+    std::map<std::string, int> reasons;
+    while (reasons["frame_missing"] < 2 || reasons["trigger_ignored"] < 1) {
+        const auto item = read_until(events, [](const auto& e) {
+            return is_item(e) && e.data.kind == EventKind::trigger_without_frame;
+        });
+        CHECK(std::string(item.data.source_name) == "cam0");
+        ++reasons[to_string(item.data.reason)];
+    }
+    CHECK(judge(stack, 2).ok);
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["cameras"][0]["slips"] == 0);
+    CHECK(status["cameras"][0]["locks"] == 1);
+}
+
+TEST_CASE("end to end: packets that get lost are asked for again") {
+    Stack stack({"loss", 18, 1, 20, "packet_loss = 0.02", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    CHECK(judge(stack, 4).ok);
+}
+
+TEST_CASE("end to end: without a board the service says so and waits; it also stops then") {
+    Stack stack({"lonely", 19, 1, 20, "", "", ""});
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    CHECK(status["board"]["state"] == "absent");
+    CHECK_THAT(status["board"]["hint"].template get<std::string>(), Catch::Contains("is the board's process"));
+    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("no such camera"));
+    CHECK(stack.service().terminate() == 0);
+}
+
+TEST_CASE("end to end: one service per instance") {
+    Stack stack({"twice", 20, 1, 20, "", "", ""});
+    stack.start_service();
+    std::string output;
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("second.log"), &output) == 69);
+    CHECK_THAT(output, Catch::Contains("another versavisd serves this instance"));
+}
+
+TEST_CASE("end to end: a bad configuration ends with 78 and its place; a good one is said to be") {
+    Stack stack({"config", 21, 1, 20, "", "", "rate = 3\n"});
+    std::string output;
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("bad.log"), &output) == 78);
+    CHECK_THAT(output, Catch::Contains("versavis.toml:10:1: unknown key 'rate'; did you mean 'rate_hz'?"));
+    Stack good({"config2", 21, 1, 20, "", "", ""});
+    CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()}, good.log_path("ok.log"), &output) == 0);
+    CHECK(run({program("versavisd"), "--nonsense"}, good.log_path("usage.log"), &output) == 64);
+}
+
+TEST_CASE("end to end: a camera without a trigger line is stamped on arrival, and says so") {
+    // Aravis's own independent camera emulator: it has no line output and no external trigger.
+    const TemporaryDirectory directory;
+    Process camera({"arv-fake-gv-camera-0.8", "-i", "127.0.22.2", "-s", "FREE1"}, (directory.path() / "camera.log").string());
+    const std::string path = directory.write("versavis.toml",
+                                             "instance = \"free\"\n[[camera]]\nname = \"cam0\"\ndevice = \"127.0.22.2\"\n"
+                                             "trigger = \"free\"\npacket_size = 1400\n");
+    Process service({program("versavisd"), "--config", path}, (directory.path() / "service.log").string());
+    auto stream = wait_for_stream<FrameStream>("cam0", "free", seconds(30));
+    for (int i = 0; i < 5; ++i) {
+        const auto frame = read_until(stream, is_item);
+        CHECK(frame.data.stamp_kind() == StampKind::arrival);
+        CHECK(frame.data.sigma_ns == sigma_unknown);
+        CHECK(frame.data.trigger == 0);
+        CHECK(frame.data.width * frame.data.height == frame.payload_size);
+        CHECK(frame.data.arrival == frame.data.host_time);
+    }
+    CHECK(service.terminate() == 0);
+}

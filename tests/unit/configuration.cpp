@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "configuration.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "../support/temporary_directory.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+Expected<Configuration> load(const std::string& text) {
+    const test::TemporaryDirectory directory;
+    return load_configuration(directory.write("versavis.toml", text));
+}
+
+std::string error_of(const std::string& text) {
+    const auto configuration = load(text);
+    return configuration ? "no error" : configuration.error().message();
+}
+
+const std::string camera = "[[camera]]\nname = \"cam0\"\ndevice = \"10.0.0.2\"\n";
+
+}  // namespace
+
+TEST_CASE("configuration: an empty file is a service without cameras") {
+    const auto configuration = load("");
+    REQUIRE(configuration);
+    CHECK(configuration->instance == "default");
+    CHECK(configuration->board.link == "usb");
+    CHECK(configuration->cameras.empty());
+}
+
+TEST_CASE("configuration: what the board is told") {
+    const auto configuration =
+        load(camera + "output = 2\nrate_hz = 29.97\nstrobe = \"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
+    REQUIRE(configuration);
+    const wire::Configuration board = board_configuration(*configuration);
+    CHECK(board.cameras[0].flags == 0);
+    CHECK(board.cameras[2].flags == (wire::camera_enabled | wire::camera_strobe_inverted));
+    CHECK(board.cameras[2].rate_uhz == 29'970'000);
+    CHECK(board.cameras[2].latency_ns == 12'500);
+    CHECK(board.imu.kind == wire::ImuKind::adis16448b);
+    CHECK(board.imu.rate_uhz == 200'000'000);
+}
+
+TEST_CASE("configuration: features are kept in text, in their own types") {
+    const auto configuration = load(camera + "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
+    REQUIRE(configuration);
+    const auto& features = configuration->cameras[0].features;
+    const auto value = [&](const std::string& name) {
+        for (const auto& feature : features)
+            if (feature.first == name) return feature.second;
+        return std::string("absent");
+    };
+    CHECK(value("Gain") == "6.5");
+    CHECK(value("ExposureAuto") == "Off");
+    CHECK(value("ReverseX") == "true");
+    CHECK(value("Bin") == "2");
+}
+
+TEST_CASE("configuration: errors name line, column and cure") {
+    CHECK_THAT(error_of("instance = \n"), Catch::Contains("versavis.toml:1:"));
+    CHECK_THAT(error_of(camera + "rate_hzz = 20\n"),
+               Catch::Contains("versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"));
+    CHECK_THAT(error_of(camera + "rate_hz = 2000\n"), Catch::Contains("versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000"));
+    CHECK_THAT(error_of(camera + "rate_hz = \"20\"\n"), Catch::Contains("must be a number"));
+    CHECK_THAT(error_of(camera + "output = 4\n"), Catch::Contains("from 0 to 3"));
+    CHECK_THAT(error_of(camera + "trigger = \"bord\"\n"), Catch::Contains("must be one of: board, free"));
+    CHECK_THAT(error_of("[[camera]]\nname = \"cam0\"\n"), Catch::Contains("needs a 'device'"));
+    CHECK_THAT(error_of(camera + camera + "output = 1\n"), Catch::Contains("the name 'cam0' is taken"));
+    CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"), Catch::Contains("uses output 0, which is taken"));
+    CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"), Catch::Contains("is no name"));
+    CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"), Catch::Contains("is taken"));
+    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("not known"));
+    CHECK_THAT(error_of("[board]\nlink = \"tty\"\n"), Catch::Contains("unix:/path"));
+    CHECK_THAT(error_of("camera = 3\n"), Catch::Contains("array of tables"));
+    CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(), Catch::Contains("/nowhere/versavis.toml"));
+}
+
+TEST_CASE("configuration: every key of the manual is known, and its example loads") {
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/configuration.md");
+    REQUIRE(file);
+    std::stringstream text;
+    text << file.rdbuf();
+    const std::string manual = text.str();
+    const auto begin = manual.find("```toml\n") + 8;
+    const std::string example = manual.substr(begin, manual.find("```", begin) - begin);
+    CHECK(error_of(example) == "no error");
+    // The example shows every key of the tables below it, and only those.
+    const std::regex row("\\| `([a-z_]+)` \\|");
+    std::size_t rows = 0;
+    for (std::sregex_iterator it(manual.begin(), manual.end(), row), end; it != end; ++it, ++rows)
+        CHECK_THAT(example, Catch::Contains((*it)[1].str() + " = "));
+    CHECK(rows > 30);
+    const std::regex key("(?:^|\n)([a-z_]+) = ");
+    for (std::sregex_iterator it(example.begin(), example.end(), key), end; it != end; ++it)
+        CHECK_THAT(manual, Catch::Contains("| `" + (*it)[1].str() + "` |"));
+}

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "status.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "status_view.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+Status healthy() {
+    Status status;
+    status.instance = "test";
+    status.now = HostTime{60'000'000'000};
+    status.board.state = BoardState::running;
+    status.clock.state = clock::ClockState::locked;
+    CameraStatus camera;
+    camera.name = "cam0";
+    camera.camera.state = CameraState::streaming;
+    camera.pipeline.pairing = pairing::State::locked;
+    status.cameras.push_back(camera);
+    status.imus.push_back({"imu0", "adis16448b"});
+    status.streams.push_back({"cam0", "frames", 7, 20.0});
+    return status;
+}
+
+/// Names of all keys, "cameras[].state" and the like.
+void collect(const nlohmann::json& value, std::string prefix, std::vector<std::string>& keys) {
+    if (value.is_array())
+        for (const auto& entry : value) collect(entry, prefix + "[]", keys);
+    if (!value.is_object()) return;
+    for (const auto& [key, inner] : value.items()) {
+        keys.push_back(prefix.empty() ? key : prefix + "." + key);
+        collect(inner, keys.back(), keys);
+    }
+}
+
+}  // namespace
+
+TEST_CASE("status: healthy only if all that is configured delivers") {
+    CHECK(health(healthy()) == "ok");
+    Status status = healthy();
+    status.cameras[0].pipeline.pairing = pairing::State::searching;
+    CHECK(health(status) == "degraded");
+    status.now = HostTime{1'000'000'000};
+    CHECK(health(status) == "starting");
+    status = healthy();
+    status.cameras[0].triggered = false;
+    status.cameras[0].pipeline.pairing = pairing::State::searching;
+    CHECK(health(status) == "ok");
+    status.board.state = BoardState::absent;
+    CHECK(health(status) == "degraded");
+    status.board_needed = false;
+    CHECK(health(status) == "ok");
+    status = healthy();
+    status.cameras[0].camera.state = CameraState::failed;
+    CHECK(health(status) == "degraded");
+}
+
+TEST_CASE("status: every key of the document is in its manual") {
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/status.md");
+    REQUIRE(file);
+    std::stringstream manual;
+    manual << file.rdbuf();
+    std::vector<std::string> keys;
+    collect(nlohmann::json::parse(to_json(healthy())), "", keys);
+    CHECK(keys.size() > 50);
+    for (const std::string& key : keys) CHECK_THAT(manual.str(), Catch::Contains("| `" + key + "` |"));
+}
+
+TEST_CASE("status: what a device says of itself cannot break the document") {
+    Status status = healthy();
+    status.cameras[0].camera.model = "bad \xFF\xFE \"quoted\"\n";
+    const auto document = nlohmann::json::parse(to_json(status), nullptr, false);
+    CHECK_FALSE(document.is_discarded());
+}
+
+TEST_CASE("status: the text for a person names what is wrong and what to do") {
+    Status status = healthy();
+    status.cameras[0].camera.state = CameraState::failed;
+    status.cameras[0].camera.hint = "no such camera; check its cable";
+    const std::string text = client::status_text(nlohmann::json::parse(to_json(status)));
+    CHECK_THAT(text, Catch::Contains("degraded"));
+    CHECK_THAT(text, Catch::Contains("check its cable"));
+}
