@@ -19,8 +19,8 @@ bool delivers(const CameraStatus& camera) {
     return !camera.triggered || camera.pipeline.pairing == pairing::State::locked;
 }
 
-json board_json(const BoardReport& board) {
-    return {{"state", to_string(board.state)},
+json board_json(const BoardReport& board, bool needed) {
+    return {{"state", needed ? to_string(board.state) : "unused"},
             {"since_ns", board.since.ns},
             {"hint", board.hint},
             {"serial", board.serial},
@@ -106,7 +106,7 @@ std::string to_json(const Status& status) {
                         {"started_ns", status.started.ns},
                         {"host_time_ns", status.now.ns},
                         {"health", health(status)},
-                        {"board", board_json(status.board)},
+                        {"board", board_json(status.board, status.board_needed)},
                         {"clock", clock_json(status.clock)},
                         {"cameras", cameras},
                         {"imus", imus},

@@ -10,7 +10,8 @@ namespace versavis::test {
 
 Stack::Stack(const StackSettings& settings) : settings_(settings) {
     std::string scenario = "imu = \"imu0\"\n";
-    std::string configuration = fmt::format("instance = \"{}\"\n[board]\nlink = \"unix:{}\"\n", settings.name, socket_path());
+    const std::string link = settings.link.empty() ? "unix:" + socket_path() : settings.link;
+    std::string configuration = fmt::format("instance = \"{}\"\n[board]\nlink = \"{}\"\n", settings.name, link);
     for (unsigned i = 0; i < settings.cameras; ++i) {
         const std::string address = fmt::format("127.0.{}.{}", settings.subnet, i + 2);
         scenario += fmt::format("[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = 320\nheight = 240\n{2}\n",

@@ -22,6 +22,7 @@ struct StackSettings {
     std::string camera_scenario; ///< keys for each camera of the rig
     std::string faults;          ///< [[fault]] tables of the rig
     std::string camera_extra;    ///< keys for each camera of the service
+    std::string link{};          ///< of the service to the board; empty: the rig's socket
 };
 
 class Stack {

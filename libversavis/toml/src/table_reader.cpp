@@ -125,9 +125,11 @@ std::vector<const toml::table*> TableReader::tables(std::string_view key) {
 }
 
 std::string TableReader::nearest(std::string_view key) const {
-    const auto closer = [key](const std::string& a, const std::string& b) {
-        return edit_distance(key, a) < edit_distance(key, b);
+    // Somebody who left out the unit meant the key that begins the same.
+    const auto distance = [key](const std::string& known) {
+        return known.rfind(key, 0) == 0 ? 0 : edit_distance(key, known);
     };
+    const auto closer = [&](const std::string& a, const std::string& b) { return distance(a) < distance(b); };
     return *std::min_element(known_.begin(), known_.end(), closer);
 }
 

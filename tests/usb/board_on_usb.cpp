@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The unmodified service finds the board through the real libusb, on a simulated bus. Run under umockdev-wrapper.
+#include <umockdev.h>
+
+#include <catch2/catch.hpp>
+
+#include "../support/stack.hpp"
+#include "judge.hpp"
+#include "usb_bridge.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+bool board_absent(const nlohmann::json& status) { return status["board"]["state"] == "absent"; }
+
+}  // namespace
+
+TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes back") {
+    const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
+    Stack stack({"usb", 30, 1, 20, "", "", "", "usb"});
+    stack.start_rig();
+    UsbBridge bridge(testbed.get(), stack.socket_path(), "RIG0001");
+    stack.start_service();
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["board"]["serial"] == "RIG0001");
+    CHECK(bridge.line_state_set());
+
+    rig::JudgeSettings settings;
+    settings.instance = stack.instance();
+    settings.truth_path = stack.truth_path();
+    settings.seconds = 4;
+    const auto verdict = rig::judge(stack.scenario(), settings);
+    REQUIRE(verdict);
+    INFO(rig::to_table(*verdict));
+    CHECK(verdict->ok);
+
+    bridge.unplug();
+    const auto unplugged = stack.wait_for_status(board_absent);
+    CHECK(unplugged["health"] == "degraded");
+    CHECK_THAT(unplugged["board"]["hint"].get<std::string>(), Catch::Contains("plug"));
+    bridge.plug();
+    const auto again = stack.wait_for_status(healthy);
+    CHECK(again["board"]["connections"] == 2);
+    // The board ran on: its clock and numbers are still those of the first connection.
+    CHECK(again["clock"]["epoch"] == status["clock"]["epoch"]);
+    CHECK(stack.service().terminate() == 0);
+}
+
+TEST_CASE("usb: no board, or the wrong one, is said with what to do") {
+    const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
+    Stack stack({"nousb", 31, 1, 20, "", "", "", "usb"});
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    CHECK(status["board"]["state"] == "absent");
+    CHECK_THAT(status["board"]["hint"].get<std::string>(), Catch::Contains("1209:5653") && Catch::Contains("lsusb"));
+    CHECK(stack.service().terminate() == 0);
+}
