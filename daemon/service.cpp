@@ -80,9 +80,12 @@ void Service::start() {
     const bool board_needed = imu_ || std::any_of(cameras_.begin(), cameras_.end(), [](const CameraUnit& unit) {
                                   return unit.pipeline->triggered();
                               });
+    // Before the cameras make their rings: readers of streams that are no longer configured learn that they are gone.
+    std::vector<std::string> configured;
+    for (const CameraUnit& unit : cameras_) configured.push_back(unit.configuration.name);
+    directory_.remove_strangers(configured);
     if (board_needed) board_->start();
     for (CameraUnit& unit : cameras_) unit.camera->start();
-    directory_.remove_strangers();  // readers of streams that are no longer configured learn that they are gone
 }
 
 Service::~Service() {

@@ -42,7 +42,9 @@ TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     }
     auto reader = Reader::open(stranger);
     REQUIRE(reader);
-    directory->remove_strangers();
+    std::filesystem::copy_file(stranger, directory->path() / "kept");
+    directory->remove_strangers({"kept"});
+    CHECK(std::filesystem::exists(directory->path() / "kept"));
     CHECK(std::filesystem::exists(directory->path() / "own"));
     CHECK_FALSE(std::filesystem::exists(stranger));
     CHECK(reader->next().found == Found::gone);

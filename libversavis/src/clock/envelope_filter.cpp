@@ -21,6 +21,9 @@ constexpr std::uint64_t early_slots = 10;
 constexpr std::size_t innovations_kept = 31;
 constexpr double outlier_sigmas = 3.0;
 constexpr int outliers_to_restart = 4;
+constexpr std::int64_t gap_ns = 2'000'000'000;
+constexpr double impossible_sigmas = 4.0;
+constexpr int impossible_to_restart = 3;
 constexpr double locked_sigma_ns = 100e3;
 constexpr std::int64_t holdover_after_ns = 3'000'000'000;
 
@@ -53,12 +56,34 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     const Duration round_trip = (exchange.arrived - exchange.sent) - (exchange.answered - exchange.received);
     if (round_trip.ns <= 0) return;
     last_round_trip_ = round_trip;
+    const bool gap = (exchange.answered - last_contact_).ns > gap_ns;
     last_contact_ = exchange.answered;
     if (exchanges_++ == 0) return start(exchange);
+    if (gap) slot_ = {exchange.answered};  // minima from both sides of a gap do not belong together
+    if (impossible(exchange)) {
+        slot_ = {exchange.answered};
+        if (++impossible_ < impossible_to_restart) return;
+        const double error = static_cast<double>(middle(exchange.sent, exchange.arrived).ns -
+                                                 predicted_ns(middle(exchange.received, exchange.answered)));
+        if (outliers_ == 0) trusted_skew_ = state_[1];
+        advance(exchange.answered);
+        return restart(error, static_cast<double>(round_trip.ns) / 2);
+    }
+    impossible_ = 0;
     slot_.down_ns = std::min(slot_.down_ns, predicted_ns(exchange.received) - exchange.sent.ns);
     slot_.up_ns = std::min(slot_.up_ns, exchange.arrived.ns - predicted_ns(exchange.answered));
     const std::int64_t slot_length = std::min((exchange.answered - started_).ns / slots_per_age, longest_slot_ns);
     if ((exchange.answered - slot_.begin).ns >= slot_length) close_slot(exchange.answered);
+}
+
+/// True when an instant would have been seen before it happened, by more than the estimate's own error explains.
+bool EnvelopeFilter::impossible(const Exchange& exchange) const {
+    const auto up = static_cast<double>(exchange.arrived.ns - predicted_ns(exchange.answered));
+    const auto down = static_cast<double>(predicted_ns(exchange.received) - exchange.sent.ns);
+    const double dt = to_seconds(exchange.answered - reference_);
+    const double variance = covariance_(0, 0) + 2 * dt * covariance_(0, 1) + dt * dt * covariance_(1, 1) +
+                            skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
+    return std::min(up, down) < -impossible_sigmas * std::sqrt(std::max(variance, 0.0));
 }
 
 std::int64_t EnvelopeFilter::predicted_ns(BoardTime board) const {
@@ -100,11 +125,12 @@ double EnvelopeFilter::measurement_variance(std::int64_t sum_ns) const {
 void EnvelopeFilter::correct(double innovation_ns, double variance) {
     last_residual_ = {std::llround(innovation_ns)};
     variance += unexplained_variance(covariance_(0, 0) + variance);
-    innovations_.push_back(std::abs(innovation_ns));
+    innovations_.push_back(innovation_ns);
     if (innovations_.size() > innovations_kept) innovations_.pop_front();
 
     double total = covariance_(0, 0) + variance;
     const double deviation = std::abs(innovation_ns) / std::sqrt(total);
+    if (deviation > outlier_sigmas && outliers_ == 0) trusted_skew_ = state_[1];
     if (deviation > outlier_sigmas) total *= deviation / outlier_sigmas;  // Huber: influence grows no further
     const Eigen::Vector2d gain = covariance_.col(0) / total;
     state_ += gain * innovation_ns;
@@ -117,16 +143,22 @@ void EnvelopeFilter::restart_if_outliers_agree(double innovation_ns, double devi
     const bool agrees = outliers_ == 0 || innovation_ns * outlier_mean_ns_ > 0;
     outliers_ = deviation > outlier_sigmas ? (agrees ? outliers_ + 1 : 1) : 0;
     outlier_mean_ns_ = innovation_ns;
-    if (outliers_ < outliers_to_restart) return;
+    if (outliers_ == outliers_to_restart) restart(innovation_ns, std::abs(innovation_ns));
+}
+
+/// Begins anew near the newest measurement; the skew is a guess from before.
+void EnvelopeFilter::restart(double offset_change_ns, double offset_sigma_ns) {
     ++restarts_;
-    outliers_ = 0;
+    outliers_ = impossible_ = 0;
     sums_.clear();
     innovations_.clear();
     slots_ = 0;
     started_ = reference_;
-    state_[0] += innovation_ns;  // the skew is kept
-    covariance_(0, 0) = innovation_ns * innovation_ns;
-    covariance_(0, 1) = covariance_(1, 0) = 0;
+    slot_ = {reference_};
+    remember(reference_, std::llround(2 * offset_sigma_ns));
+    state_[0] += offset_change_ns;
+    state_[1] = trusted_skew_;
+    covariance_ << offset_sigma_ns * offset_sigma_ns, 0, 0, start_skew_sigma * start_skew_sigma;
 }
 
 void EnvelopeFilter::remember(BoardTime at, std::int64_t sum_ns) {
@@ -149,6 +181,9 @@ double EnvelopeFilter::unexplained_variance(double explained) const {
     if (innovations_.size() < early_slots) return 0;
     std::vector<double> sorted(innovations_.begin(), innovations_.end());
     const auto middle_at = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle_at, sorted.end());
+    const double bias = *middle_at;  // a common part is not noise: it must be followed
+    for (double& innovation : sorted) innovation = std::abs(innovation - bias);
     std::nth_element(sorted.begin(), middle_at, sorted.end());
     const double sigma = 1.4826 * *middle_at;
     return std::max(0.0, sigma * sigma - explained);

@@ -11,8 +11,7 @@ namespace {
 
 constexpr Duration wide_sandwich = microseconds(2);
 constexpr int most_tries = 8;
-constexpr Duration step_floor = microseconds(200);
-constexpr std::int64_t slew_limit_divisor = 1000;  // the kernel slews by at most 0.05 %, adjtime() included
+constexpr Duration smallest_step = microseconds(200);
 
 clockid_t clock_id(OutputClockKind kind) { return kind == OutputClockKind::tai ? CLOCK_TAI : CLOCK_REALTIME; }
 
@@ -42,7 +41,7 @@ Expected<OutputClock> OutputClock::create(OutputClockKind kind) {
 }
 
 OutputClock::OutputClock(OutputClockKind kind) : kind_(kind) {
-    last_offset_ = offset();
+    offset();
     steps_ = 0;
 }
 
@@ -50,20 +49,20 @@ Duration OutputClock::offset() {
     if (kind_ == OutputClockKind::monotonic_raw) return {};
     Duration best_width = seconds(1);
     Duration best_offset;
-    HostTime read_at;
+    Duration best_against_monotonic;
     for (int attempt = 0; attempt < most_tries && best_width > wide_sandwich; ++attempt) {
         const HostTime before = host_now();
         const std::int64_t output_ns = read_ns(clock_id(kind_));
+        const std::int64_t monotonic_ns = read_ns(CLOCK_MONOTONIC);
         const HostTime after = host_now();
         if (after - before >= best_width) continue;
         best_width = after - before;
         best_offset = {output_ns - middle(before, after).ns};
-        read_at = after;
+        best_against_monotonic = {output_ns - monotonic_ns};
     }
-    const Duration slewed = (read_at - last_read_) / slew_limit_divisor;
-    if (absolute(best_offset - last_offset_) > step_floor + slewed) ++steps_;
-    last_offset_ = best_offset;
-    last_read_ = read_at;
+    // CLOCK_MONOTONIC is slewed together with the output clock, but never stepped: what parts them is a step.
+    if (absolute(best_against_monotonic - against_monotonic_) > smallest_step) ++steps_;
+    against_monotonic_ = best_against_monotonic;
     return best_offset;
 }
 

@@ -17,8 +17,8 @@ std::uint32_t saturated(Duration sigma) {
 
 void Translator::board_restarted() {
     const std::lock_guard lock(mutex_);
+    board_lives_ += 1 + static_cast<std::uint32_t>(filter_.restarts());
     filter_ = EnvelopeFilter();
-    ++board_lives_;
 }
 
 void Translator::add(const Exchange& exchange) {

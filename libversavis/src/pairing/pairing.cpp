@@ -9,7 +9,8 @@ namespace versavis::pairing {
 
 namespace {
 
-constexpr double drift_gain = 0.05;
+constexpr double drift_gain_per_s = 0.2;
+constexpr double largest_drift_gain = 0.05;
 constexpr double largest_drift = 500e-6;
 constexpr double difference_gain = 0.25;
 
@@ -34,14 +35,15 @@ bool Pairing::arrival_possible(const Arrival& arrival, const Exposure& exposure)
 }
 
 /// How many faults it takes that ids step by `id_step` between these triggers. Cameras count either every trigger or
-/// only those that they took: both counts are right.
-unsigned Pairing::step_faults(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const {
-    if (to_trigger <= from_trigger || id_step == 0 || id_step > to_trigger - from_trigger) return faults_to_refute;
-    std::uint64_t taken = 1;
-    for (const Record& record : exposures_)
-        if (record.exposure.trigger > from_trigger && record.exposure.trigger < to_trigger && record.exposure.exposed)
-            ++taken;
-    return static_cast<unsigned>(taken > id_step ? taken - id_step : 0);
+/// only those that they took: both counts are right. A trigger without record may have been taken or not.
+unsigned Pairing::step_faults(std::uint64_t id_step, const Record& from, const Record& to) {
+    if (to.exposure.trigger <= from.exposure.trigger) return faults_to_refute;
+    const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
+    if (id_step == 0 || id_step > sent) return faults_to_refute;
+    const std::uint64_t unrecorded = sent - std::min(sent, to.recorded - from.recorded);
+    const std::uint64_t silent = to.silent - from.silent - (to.exposure.exposed ? 0 : 1);
+    const std::uint64_t taken = sent - std::min(sent - 1, unrecorded + silent);
+    return taken > id_step ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute)) : 0;
 }
 
 /// Index of the first exposure that starts after `start`.
@@ -65,7 +67,7 @@ bool Pairing::record_lost_near(BoardTime start) const {
     const std::size_t after = first_after(start);
     if (after == exposures_.size()) return false;
     if (after > 0) return exposures_[after].exposure.trigger > exposures_[after - 1].exposure.trigger + 1;
-    return last_ && exposures_[after].exposure.trigger > last_->trigger + 1;
+    return last_ && exposures_[after].exposure.trigger > last_->record.exposure.trigger + 1;
 }
 
 void Pairing::add(const Exposure& exposure) {
@@ -76,7 +78,9 @@ void Pairing::add(const Exposure& exposure) {
             return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
         smallest_gap_ns_ = std::min(smallest_gap_ns_, (exposure.start - before.start).ns);
     }
-    exposures_.push_back({exposure});
+    ++recorded_;
+    if (!exposure.exposed) ++silent_;
+    exposures_.push_back({exposure, false, recorded_, silent_});
     if (exposures_.size() > exposures_kept)
         drop_oldest_exposure(state_ == State::searching ? EventReason::unproved : EventReason::frame_missing);
     process();
@@ -86,7 +90,8 @@ void Pairing::add(const Arrival& arrival) {
     if (state_ == State::searching) {
         ++fruitless_;
         const bool has_clock = arrival.camera_time.ns != 0;
-        if (arrivals_.empty()) camera_clock_ = has_clock;
+        while (has_clock != camera_clock_ && !arrivals_.empty()) drop_front(EventReason::unproved);
+        camera_clock_ = has_clock;
         if (arrivals_.size() == std::max(limits_.frames_held, frames_for_proof)) drop_front(EventReason::unproved);
     } else if (arrivals_.size() == limits_.frames_held) {
         drop_front(EventReason::exposure_missing);
@@ -104,7 +109,7 @@ void Pairing::process() {
 /// What must have gone wrong if the frames' clock differs from the board's by `difference_ns`. None: it cannot be.
 std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) const {
     Alignment alignment;
-    std::uint64_t last_trigger = 0;
+    const Record* last = nullptr;
     std::uint64_t last_id = 0;
     for (const Arrival& arrival : arrivals_) {
         const BoardTime start{frame_time_ns(arrival) - difference_ns};
@@ -114,12 +119,11 @@ std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) con
             alignment.unknown = true;
             continue;
         }
-        if (!arrival_possible(arrival, record->exposure)) return std::nullopt;
-        const std::uint64_t trigger = record->exposure.trigger;
-        if (last_trigger != 0) alignment.faults += step_faults(arrival.block_id - last_id, last_trigger, trigger);
-        last_trigger = trigger;
+        if (record->used || !arrival_possible(arrival, record->exposure)) return std::nullopt;
+        if (last != nullptr) alignment.faults += step_faults(arrival.block_id - last_id, *last, *record);
+        last = record;
         last_id = arrival.block_id;
-        alignment.triggers.push_back(trigger);
+        alignment.triggers.push_back(record->exposure.trigger);
     }
     return alignment;
 }
@@ -150,13 +154,28 @@ void Pairing::search() {
         if (alignment->faults > 0 || alignment->unknown || found) return;
         found = std::move(alignment);
     }
-    if (found) accept_alignment(found->triggers);
+    if (found && irregular(found->triggers.front(), found->triggers.back())) accept_alignment(found->triggers);
+}
+
+/// Regular triggers prove nothing: the true exposures may be those whose records are missing at either end.
+bool Pairing::irregular(std::uint64_t first, std::uint64_t last) const {
+    std::int64_t shortest = INT64_MAX;
+    std::int64_t longest = 0;
+    for (std::size_t i = 1; i < exposures_.size(); ++i) {
+        const Exposure& before = exposures_[i - 1].exposure;
+        const Exposure& after = exposures_[i].exposure;
+        if (before.trigger < first || after.trigger > last || after.trigger != before.trigger + 1) continue;
+        shortest = std::min(shortest, (after.start - before.start).ns);
+        longest = std::max(longest, (after.start - before.start).ns);
+    }
+    return longest > shortest + 2 * tolerance_ns();
 }
 
 void Pairing::accept_alignment(const std::vector<std::uint64_t>& triggers) {
     state_ = State::locked;
     drift_ = 0;
     last_.reset();
+    proved_.reset();
     forget_exposures_before(triggers.front(), EventReason::unproved);
     outcome_.locked(exposures_.front().exposure);
     for (const std::uint64_t trigger : triggers) pair_front(trigger);
@@ -166,41 +185,55 @@ void Pairing::accept_alignment(const std::vector<std::uint64_t>& triggers) {
 bool Pairing::match_front() {
     const Arrival arrival = arrivals_.front();
     const BoardTime start = expected_start(arrival);
-    if (exposures_.empty() || (start - exposures_.back().exposure.start).ns > tolerance_ns()) return false;
+    if (exposures_.empty()) return false;
+    const Exposure& newest = exposures_.back().exposure;
+    if ((start - newest.start).ns > tolerance_ns()) {
+        const HostTime on_host = newest.end_on_host + (start - newest.end);
+        if (arrival.arrived - on_host >= limits_.earliest_arrival) return false;
+        search_anew(arrival);  // it would have arrived before it was exposed
+        return true;
+    }
     const Record* record = near(start);
     if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
-        decide_front(record->exposure);
+        decide_front(*record);
     } else if (record == nullptr && record_lost_near(start)) {
         drop_front(EventReason::exposure_missing);
     } else {
-        // Camera time leads nowhere: what was known of the camera's clock is void.
-        slip(arrival);
-        state_ = State::searching;
-        fruitless_ = pattern_patience;
-        drop_front(EventReason::mismatch);
+        search_anew(arrival);
     }
     return true;
 }
 
-/// The front frame is of this exposure by time; publish it only if the ids say the same.
-void Pairing::decide_front(const Exposure& exposure) {
+/// What was known of the camera's clock, or of its ids, is void.
+void Pairing::search_anew(const Arrival& arrival) {
+    if (state_ == State::locked) slip(arrival);
+    state_ = State::searching;
+    fruitless_ = pattern_patience;
+    drop_front(EventReason::mismatch);
+}
+
+/// The front frame is of this exposure by time; publish it only if the ids say the same. They are counted from the
+/// newest frame that was published: counted from the one before, a clock that stepped by a period agrees with itself.
+void Pairing::decide_front(const Record& record) {
     const Arrival arrival = arrivals_.front();
-    const bool agrees = step_faults(arrival.block_id - last_->block_id, last_->trigger, exposure.trigger) == 0;
-    if (state_ == State::locked && agrees) return pair_front(exposure.trigger);
+    const bool agrees = step_faults(arrival.block_id - proved_->block_id, proved_->record, record) == 0;
+    if (state_ == State::locked && agrees) return pair_front(record.exposure.trigger);
     if (state_ == State::locked) slip(arrival);
     agreeing_ = agrees ? agreeing_ + 1 : 0;
+    disagreeing_ = agrees ? 0 : disagreeing_ + 1;
+    if (disagreeing_ >= frames_to_relock) return search_anew(arrival);
     if (agreeing_ >= frames_to_relock) {
         state_ = State::locked;
-        outcome_.locked(exposure);
-        return pair_front(exposure.trigger);
+        outcome_.locked(record.exposure);
+        return pair_front(record.exposure.trigger);
     }
-    track(arrival, exposure);
+    track(arrival, record);
     drop_front(EventReason::unproved);
 }
 
 BoardTime Pairing::expected_start(const Arrival& arrival) const {
     const BoardTime undrifted{frame_time_ns(arrival) - last_->difference_ns};
-    return undrifted - Duration{std::llround(drift_ * static_cast<double>((undrifted - last_->start).ns))};
+    return undrifted - Duration{std::llround(drift_ * static_cast<double>((undrifted - last_->record.exposure.start).ns))};
 }
 
 /// Once the pattern is over and every exposure of it is too old for a frame to come.
@@ -215,22 +248,26 @@ void Pairing::pattern_requested(HostTime now) {
 
 void Pairing::slip(const Arrival& arrival) {
     state_ = State::checking;
-    agreeing_ = 0;
+    agreeing_ = disagreeing_ = 0;
     outcome_.slipped(arrival);
 }
 
 /// Follows the difference of the two clocks and its rate.
-void Pairing::track(const Arrival& arrival, const Exposure& exposure) {
+void Pairing::track(const Arrival& arrival, const Record& record) {
+    const Exposure& exposure = record.exposure;
     const std::int64_t difference = frame_time_ns(arrival) - exposure.start.ns;
     if (!last_) {
-        last_ = Pair{difference, arrival.block_id, exposure.trigger, exposure.start};
+        last_ = Pair{difference, arrival.block_id, record};
         return;
     }
-    const auto elapsed = static_cast<double>((exposure.start - last_->start).ns);
+    const auto elapsed = static_cast<double>((exposure.start - last_->record.exposure.start).ns);
     const double surprise = static_cast<double>(difference - last_->difference_ns) - drift_ * elapsed;
-    if (elapsed > 0) drift_ = std::clamp(drift_ + drift_gain * surprise / elapsed, -largest_drift, largest_drift);
+    if (elapsed > 0 && camera_clock_) {
+        const double gain = std::min(drift_gain_per_s * elapsed * 1e-9, largest_drift_gain);
+        drift_ = std::clamp(drift_ + gain * surprise / elapsed, -largest_drift, largest_drift);
+    }
     const double smoothed = drift_ * elapsed + difference_gain * surprise;
-    last_ = Pair{last_->difference_ns + std::llround(smoothed), arrival.block_id, exposure.trigger, exposure.start};
+    last_ = Pair{last_->difference_ns + std::llround(smoothed), arrival.block_id, record};
 }
 
 void Pairing::pair_front(std::uint64_t trigger) {
@@ -239,7 +276,8 @@ void Pairing::pair_front(std::uint64_t trigger) {
     forget_exposures_before(trigger, EventReason::frame_missing);
     Record& record = exposures_.front();
     record.used = true;
-    track(arrival, record.exposure);
+    track(arrival, record);
+    proved_ = last_;
     outcome_.paired(arrival, record.exposure);
 }
 
@@ -277,6 +315,7 @@ void Pairing::reset() {
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     state_ = State::searching;
     last_.reset();
+    proved_.reset();
     fruitless_ = 0;
     smallest_gap_ns_ = INT64_MAX;
 }

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -49,12 +50,13 @@ OwnedDirectory::~OwnedDirectory() {
     if (lock_ >= 0) ::close(lock_);
 }
 
-void OwnedDirectory::remove_strangers() const {
+void OwnedDirectory::remove_strangers(const std::vector<std::string>& keep) const {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
-        if (entry.path().filename() == lock_name) continue;
+        const std::string name = entry.path().filename();
+        if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
         auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
-        if (segment && segment->header().writer_pid == static_cast<std::uint32_t>(::getpid())) continue;
+        if (segment && is_own(segment->header())) continue;
         std::filesystem::remove(entry.path(), error);
         if (segment) retire(segment->header(), WriterState::closed);
     }

@@ -32,6 +32,14 @@ void copy_words(const std::byte* source, std::byte* destination, std::size_t siz
     }
 }
 
+/// Tells a segment from its successor of the same name, without mapping it.
+using FileId = std::pair<dev_t, ino_t>;
+
+FileId file_id(const std::filesystem::path& path) {
+    struct stat file {};
+    return ::stat(path.c_str(), &file) == 0 ? FileId{file.st_dev, file.st_ino} : FileId{};
+}
+
 Expected<> check_owner(const std::filesystem::path& path) {
     struct stat file {};
     struct stat directory {};
@@ -50,13 +58,15 @@ Expected<> check_owner(const std::filesystem::path& path) {
 
 struct Reader::Segment {
     Mapping mapping;
+    FileId file;
 };
 
 Expected<std::unique_ptr<Reader::Segment>> Reader::map(const std::filesystem::path& path) {
     if (auto owner = check_owner(path); !owner) return tl::unexpected(owner.error());
+    const FileId file = file_id(path);  // before the mapping: a successor in between is seen as one
     auto mapping = Mapping::open(path, Mapping::Access::read_only);
     if (!mapping) return tl::unexpected(mapping.error());
-    return std::make_unique<Segment>(Segment{std::move(*mapping)});
+    return std::make_unique<Segment>(Segment{std::move(*mapping), file});
 }
 
 Expected<Reader> Reader::open(const std::filesystem::path& path, From from) {
@@ -140,8 +150,10 @@ Item Reader::next() {
 Item Reader::idle() {
     Item item;
     const Header& header = segment_->mapping.header();
-    if (header.state.load(std::memory_order_acquire) == static_cast<std::uint32_t>(WriterState::live)) return item;
+    // A writer that was killed never marked its segment: its silence counts, too.
+    if (writer_alive()) return item;
     item.found = Found::gone;
+    if (file_id(path_) == segment_->file) return item;
     auto successor = map(path_);
     if (!successor || (*successor)->mapping.header().generation == header.generation) return item;
     segment_ = std::move(*successor);
@@ -160,7 +172,6 @@ Item Reader::wait(Duration timeout) {
         const std::int64_t left_ns = (deadline - host_now()).ns;
         if (final_result) return item;
         if (left_ns <= 0) {
-            if (item.found == Found::nothing && !writer_alive()) item.found = Found::gone;
             return item;
         }
         futex_wait(wake, seen, std::min(left_ns, longest_wait_ns));
@@ -169,6 +180,7 @@ Item Reader::wait(Duration timeout) {
 
 bool Reader::intact(const Item& item) const {
     if (item.slot == no_slot) return true;
+    if (item.slot >= segment_->mapping.header().slot_count) return false;  // of a segment before this one
     std::atomic_thread_fence(std::memory_order_acquire);
     return segment_->mapping.generation(item.slot).load(std::memory_order_relaxed) == item.slot_generation;
 }

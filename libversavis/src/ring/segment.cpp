@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include <boost/interprocess/exceptions.hpp>
+#include <cstdlib>
 #include <ctime>
+#include <fstream>
 
 namespace versavis::ring {
 
@@ -27,7 +29,7 @@ bool well_formed(const Header& header, std::size_t size) {
            header.generations_at % generation_stride == 0 && header.slots_at % page_size == 0 &&
            inside(header.descriptors_at, descriptors, sizeof(Descriptor), size) &&
            inside(header.generations_at, header.slot_count, generation_stride, size) &&
-           inside(header.slots_at, header.slot_count, header.slot_size, size) &&
+           header.slot_size % page_size == 0 && inside(header.slots_at, header.slot_count, header.slot_size, size) &&
            header.name[sizeof header.name - 1] == '\0';
 }
 
@@ -59,6 +61,20 @@ Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access
                        "install service and clients of the same release");
     if (!well_formed(header, mapping->size())) return failure(path.string(), "has a damaged header");
     return mapping;
+}
+
+std::uint64_t start_ticks_of_this_process() {
+    std::ifstream stat("/proc/self/stat");
+    std::string line;
+    std::getline(stat, line);
+    std::size_t at = line.rfind(')');  // the command may contain blanks
+    for (int field = 3; field <= 22 && at != std::string::npos; ++field) at = line.find(' ', at + 1);
+    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
+}
+
+bool is_own(const Header& header) {
+    return header.writer_pid == static_cast<std::uint32_t>(::getpid()) &&
+           header.writer_start_ticks == start_ticks_of_this_process();
 }
 
 void retire(Header& header, WriterState state) {

@@ -39,6 +39,12 @@ class Mapping {
     boost::interprocess::mapped_region region_;
 };
 
+/// Field 22 of /proc/self/stat: with the process id, tells this process from all before it.
+std::uint64_t start_ticks_of_this_process();
+
+/// True when this process made the segment.
+bool is_own(const Header& header);
+
 /// Marks a segment that some writer left behind as `state` and wakes its readers.
 void retire(Header& header, WriterState state);
 

@@ -38,17 +38,6 @@ std::uint64_t round_up(std::uint64_t value, std::uint64_t multiple) { return (va
 
 std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
 
-std::uint64_t start_ticks_of_this_process() {
-    std::ifstream stat("/proc/self/stat");
-    std::string line;
-    std::getline(stat, line);
-    const auto command_end = line.rfind(')');  // the command may contain blanks
-    if (command_end == std::string::npos) return 0;
-    std::size_t at = command_end;
-    for (int field = 3; field <= 22; ++field) at = line.find(' ', at + 1);
-    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
-}
-
 void read_boot_id(std::uint8_t (&boot_id)[16]) {
     std::ifstream file("/proc/sys/kernel/random/boot_id");
     std::string text;

@@ -63,6 +63,8 @@ class EnvelopeFilter {
     };
 
     void start(const Exchange& exchange);
+    bool impossible(const Exchange& exchange) const;
+    void restart(double offset_change_ns, double offset_sigma_ns);
     std::int64_t predicted_ns(BoardTime board) const;
     void close_slot(BoardTime now);
     void advance(BoardTime to);
@@ -88,6 +90,8 @@ class EnvelopeFilter {
     std::deque<double> innovations_;     ///< of the last slots, absolute
     double outlier_mean_ns_ = 0;
     int outliers_ = 0;
+    int impossible_ = 0;
+    double trusted_skew_ = 0;  ///< before the first of the outliers
     std::uint64_t slots_ = 0;
     std::uint64_t exchanges_ = 0;
     std::uint64_t restarts_ = 0;

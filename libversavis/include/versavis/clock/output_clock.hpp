@@ -30,8 +30,7 @@ class OutputClock {
     explicit OutputClock(OutputClockKind kind);
 
     OutputClockKind kind_;
-    Duration last_offset_;
-    HostTime last_read_;
+    Duration against_monotonic_;
     std::uint32_t steps_ = 0;
 };
 

@@ -25,7 +25,7 @@ struct ClockReport {
     ClockState state = ClockState::init;
     OutputClockKind output = OutputClockKind::realtime;
     Duration sigma;
-    Duration bound;  ///< no error can be larger than this, whatever the asymmetry of the link
+    Duration bound;  ///< what the asymmetry of the link can make of an error at most
     Duration residual;
     Duration round_trip;
     Duration smallest_round_trip;
@@ -60,12 +60,14 @@ class Translator {
     ClockReport report();
 
    private:
-    std::uint32_t epoch() const { return board_lives_ + output_.steps(); }
+    std::uint32_t epoch() const {
+        return board_lives_ + output_.steps() + static_cast<std::uint32_t>(filter_.restarts());
+    }
 
     mutable std::mutex mutex_;
     EnvelopeFilter filter_;
     OutputClock output_;
-    std::uint32_t board_lives_ = 0;
+    std::uint32_t board_lives_ = 0;  ///< and restarts of the filters of earlier ones
 };
 
 }  // namespace versavis::clock

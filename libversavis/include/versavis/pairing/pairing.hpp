@@ -98,6 +98,8 @@ class Pairing {
     struct Record {
         Exposure exposure;
         bool used = false;
+        std::uint64_t recorded = 0;  ///< records until this one, itself included
+        std::uint64_t silent = 0;    ///< those of them without an exposure
     };
     struct Alignment {
         std::vector<std::uint64_t> triggers;  ///< of the waiting frames
@@ -107,15 +109,14 @@ class Pairing {
     struct Pair {  ///< the newest accepted match
         std::int64_t difference_ns;  ///< camera time - board time
         std::uint64_t block_id;
-        std::uint64_t trigger;
-        BoardTime start;
+        Record record;
     };
 
     std::int64_t frame_time_ns(const Arrival& arrival) const;
     /// Twice this is half the way between neighbouring exposures.
     std::int64_t tolerance_ns() const { return smallest_gap_ns_ / 4; }
     bool arrival_possible(const Arrival& arrival, const Exposure& exposure) const;
-    unsigned step_faults(std::uint64_t id_step, std::uint64_t from_trigger, std::uint64_t to_trigger) const;
+    static unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to);
     std::size_t first_after(BoardTime start) const;
     const Record* near(BoardTime start) const;
     bool record_lost_near(BoardTime start) const;
@@ -125,9 +126,11 @@ class Pairing {
     void accept_alignment(const std::vector<std::uint64_t>& triggers);
     void process();
     bool match_front();
-    void decide_front(const Exposure& exposure);
+    void decide_front(const Record& record);
+    bool irregular(std::uint64_t first, std::uint64_t last) const;
+    void search_anew(const Arrival& arrival);
     BoardTime expected_start(const Arrival& arrival) const;
-    void track(const Arrival& arrival, const Exposure& exposure);
+    void track(const Arrival& arrival, const Record& record);
     void slip(const Arrival& arrival);
     void pair_front(std::uint64_t trigger);
     void drop_front(EventReason reason);
@@ -140,6 +143,10 @@ class Pairing {
     std::deque<Record> exposures_;
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::optional<Pair> last_;
+    std::optional<Pair> proved_;  ///< the newest that was published
+    std::uint64_t recorded_ = 0;
+    std::uint64_t silent_ = 0;
+    int disagreeing_ = 0;
     std::int64_t smallest_gap_ns_ = INT64_MAX;
     double drift_ = 0;  ///< camera clock against board clock, relative
     bool camera_clock_ = true;

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "versavis/error.hpp"
 
@@ -18,8 +20,9 @@ class OwnedDirectory {
     OwnedDirectory& operator=(OwnedDirectory&&) = delete;
     ~OwnedDirectory();  ///< releases the lock
 
-    /// Retires and removes the segments that were not made by this process.
-    void remove_strangers() const;
+    /// Retires and removes the segments that were not made by this process, but for those of the names in `keep`:
+    /// their readers are handed over when the segment is made anew.
+    void remove_strangers(const std::vector<std::string>& keep) const;
 
     const std::filesystem::path& path() const { return path_; }
 

@@ -27,7 +27,7 @@ struct Item {
     std::uint64_t number = 0;  ///< item number since the segment was made
     OutputTime time;
     Metadata metadata{};
-    const std::byte* payload = nullptr;  ///< in the ring: check Reader::intact() after reading it
+    const std::byte* payload = nullptr;  ///< in the ring, until the next call; check intact() after reading
     std::uint32_t payload_size = 0;
     std::uint32_t slot = no_slot;
     std::uint64_t slot_generation = 0;
