@@ -165,7 +165,9 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(ArvCamera* camera, 
 
 AravisStream::~AravisStream() {
     closing_ = true;  // buffers that Aravis flushes are not frames
-    stream_.reset();  // waits for the stream's thread: nobody writes into the slots any more
+    // Waits for the stream's thread, which may still read stream_: then nobody writes into the slots any more.
+    g_object_unref(stream_.get());
+    static_cast<void>(stream_.release());
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }
 
@@ -210,8 +212,9 @@ EventReason AravisStream::refusal(ArvBuffer* buffer) const {
     if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) return EventReason::frame_incomplete;
     std::size_t size = 0;
     arv_buffer_get_data(buffer, &size);
-    const bool whole = size == payload_ && arv_buffer_get_image_width(buffer) > 0 &&
-                       payload_ % static_cast<std::uint64_t>(arv_buffer_get_image_height(buffer)) == 0;
+    const gint height = arv_buffer_get_image_height(buffer);
+    const bool whole = size == payload_ && arv_buffer_get_image_width(buffer) > 0 && height > 0 &&
+                       payload_ % static_cast<std::uint64_t>(height) == 0;
     return whole ? EventReason::none : EventReason::wrong_size;
 }
 

@@ -13,6 +13,7 @@ constexpr Duration silence_limit = seconds(3);  // the board reports its health 
 constexpr Duration request_timeout = milliseconds(500);
 constexpr unsigned exchanges_to_start = 4;
 constexpr Duration longest_read = milliseconds(100);
+constexpr Duration largest_clock_surprise = milliseconds(500);
 
 const char* field_name(wire::ConfigurationField field) {
     using Field = wire::ConfigurationField;
@@ -105,6 +106,7 @@ void BoardLink::run() {
             host_sequence_ = 0;
         }
         const auto ended = serve();
+        accepting_ = false;
         if (connected_) listener_.board_lost();
         connected_ = false;
         if (ended) send(wire::Stop{0xFF, {}});  // asked to stop: leave no camera triggered
@@ -126,6 +128,7 @@ Expected<> BoardLink::serve() {
     if (auto done = synchronise(); !done) return done;
     set_state(BoardState::running, "");
     connected_ = true;
+    accepting_ = true;
     listener_.board_connected();
     while (!stop_) {
         const HostTime now = host_now();
@@ -219,8 +222,10 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         greeted_ = true;
         nonce_ = packet.header.nonce;
         next_sequence_ = packet.header.sequence + 1;
-        // Every connection begins an epoch: nothing proves that the board ran on in between, but its nonce.
-        if (nonce_ != last_life_) translator_.board_restarted();
+        if (!same_life(packet.header, received)) {
+            listener_.board_restarted();
+            translator_.board_restarted();
+        }
         last_life_ = nonce_;
         return;
     }
@@ -249,6 +254,13 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         const std::lock_guard lock(report_mutex_);
         report_.health = health;
     }
+}
+
+/// The nonce says so, and the clock must agree: a nonce could be drawn twice.
+bool BoardLink::same_life(const wire::Header& header, HostTime received) const {
+    if (header.nonce != last_life_) return false;
+    const auto expected = translator_.to_host(BoardTime{hello_.board_time_ns});
+    return !expected || absolute(received - expected->time) < largest_clock_surprise;
 }
 
 void BoardLink::count_losses(const wire::Header& header) {
@@ -291,6 +303,7 @@ Expected<> BoardLink::send(const T& message) {
 }
 
 void BoardLink::start_cameras(std::uint8_t mask, bool pattern) {
+    if (!accepting_) return;  // board_connected() starts what streams by then
     wire::Start message{};
     message.cameras = mask;
     message.flags = pattern ? std::uint8_t{wire::start_pattern} : std::uint8_t{0};

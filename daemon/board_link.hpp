@@ -23,6 +23,7 @@ namespace versavis::daemon {
 class BoardListener {
    public:
     virtual ~BoardListener() = default;
+    virtual void board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
     virtual void board_connected() = 0;  ///< configured, its clock known: cameras may be started
     virtual void board_lost() = 0;
     virtual void exposure(const wire::Exposure& record) = 0;
@@ -65,6 +66,7 @@ class BoardLink {
     void stop_cameras(std::uint8_t mask);
 
     BoardReport report() const;
+    bool running() const { return accepting_; }
 
    private:
     void run();
@@ -75,6 +77,7 @@ class BoardLink {
     Expected<> read(Duration timeout);
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
+    bool same_life(const wire::Header& header, HostTime received) const;
     void take_answer(const wire::ClockAnswer& answer, HostTime received);
     void count_losses(const wire::Header& header);
     Expected<> request_clock();
@@ -116,6 +119,7 @@ class BoardLink {
     mutable std::mutex report_mutex_;
     BoardReport report_;
     std::atomic<bool> stop_{false};
+    std::atomic<bool> accepting_{false};  ///< configured: cameras may be started
     std::thread thread_;
 };
 

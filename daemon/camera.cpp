@@ -40,12 +40,14 @@ void Camera::start() {
     thread_ = std::thread([this] { run(); });
 }
 
-void Camera::stop() {
-    {
-        const std::lock_guard lock(mutex_);
-        stop_ = true;
-    }
+void Camera::request_stop() {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
     wake_.notify_all();
+}
+
+void Camera::stop() {
+    request_stop();
     if (thread_.joinable()) thread_.join();
 }
 
@@ -78,12 +80,10 @@ void Camera::run() {
     do {
         const HostTime begin = host_now();
         const auto ended = session();
-        if (streaming_.exchange(false)) hooks_.lost();
         if (ended) return;
         const bool ran = host_now() - begin > longest_retry;
         retry = ran ? first_retry : std::min(retry * 2, longest_retry);
-        set_state(report().state == CameraState::streaming ? CameraState::silent : CameraState::failed,
-                  ended.error().message());
+        set_state(CameraState::failed, ended.error().message());
     } while (pause(retry));
 }
 
@@ -92,17 +92,40 @@ Expected<> Camera::session() {
     ControlLost control_lost{false};  // outlives the camera, whose heartbeat thread sets it
     auto camera = open_camera(configuration_.device);
     if (!camera) return tl::unexpected(camera.error());
+    if (!pause({})) return {};
     ArvDevice* device = arv_camera_get_device(camera->get());
     g_signal_connect(device, "control-lost", G_CALLBACK(on_control_lost), &control_lost);
     if (auto done = configure_camera(camera->get(), configuration_); !done) return done;
-    const guint payload = arv_camera_get_payload(camera->get(), nullptr);
+    describe(camera->get());
+    return stream(camera->get(), control_lost);
+}
+
+void Camera::describe(ArvCamera* camera) {
+    // Registers are read before the lock is taken: a mute camera blocks for seconds.
+    const char* model = arv_camera_get_model_name(camera, nullptr);
+    const char* serial = arv_camera_get_device_serial_number(camera, nullptr);
+    const std::lock_guard lock(mutex_);
+    report_.model = model != nullptr ? model : "";
+    report_.serial = serial != nullptr ? serial : "";
+}
+
+/// The board and the status learn it before Aravis takes its time to let the camera go.
+void Camera::lose() {
+    streaming_ = false;
+    hooks_.lost();
+}
+
+Expected<> Camera::stream(ArvCamera* camera, const std::atomic<bool>& control_lost) {
+    const guint payload = arv_camera_get_payload(camera, nullptr);
     if (payload == 0) return failure(configuration_.name, "the camera does not say how large its frames are");
     if (auto done = pipeline_.prepare(ring_directory_, payload); !done) return done;
     pipeline_.reset();
-    auto stream = AravisStream::create(camera->get(), configuration_, pipeline_, payload);
+    auto stream = AravisStream::create(camera, configuration_, pipeline_, payload);
     if (!stream) return tl::unexpected(stream.error());
+    const bool gige = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
+    const guint packet_size = gige ? arv_camera_gv_get_packet_size(camera, nullptr) : 0;
     GError* error = nullptr;
-    arv_camera_start_acquisition(camera->get(), &error);
+    arv_camera_start_acquisition(camera, &error);
     if (error != nullptr) {
         const std::string reason = error->message;
         g_clear_error(&error);
@@ -110,11 +133,7 @@ Expected<> Camera::session() {
     }
     {
         const std::lock_guard lock(mutex_);
-        const char* model = arv_camera_get_model_name(camera->get(), nullptr);
-        const char* serial = arv_camera_get_device_serial_number(camera->get(), nullptr);
-        report_.model = model != nullptr ? model : "";
-        report_.serial = serial != nullptr ? serial : "";
-        report_.packet_size = ARV_IS_GV_DEVICE(device) ? arv_camera_gv_get_packet_size(camera->get(), nullptr) : 0;
+        report_.packet_size = packet_size;
         ++report_.connections;
     }
     set_state(CameraState::streaming, "");
@@ -123,13 +142,18 @@ Expected<> Camera::session() {
     const HostTime began = host_now();
     while (pause((*stream)->needs_polling() ? Duration{} : step)) {
         if ((*stream)->needs_polling()) (*stream)->poll(step);
-        if (control_lost) return failure(configuration_.name, "the camera is gone", "check cable and power");
         const HostTime last_frame = std::max(pipeline_.report().last_frame, began);
-        if (pipeline_.unanswered_triggers() > triggers_of_silence && host_now() - last_frame > time_of_silence)
-            return failure(configuration_.name, "triggers are sent but no frames come",
-                           "check the trigger cable, TriggerSource and the network; it is opened anew");
+        const bool silent = pipeline_.unanswered_triggers() > triggers_of_silence && host_now() - last_frame > time_of_silence;
+        if (!control_lost && !silent) continue;
+        lose();
+        const auto lost = control_lost ? failure(configuration_.name, "the camera is gone", "check cable and power")
+                                       : failure(configuration_.name, "triggers are sent but no frames come",
+                                                 "check the trigger cable, TriggerSource and the network; it is opened anew");
+        set_state(CameraState::silent, lost.value().message());
+        return lost;
     }
-    arv_camera_stop_acquisition(camera->get(), nullptr);
+    lose();
+    arv_camera_stop_acquisition(camera, nullptr);
     return {};
 }
 

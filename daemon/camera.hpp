@@ -13,6 +13,9 @@
 #include "camera_pipeline.hpp"
 #include "configuration.hpp"
 
+struct _ArvCamera;
+using ArvCamera = _ArvCamera;
+
 namespace versavis::daemon {
 
 enum class CameraState { absent, opening, streaming, silent, failed };
@@ -43,13 +46,17 @@ class Camera {
     Camera& operator=(const Camera&) = delete;
 
     void start();
-    void stop();
+    void request_stop();  ///< returns at once
+    void stop();          ///< waits for the end
     bool streaming() const { return streaming_; }
     CameraReport report() const;
 
    private:
     void run();
     Expected<> session();
+    Expected<> stream(ArvCamera* camera, const std::atomic<bool>& control_lost);
+    void describe(ArvCamera* camera);
+    void lose();
     void set_state(CameraState state, const std::string& hint);
     bool pause(Duration duration);
 

@@ -35,6 +35,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       translator_(translator),
       events_(events),
       pairing_(limits_of(configuration), *this),
+      start_patience_(seconds(2) + from_us(2e6 / configuration.rate_hz)),
       last_exposure_(from_us(configuration.exposure_us)) {}
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::uint64_t payload_size) {
@@ -68,6 +69,7 @@ void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64
     ring_->abandon(slot);
     if (reason == EventReason::none) return;
     ++report_.incomplete;
+    unanswered_ = 0;  // it does answer
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
 }
 
@@ -86,6 +88,7 @@ void CameraPipeline::add(const wire::Exposure& record) {
     const std::lock_guard lock(mutex_);
     ++report_.triggers;
     ++unanswered_;
+    last_trigger_ = host_now();
     pairing::Exposure exposure = complete(record);
     const auto end = translator_.to_host(exposure.end);
     if (!end) return exposure_unpaired(exposure, EventReason::no_clock);
@@ -104,11 +107,17 @@ pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
     exposure.exposed = started || !strobe;
     exposure.start = started ? BoardTime{record.start_ns} : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);
     exposure.end = ended ? BoardTime{record.end_ns} : exposure.start + last_exposure_;
+    report_.measured = started && ended;
+    if (!report_.measured) ++report_.unmeasured;
     if (started && ended && strobe) {
         exposure.kind = StampKind::measured_middle;
         last_exposure_ = exposure.end - exposure.start;
+    } else if (started && strobe) {
+        // It lasted longer than the board was willing to wait: the middle is at least here.
+        exposure.kind = StampKind::predicted_middle;
+        exposure.end = exposure.start + std::max(last_exposure_, from_us(configuration_.max_exposure_us));
     } else {
-        exposure.kind = started && strobe ? StampKind::predicted_middle : StampKind::trigger_edge;
+        exposure.kind = StampKind::trigger_edge;
     }
     return exposure;
 }
@@ -187,7 +196,6 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
     pairing_.reset();
-    pairing_.pattern_requested(host_now());  // the start that follows brings one
     unanswered_ = 0;
 }
 
@@ -196,9 +204,13 @@ bool CameraPipeline::advance(HostTime now) {
     if (ring_) ring_->heartbeat(now);
     if (!triggered()) return false;
     pairing_.advance(now);
-    if (!pairing_.wants_pattern(now)) return false;
+    return pairing_.wants_pattern(now) || now - last_trigger_ > start_patience_;
+}
+
+void CameraPipeline::start_requested(HostTime now) {
+    const std::lock_guard lock(mutex_);
     pairing_.pattern_requested(now);
-    return true;
+    last_trigger_ = now;
 }
 
 std::uint64_t CameraPipeline::unanswered_triggers() {

@@ -23,6 +23,8 @@ struct PipelineReport {
     std::uint64_t frames_without_trigger = 0;
     std::uint64_t triggers = 0;
     std::uint64_t triggers_without_frame = 0;
+    std::uint64_t unmeasured = 0;  ///< triggers whose exposure was not measured although its line is wired
+    bool measured = true;          ///< the newest one was
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
     HostTime last_frame;
@@ -48,8 +50,10 @@ class CameraPipeline final : private pairing::Outcome {
     /// Camera or board began a new life.
     void reset();
 
-    /// Gives up what waited too long. True: the board should repeat its start pattern for this camera.
+    /// Gives up what waited too long. True: the board should start this camera with its pattern, because nothing else
+    /// can prove the pairing, or because no trigger came although it was asked to.
     bool advance(HostTime now);
+    void start_requested(HostTime now);
 
     bool triggered() const { return configuration_.trigger == TriggerSource::board; }
     std::uint8_t board_mask() const { return static_cast<std::uint8_t>(1U << configuration_.output); }
@@ -81,8 +85,10 @@ class CameraPipeline final : private pairing::Outcome {
     std::optional<ring::Writer> ring_;
     pairing::Pairing pairing_;
     StampGuard guard_;
+    Duration start_patience_;
     Duration last_exposure_;
     std::uint64_t unanswered_ = 0;
+    HostTime last_trigger_;  ///< its record came, or it was asked for
     PipelineReport report_;
 };
 

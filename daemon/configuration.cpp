@@ -126,7 +126,8 @@ void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cam
 }
 
 std::uint32_t micro_hertz(double hertz) { return static_cast<std::uint32_t>(std::llround(hertz * 1e6)); }
-std::uint32_t short_ns(double us) { return static_cast<std::uint32_t>(std::llround(us * 1e3)); }
+/// The wire has 32 bits for it: 4 s at most.
+std::uint32_t short_ns(double us) { return static_cast<std::uint32_t>(std::llround(std::min(us * 1e3, 4e9))); }
 
 wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     wire::CameraConfiguration out{};
@@ -135,7 +136,8 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     if (camera.strobe == Strobe::active_low) out.flags |= wire::camera_strobe_inverted;
     if (camera.strobe == Strobe::none) out.flags |= wire::camera_no_strobe;
     out.rate_uhz = micro_hertz(camera.rate_hz);
-    out.phase_ns = short_ns(camera.phase_us);
+    // Rounded to whole nanoseconds, the phase must still be below the period.
+    out.phase_ns = std::min(short_ns(camera.phase_us), static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
     out.pulse_ns = short_ns(camera.pulse_us);
     out.latency_ns = short_ns(camera.latency_us);
     out.gap_ns = short_ns(camera.gap_us);

@@ -9,7 +9,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
     report_.model = model_.name;
 }
 
-void ImuPipeline::board_connected() {
+void ImuPipeline::board_restarted() {
     const std::lock_guard lock(mutex_);
     last_number_.reset();
 }

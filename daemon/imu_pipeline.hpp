@@ -27,7 +27,7 @@ class ImuPipeline {
     ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring, clock::Translator& translator);
 
     void add(const wire::ImuSample& sample);
-    void board_connected();
+    void board_restarted();
     void heartbeat(HostTime now);
     ImuReport report();
 

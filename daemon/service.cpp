@@ -66,6 +66,7 @@ void Service::add_camera(const CameraConfiguration& configuration) {
     Camera::Hooks hooks;
     hooks.streaming = [this, pipeline, index, name = configuration.name] {
         events_->add({EventKind::camera_connected, EventReason::none, index, name});
+        pipeline->start_requested(host_now());
         if (pipeline->triggered()) board_->start_cameras(pipeline->board_mask(), true);
     };
     hooks.lost = [this, pipeline, index, name = configuration.name] {
@@ -89,6 +90,7 @@ void Service::start() {
 }
 
 Service::~Service() {
+    for (CameraUnit& unit : cameras_) unit.camera->request_stop();  // all at once: each may take its time
     for (CameraUnit& unit : cameras_) unit.camera->stop();
     if (board_) board_->stop();
 }
@@ -99,12 +101,19 @@ Service::CameraUnit* Service::camera_at(unsigned output) {
     return nullptr;
 }
 
+/// Before the clock is: no record of the old life may be translated by the new clock.
+void Service::board_restarted() {
+    if (imu_) imu_->board_restarted();
+    for (CameraUnit& unit : cameras_)
+        if (unit.pipeline->triggered()) unit.pipeline->reset();
+}
+
 void Service::board_connected() {
     events_->add({EventKind::board_connected, EventReason::none, 0, "board", board_->report().nonce});
-    if (imu_) imu_->board_connected();
     for (CameraUnit& unit : cameras_) {
         if (!unit.pipeline->triggered()) continue;
         unit.pipeline->reset();
+        unit.pipeline->start_requested(host_now());
         if (unit.camera->streaming()) board_->start_cameras(unit.pipeline->board_mask(), true);
     }
 }
@@ -136,9 +145,13 @@ void Service::board_event(const wire::Event& event) {
 
 void Service::tick() {
     const HostTime now = host_now();
-    for (CameraUnit& unit : cameras_)
-        if (unit.pipeline->advance(now) && unit.camera->streaming())
+    for (CameraUnit& unit : cameras_) {
+        const bool wants_start = unit.pipeline->advance(now);
+        if (wants_start && unit.camera->streaming() && board_->running()) {
+            unit.pipeline->start_requested(now);
             board_->start_cameras(unit.pipeline->board_mask(), true);
+        }
+    }
     if (imu_) imu_->heartbeat(now);
     events_->heartbeat(now);
     status_ring_.heartbeat(now);
@@ -172,8 +185,11 @@ void Service::publish_status(HostTime now) {
     status.clock = translator_.report();
     for (CameraUnit& unit : cameras_) {
         status.board_needed = status.board_needed || unit.pipeline->triggered();
+        const PipelineReport report = unit.pipeline->report();
+        const Duration patience = seconds(1) + Duration{static_cast<std::int64_t>(3e9 / unit.configuration.rate_hz)};
+        const bool stalled = unit.pipeline->triggered() && now - report.last_frame > patience;
         status.cameras.push_back(
-            {unit.configuration.name, unit.pipeline->triggered(), unit.camera->report(), unit.pipeline->report()});
+            {unit.configuration.name, unit.pipeline->triggered(), stalled, unit.camera->report(), report});
     }
     if (imu_) status.imus.push_back(imu_->report());
     status.streams = stream_status(now);

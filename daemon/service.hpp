@@ -51,6 +51,7 @@ class Service final : private BoardListener {
     std::vector<StreamStatus> stream_status(HostTime now);
     CameraUnit* camera_at(unsigned output);
 
+    void board_restarted() override;
     void board_connected() override;
     void board_lost() override;
     void exposure(const wire::Exposure& record) override;

@@ -16,7 +16,17 @@ constexpr Duration grace = seconds(5);
 
 bool delivers(const CameraStatus& camera) {
     if (camera.camera.state != CameraState::streaming) return false;
-    return !camera.triggered || camera.pipeline.pairing == pairing::State::locked;
+    if (camera.stalled) return false;
+    return !camera.triggered || (camera.pipeline.pairing == pairing::State::locked && camera.pipeline.measured);
+}
+
+std::string hint(const CameraStatus& status) {
+    if (!status.camera.hint.empty() || status.camera.state != CameraState::streaming || !status.triggered)
+        return status.camera.hint;
+    if (status.pipeline.triggers == 0) return "no trigger yet: is the board running?";
+    if (!status.pipeline.measured)
+        return "exposures are not measured: check the exposure line, 'strobe', 'latency_us' and 'max_exposure_us'";
+    return status.stalled ? "triggers are sent but no frames come: check trigger cable and network" : "";
 }
 
 json board_json(const BoardReport& board, bool needed) {
@@ -54,11 +64,11 @@ json clock_json(const clock::ClockReport& clock) {
 }
 
 json camera_json(const CameraStatus& status) {
-    const auto& [name, triggered, camera, pipeline] = status;
+    const auto& [name, triggered, stalled, camera, pipeline] = status;
     return {{"name", name},
             {"state", to_string(camera.state)},
             {"since_ns", camera.since.ns},
-            {"hint", camera.hint},
+            {"hint", hint(status)},
             {"trigger", triggered ? "board" : "free"},
             {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
             {"model", camera.model},
@@ -71,6 +81,7 @@ json camera_json(const CameraStatus& status) {
             {"frames_without_trigger", pipeline.frames_without_trigger},
             {"triggers", pipeline.triggers},
             {"triggers_without_frame", pipeline.triggers_without_frame},
+            {"exposures_unmeasured", pipeline.unmeasured},
             {"locks", pipeline.locks},
             {"slips", pipeline.slips},
             {"last_frame_ns", pipeline.last_frame.ns}};

@@ -16,6 +16,7 @@ namespace versavis::daemon {
 struct CameraStatus {
     std::string name;
     bool triggered = true;
+    bool stalled = false;  ///< no frame for longer than its rate explains
     CameraReport camera;
     PipelineReport pipeline;
 };

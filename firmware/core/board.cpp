@@ -136,7 +136,7 @@ void Board::start(const wire::Start& start) {
 
 void Board::stop(std::uint8_t cameras) {
     for (unsigned i = 0; i < camera_count; ++i)
-        if ((cameras >> i & 1U) != 0) cameras_[i].stop(hal_.clock.now());
+        if ((cameras >> i & 1U) != 0) cameras_[i].stop();
 }
 
 void Board::answer_clock(const wire::ClockRequest& request, Nanoseconds received) {

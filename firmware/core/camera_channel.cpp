@@ -15,18 +15,11 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 }  // namespace
 
-void CameraChannel::configure(const wire::CameraConfiguration& configuration, Nanoseconds now) {
-    configuration_ = configuration;
-    expected_ = configuration.exposure_ns;
-    expected_since_ = 0;
-    announced_from_ = 0;
-    outputs_.cancel(camera_, has(wire::camera_trigger_inverted), now);
-}
-
 void CameraChannel::start(Nanoseconds origin, Nanoseconds now, bool pattern) {
     if (!has(wire::camera_enabled)) return;
     if (!running_) {
         grid_ = Grid(origin + configuration_.phase_ns, configuration_.rate_uhz);
+        grid_.skip_before(now);
         while (trigger_time() < now + decide_ahead) grid_.advance();
     }
     running_ = true;
@@ -34,9 +27,12 @@ void CameraChannel::start(Nanoseconds origin, Nanoseconds now, bool pattern) {
     first_tick_ = grid_.tick();
 }
 
-void CameraChannel::stop(Nanoseconds now) {
-    if (!running_) return;
-    running_ = false;
+void CameraChannel::configure(const wire::CameraConfiguration& configuration, Nanoseconds now) {
+    configuration_ = configuration;
+    expected_ = configuration.exposure_ns;
+    expected_since_ = 0;
+    announced_from_ = 0;
+    flight_count_ = 0;
     outputs_.cancel(camera_, has(wire::camera_trigger_inverted), now);
 }
 
@@ -73,7 +69,7 @@ Nanoseconds CameraChannel::busy_until(Nanoseconds now) const {
 void CameraChannel::decide(Nanoseconds now) {
     const Nanoseconds at = trigger_time();
     if (!in_pattern_gap()) {
-        if (flight_count_ == max_flights || busy_until(now) + configuration_.gap_ns > at)
+        if (flight_count_ == max_flights || !outputs_.has_room() || busy_until(now) + configuration_.gap_ns > at)
             reports_.event(wire::EventKind::trigger_skipped, camera_, at, static_cast<std::int64_t>(grid_.tick()));
         else
             send_trigger(at, now);
@@ -108,6 +104,7 @@ void CameraChannel::send_trigger(Nanoseconds at, Nanoseconds now) {
 }
 
 void CameraChannel::edge(Nanoseconds at, bool level) {
+    if (!has(wire::camera_enabled) || has(wire::camera_no_strobe)) return;  // nothing is wired there
     expire(at);
     const bool exposing = level != has(wire::camera_strobe_inverted);
     if (exposing)
@@ -122,14 +119,13 @@ void CameraChannel::start_edge(Nanoseconds at) {
     for (std::size_t i = 0; i < flight_count_; ++i)
         if (flights_[i].record.trigger_ns <= at && flights_[i].record.start_ns == wire::no_time) found = i;
     if (found == max_flights) return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
-    flights_[found].record.start_ns = at;
-    for (; found > 0; --found)
-        if (flights_[0].record.start_ns == wire::no_time) {
-            flights_[0].record.flags |= wire::exposure_no_start;
-            finish(0);
-        } else {
-            break;
-        }
+    // The line has one level: whatever still waits before this trigger was ignored, or its end edge was lost.
+    for (; found > 0; --found) {
+        flights_[0].record.flags |=
+            flights_[0].record.start_ns == wire::no_time ? wire::exposure_no_start : wire::exposure_no_end;
+        finish(0);
+    }
+    flights_[0].record.start_ns = at;
 }
 
 void CameraChannel::end_edge(Nanoseconds at) {
@@ -148,7 +144,7 @@ void CameraChannel::end_edge(Nanoseconds at) {
 Nanoseconds CameraChannel::deadline(const Flight& flight) const {
     if (has(wire::camera_no_strobe)) return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;
     if (flight.record.start_ns != wire::no_time) return flight.record.start_ns + configuration_.max_exposure_ns;
-    const Nanoseconds patience = min(max(grid_.period() / 2, start_timeout_floor), start_timeout_limit);
+    const Nanoseconds patience = min(max(grid_.period(), start_timeout_floor), start_timeout_limit);
     return flight.record.trigger_ns + configuration_.latency_ns + patience;
 }
 

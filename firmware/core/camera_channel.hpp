@@ -30,7 +30,9 @@ class CameraChannel {
 
     /// Begins triggering on the grid through `origin`, the first tick not before `now`; numbers go on.
     void start(Nanoseconds origin, Nanoseconds now, bool pattern);
-    void stop(Nanoseconds now);
+
+    /// Pulses that were decided are still sent, and recorded.
+    void stop() { running_ = false; }
     bool running() const { return running_; }
 
     void announce(std::uint64_t trigger, Nanoseconds exposure);

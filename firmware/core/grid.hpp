@@ -29,6 +29,18 @@ class Grid {
         }
     }
 
+    /// Goes to a tick close before `at` in a few steps, however long ago the origin was.
+    void skip_before(Nanoseconds at) {
+        while (at - next_ > 2 * (whole_ + 1)) {
+            std::int64_t ticks = (at - next_) / (whole_ + 1);
+            if (ticks > 1'000'000'000) ticks = 1'000'000'000;
+            const std::int64_t carried = carry_ + ticks * remainder_;
+            tick_ += static_cast<std::uint64_t>(ticks);
+            next_ += ticks * whole_ + carried / rate_uhz_;
+            carry_ = carried % rate_uhz_;
+        }
+    }
+
    private:
     static constexpr std::int64_t ns_uhz = 1'000'000'000'000'000;
 

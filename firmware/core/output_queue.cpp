@@ -5,7 +5,7 @@ namespace versavis::firmware {
 
 Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level) {
     if (at <= committed_until_) at = committed_until_ + 1;
-    if (size_ == capacity) commit(edges_[0].at + 1);
+    if (size_ == capacity) return at;
     std::size_t i = size_++;
     for (; i > 0 && edges_[i - 1].at > at; --i) edges_[i] = edges_[i - 1];
     edges_[i] = {at, static_cast<std::uint8_t>(output), level};

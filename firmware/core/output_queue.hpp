@@ -13,7 +13,11 @@ class OutputQueue {
    public:
     explicit OutputQueue(OutputSchedule& hardware) : hardware_(hardware) {}
 
+    /// True while both edges of a pulse can be set.
+    bool has_room() const { return size_ + 2 <= capacity; }
+
     /// Sets the level of `output` at `at`, or as soon as possible after what was already committed. Returns the instant.
+    /// Without room nothing is set.
     Nanoseconds set(Nanoseconds at, unsigned output, bool level);
 
     /// Hands to the hardware what is due before `until`.

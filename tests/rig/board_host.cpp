@@ -65,7 +65,7 @@ BoardHost::~BoardHost() {
 
 void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero) {
     ++life_;
-    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)());
+    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)() ^ static_cast<std::uint64_t>(host_now().ns));
     serial_.copy(identity.serial, sizeof identity.serial - 1);
     clock_ = std::make_unique<SkewedClock>(zero, clock);
     levels_ = 0;

@@ -280,6 +280,12 @@ void GigeCamera::free_run(HostTime now) {
     expose(next, nullptr);
 }
 
+void GigeCamera::reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset) {
+    const std::lock_guard lock(mutex_);
+    board_resets_ = std::move(exposures);
+    reset_board_ = std::move(reset);
+}
+
 std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level, const TriggerPulse& pulse) {
     const bool falling = registers_.value(reg_trigger_activation) == 1;
     if (level == falling) return std::nullopt;
@@ -327,6 +333,7 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         const std::lock_guard lock(mutex_);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
+        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) != board_resets_.end()) reset_board_();
         if (active_fault(FaultKind::ignore_trigger) != nullptr) return std::nullopt;
         apply_outages();
         block_id_ = static_cast<std::uint16_t>(block_id_ == 0xFFFF ? 1 : block_id_ + 1);
@@ -337,7 +344,6 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         frame.serial = exposures_;
         if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;
     }
-    if (on_exposure) on_exposure(exposures_);
     truth.camera = settings_.name;
     truth.board_life = pulse != nullptr ? pulse->board_life : 0;
     truth.trigger = pulse != nullptr ? pulse->trigger : 0;

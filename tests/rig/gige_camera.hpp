@@ -41,8 +41,8 @@ class GigeCamera {
     /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it exposes.
     std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse);
 
-    /// Called with the number of each exposure since the rig's start, for the faults of other parts.
-    std::function<void(std::uint64_t exposure)> on_exposure;
+    /// Calls `reset` with each of these exposures, counted since the rig's start.
+    void reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset);
 
     const CameraScenario& settings() const { return settings_; }
 
@@ -79,12 +79,14 @@ class GigeCamera {
     Wall wall_;
     GvspTransmitter transmitter_;
 
-    std::mutex mutex_;  ///< guards what follows, down to free_run_next_
+    std::mutex mutex_;  ///< guards what follows, down to reset_board_
     bool acquiring_ = false;
     std::uint16_t block_id_ = 0;
     std::uint64_t exposures_ = 0;
     HostTime busy_until_;
     HostTime free_run_next_;
+    std::vector<std::uint64_t> board_resets_;
+    std::function<void()> reset_board_;
 
     sockaddr_in controller_{};  ///< used by the server thread only
     HostTime last_contact_;

@@ -24,13 +24,16 @@ using nlohmann::json;
 
 constexpr double lost_tolerated = 0.01;
 constexpr Duration start_pattern_time = milliseconds(1500);  // with its gaps, a rate would be low
-constexpr std::int64_t imu_mismatch_ns = 500'000;  // a tenth of the period at 200 Hz
+constexpr double honest_sigmas = 6;
+constexpr double honest_floor_ns = 300e3;  // what a loaded machine may add to a stamp, far below any exposure's period
+constexpr std::int64_t in_flight_ns = 1'000'000'000;
 
 /// One published stamp, brought back to host time, and what it claims to be of.
 struct Published {
     std::uint64_t key;      ///< frames: serial from the pixels; IMU: sample number
     std::uint64_t trigger;  ///< frames only
     std::int64_t host_ns;
+    std::uint32_t sigma_ns;
 };
 
 struct Recording {
@@ -66,7 +69,6 @@ class Recorder {
     }
 
     std::map<std::string, Recording>& recordings() { return recordings_; }
-    void clear() { recordings_.clear(); }
 
     std::string missing() const {
         std::string names;
@@ -96,13 +98,14 @@ class Recorder {
             ++recording.unreadable;
         else
             recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0, item.data.trigger,
-                                       to_host_ns(item.time)});
+                                       to_host_ns(item.time), item.data.sigma_ns});
     }
 
     void take(const Received<ImuMetadata>& item) {
         Recording& recording = recordings_[imu_name_];
         if (item.found == Found::lost) recording.skipped += item.lost;
-        if (item.found == Found::item) recording.items.push_back({item.data.number, 0, to_host_ns(item.time)});
+        if (item.found == Found::item) 
+            recording.items.push_back({item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
     }
 
     std::string instance_;
@@ -152,45 +155,63 @@ void summarise(std::vector<double>& errors, StreamVerdict& verdict) {
     verdict.error_max_ns = errors.back();
 }
 
-double rate(const Recording& recording) {
-    if (recording.items.size() < 2) return 0;
-    const auto span = static_cast<double>(recording.items.back().host_ns - recording.items.front().host_ns);
-    return static_cast<double>(recording.items.size() - 1) / span * 1e9;
+/// When the streams were recorded, in host time: the start pattern comes before, and does not count for the rates.
+struct Interval {
+    std::int64_t begin_ns = 0;
+    std::int64_t end_ns = 0;
+};
+
+void count(const Recording& recording, const Interval& interval, StreamVerdict& verdict) {
+    std::int64_t first = 0;
+    std::int64_t last = 0;
+    for (const Published& item : recording.items) {
+        if (item.host_ns < interval.begin_ns) continue;
+        if (verdict.items++ == 0) first = item.host_ns;
+        last = item.host_ns;
+    }
+    if (verdict.items > 1) verdict.rate_hz = static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
 }
 
-StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint64_t, TrueFrame>& truth) {
+/// A stamp that is further off than it claims is as wrong as one of another exposure.
+bool honest(const Published& item, double error_ns) {
+    return error_ns <= std::max(honest_sigmas * item.sigma_ns, honest_floor_ns);
+}
+
+StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint64_t, TrueFrame>& truth,
+                           const Interval& interval) {
     StreamVerdict verdict;
-    verdict.items = recording.items.size();
-    verdict.rate_hz = rate(recording);
+    count(recording, interval, verdict);
     std::vector<double> errors;
     std::set<std::uint64_t> seen;
     for (const Published& item : recording.items) {
         const auto found = truth.find(item.key);
-        if (found == truth.end() || found->second.trigger != item.trigger || !seen.insert(item.key).second)
+        const bool paired = found != truth.end() && found->second.trigger == item.trigger && seen.insert(item.key).second;
+        const double error = paired ? std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)) : 0;
+        if (!paired || !honest(item, error))
             ++verdict.wrong_pairs;
         else
-            errors.push_back(std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)));
+            errors.push_back(error);
     }
     summarise(errors, verdict);
     if (seen.empty()) return verdict;
-    for (auto it = truth.find(*seen.begin()); it != truth.end() && it->first <= *seen.rbegin(); ++it)
-        if (it->second.sent && seen.count(it->first) == 0) ++verdict.lost;
+    for (auto it = truth.find(*seen.begin()); it != truth.end(); ++it)
+        if (it->second.sent && it->second.middle_ns < interval.end_ns - in_flight_ns && seen.count(it->first) == 0)
+            ++verdict.lost;
     return verdict;
 }
 
-StreamVerdict judge_imu(const Recording& recording, const Truth& truth) {
+StreamVerdict judge_imu(const Recording& recording, const Truth& truth, const Interval& interval) {
     StreamVerdict verdict;
-    verdict.items = recording.items.size();
-    verdict.rate_hz = rate(recording);
+    count(recording, interval, verdict);
     std::vector<double> errors;
     for (const Published& item : recording.items) {
         double best = 1e18;
         const auto [begin, end] = truth.imu.equal_range(item.key);
         for (auto it = begin; it != end; ++it) best = std::min(best, std::abs(static_cast<double>(item.host_ns - it->second)));
-        if (best > imu_mismatch_ns)
-            ++verdict.wrong_pairs;
-        else
+        if (honest(item, best))
             errors.push_back(best);
+        else
+            ++verdict.wrong_pairs;
     }
     summarise(errors, verdict);
     for (std::size_t i = 1; i < recording.items.size(); ++i)
@@ -219,7 +240,24 @@ std::uint64_t withheld(const json& status, const std::string& camera) {
     return 0;
 }
 
-Expected<> record(Recorder& recorder, const JudgeSettings& settings, double& recorded_s) {
+/// The clock that the service publishes in, by its status document.
+Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
+    const HostTime deadline = host_now() + Duration{static_cast<std::int64_t>(settings.start_timeout_s * 1e9)};
+    for (;;) {
+        const json status = read_status(settings.instance);
+        if (status.is_object() && status.contains("clock")) {
+            using clock::OutputClockKind;
+            for (const auto kind : {OutputClockKind::realtime, OutputClockKind::tai, OutputClockKind::monotonic_raw})
+                if (status["clock"]["output"] == clock::to_string(kind)) return clock::OutputClock::create(kind);
+        }
+        if (host_now() > deadline) return failure(settings.instance, "publishes no status", "is versavisd running?");
+        const timespec pause{0, 20'000'000};
+        nanosleep(&pause, nullptr);
+    }
+}
+
+/// Error: a stream did not begin in time.
+Expected<Interval> record(Recorder& recorder, const JudgeSettings& settings) {
     const HostTime begin = host_now();
     std::optional<HostTime> flowing;
     std::optional<HostTime> recording;
@@ -231,12 +269,10 @@ Expected<> record(Recorder& recorder, const JudgeSettings& settings, double& rec
         if (!flowing && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
             return failure(settings.instance, "these streams did not begin in time:" + recorder.missing(),
                            "see 'versavis status' and the service's log");
-        if (flowing && !recording && now - *flowing > start_pattern_time) {
-            recorder.clear();
-            recording = now;
-        }
-        recorded_s = recording ? static_cast<double>((now - *recording).ns) * 1e-9 : 0;
-        if (recorded_s >= settings.seconds || (settings.stop_requested && settings.stop_requested())) return {};
+        if (flowing && !recording && now - *flowing > start_pattern_time) recording = now;
+        const bool over = recording && static_cast<double>((now - *recording).ns) * 1e-9 >= settings.seconds;
+        const bool stopped = settings.stop_requested && settings.stop_requested();
+        if (over || stopped) return Interval{recording.value_or(now).ns, now.ns};
         if (now >= next_report) {
             next_report = next_report + seconds(1);
             if (settings.on_second) settings.on_second();
@@ -260,21 +296,22 @@ void complain(Verdict& verdict) {
 }  // namespace
 
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings) {
-    auto clock = clock::OutputClock::create(clock::OutputClockKind::realtime);
+    auto clock = output_clock(settings);
     if (!clock) return tl::unexpected(clock.error());
     Recorder recorder(scenario, settings.instance, std::move(*clock));
-    Verdict verdict;
-    if (auto recorded = record(recorder, settings, verdict.seconds); !recorded)
-        return tl::unexpected(recorded.error());
+    const auto interval = record(recorder, settings);
+    if (!interval) return tl::unexpected(interval.error());
     auto truth = load_truth(settings.truth_path);
     if (!truth) return tl::unexpected(truth.error());
+    Verdict verdict;
+    verdict.seconds = static_cast<double>(interval->end_ns - interval->begin_ns) * 1e-9;
     const json status = read_status(settings.instance);
     for (const CameraScenario& camera : scenario.cameras) {
-        StreamVerdict stream = judge_frames(recorder.recordings()[camera.name], truth->frames[camera.name]);
+        StreamVerdict stream = judge_frames(recorder.recordings()[camera.name], truth->frames[camera.name], *interval);
         stream.unpaired = withheld(status, camera.name);
         verdict.streams[camera.name] = stream;
     }
-    verdict.streams[scenario.imu] = judge_imu(recorder.recordings()[scenario.imu], *truth);
+    verdict.streams[scenario.imu] = judge_imu(recorder.recordings()[scenario.imu], *truth, *interval);
     complain(verdict);
     return verdict;
 }

@@ -18,7 +18,7 @@ struct StreamVerdict {
     double rate_hz = 0;
     std::uint64_t lost = 0;         ///< happened and was sent between the first and the last item, but not published
     std::uint64_t unpaired = 0;     ///< frames that the service received and withheld
-    std::uint64_t wrong_pairs = 0;  ///< published with the stamp of another exposure or sample
+    std::uint64_t wrong_pairs = 0;  ///< stamps of another exposure or sample, or further off than they claim
     double error_p50_ns = 0;
     double error_p99_ns = 0;
     double error_max_ns = 0;

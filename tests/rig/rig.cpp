@@ -3,6 +3,17 @@
 
 namespace versavis::rig {
 
+namespace {
+
+std::vector<std::uint64_t> board_resets(const Scenario& scenario, const std::string& camera) {
+    std::vector<std::uint64_t> exposures;
+    for (const Fault& fault : scenario.faults)
+        if (fault.kind == FaultKind::board_reset && fault.camera == camera) exposures.push_back(fault.at_exposure);
+    return exposures;
+}
+
+}  // namespace
+
 Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::string& socket_path,
                                           const std::string& truth_path) {
     const HostTime zero = host_now();
@@ -20,14 +31,8 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
     auto board = BoardHost::create(scenario, socket_path, zero, rig->motion_, *rig->truth_, wired);
     if (!board) return tl::unexpected(board.error());
     rig->board_ = std::move(*board);
-    for (const Fault& fault : scenario.faults) {
-        if (fault.kind != FaultKind::board_reset) continue;
-        for (GigeCamera* camera : wired)
-            if (camera->settings().name == fault.camera)
-                camera->on_exposure = [host = rig->board_.get(), at = fault.at_exposure](std::uint64_t exposure) {
-                    if (exposure == at) host->reset();
-                };
-    }
+    for (GigeCamera* camera : wired)
+        camera->reset_board_at(board_resets(scenario, camera->settings().name), [host = rig->board_.get()] { host->reset(); });
     return rig;
 }
 

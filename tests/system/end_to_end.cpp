@@ -194,6 +194,35 @@ TEST_CASE("end to end: lost frames and ignored triggers are records, and shift n
     CHECK(status["cameras"][0]["locks"] == 1);
 }
 
+TEST_CASE("end to end: an exposure that outlasts what the board waits for is predicted, says so, and is not called healthy") {
+    Stack stack({"overlong", 23, 1, 10, "exposure_us = 60000", "", "max_exposure_us = 40000.0"});
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["pairing"] == "locked" && s["health"] == "degraded";
+    });
+    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("max_exposure_us"));
+    auto stream = wait_for_stream<FrameStream>("cam0", "overlong");
+    const auto frame = read_until(stream, is_item);
+    CHECK(frame.data.stamp_kind() == StampKind::predicted_middle);
+    CHECK(frame.data.sigma_ns > 15'000'000);
+    judge(stack, 2);
+}
+
+TEST_CASE("end to end: stamps in another output clock") {
+    Stack stack({"raw", 24, 1, 20, "", "", ""});
+    {
+        std::ofstream file(stack.configuration_path(), std::ios::app);
+        file << "[clock]\noutput = \"monotonic_raw\"\n";
+    }
+    stack.start_rig();
+    stack.start_service();
+    CHECK(judge(stack, 2).ok);
+    auto stream = wait_for_stream<FrameStream>("cam0", "raw");
+    const auto frame = read_until(stream, is_item);
+    CHECK(frame.time.ns == frame.data.host_time.ns);
+}
+
 TEST_CASE("end to end: packets that get lost are asked for again") {
     Stack stack({"loss", 18, 1, 20, "packet_loss = 0.02", "", ""});
     stack.start_rig();

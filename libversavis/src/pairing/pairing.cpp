@@ -119,7 +119,7 @@ std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) con
             alignment.unknown = true;
             continue;
         }
-        if (record->used || !arrival_possible(arrival, record->exposure)) return std::nullopt;
+        if (record->used || !record->exposure.exposed || !arrival_possible(arrival, record->exposure)) return std::nullopt;
         if (last != nullptr) alignment.faults += step_faults(arrival.block_id - last_id, *last, *record);
         last = record;
         last_id = arrival.block_id;
@@ -194,7 +194,9 @@ bool Pairing::match_front() {
         return true;
     }
     const Record* record = near(start);
-    if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
+    if (record != nullptr && !record->exposure.exposed) {
+        drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none: one of them is wrong
+    } else if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
         decide_front(*record);
     } else if (record == nullptr && record_lost_near(start)) {
         drop_front(EventReason::exposure_missing);
