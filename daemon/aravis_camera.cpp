@@ -19,7 +19,7 @@ constexpr unsigned frame_retention_us = 500'000;
 
 /// A GError that must be looked at.
 class GlibError {
-   public:
+ public:
     GlibError() = default;
     ~GlibError() { g_clear_error(&error_); }
     GlibError(const GlibError&) = delete;
@@ -29,13 +29,14 @@ class GlibError {
     bool set() const { return error_ != nullptr; }
     std::string text() const { return set() ? error_->message : ""; }
 
-   private:
+ private:
     GError* error_ = nullptr;
 };
 
 std::vector<std::string> allowed_values(ArvDevice* device, const std::string& feature) {
     guint count = 0;
-    const char** names = arv_device_dup_available_enumeration_feature_values_as_strings(device, feature.c_str(), &count, nullptr);
+    const char** names = arv_device_dup_available_enumeration_feature_values_as_strings(
+        device, feature.c_str(), &count, nullptr);
     std::vector<std::string> values(names, names + (names == nullptr ? 0 : count));
     g_free(names);
     return values;
@@ -66,7 +67,9 @@ Expected<> configure_triggered(ArvDevice* device, const CameraConfiguration& con
     const char* edge = configuration.trigger_inverted ? "FallingEdge" : "RisingEdge";
     set_if_available(device, "TriggerSelector", "FrameStart");
     set_if_available(device, "TriggerMode", "Off");
-    if (auto done = set_all(device, {{"TriggerSource", configuration.trigger_line}, {"TriggerActivation", edge}}); !done)
+    if (auto done =
+            set_all(device, {{"TriggerSource", configuration.trigger_line}, {"TriggerActivation", edge}});
+        !done)
         return done;
     set_if_available(device, "TriggerOverlap", "ReadOut");
     if (auto done = set_feature(device, "TriggerMode", "On"); !done) return done;
@@ -82,8 +85,9 @@ Expected<Object<ArvCamera>> open_camera(const std::string& device) {
     GlibError error;
     Object<ArvCamera> camera(arv_camera_new(device.c_str(), error.out()));
     if (!camera)
-        return failure(device, "no such camera: " + error.text(),
-                       "check cable, power and address ('arv-tool-0.8' lists cameras); its network must be this host's");
+        return failure(
+            device, "no such camera: " + error.text(),
+            "check cable, power and address ('arv-tool-0.8' lists cameras); its network must be this host's");
     ArvDevice* raw = arv_camera_get_device(camera.get());
     if (ARV_IS_GV_DEVICE(raw) && arv_gv_device_is_controller(ARV_GV_DEVICE(raw)) == FALSE)
         return failure(device, "is controlled by another program", "close that program");
@@ -93,7 +97,8 @@ Expected<Object<ArvCamera>> open_camera(const std::string& device) {
 Expected<> set_feature(ArvDevice* device, const std::string& name, const std::string& value) {
     ArvGcNode* node = arv_device_get_feature(device, name.c_str());
     const std::string where = "feature " + name;
-    if (node == nullptr) return failure(where, "the camera has none of this name", "'arv-tool-0.8 features' lists them");
+    if (node == nullptr)
+        return failure(where, "the camera has none of this name", "'arv-tool-0.8 features' lists them");
     GlibError error;
     std::string allowed;
     try {
@@ -103,7 +108,8 @@ Expected<> set_feature(ArvDevice* device, const std::string& name, const std::st
             arv_device_set_string_feature_value(device, name.c_str(), value.c_str(), error.out());
         } else if (ARV_IS_GC_BOOLEAN(node)) {
             allowed = "true, false";
-            arv_device_set_boolean_feature_value(device, name.c_str(), value == "true" ? TRUE : FALSE, error.out());
+            arv_device_set_boolean_feature_value(device, name.c_str(), value == "true" ? TRUE : FALSE,
+                                                 error.out());
         } else if (ARV_IS_GC_FLOAT(node)) {
             allowed = range_text(node);
             arv_device_set_float_feature_value(device, name.c_str(), std::stod(value), error.out());
@@ -136,8 +142,10 @@ Expected<> configure_camera(ArvCamera* camera, const CameraConfiguration& config
     return set_all(device, configuration.features);
 }
 
-Expected<std::unique_ptr<AravisStream>> AravisStream::create(ArvCamera* camera, const CameraConfiguration& configuration,
-                                                             CameraPipeline& pipeline, std::uint64_t payload) {
+Expected<std::unique_ptr<AravisStream>> AravisStream::create(ArvCamera* camera,
+                                                             const CameraConfiguration& configuration,
+                                                             CameraPipeline& pipeline,
+                                                             std::uint64_t payload) {
     std::unique_ptr<AravisStream> self(new AravisStream(configuration, pipeline, payload));
     self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
     GlibError error;
@@ -150,10 +158,11 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(ArvCamera* camera, 
             arv_camera_gv_set_packet_size(camera, static_cast<gint>(configuration.packet_size), error.out());
         else
             arv_camera_gv_auto_packet_size(camera, error.out());
-        if (error.set()) return failure("packet size", error.text(), "set 'packet_size' to what the network passes");
+        if (error.set())
+            return failure("packet size", error.text(), "set 'packet_size' to what the network passes");
     }
-    self->stream_.reset(
-        arv_camera_create_stream(camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
+    self->stream_.reset(arv_camera_create_stream(
+        camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
     if (!self->stream_) return failure("stream", error.text());
     if (ARV_IS_GV_STREAM(self->stream_.get())) {
         g_object_set(self->stream_.get(), "frame-retention", frame_retention_us, nullptr);
@@ -165,14 +174,15 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(ArvCamera* camera, 
 
 AravisStream::~AravisStream() {
     closing_ = true;  // buffers that Aravis flushes are not frames
-    // Waits for the stream's thread, which may still read stream_: then nobody writes into the slots any more.
+    // Waits for the stream's thread, which may still read stream_: then nobody writes into the slots any
+    // more.
     g_object_unref(stream_.get());
     static_cast<void>(stream_.release());
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }
 
-/// The default of 208 KiB does not hold one frame. Aravis sets its own property only when the first frame opens, and
-/// loses that frame: so the socket is found by its port and enlarged here.
+/// The default of 208 KiB does not hold one frame. Aravis sets its own property only when the first frame
+/// opens, and loses that frame: so the socket is found by its port and enlarged here.
 void AravisStream::enlarge_receive_buffer() const {
     const std::uint16_t port = arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get()));
     std::error_code ignored;
@@ -182,14 +192,16 @@ void AravisStream::enlarge_receive_buffer() const {
         socklen_t size = sizeof self;
         if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&self), &size) != 0) continue;
         if (self.sin_family != AF_INET || ntohs(self.sin_port) != port) continue;
-        if (::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) == 0) continue;
+        if (::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) == 0)
+            continue;
         ::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
         int got = 0;
         size = sizeof got;
         ::getsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &got, &size);
         if (static_cast<std::uint64_t>(got) < payload_)
             log(LogLevel::warning, configuration_.name,
-                "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max or give the service "
+                "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max or give the "
+                "service "
                 "CAP_NET_ADMIN",
                 got >> 10);
     }
@@ -203,7 +215,8 @@ void AravisStream::on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* 
 }
 
 void AravisStream::poll(Duration timeout) {
-    if (ArvBuffer* done = arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(timeout.ns / 1000)))
+    if (ArvBuffer* done =
+            arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(timeout.ns / 1000)))
         take(done);
 }
 
@@ -245,7 +258,8 @@ void AravisStream::refill() {
     while (queued_.size() < configuration_.buffers) {
         const auto slot = pipeline_.acquire();
         if (!slot) return;
-        ArvBuffer* buffer = arv_buffer_new_full(payload_, pipeline_.slot_data(*slot), GUINT_TO_POINTER(*slot), nullptr);
+        ArvBuffer* buffer =
+            arv_buffer_new_full(payload_, pipeline_.slot_data(*slot), GUINT_TO_POINTER(*slot), nullptr);
         // What a lost leader leaves untouched reads as zero, not as the frame before.
         arv_buffer_set_frame_id(buffer, 0);
         arv_buffer_set_timestamp(buffer, 0);

@@ -35,9 +35,10 @@ Expected<> set_feature(ArvDevice* device, const std::string& name, const std::st
 
 /// Frames of one camera, received straight into the slots of its pipeline.
 class AravisStream {
-   public:
+ public:
     /// `camera` must outlive the stream. The pipeline's ring must be prepared.
-    static Expected<std::unique_ptr<AravisStream>> create(ArvCamera* camera, const CameraConfiguration& configuration,
+    static Expected<std::unique_ptr<AravisStream>> create(ArvCamera* camera,
+                                                          const CameraConfiguration& configuration,
                                                           CameraPipeline& pipeline, std::uint64_t payload);
     ~AravisStream();  ///< gives back all slots
     AravisStream(const AravisStream&) = delete;
@@ -47,7 +48,7 @@ class AravisStream {
     bool needs_polling() const { return !calls_back_; }
     void poll(Duration timeout);
 
-   private:
+ private:
     AravisStream(const CameraConfiguration& configuration, CameraPipeline& pipeline, std::uint64_t payload)
         : configuration_(configuration), pipeline_(pipeline), payload_(payload) {}
 

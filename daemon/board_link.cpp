@@ -78,8 +78,9 @@ bool BoardLink::pause(Duration duration) const {
 void BoardLink::set_state(BoardState state, const std::string& hint) {
     const std::lock_guard lock(report_mutex_);
     if (report_.state != state || report_.hint != hint) {
-        log(state == BoardState::running || state == BoardState::handshake ? LogLevel::info : LogLevel::warning, "board",
-            "{}{}{}", to_string(state), hint.empty() ? "" : ": ", hint);
+        log(state == BoardState::running || state == BoardState::handshake ? LogLevel::info
+                                                                           : LogLevel::warning,
+            "board", "{}{}{}", to_string(state), hint.empty() ? "" : ": ", hint);
         report_.since = host_now();
     }
     report_.state = state;
@@ -132,10 +133,12 @@ Expected<> BoardLink::serve() {
     listener_.board_connected();
     while (!stop_) {
         const HostTime now = host_now();
-        if (now - last_packet_ > silence_limit) return failure("board", "it fell silent", "check cable and power");
+        if (now - last_packet_ > silence_limit)
+            return failure("board", "it fell silent", "check cable and power");
         if (now >= next_request_)
             if (auto sent = request_clock(); !sent) return sent;
-        if (auto done = read(std::min(longest_read, std::max(next_request_ - host_now(), microseconds(100)))); !done)
+        if (auto done = read(std::min(longest_read, std::max(next_request_ - host_now(), microseconds(100))));
+            !done)
             return done;
         if (!greeted_) return failure("board", "it was reset");
     }
@@ -149,14 +152,15 @@ Expected<> BoardLink::handshake() {
     const std::uint8_t delimiter = 0;
     if (auto sent = stream_->write({&delimiter, 1}); !sent) return sent;
     for (int attempt = 0; attempt < 5 && !greeted_; ++attempt) {
-        if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}}); !sent) return sent;
+        if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}}); !sent)
+            return sent;
         auto done = read_until([this] { return greeted_; }, answer_timeout / 4, "does not answer");
         if (!done && attempt == 4) return done;
     }
     if (hello_.major != wire::protocol_major) {
-        set_state(BoardState::incompatible, fmt::format("it speaks protocol {}.{}, this service {}.{}: update its firmware",
-                                                        hello_.major, hello_.minor, wire::protocol_major,
-                                                        wire::protocol_minor));
+        set_state(BoardState::incompatible,
+                  fmt::format("it speaks protocol {}.{}, this service {}.{}: update its firmware",
+                              hello_.major, hello_.minor, wire::protocol_major, wire::protocol_minor));
         return failure("board", "incompatible protocol");
     }
     const std::lock_guard lock(report_mutex_);
@@ -171,12 +175,16 @@ Expected<> BoardLink::configure() {
     answered_ = false;
     ++configuration_.id;
     if (auto sent = send(configuration_); !sent) return sent;
-    if (auto done = read_until([this] { return answered_; }, answer_timeout, "does not take its configuration"); !done)
+    if (auto done =
+            read_until([this] { return answered_; }, answer_timeout, "does not take its configuration");
+        !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
-    set_state(BoardState::refused,
-              fmt::format("it refuses '{}' of output {}: allowed are {} to {} (ns, micro-hertz); change the configuration",
-                          field_name(answer_.field), answer_.camera, answer_.minimum, answer_.maximum));
+    set_state(
+        BoardState::refused,
+        fmt::format(
+            "it refuses '{}' of output {}: allowed are {} to {} (ns, micro-hertz); change the configuration",
+            field_name(answer_.field), answer_.camera, answer_.minimum, answer_.maximum));
     return failure("board", "refuses its configuration");
 }
 
@@ -187,7 +195,8 @@ Expected<> BoardLink::synchronise() {
     while (exchanges_ < exchanges_to_start) {
         const unsigned before = exchanges_;
         if (auto sent = request_clock(); !sent) return sent;
-        if (auto done = read_until([&] { return exchanges_ > before; }, answer_timeout, "does not answer clock requests");
+        if (auto done = read_until([&] { return exchanges_ > before; }, answer_timeout,
+                                   "does not answer clock requests");
             !done)
             return done;
     }
@@ -245,7 +254,8 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     if (packet.read(sample)) return listener_.imu_sample(sample);
     if (packet.read(event)) return listener_.board_event(event);
     if (packet.read(answer)) return take_answer(answer, received);
-    if (packet.read(line)) return log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
+    if (packet.read(line))
+        return log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
     if (packet.read(answer_)) {
         answered_ = answer_.id == configuration_.id;
         return;
@@ -283,7 +293,9 @@ Expected<> BoardLink::request_clock() {
 /// Dithered, so that the requests do not beat with the schedule of the bus.
 void BoardLink::plan_next_request() {
     std::uniform_real_distribution<> dither(0.75, 1.25);
-    next_request_ = host_now() + Duration{static_cast<std::int64_t>(dither(random_) * static_cast<double>(exchange_interval_.ns))};
+    next_request_ =
+        host_now() +
+        Duration{static_cast<std::int64_t>(dither(random_) * static_cast<double>(exchange_interval_.ns))};
 }
 
 void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {

@@ -21,9 +21,10 @@ namespace versavis::daemon {
 
 /// Called on the link's thread.
 class BoardListener {
-   public:
+ public:
     virtual ~BoardListener() = default;
-    virtual void board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
+    virtual void
+    board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
     virtual void board_connected() = 0;  ///< configured, its clock known: cameras may be started
     virtual void board_lost() = 0;
     virtual void exposure(const wire::Exposure& record) = 0;
@@ -49,7 +50,7 @@ struct BoardReport {
 };
 
 class BoardLink {
-   public:
+ public:
     using OpenStream = std::function<Expected<std::unique_ptr<ByteStream>>()>;
 
     BoardLink(OpenStream open, const wire::Configuration& configuration, double exchange_rate_hz,
@@ -68,7 +69,7 @@ class BoardLink {
     BoardReport report() const;
     bool running() const { return accepting_; }
 
-   private:
+ private:
     void run();
     Expected<> serve();
     Expected<> handshake();

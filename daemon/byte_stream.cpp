@@ -8,7 +8,8 @@ namespace versavis::daemon {
 
 Expected<std::unique_ptr<ByteStream>> open_byte_stream(const BoardConfiguration& configuration) {
     constexpr std::string_view unix_prefix = "unix:";
-    if (configuration.link.rfind(unix_prefix, 0) == 0) return open_unix_stream(configuration.link.substr(unix_prefix.size()));
+    if (configuration.link.rfind(unix_prefix, 0) == 0)
+        return open_unix_stream(configuration.link.substr(unix_prefix.size()));
     return open_usb_stream(configuration);
 }
 

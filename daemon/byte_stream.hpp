@@ -21,7 +21,7 @@ struct Chunk {
 
 /// read() belongs to one thread, write() may be called by any other.
 class ByteStream {
-   public:
+ public:
     virtual ~ByteStream() = default;
 
     /// Waits up to `timeout` for bytes. Error: the board is gone.

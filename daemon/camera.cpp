@@ -32,7 +32,10 @@ const char* to_string(CameraState state) {
 
 Camera::Camera(const CameraConfiguration& configuration, const std::filesystem::path& ring_directory,
                CameraPipeline& pipeline, Hooks hooks)
-    : configuration_(configuration), ring_directory_(ring_directory), pipeline_(pipeline), hooks_(std::move(hooks)) {}
+    : configuration_(configuration),
+      ring_directory_(ring_directory),
+      pipeline_(pipeline),
+      hooks_(std::move(hooks)) {}
 
 Camera::~Camera() { stop(); }
 
@@ -143,12 +146,15 @@ Expected<> Camera::stream(ArvCamera* camera, const std::atomic<bool>& control_lo
     while (pause((*stream)->needs_polling() ? Duration{} : step)) {
         if ((*stream)->needs_polling()) (*stream)->poll(step);
         const HostTime last_frame = std::max(pipeline_.report().last_frame, began);
-        const bool silent = pipeline_.unanswered_triggers() > triggers_of_silence && host_now() - last_frame > time_of_silence;
+        const bool silent = pipeline_.unanswered_triggers() > triggers_of_silence &&
+                            host_now() - last_frame > time_of_silence;
         if (!control_lost && !silent) continue;
         lose();
-        const auto lost = control_lost ? failure(configuration_.name, "the camera is gone", "check cable and power")
-                                       : failure(configuration_.name, "triggers are sent but no frames come",
-                                                 "check the trigger cable, TriggerSource and the network; it is opened anew");
+        const auto lost =
+            control_lost
+                ? failure(configuration_.name, "the camera is gone", "check cable and power")
+                : failure(configuration_.name, "triggers are sent but no frames come",
+                          "check the trigger cable, TriggerSource and the network; it is opened anew");
         set_state(CameraState::silent, lost.value().message());
         return lost;
     }

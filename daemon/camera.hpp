@@ -31,9 +31,10 @@ struct CameraReport {
     std::uint32_t packet_size = 0;
 };
 
-/// Its control thread is the only one that calls Aravis's camera and device; frames come on Aravis's stream thread.
+/// Its control thread is the only one that calls Aravis's camera and device; frames come on Aravis's stream
+/// thread.
 class Camera {
-   public:
+ public:
     struct Hooks {
         std::function<void()> streaming;  ///< it can be triggered
         std::function<void()> lost;
@@ -51,7 +52,7 @@ class Camera {
     bool streaming() const { return streaming_; }
     CameraReport report() const;
 
-   private:
+ private:
     void run();
     Expected<> session();
     Expected<> stream(ArvCamera* camera, const std::atomic<bool>& control_lost);

@@ -9,7 +9,8 @@ namespace versavis::daemon {
 namespace {
 
 constexpr std::uint32_t descriptor_floor = 64;
-constexpr Duration arrival_sigma = milliseconds(5);  // how long frames take after their exposure is not known at all
+constexpr Duration arrival_sigma =
+    milliseconds(5);  // how long frames take after their exposure is not known at all
 
 std::uint32_t power_of_two(std::uint32_t at_least) {
     std::uint32_t value = descriptor_floor;
@@ -105,7 +106,8 @@ pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
     const bool ended = record.end_ns != wire::no_time;
     const bool strobe = (record.flags & wire::exposure_no_strobe) == 0;
     exposure.exposed = started || !strobe;
-    exposure.start = started ? BoardTime{record.start_ns} : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);
+    exposure.start = started ? BoardTime{record.start_ns}
+                             : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);
     exposure.end = ended ? BoardTime{record.end_ns} : exposure.start + last_exposure_;
     report_.measured = started && ended;
     if (!report_.measured) ++report_.unmeasured;
@@ -132,7 +134,8 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
     const BoardTime instant = middle(exposure.start, exposure.end);
     auto stamp = translator_.translate(instant);
     if (!stamp) return frame_unpaired(arrival, EventReason::no_clock);
-    const double sigma = std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind_sigma(exposure).ns));
+    const double sigma =
+        std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind_sigma(exposure).ns));
     stamp->sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
     FrameMetadata metadata{};
     metadata.trigger = exposure.trigger;
@@ -149,7 +152,8 @@ void CameraPipeline::publish_free_run(const pairing::Arrival& arrival) {
     publish(arrival, translator_.translate(arrival.arrived, arrival_sigma), metadata);
 }
 
-void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp, FrameMetadata metadata) {
+void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+                             FrameMetadata metadata) {
     metadata.block_id = arrival.block_id;
     metadata.host_time = stamp.host;
     metadata.arrival = arrival.arrived;
@@ -173,23 +177,26 @@ void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason
 
 void CameraPipeline::exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) {
     ++report_.triggers_without_frame;
-    journal(EventKind::trigger_without_frame, reason, static_cast<std::int64_t>(exposure.trigger), exposure.start);
+    journal(EventKind::trigger_without_frame, reason, static_cast<std::int64_t>(exposure.trigger),
+            exposure.start);
 }
 
 void CameraPipeline::locked(const pairing::Exposure& first) {
     ++report_.locks;
     log(LogLevel::info, configuration_.name, "paired: frames are verified from trigger {} on", first.trigger);
-    journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger), first.start);
+    journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger),
+            first.start);
 }
 
 void CameraPipeline::slipped(const pairing::Arrival& at) {
     ++report_.slips;
-    log(LogLevel::warning, configuration_.name, "pairing slipped at block {}: frames are withheld until it is proved again",
-        at.block_id);
+    log(LogLevel::warning, configuration_.name,
+        "pairing slipped at block {}: frames are withheld until it is proved again", at.block_id);
     journal(EventKind::pairing_slipped, EventReason::mismatch, static_cast<std::int64_t>(at.block_id));
 }
 
-void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t value, std::optional<BoardTime> at) {
+void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t value,
+                             std::optional<BoardTime> at) {
     events_.add({kind, reason, index_, configuration_.name, value, at});
 }
 

@@ -32,11 +32,12 @@ struct PipelineReport {
 
 /// Thread-safe. Whoever completes a pair publishes it.
 class CameraPipeline final : private pairing::Outcome {
-   public:
-    CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index, clock::Translator& translator,
-                   EventJournal& events);
+ public:
+    CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
+                   clock::Translator& translator, EventJournal& events);
 
-    /// Makes the ring, or one with larger slots: called by the camera once it knows its payload. Slots are void then.
+    /// Makes the ring, or one with larger slots: called by the camera once it knows its payload. Slots are
+    /// void then.
     Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size);
 
     std::optional<std::uint32_t> acquire();
@@ -50,8 +51,8 @@ class CameraPipeline final : private pairing::Outcome {
     /// Camera or board began a new life.
     void reset();
 
-    /// Gives up what waited too long. True: the board should start this camera with its pattern, because nothing else
-    /// can prove the pairing, or because no trigger came although it was asked to.
+    /// Gives up what waited too long. True: the board should start this camera with its pattern, because
+    /// nothing else can prove the pairing, or because no trigger came although it was asked to.
     bool advance(HostTime now);
     void start_requested(HostTime now);
 
@@ -63,7 +64,7 @@ class CameraPipeline final : private pairing::Outcome {
     PipelineReport report();
     std::uint64_t items();
 
-   private:
+ private:
     void paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) override;
     void frame_unpaired(const pairing::Arrival& arrival, EventReason reason) override;
     void exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) override;

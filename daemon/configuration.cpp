@@ -18,20 +18,23 @@ constexpr double longest_us = 1e7;
 constexpr unsigned spare_slots = 8;  // frames that wait for proof, and the newest that readers still want
 
 bool valid_name(const std::string& name) {
-    const auto allowed = [](char c) { return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-'; };
+    const auto allowed = [](char c) {
+        return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-';
+    };
     return !name.empty() && name.size() < 32 && std::all_of(name.begin(), name.end(), allowed);
 }
 
 /// Names become file names and must be unique.
 class Names {
-   public:
+ public:
     void check(TableReader& reader, const std::string& name) {
         if (!valid_name(name))
-            reader.fail("name", fmt::format("'{}' is no name", name), "use up to 31 letters, digits, '_' and '-'");
+            reader.fail("name", fmt::format("'{}' is no name", name),
+                        "use up to 31 letters, digits, '_' and '-'");
         if (!taken_.insert(name).second) reader.fail("name", fmt::format("the name '{}' is taken", name));
     }
 
-   private:
+ private:
     std::set<std::string> taken_{"events", "status"};
 };
 
@@ -41,7 +44,8 @@ void read_board(TableReader& reader, BoardConfiguration& board) {
     reader.read("usb_vendor", board.usb_vendor, 0, 0xFFFF);
     reader.read("usb_product", board.usb_product, 0, 0xFFFF);
     if (board.link != "usb" && board.link.rfind("unix:", 0) != 0)
-        reader.fail("link", fmt::format("'{}' is no link", board.link), "use \"usb\" or \"unix:/path/of/socket\"");
+        reader.fail("link", fmt::format("'{}' is no link", board.link),
+                    "use \"usb\" or \"unix:/path/of/socket\"");
 }
 
 void read_clock(TableReader& reader, ClockConfiguration& clock) {
@@ -81,8 +85,9 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     camera.pulse_us = std::min(camera.pulse_us, period_us / 4);
     reader.read("pulse_us", camera.pulse_us, 1, std::min(1e4, period_us / 2));
     reader.read("trigger_inverted", camera.trigger_inverted);
-    reader.choose<Strobe>("strobe", camera.strobe,
-                          {{"active_high", Strobe::active_high}, {"active_low", Strobe::active_low}, {"none", Strobe::none}});
+    reader.choose<Strobe>(
+        "strobe", camera.strobe,
+        {{"active_high", Strobe::active_high}, {"active_low", Strobe::active_low}, {"none", Strobe::none}});
     reader.read("trigger_line", camera.trigger_line);
     reader.read("strobe_line", camera.strobe_line);
 }
@@ -121,13 +126,16 @@ void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cam
     std::set<unsigned> taken;
     for (const CameraConfiguration& camera : cameras)
         if (camera.trigger == TriggerSource::board && !taken.insert(camera.output).second)
-            top.fail("camera", fmt::format("camera '{}' uses output {}, which is taken", camera.name, camera.output),
+            top.fail("camera",
+                     fmt::format("camera '{}' uses output {}, which is taken", camera.name, camera.output),
                      "give each triggered camera an 'output' of its own, 0 to 3");
 }
 
 std::uint32_t micro_hertz(double hertz) { return static_cast<std::uint32_t>(std::llround(hertz * 1e6)); }
 /// The wire has 32 bits for it: 4 s at most.
-std::uint32_t short_ns(double us) { return static_cast<std::uint32_t>(std::llround(std::min(us * 1e3, 4e9))); }
+std::uint32_t short_ns(double us) {
+    return static_cast<std::uint32_t>(std::llround(std::min(us * 1e3, 4e9)));
+}
 
 wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     wire::CameraConfiguration out{};
@@ -137,7 +145,8 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     if (camera.strobe == Strobe::none) out.flags |= wire::camera_no_strobe;
     out.rate_uhz = micro_hertz(camera.rate_hz);
     // Rounded to whole nanoseconds, the phase must still be below the period.
-    out.phase_ns = std::min(short_ns(camera.phase_us), static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
+    out.phase_ns = std::min(short_ns(camera.phase_us),
+                            static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
     out.pulse_ns = short_ns(camera.pulse_us);
     out.latency_ns = short_ns(camera.latency_us);
     out.gap_ns = short_ns(camera.gap_us);
@@ -156,9 +165,13 @@ Expected<Configuration> load_configuration(const std::string& path) {
     Names names;
     TableReader top(file, *root);
     top.read("instance", configuration.instance);
-    if (!valid_name(configuration.instance)) top.fail("instance", "'instance' must be a name of letters and digits");
+    if (!valid_name(configuration.instance))
+        top.fail("instance", "'instance' must be a name of letters and digits");
     top.choose<LogLevel>("log_level", configuration.log_level,
-                         {{"error", LogLevel::error}, {"warning", LogLevel::warning}, {"info", LogLevel::info}, {"debug", LogLevel::debug}});
+                         {{"error", LogLevel::error},
+                          {"warning", LogLevel::warning},
+                          {"info", LogLevel::info},
+                          {"debug", LogLevel::debug}});
     if (const toml::table* table = top.table("board")) {
         TableReader reader(file, *table);
         read_board(reader, configuration.board);
@@ -181,7 +194,8 @@ Expected<Configuration> load_configuration(const std::string& path) {
         names.check(reader, configuration.imus.back().name);
         reader.finish();
     }
-    if (configuration.imus.size() > 1) top.fail("imu", "the board has one IMU port", "remove the other [[imu]] tables");
+    if (configuration.imus.size() > 1)
+        top.fail("imu", "the board has one IMU port", "remove the other [[imu]] tables");
     check_outputs(top, configuration.cameras);
     top.finish();
     if (!file.result) return tl::unexpected(file.result.error());

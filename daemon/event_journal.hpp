@@ -22,14 +22,15 @@ struct Happening {
 
 /// Thread-safe.
 class EventJournal {
-   public:
-    EventJournal(ring::Writer ring, clock::Translator& translator) : ring_(std::move(ring)), translator_(translator) {}
+ public:
+    EventJournal(ring::Writer ring, clock::Translator& translator)
+        : ring_(std::move(ring)), translator_(translator) {}
 
     void add(const Happening& happening);
     void heartbeat(HostTime now);
     std::uint64_t items();
 
-   private:
+ private:
     std::mutex mutex_;
     ring::Writer ring_;
     clock::Translator& translator_;

@@ -3,7 +3,8 @@
 
 namespace versavis::daemon {
 
-ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring, clock::Translator& translator)
+ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
+                         clock::Translator& translator)
     : model_(*configuration.model), ring_(std::move(ring)), translator_(translator) {
     report_.name = configuration.name;
     report_.model = model_.name;
@@ -17,8 +18,9 @@ void ImuPipeline::board_restarted() {
 void ImuPipeline::add(const wire::ImuSample& sample) {
     const std::lock_guard lock(mutex_);
     // 32 bits on the wire are extended by the number before.
-    const std::uint64_t number = last_number_ ? *last_number_ + (sample.number - static_cast<std::uint32_t>(*last_number_))
-                                              : sample.number;
+    const std::uint64_t number =
+        last_number_ ? *last_number_ + (sample.number - static_cast<std::uint32_t>(*last_number_))
+                     : sample.number;
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
     last_number_ = number;
     const auto stamp = translator_.translate(BoardTime{sample.time_ns});

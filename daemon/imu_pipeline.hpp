@@ -23,7 +23,7 @@ struct ImuReport {
 
 /// Thread-safe.
 class ImuPipeline {
-   public:
+ public:
     ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring, clock::Translator& translator);
 
     void add(const wire::ImuSample& sample);
@@ -31,7 +31,7 @@ class ImuPipeline {
     void heartbeat(HostTime now);
     ImuReport report();
 
-   private:
+ private:
     std::mutex mutex_;
     const imu::ImuModel& model_;
     ring::Writer ring_;

@@ -31,12 +31,13 @@ void log_line(LogLevel level, const std::string& subject, const std::string& tex
     if (level > threshold.load()) return;
     static const bool journal = std::getenv("JOURNAL_STREAM") != nullptr;
     if (journal) {
-        sd_journal_send("MESSAGE=%s: %s", subject.c_str(), text.c_str(), "PRIORITY=%i", static_cast<int>(level),
-                        "VERSAVIS_SUBJECT=%s", subject.c_str(), nullptr);
+        sd_journal_send("MESSAGE=%s: %s", subject.c_str(), text.c_str(), "PRIORITY=%i",
+                        static_cast<int>(level), "VERSAVIS_SUBJECT=%s", subject.c_str(), nullptr);
         return;
     }
     const std::string line = fmt::format("versavisd: {}: {}: {}\n", name(level), subject, text);
-    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, line.data(), line.size());  // one call: lines stay whole
+    [[maybe_unused]] const auto written =
+        ::write(STDERR_FILENO, line.data(), line.size());  // one call: lines stay whole
 }
 
 }  // namespace versavis::daemon

@@ -36,7 +36,8 @@ int serve(Service& service, const sigset_t& signals) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
         if (signal == SIGHUP)
-            log(LogLevel::warning, "service", "SIGHUP: the configuration is read at start only: restart the service");
+            log(LogLevel::warning, "service",
+                "SIGHUP: the configuration is read at start only: restart the service");
         service.tick();
         sd_notify(0, "WATCHDOG=1");
         if (health == service.health()) continue;
@@ -65,8 +66,8 @@ int run(const std::string& path, bool check_only) {
     }
     (*service)->start();
     sd_notify(0, "READY=1");
-    log(LogLevel::info, "service", "serving instance '{}' with {} camera(s) and {} IMU(s)", configuration->instance,
-        configuration->cameras.size(), configuration->imus.size());
+    log(LogLevel::info, "service", "serving instance '{}' with {} camera(s) and {} IMU(s)",
+        configuration->instance, configuration->cameras.size(), configuration->imus.size());
     const int signal = serve(**service, signals);
     sd_notify(0, "STOPPING=1");
     log(LogLevel::info, "service", "stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");

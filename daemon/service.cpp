@@ -32,8 +32,8 @@ Expected<std::unique_ptr<Service>> Service::create(const Configuration& configur
     return service;
 }
 
-Service::Service(const Configuration& configuration, ring::OwnedDirectory directory, clock::OutputClock output,
-                 ring::Writer status_ring)
+Service::Service(const Configuration& configuration, ring::OwnedDirectory directory,
+                 clock::OutputClock output, ring::Writer status_ring)
     : configuration_(configuration),
       directory_(std::move(directory)),
       translator_(std::move(output)),
@@ -41,7 +41,8 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       started_(host_now()) {}
 
 Expected<> Service::make_parts() {
-    auto event_ring = ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
+    auto event_ring =
+        ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
     if (!event_ring) return tl::unexpected(event_ring.error());
     events_ = std::make_unique<EventJournal>(std::move(*event_ring), translator_);
     for (const ImuConfiguration& imu : configuration_.imus) {
@@ -52,8 +53,8 @@ Expected<> Service::make_parts() {
     for (const CameraConfiguration& camera : configuration_.cameras) add_camera(camera);
     BoardListener& self = *this;
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         board_configuration(configuration_), configuration_.clock.exchange_rate_hz,
-                                         translator_, self);
+                                         board_configuration(configuration_),
+                                         configuration_.clock.exchange_rate_hz, translator_, self);
     return {};
 }
 
@@ -78,10 +79,11 @@ void Service::add_camera(const CameraConfiguration& configuration) {
 }
 
 void Service::start() {
-    const bool board_needed = imu_ || std::any_of(cameras_.begin(), cameras_.end(), [](const CameraUnit& unit) {
-                                  return unit.pipeline->triggered();
-                              });
-    // Before the cameras make their rings: readers of streams that are no longer configured learn that they are gone.
+    const bool board_needed =
+        imu_ || std::any_of(cameras_.begin(), cameras_.end(),
+                            [](const CameraUnit& unit) { return unit.pipeline->triggered(); });
+    // Before the cameras make their rings: readers of streams that are no longer configured learn that they
+    // are gone.
     std::vector<std::string> configured;
     for (const CameraUnit& unit : cameras_) configured.push_back(unit.configuration.name);
     directory_.remove_strangers(configured);
@@ -139,8 +141,8 @@ void Service::board_event(const wire::Event& event) {
         return EventKind{};
     }();
     const CameraUnit* unit = camera_at(event.source);
-    events_->add({kind, EventReason::none, event.source, unit != nullptr ? unit->configuration.name : "board", event.value,
-                  BoardTime{event.time_ns}});
+    events_->add({kind, EventReason::none, event.source, unit != nullptr ? unit->configuration.name : "board",
+                  event.value, BoardTime{event.time_ns}});
 }
 
 void Service::tick() {
@@ -163,7 +165,8 @@ std::vector<StreamStatus> Service::stream_status(HostTime now) {
     const auto add = [&](const std::string& name, const char* kind, std::uint64_t items) {
         auto& [before, at] = last_items_[name];
         const double seconds = static_cast<double>((now - at).ns) * 1e-9;
-        streams.push_back({name, kind, items, at.ns == 0 ? 0 : static_cast<double>(items - std::min(items, before)) / seconds});
+        streams.push_back({name, kind, items,
+                           at.ns == 0 ? 0 : static_cast<double>(items - std::min(items, before)) / seconds});
         before = items;
         at = now;
     };
@@ -186,7 +189,8 @@ void Service::publish_status(HostTime now) {
     for (CameraUnit& unit : cameras_) {
         status.board_needed = status.board_needed || unit.pipeline->triggered();
         const PipelineReport report = unit.pipeline->report();
-        const Duration patience = seconds(1) + Duration{static_cast<std::int64_t>(3e9 / unit.configuration.rate_hz)};
+        const Duration patience =
+            seconds(1) + Duration{static_cast<std::int64_t>(3e9 / unit.configuration.rate_hz)};
         const bool stalled = unit.pipeline->triggered() && now - report.last_frame > patience;
         status.cameras.push_back(
             {unit.configuration.name, unit.pipeline->triggered(), stalled, unit.camera->report(), report});

@@ -18,8 +18,9 @@
 namespace versavis::daemon {
 
 class Service final : private BoardListener {
-   public:
-    /// Errors: the instance is served by another process, the rings cannot be made, the output clock is not set.
+ public:
+    /// Errors: the instance is served by another process, the rings cannot be made, the output clock is not
+    /// set.
     static Expected<std::unique_ptr<Service>> create(const Configuration& configuration);
     ~Service() override;
     Service(const Service&) = delete;
@@ -35,7 +36,7 @@ class Service final : private BoardListener {
 
     static constexpr Duration tick_interval = milliseconds(50);
 
-   private:
+ private:
     struct CameraUnit {
         CameraConfiguration configuration;
         std::unique_ptr<CameraPipeline> pipeline;

@@ -11,7 +11,7 @@
 namespace versavis::daemon {
 
 class StampGuard {
-   public:
+ public:
     /// The stamp to publish: `stamp.output`, or just after the one before; then `flags` says so.
     OutputTime guard(const clock::Stamp& stamp, std::uint32_t& flags) {
         if (stamp.state == clock::ClockState::holdover) flags |= flag_holdover;
@@ -25,7 +25,7 @@ class StampGuard {
         return time;
     }
 
-   private:
+ private:
     std::optional<OutputTime> last_;
     std::uint32_t epoch_ = 0;
 };

@@ -17,7 +17,8 @@ constexpr Duration grace = seconds(5);
 bool delivers(const CameraStatus& camera) {
     if (camera.camera.state != CameraState::streaming) return false;
     if (camera.stalled) return false;
-    return !camera.triggered || (camera.pipeline.pairing == pairing::State::locked && camera.pipeline.measured);
+    return !camera.triggered ||
+           (camera.pipeline.pairing == pairing::State::locked && camera.pipeline.measured);
 }
 
 std::string hint(const CameraStatus& status) {
@@ -25,7 +26,8 @@ std::string hint(const CameraStatus& status) {
         return status.camera.hint;
     if (status.pipeline.triggers == 0) return "no trigger yet: is the board running?";
     if (!status.pipeline.measured)
-        return "exposures are not measured: check the exposure line, 'strobe', 'latency_us' and 'max_exposure_us'";
+        return "exposures are not measured: check the exposure line, 'strobe', 'latency_us' and "
+               "'max_exposure_us'";
     return status.stalled ? "triggers are sent but no frames come: check trigger cable and network" : "";
 }
 
@@ -90,8 +92,8 @@ json camera_json(const CameraStatus& status) {
 }  // namespace
 
 std::string health(const Status& status) {
-    bool ok = !status.board_needed || (status.board.state == BoardState::running &&
-                                       status.clock.state == clock::ClockState::locked);
+    bool ok = !status.board_needed ||
+              (status.board.state == BoardState::running && status.clock.state == clock::ClockState::locked);
     for (const CameraStatus& camera : status.cameras) ok = ok && delivers(camera);
     if (ok) return "ok";
     return status.now - status.started < grace ? "starting" : "degraded";
@@ -110,7 +112,10 @@ std::string to_json(const Status& status) {
                         {"faulty", imu.faulty}});
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
-        streams.push_back({{"name", stream.name}, {"kind", stream.kind}, {"items", stream.items}, {"rate_hz", stream.rate_hz}});
+        streams.push_back({{"name", stream.name},
+                           {"kind", stream.kind},
+                           {"items", stream.items},
+                           {"rate_hz", stream.rate_hz}});
     const json document{{"schema", schema},
                         {"instance", status.instance},
                         {"pid", ::getpid()},

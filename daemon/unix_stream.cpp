@@ -19,7 +19,7 @@ namespace {
 constexpr int write_timeout_ms = 500;
 
 class UnixStream final : public ByteStream {
-   public:
+ public:
     UnixStream(std::string path, int socket) : path_(std::move(path)), socket_(socket) {}
     ~UnixStream() override { ::close(socket_); }
     UnixStream(const UnixStream&) = delete;
@@ -33,7 +33,8 @@ class UnixStream final : public ByteStream {
         chunk.bytes.resize(4096);
         const ssize_t size = ::recv(socket_, chunk.bytes.data(), chunk.bytes.size(), MSG_DONTWAIT);
         chunk.received = host_now();
-        if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) return failure(path_, "the board closed the link");
+        if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR))
+            return failure(path_, "the board closed the link");
         chunk.bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
         return chunk;
     }
@@ -52,7 +53,7 @@ class UnixStream final : public ByteStream {
         return {};
     }
 
-   private:
+ private:
     std::string path_;
     int socket_;
 };
@@ -62,13 +63,15 @@ class UnixStream final : public ByteStream {
 Expected<std::unique_ptr<ByteStream>> open_unix_stream(const std::string& path) {
     sockaddr_un peer{};
     peer.sun_family = AF_UNIX;
-    if (path.size() >= sizeof peer.sun_path) return failure("board.link", "the path of the socket is too long");
+    if (path.size() >= sizeof peer.sun_path)
+        return failure("board.link", "the path of the socket is too long");
     std::memcpy(peer.sun_path, path.c_str(), path.size() + 1);
     const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (::connect(socket, reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0) {
         const std::string reason = std::generic_category().message(errno);
         ::close(socket);
-        return failure(path, fmt::format("cannot connect: {}", reason), "is the board's process (versavis-rig) running?");
+        return failure(path, fmt::format("cannot connect: {}", reason),
+                       "is the board's process (versavis-rig) running?");
     }
     return std::make_unique<UnixStream>(path, socket);
 }

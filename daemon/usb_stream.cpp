@@ -50,7 +50,7 @@ tl::unexpected<Error> usb_failure(const std::string& what, int code) {
 }
 
 class UsbStream final : public ByteStream {
-   public:
+ public:
     UsbStream(Context context, Handle handle, const CdcFunction& function)
         : context_(std::move(context)), handle_(std::move(handle)), function_(function) {}
 
@@ -73,8 +73,9 @@ class UsbStream final : public ByteStream {
         for (Slot& slot : slots_) {
             slot.owner = this;
             slot.transfer.reset(libusb_alloc_transfer(0));
-            libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), function_.endpoint_in, slot.buffer.data(),
-                                      static_cast<int>(slot.buffer.size()), &UsbStream::completed, &slot, 0);
+            libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), function_.endpoint_in,
+                                      slot.buffer.data(), static_cast<int>(slot.buffer.size()),
+                                      &UsbStream::completed, &slot, 0);
             if (const int code = libusb_submit_transfer(slot.transfer.get()); code != 0)
                 return usb_failure("cannot read", code);
             slot.pending = true;
@@ -92,13 +93,15 @@ class UsbStream final : public ByteStream {
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
         int done = 0;
-        const int code = libusb_bulk_transfer(handle_.get(), function_.endpoint_out, const_cast<std::uint8_t*>(bytes.data()),
+        const int code = libusb_bulk_transfer(handle_.get(), function_.endpoint_out,
+                                              const_cast<std::uint8_t*>(bytes.data()),
                                               static_cast<int>(bytes.size()), &done, write_timeout_ms);
-        if (code != 0 || done != static_cast<int>(bytes.size())) return usb_failure("the board does not take data", code);
+        if (code != 0 || done != static_cast<int>(bytes.size()))
+            return usb_failure("the board does not take data", code);
         return {};
     }
 
-   private:
+ private:
     struct Slot {
         UsbStream* owner = nullptr;
         std::unique_ptr<libusb_transfer, TransferDeleter> transfer;
@@ -106,7 +109,8 @@ class UsbStream final : public ByteStream {
         std::atomic<bool> pending{false};
     };
 
-    /// May run on a writing thread, too: libusb lets whichever thread waits handle events, under its own lock.
+    /// May run on a writing thread, too: libusb lets whichever thread waits handle events, under its own
+    /// lock.
     static void LIBUSB_CALL completed(libusb_transfer* transfer) {
         auto& slot = *static_cast<Slot*>(transfer->user_data);
         slot.owner->take(slot, *transfer);
@@ -118,7 +122,8 @@ class UsbStream final : public ByteStream {
             const std::lock_guard lock(chunks_mutex_);
             chunks_.push_back({received, {transfer.buffer, transfer.buffer + transfer.actual_length}});
         }
-        const bool usable = transfer.status == LIBUSB_TRANSFER_COMPLETED || transfer.status == LIBUSB_TRANSFER_TIMED_OUT;
+        const bool usable =
+            transfer.status == LIBUSB_TRANSFER_COMPLETED || transfer.status == LIBUSB_TRANSFER_TIMED_OUT;
         slot.pending = usable && libusb_submit_transfer(&transfer) == 0;
         if (!slot.pending) gone_ = true;
     }
@@ -148,8 +153,10 @@ class UsbStream final : public ByteStream {
 
 std::string text_descriptor(libusb_device_handle* handle, std::uint8_t index) {
     std::array<unsigned char, 256> text{};
-    const int size = libusb_get_string_descriptor_ascii(handle, index, text.data(), static_cast<int>(text.size()));
-    return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()), static_cast<std::size_t>(size)) : "";
+    const int size =
+        libusb_get_string_descriptor_ascii(handle, index, text.data(), static_cast<int>(text.size()));
+    return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()), static_cast<std::size_t>(size))
+                    : "";
 }
 
 CdcFunction find_function(libusb_device* device) {
@@ -158,7 +165,8 @@ CdcFunction find_function(libusb_device* device) {
     if (libusb_get_active_config_descriptor(device, &configuration) != 0) return function;
     for (int i = 0; i < configuration->bNumInterfaces; ++i) {
         const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
-        if (setting.bInterfaceClass == LIBUSB_CLASS_COMM) function.control_interface = setting.bInterfaceNumber;
+        if (setting.bInterfaceClass == LIBUSB_CLASS_COMM)
+            function.control_interface = setting.bInterfaceNumber;
         if (setting.bInterfaceClass != LIBUSB_CLASS_DATA) continue;
         function.data_interface = setting.bInterfaceNumber;
         for (int e = 0; e < setting.bNumEndpoints; ++e) {
@@ -202,7 +210,8 @@ Expected<Handle> find_board(libusb_context* context, const BoardConfiguration& w
 
 Expected<std::unique_ptr<ByteStream>> open_usb_stream(const BoardConfiguration& configuration) {
     libusb_context* raw_context = nullptr;
-    if (const int code = libusb_init(&raw_context); code != 0) return usb_failure("libusb cannot start", code);
+    if (const int code = libusb_init(&raw_context); code != 0)
+        return usb_failure("libusb cannot start", code);
     Context context(raw_context);
     auto handle = find_board(context.get(), configuration);
     if (!handle) return tl::unexpected(handle.error());
@@ -214,7 +223,8 @@ Expected<std::unique_ptr<ByteStream>> open_usb_stream(const BoardConfiguration& 
         if (const int code = libusb_claim_interface(handle->get(), interface); code != 0)
             return usb_failure("cannot be claimed", code);
     libusb_control_transfer(handle->get(), class_interface_out, set_control_line_state, dtr_rts,
-                            static_cast<std::uint16_t>(function.control_interface), nullptr, 0, control_timeout_ms);
+                            static_cast<std::uint16_t>(function.control_interface), nullptr, 0,
+                            control_timeout_ms);
     auto stream = std::make_unique<UsbStream>(std::move(context), std::move(*handle), function);
     if (auto started = stream->start(); !started) return tl::unexpected(started.error());
     return stream;

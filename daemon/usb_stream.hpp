@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board on USB: bulk endpoints of its CDC-ACM function, through libusb, without the kernel's tty in between.
+// The board on USB: bulk endpoints of its CDC-ACM function, through libusb, without the kernel's tty in
+// between.
 #pragma once
 
 #include <memory>

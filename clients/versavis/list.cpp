@@ -33,7 +33,8 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
     for (const auto& entry : std::filesystem::directory_iterator(directory, error))
         if (entry.path().filename().string().front() != '.') paths.push_back(entry.path());
     if (error)
-        return failure(directory.string(), error.message(), "is versavisd running? --instance names another instance");
+        return failure(directory.string(), error.message(),
+                       "is versavisd running? --instance names another instance");
     std::sort(paths.begin(), paths.end());
     nlohmann::json document = nlohmann::json::array();
     std::string text;
@@ -46,8 +47,9 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
                             {"items", reader->head()},
                             {"retained", reader->retained()},
                             {"alive", alive}});
-        text += fmt::format("{:<12} {:<7} {:>10} items, {:>6} retained{}\n", reader->name(), kind_name(reader->kind()),
-                            reader->head(), reader->retained(), alive ? "" : ", its writer is gone");
+        text += fmt::format("{:<12} {:<7} {:>10} items, {:>6} retained{}\n", reader->name(),
+                            kind_name(reader->kind()), reader->head(), reader->retained(),
+                            alive ? "" : ", its writer is gone");
     }
     return as_json ? document.dump() + "\n" : text;
 }

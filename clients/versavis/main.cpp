@@ -59,7 +59,9 @@ int main(int argc, char** argv) {
     bool json = false;
 
     bool watch = false;
-    auto* status = app.add_subcommand("status", "State of board, clock, cameras and streams; exit code 0: all well, 1: not all delivers, 69: not running");
+    auto* status = app.add_subcommand("status",
+                                      "State of board, clock, cameras and streams; exit code 0: all well, 1: "
+                                      "not all delivers, 69: not running");
     status->add_flag("--watch", watch, "Show it again every second");
     status->add_flag("--json", json, "The status document itself (docs/status.md)");
 
@@ -78,7 +80,9 @@ int main(int argc, char** argv) {
     auto* snapshot = app.add_subcommand("snapshot", "Write the next frame of a stream to a PNG file");
     snapshot->add_option("stream", stream, "Name of the stream")->required();
     snapshot->add_option("-o,--output", output, "File to write")->required();
-    snapshot->add_option("--timeout", timeout_s, "Seconds to wait for a frame")->check(CLI::PositiveNumber)->capture_default_str();
+    snapshot->add_option("--timeout", timeout_s, "Seconds to wait for a frame")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
 
     try {
         app.parse(argc, argv);
@@ -99,7 +103,8 @@ int main(int argc, char** argv) {
         const auto done = client::tail(tail);
         return done ? EX_OK : fail(done.error());
     }
-    const auto written = client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
+    const auto written =
+        client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
     if (!written) return fail(written.error());
     fmt::print("{}\n", *written);
     return EX_OK;

@@ -32,12 +32,14 @@ std::optional<PixelLayout> layout_of(std::uint32_t pixel_format) {
     return std::nullopt;
 }
 
-Expected<> write_png(const std::string& path, const FrameMetadata& frame, const std::vector<std::byte>& pixels) {
+Expected<> write_png(const std::string& path, const FrameMetadata& frame,
+                     const std::vector<std::byte>& pixels) {
     const auto layout = layout_of(frame.pixel_format);
     if (!layout)
         return failure(path, fmt::format("pixel format {:#010x} cannot be written", frame.pixel_format),
                        "choose an unpacked format of 8 or 16 bits in the camera's [features]");
-    if (std::uint64_t{frame.stride} * frame.height > pixels.size() || frame.stride < frame.width * layout->bytes_per_pixel)
+    if (std::uint64_t{frame.stride} * frame.height > pixels.size() ||
+        frame.stride < frame.width * layout->bytes_per_pixel)
         return failure(path, "the frame is smaller than its size says");
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
@@ -53,8 +55,8 @@ Expected<> write_png(const std::string& path, const FrameMetadata& frame, const 
 
 }  // namespace
 
-Expected<std::string> snapshot(const std::string& instance, const std::string& stream_name, const std::string& path,
-                               Duration timeout) {
+Expected<std::string> snapshot(const std::string& instance, const std::string& stream_name,
+                               const std::string& path, Duration timeout) {
     auto stream = FrameStream::open(stream_name, instance);
     if (!stream) return tl::unexpected(stream.error());
     const HostTime deadline = host_now() + timeout;
@@ -63,7 +65,8 @@ Expected<std::string> snapshot(const std::string& instance, const std::string& s
         if (item.found != Found::item) continue;
         std::vector<std::byte> pixels(item.payload_size);
         if (!stream->copy(item, pixels.data())) continue;
-        if (auto written = write_png(path, item.data, pixels); !written) return tl::unexpected(written.error());
+        if (auto written = write_png(path, item.data, pixels); !written)
+            return tl::unexpected(written.error());
         return fmt::format("{}: {} x {}, {} stamp {} ns", path, item.data.width, item.data.height,
                            to_string(item.data.stamp_kind()), item.time.ns);
     }

@@ -9,9 +9,10 @@
 
 namespace versavis::client {
 
-/// Waits for the next frame and writes it. 8 and 16 bit grey, RGB and BGR are known; Bayer patterns are written grey.
-/// Errors: no such stream, no frame in time, an unknown pixel format, the file cannot be written.
-Expected<std::string> snapshot(const std::string& instance, const std::string& stream, const std::string& path,
-                               Duration timeout);
+/// Waits for the next frame and writes it. 8 and 16 bit grey, RGB and BGR are known; Bayer patterns are
+/// written grey. Errors: no such stream, no frame in time, an unknown pixel format, the file cannot be
+/// written.
+Expected<std::string> snapshot(const std::string& instance, const std::string& stream,
+                               const std::string& path, Duration timeout);
 
 }  // namespace versavis::client

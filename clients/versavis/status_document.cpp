@@ -18,7 +18,8 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
     if (!stream->reader().writer_alive())
         return failure(fmt::format("instance {}", instance), "the service has died or hangs",
                        "see its log ('journalctl -u versavisd'), then restart it");
-    if (!newest) return failure(fmt::format("instance {}", instance), "the service has not published its status yet");
+    if (!newest)
+        return failure(fmt::format("instance {}", instance), "the service has not published its status yet");
     auto document = nlohmann::json::parse(*newest, nullptr, false);
     if (document.is_discarded() || document.value("schema", 0) != 1)
         return failure(fmt::format("instance {}", instance), "the status document is of another version",

@@ -10,7 +10,8 @@
 
 namespace versavis::client {
 
-/// The newest document of `instance`. Error: the service does not run, or its document is older than three seconds.
+/// The newest document of `instance`. Error: the service does not run, or its document is older than three
+/// seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
 
 }  // namespace versavis::client

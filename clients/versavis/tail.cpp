@@ -75,7 +75,8 @@ json describe(const Received<EventMetadata>& item) {
 json describe(const StatusStream& stream, const Received<ring::Metadata>& item) {
     std::string text(item.payload_size, '\0');
     json line = describe(static_cast<const ring::Item&>(item));
-    if (stream.copy(item, reinterpret_cast<std::byte*>(text.data()))) line["status"] = json::parse(text, nullptr, false);
+    if (stream.copy(item, reinterpret_cast<std::byte*>(text.data())))
+        line["status"] = json::parse(text, nullptr, false);
     return line;
 }
 
@@ -87,7 +88,8 @@ json describe(const S& /*stream*/, const D& item) {
 std::string one_line(const json& line, bool as_json) {
     if (as_json) return line.dump();
     std::string text;
-    for (const auto& [key, value] : line.items()) text += fmt::format("{}{}={}", text.empty() ? "" : " ", key, value.dump());
+    for (const auto& [key, value] : line.items())
+        text += fmt::format("{}{}={}", text.empty() ? "" : " ", key, value.dump());
     return text;
 }
 

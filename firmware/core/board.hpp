@@ -17,7 +17,7 @@ struct Identity {
 };
 
 class Board final : private ChannelReports {
-   public:
+ public:
     Board(const Hal& hal, const Identity& identity);
     Board(const Board&) = delete;
     Board& operator=(const Board&) = delete;
@@ -27,7 +27,7 @@ class Board final : private ChannelReports {
 
     Nanoseconds next_wake() const;
 
-   private:
+ private:
     void exposure(const wire::Exposure& record) override;
     void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value) override;
 

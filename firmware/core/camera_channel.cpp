@@ -5,7 +5,8 @@ namespace versavis::firmware {
 
 namespace {
 
-// Decided this long before it is due: late enough for the newest exposure, early enough for the commit horizon.
+// Decided this long before it is due: late enough for the newest exposure, early enough for the commit
+// horizon.
 constexpr Nanoseconds decide_ahead = 1'500'000;
 constexpr Nanoseconds start_timeout_floor = 2'000'000;
 constexpr Nanoseconds start_timeout_limit = 50'000'000;
@@ -61,7 +62,8 @@ Nanoseconds CameraChannel::busy_until(Nanoseconds now) const {
     if (flight_count_ == 0) return last_end_;
     const Flight& newest = flights_[flight_count_ - 1];
     const bool started = newest.record.start_ns != wire::no_time;
-    const Nanoseconds start = started ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
+    const Nanoseconds start =
+        started ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
     const Nanoseconds end = start + newest.expected;
     return started && end < now ? INT64_MAX / 2 : end;  // overdue: it may last for any time
 }
@@ -69,8 +71,10 @@ Nanoseconds CameraChannel::busy_until(Nanoseconds now) const {
 void CameraChannel::decide(Nanoseconds now) {
     const Nanoseconds at = trigger_time();
     if (!in_pattern_gap()) {
-        if (flight_count_ == max_flights || !outputs_.has_room() || busy_until(now) + configuration_.gap_ns > at)
-            reports_.event(wire::EventKind::trigger_skipped, camera_, at, static_cast<std::int64_t>(grid_.tick()));
+        if (flight_count_ == max_flights || !outputs_.has_room() ||
+            busy_until(now) + configuration_.gap_ns > at)
+            reports_.event(wire::EventKind::trigger_skipped, camera_, at,
+                           static_cast<std::int64_t>(grid_.tick()));
         else
             send_trigger(at, now);
     }
@@ -113,7 +117,8 @@ void CameraChannel::edge(Nanoseconds at, bool level) {
         end_edge(at);
 }
 
-/// The edge belongs to the newest trigger before it: older ones that wait for a start were ignored by the camera.
+/// The edge belongs to the newest trigger before it: older ones that wait for a start were ignored by the
+/// camera.
 void CameraChannel::start_edge(Nanoseconds at) {
     std::size_t found = max_flights;
     for (std::size_t i = 0; i < flight_count_; ++i)
@@ -142,8 +147,10 @@ void CameraChannel::end_edge(Nanoseconds at) {
 }
 
 Nanoseconds CameraChannel::deadline(const Flight& flight) const {
-    if (has(wire::camera_no_strobe)) return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;
-    if (flight.record.start_ns != wire::no_time) return flight.record.start_ns + configuration_.max_exposure_ns;
+    if (has(wire::camera_no_strobe))
+        return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;
+    if (flight.record.start_ns != wire::no_time)
+        return flight.record.start_ns + configuration_.max_exposure_ns;
     const Nanoseconds patience = min(max(grid_.period(), start_timeout_floor), start_timeout_limit);
     return flight.record.trigger_ns + configuration_.latency_ns + patience;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One camera: places its triggers so that the middles of its exposures lie on the grid, and records what it did.
+// One camera: places its triggers so that the middles of its exposures lie on the grid, and records what it
+// did.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +18,12 @@ struct ChannelReports {
     virtual void exposure(const wire::Exposure& record) = 0;
     virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value) = 0;
 
-   protected:
+ protected:
     ~ChannelReports() = default;
 };
 
 class CameraChannel {
-   public:
+ public:
     CameraChannel(std::uint8_t camera, OutputQueue& outputs, ChannelReports& reports)
         : camera_(camera), outputs_(outputs), reports_(reports) {}
 
@@ -46,7 +47,7 @@ class CameraChannel {
     /// When poll() has something to do next; INT64_MAX: never.
     Nanoseconds next_wake() const;
 
-   private:
+ private:
     /// A trigger that was sent and whose record is not complete.
     struct Flight {
         wire::Exposure record;

@@ -53,7 +53,8 @@ void check(const wire::Configuration& configuration, wire::ConfigurationAnswer& 
         answer.field = wire::ConfigurationField::imu_kind;
         return;
     }
-    refuse({wire::ConfigurationField::imu_rate, configuration.imu.rate_uhz, 1'000'000, 1'000'000'000}, answer);
+    refuse({wire::ConfigurationField::imu_rate, configuration.imu.rate_uhz, 1'000'000, 1'000'000'000},
+           answer);
 }
 
 }  // namespace versavis::firmware

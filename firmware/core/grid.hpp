@@ -8,9 +8,10 @@
 
 namespace versavis::firmware {
 
-/// Tick k lies at origin + floor(k * 10^15 / rate_uhz) ns: the remainder of the period is carried (Bresenham).
+/// Tick k lies at origin + floor(k * 10^15 / rate_uhz) ns: the remainder of the period is carried
+/// (Bresenham).
 class Grid {
-   public:
+ public:
     Grid() = default;
     Grid(Nanoseconds origin, std::uint32_t rate_uhz)
         : next_(origin), rate_uhz_(rate_uhz), whole_(ns_uhz / rate_uhz), remainder_(ns_uhz % rate_uhz) {}
@@ -41,7 +42,7 @@ class Grid {
         }
     }
 
-   private:
+ private:
     static constexpr std::int64_t ns_uhz = 1'000'000'000'000'000;
 
     Nanoseconds next_ = 0;

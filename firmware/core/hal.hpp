@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the portable core needs of a board: time, scheduled outputs, stamped edges, an IMU bus and a byte link.
+// What the portable core needs of a board: time, scheduled outputs, stamped edges, an IMU bus and a byte
+// link.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ inline constexpr std::size_t camera_count = 4;
 struct Clock64 {
     virtual Nanoseconds now() = 0;
 
-   protected:
+ protected:
     ~Clock64() = default;
 };
 
@@ -26,7 +27,7 @@ struct OutputSchedule {
     /// Nanoseconds by which a word left too late since the last call; 0: none did.
     virtual Nanoseconds take_lateness() = 0;
 
-   protected:
+ protected:
     ~OutputSchedule() = default;
 };
 
@@ -42,7 +43,7 @@ struct EdgeStream {
     /// Edges lost since the last call because nobody popped them.
     virtual std::uint32_t take_lost() = 0;
 
-   protected:
+ protected:
     ~EdgeStream() = default;
 };
 
@@ -60,7 +61,7 @@ struct ImuBus {
     virtual bool start(Nanoseconds at, const std::uint8_t* transmit, std::size_t size) = 0;
     virtual bool complete(Transfer& transfer) = 0;
 
-   protected:
+ protected:
     ~ImuBus() = default;
 };
 
@@ -71,14 +72,14 @@ struct ByteLink {
     /// `received` is when the newest of the bytes entered the board.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
 
-   protected:
+ protected:
     ~ByteLink() = default;
 };
 
 struct Rebooter {
     virtual void reboot(bool to_boot_loader) = 0;
 
-   protected:
+ protected:
     ~Rebooter() = default;
 };
 

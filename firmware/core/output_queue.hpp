@@ -10,14 +10,14 @@
 namespace versavis::firmware {
 
 class OutputQueue {
-   public:
+ public:
     explicit OutputQueue(OutputSchedule& hardware) : hardware_(hardware) {}
 
     /// True while both edges of a pulse can be set.
     bool has_room() const { return size_ + 2 <= capacity; }
 
-    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed. Returns the instant.
-    /// Without room nothing is set.
+    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed. Returns
+    /// the instant. Without room nothing is set.
     Nanoseconds set(Nanoseconds at, unsigned output, bool level);
 
     /// Hands to the hardware what is due before `until`.
@@ -31,7 +31,7 @@ class OutputQueue {
 
     std::size_t high_water() const { return high_water_; }
 
-   private:
+ private:
     struct PendingEdge {
         Nanoseconds at;
         std::uint8_t output;

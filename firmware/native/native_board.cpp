@@ -13,7 +13,8 @@ constexpr Nanoseconds spi_byte_ns = 8'000;  // 1 MHz
 }  // namespace
 
 NativeBoard::NativeBoard(const Identity& identity, Surroundings surroundings)
-    : surroundings_(std::move(surroundings)), board_(Hal{*this, *this, *this, *this, *this, *this}, identity) {}
+    : surroundings_(std::move(surroundings)),
+      board_(Hal{*this, *this, *this, *this, *this, *this}, identity) {}
 
 void NativeBoard::receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
     received_.insert(received_.end(), bytes.begin(), bytes.end());
@@ -21,7 +22,8 @@ void NativeBoard::receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
 }
 
 Nanoseconds NativeBoard::burst_end() const {
-    return burst_ ? burst_->at + static_cast<Nanoseconds>(burst_->transmitted.size()) * spi_byte_ns : INT64_MAX;
+    return burst_ ? burst_->at + static_cast<Nanoseconds>(burst_->transmitted.size()) * spi_byte_ns
+                  : INT64_MAX;
 }
 
 Nanoseconds NativeBoard::next_wake() const {

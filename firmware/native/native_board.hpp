@@ -15,19 +15,21 @@
 
 namespace versavis::firmware {
 
-/// What is connected to the board. Called from run_until(), with the instants at which the hardware would act.
+/// What is connected to the board. Called from run_until(), with the instants at which the hardware would
+/// act.
 struct Surroundings {
     std::function<void(Nanoseconds at, std::uint32_t levels)> outputs_changed;
     /// A burst that started at `at`: fills `received`, as long as `transmitted`.
-    std::function<void(Nanoseconds at, std::span<const std::uint8_t> transmitted, std::span<std::uint8_t> received)>
+    std::function<void(Nanoseconds at, std::span<const std::uint8_t> transmitted,
+                       std::span<std::uint8_t> received)>
         imu_burst;
     std::function<void(bool to_boot_loader)> reboot;
 };
 
-/// Events happen at the instants of the model, not when the process wakes up: after a late call of run_until() all
-/// that lies in between is made up for, in order. Not thread-safe.
+/// Events happen at the instants of the model, not when the process wakes up: after a late call of
+/// run_until() all that lies in between is made up for, in order. Not thread-safe.
 class NativeBoard final : Clock64, OutputSchedule, EdgeStream, ImuBus, ByteLink, Rebooter {
-   public:
+ public:
     NativeBoard(const Identity& identity, Surroundings surroundings);
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
@@ -50,7 +52,7 @@ class NativeBoard final : Clock64, OutputSchedule, EdgeStream, ImuBus, ByteLink,
 
     static constexpr std::size_t link_capacity = 64 * 1024;
 
-   private:
+ private:
     struct Later {
         bool operator()(const Edge& a, const Edge& b) const { return a.at > b.at; }
     };

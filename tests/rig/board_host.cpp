@@ -22,16 +22,19 @@ constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is see
 
 }  // namespace
 
-Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario, const std::string& socket_path,
-                                                       HostTime zero, const Motion& motion, GroundTruth& truth,
+Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
+                                                       const std::string& socket_path, HostTime zero,
+                                                       const Motion& motion, GroundTruth& truth,
                                                        std::vector<GigeCamera*> cameras) {
     sockaddr_un self{};
     self.sun_family = AF_UNIX;
-    if (socket_path.size() >= sizeof self.sun_path) return failure(socket_path, "the socket's path is too long");
+    if (socket_path.size() >= sizeof self.sun_path)
+        return failure(socket_path, "the socket's path is too long");
     std::memcpy(self.sun_path, socket_path.c_str(), socket_path.size() + 1);
     ::unlink(socket_path.c_str());
     const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (::bind(listener, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 || ::listen(listener, 1) != 0) {
+    if (::bind(listener, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 ||
+        ::listen(listener, 1) != 0) {
         const std::string reason = std::generic_category().message(errno);
         ::close(listener);
         return failure(socket_path, fmt::format("cannot listen: {}", reason), "choose another with --socket");
@@ -65,7 +68,8 @@ BoardHost::~BoardHost() {
 
 void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero) {
     ++life_;
-    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)() ^ static_cast<std::uint64_t>(host_now().ns));
+    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)() ^
+                                                static_cast<std::uint64_t>(host_now().ns));
     serial_.copy(identity.serial, sizeof identity.serial - 1);
     clock_ = std::make_unique<SkewedClock>(zero, clock);
     levels_ = 0;

@@ -15,10 +15,11 @@
 namespace versavis::rig {
 
 class BoardHost {
-   public:
+ public:
     /// Error: the socket cannot be made.
-    static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario, const std::string& socket_path,
-                                                       HostTime zero, const Motion& motion, GroundTruth& truth,
+    static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
+                                                       const std::string& socket_path, HostTime zero,
+                                                       const Motion& motion, GroundTruth& truth,
                                                        std::vector<GigeCamera*> cameras);
     ~BoardHost();
     BoardHost(const BoardHost&) = delete;
@@ -27,7 +28,7 @@ class BoardHost {
     /// The board starts anew as soon as it can. From any thread.
     void reset() { reset_pending_ = true; }
 
-   private:
+ private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
               GroundTruth& truth, std::vector<GigeCamera*> cameras, int listener);
 

@@ -42,8 +42,8 @@ enum Status : std::uint16_t {
 };
 
 std::uint32_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
-    return std::uint32_t{bytes[at]} << 24U | std::uint32_t{bytes[at + 1]} << 16U | std::uint32_t{bytes[at + 2]} << 8U |
-           bytes[at + 3];
+    return std::uint32_t{bytes[at]} << 24U | std::uint32_t{bytes[at + 1]} << 16U |
+           std::uint32_t{bytes[at + 2]} << 8U | bytes[at + 3];
 }
 
 std::uint16_t half(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -63,6 +63,18 @@ bool same(const sockaddr_in& a, const sockaddr_in& b) {
     return a.sin_addr.s_addr == b.sin_addr.s_addr && a.sin_port == b.sin_port;
 }
 
+/// Hears what is sent to everybody. Never on loopback: a rig there must not show up on the machine's real
+/// networks.
+int open_broadcast_socket(sockaddr_in self) {
+    if ((ntohl(self.sin_addr.s_addr) >> 24U) == 127) return -1;
+    self.sin_addr.s_addr = INADDR_BROADCAST;
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    ::bind(socket, reinterpret_cast<const sockaddr*>(&self), sizeof self);
+    return socket;
+}
+
 std::vector<Fault> faults_of(const Scenario& scenario, const std::string& camera) {
     std::vector<Fault> faults;
     std::copy_if(scenario.faults.begin(), scenario.faults.end(), std::back_inserter(faults),
@@ -72,8 +84,9 @@ std::vector<Fault> faults_of(const Scenario& scenario, const std::string& camera
 
 }  // namespace
 
-Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenario, const CameraScenario& settings,
-                                                         HostTime zero, const Motion& motion, GroundTruth& truth) {
+Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenario,
+                                                         const CameraScenario& settings, HostTime zero,
+                                                         const Motion& motion, GroundTruth& truth) {
     const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_in self{};
     self.sin_family = AF_INET;
@@ -88,11 +101,12 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
                        fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
                        "is another rig running? use other addresses of 127.0.0.0/8");
     }
-    return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, motion, truth, socket));
+    return std::unique_ptr<GigeCamera>(
+        new GigeCamera(scenario, settings, zero, motion, truth, socket, open_broadcast_socket(self)));
 }
 
-GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,
-                       GroundTruth& truth, int socket)
+GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
+                       const Motion& motion, GroundTruth& truth, int socket, int broadcast_socket)
     : settings_(settings),
       faults_(faults_of(scenario, settings.name)),
       zero_(zero),
@@ -103,7 +117,8 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
                   settings.exposure_us, settings.exposure_swing > 0}),
       wall_(settings.width, settings.height, scenario.seed),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
-      socket_(socket) {
+      socket_(socket),
+      broadcast_socket_(broadcast_socket) {
     configure_stream();
     server_ = std::thread([this] { serve(); });
 }
@@ -112,25 +127,30 @@ GigeCamera::~GigeCamera() {
     stop_ = true;
     server_.join();
     ::close(socket_);
+    if (broadcast_socket_ >= 0) ::close(broadcast_socket_);
 }
 
 void GigeCamera::serve() {
-    std::uint8_t buffer[2048];
     while (!stop_) {
-        pollfd readable{socket_, POLLIN, 0};
-        ::poll(&readable, 1, poll_ms);
+        pollfd readable[] = {{socket_, POLLIN, 0}, {broadcast_socket_, POLLIN, 0}};
+        ::poll(readable, 2, poll_ms);
         if (!muted() && power_cycle_pending_.exchange(false)) power_cycle();
-        if ((readable.revents & POLLIN) != 0) {
-            sockaddr_in from{};
-            socklen_t from_size = sizeof from;
-            const ssize_t size =
-                ::recvfrom(socket_, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &from_size);
-            if (size >= 8 && !muted()) handle({buffer, static_cast<std::size_t>(size)}, from);
-        }
+        for (const pollfd& entry : readable)
+            if ((entry.revents & POLLIN) != 0) receive(entry.fd);
         const Duration silence = host_now() - last_contact_;
-        if (controller_.sin_port != 0 && silence > milliseconds(registers_.value(reg_heartbeat_ms))) lose_controller();
+        if (controller_.sin_port != 0 && silence > milliseconds(registers_.value(reg_heartbeat_ms)))
+            lose_controller();
         free_run(host_now());
     }
+}
+
+void GigeCamera::receive(int socket) {
+    std::uint8_t buffer[2048];
+    sockaddr_in from{};
+    socklen_t from_size = sizeof from;
+    const ssize_t size =
+        ::recvfrom(socket, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &from_size);
+    if (size >= 8 && !muted()) handle({buffer, static_cast<std::size_t>(size)}, from);
 }
 
 void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in& from) {
@@ -186,7 +206,8 @@ std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command, std::span<co
         case write_memory:
             if (body.size() % 4 != 0 || body.size() < 8) status = invalid_parameter;
             for (std::size_t at = 4; at + 4 <= body.size() && status == success; at += 4)
-                status = write_register(word(body, 0) + static_cast<std::uint32_t>(at - 4), word(body, at), from);
+                status =
+                    write_register(word(body, 0) + static_cast<std::uint32_t>(at - 4), word(body, at), from);
             put_half(out, 0);
             put_half(out, static_cast<std::uint16_t>(body.size() - 4));
             break;
@@ -203,7 +224,8 @@ bool GigeCamera::in_control(const sockaddr_in& from) const {
     return registers_.value(reg_control_privilege) != 0 && same(from, controller_);
 }
 
-std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t value, const sockaddr_in& from) {
+std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t value,
+                                         const sockaddr_in& from) {
     if (address == reg_control_privilege) {
         const bool taken = registers_.value(reg_control_privilege) != 0 && !same(from, controller_);
         if (taken) return access_denied;
@@ -213,7 +235,8 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
     } else if (!in_control(from)) {
         return access_denied;
     }
-    if (address == reg_stream_packet_size) value = std::clamp<std::uint32_t>(value & 0xFFFFU, 256, 16000) & ~3U;
+    if (address == reg_stream_packet_size)
+        value = std::clamp<std::uint32_t>(value & 0xFFFFU, 256, 16000) & ~3U;
     if (!registers_.write(address, value)) return invalid_address;
     switch (address) {
         case reg_stream_port:
@@ -308,7 +331,8 @@ Duration GigeCamera::exposure_at(HostTime at) const {
 
 const Fault* GigeCamera::active_fault(FaultKind kind) const {
     for (const Fault& fault : faults_)
-        if (fault.kind == kind && exposures_ >= fault.at_exposure && exposures_ < fault.at_exposure + fault.count)
+        if (fault.kind == kind && exposures_ >= fault.at_exposure &&
+            exposures_ < fault.at_exposure + fault.count)
             return &fault;
     return nullptr;
 }
@@ -333,7 +357,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         const std::lock_guard lock(mutex_);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
-        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) != board_resets_.end()) reset_board_();
+        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) != board_resets_.end())
+            reset_board_();
         if (active_fault(FaultKind::ignore_trigger) != nullptr) return std::nullopt;
         apply_outages();
         block_id_ = static_cast<std::uint16_t>(block_id_ == 0xFFFF ? 1 : block_id_ + 1);

@@ -28,17 +28,19 @@ struct TriggerPulse {
 };
 
 class GigeCamera {
-   public:
+ public:
     using Interval = std::pair<HostTime, HostTime>;
 
     /// Binds the control port. Error: the address is not there or taken.
-    static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario, const CameraScenario& settings,
-                                                        HostTime zero, const Motion& motion, GroundTruth& truth);
+    static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario,
+                                                        const CameraScenario& settings, HostTime zero,
+                                                        const Motion& motion, GroundTruth& truth);
     ~GigeCamera();
     GigeCamera(const GigeCamera&) = delete;
     GigeCamera& operator=(const GigeCamera&) = delete;
 
-    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it exposes.
+    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it
+    /// exposes.
     std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse);
 
     /// Calls `reset` with each of these exposures, counted since the rig's start.
@@ -46,14 +48,15 @@ class GigeCamera {
 
     const CameraScenario& settings() const { return settings_; }
 
-   private:
+ private:
     GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,
-               GroundTruth& truth, int socket);
+               GroundTruth& truth, int socket, int broadcast_socket);
 
     void serve();
+    void receive(int socket);
     void handle(std::span<const std::uint8_t> packet, const sockaddr_in& from);
-    std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body, const sockaddr_in& from,
-                                     std::uint16_t& status);
+    std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body,
+                                     const sockaddr_in& from, std::uint16_t& status);
     std::uint16_t write_register(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
     bool in_control(const sockaddr_in& from) const;
     void lose_controller();
@@ -94,6 +97,7 @@ class GigeCamera {
     std::atomic<bool> power_cycle_pending_{false};
     std::atomic<bool> stop_{false};
     int socket_;
+    int broadcast_socket_;  ///< hears discovery; -1 on loopback, which does not broadcast
     std::thread server_;
 };
 

@@ -19,7 +19,9 @@ constexpr std::uint32_t capability_resend = 1U << 2U;
 
 }  // namespace
 
-GigeRegisters::GigeRegisters(const Identity& identity) : identity_(identity), memory_(memory_size) { reset(); }
+GigeRegisters::GigeRegisters(const Identity& identity) : identity_(identity), memory_(memory_size) {
+    reset();
+}
 
 void GigeRegisters::reset() {
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Register space of an emulated GigE Vision camera: bootstrap registers, features, and the XML that names them.
+// Register space of an emulated GigE Vision camera: bootstrap registers, features, and the XML that names
+// them.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,8 @@
 
 namespace versavis::rig {
 
-/// Addresses of GigE Vision bootstrap registers (GigE Vision specification 1.2, chapter 28) and of our features.
+/// Addresses of GigE Vision bootstrap registers (GigE Vision specification 1.2, chapter 28) and of our
+/// features.
 enum Register : std::uint32_t {
     reg_version = 0x0000,
     reg_device_mode = 0x0004,
@@ -70,7 +72,7 @@ inline constexpr std::uint32_t gige_default_heartbeat_ms = 3000;
 
 /// Thread-safe.
 class GigeRegisters {
-   public:
+ public:
     struct Identity {
         std::string address;
         std::string serial;
@@ -93,7 +95,7 @@ class GigeRegisters {
     std::uint32_t value(Register address) const;
     float real(Register address) const;
 
-   private:
+ private:
     void set(Register address, std::uint32_t value);
     void set_text(Register address, const std::string& text, std::size_t capacity);
 

@@ -13,18 +13,22 @@ using Entries = std::vector<std::pair<std::string, std::uint32_t>>;
 
 /// Collects feature nodes and the category that lists them.
 class XmlWriter {
-   public:
+ public:
     void integer(const std::string& name, Register address, const std::string& range, bool writable = true) {
         list(name);
-        nodes_ += fmt::format("<Integer Name=\"{0}\"><pValue>{0}Register</pValue>{1}</Integer>\n", name, range);
+        nodes_ +=
+            fmt::format("<Integer Name=\"{0}\"><pValue>{0}Register</pValue>{1}</Integer>\n", name, range);
         int_register(name, address, writable);
     }
 
-    void real(const std::string& name, Register address, const std::string& unit, double minimum, double maximum) {
+    void real(const std::string& name, Register address, const std::string& unit, double minimum,
+              double maximum) {
         list(name);
         nodes_ += fmt::format(
-            "<Float Name=\"{0}\"><pValue>{0}Register</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></Float>\n"
-            "<FloatReg Name=\"{0}Register\"><Address>{4:#x}</Address><Length>4</Length><AccessMode>RW</AccessMode>"
+            "<Float "
+            "Name=\"{0}\"><pValue>{0}Register</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></Float>\n"
+            "<FloatReg "
+            "Name=\"{0}Register\"><Address>{4:#x}</Address><Length>4</Length><AccessMode>RW</AccessMode>"
             "<pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n",
             name, minimum, maximum, unit, std::uint32_t{address});
     }
@@ -41,7 +45,8 @@ class XmlWriter {
     void command(const std::string& name, Register address) {
         list(name);
         nodes_ += fmt::format(
-            "<Command Name=\"{0}\"><pValue>{0}Register</pValue><CommandValue>1</CommandValue></Command>\n", name);
+            "<Command Name=\"{0}\"><pValue>{0}Register</pValue><CommandValue>1</CommandValue></Command>\n",
+            name);
         int_register(name, address, true);
     }
 
@@ -56,10 +61,13 @@ class XmlWriter {
     std::string document() const {
         return fmt::format(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
-            "<RegisterDescription ModelName=\"RigCamera\" VendorName=\"VersaVIS\" ToolTip=\"Emulated camera\" "
-            "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" "
+            "<RegisterDescription ModelName=\"RigCamera\" VendorName=\"VersaVIS\" ToolTip=\"Emulated "
+            "camera\" "
+            "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" "
+            "SchemaSubMinorVersion=\"0\" "
             "MajorVersion=\"1\" MinorVersion=\"0\" SubMinorVersion=\"0\" "
-            "ProductGuid=\"7A1B6F3E-0F5C-4A53-9F5E-1D2B3C4D5E6F\" VersionGuid=\"8B2C7F4E-1A6D-4B64-8A6F-2E3C4D5E6F70\" "
+            "ProductGuid=\"7A1B6F3E-0F5C-4A53-9F5E-1D2B3C4D5E6F\" "
+            "VersionGuid=\"8B2C7F4E-1A6D-4B64-8A6F-2E3C4D5E6F70\" "
             "xmlns=\"http://www.genicam.org/GenApi/Version_1_0\" "
             "xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "
             "xsi:schemaLocation=\"http://www.genicam.org/GenApi/Version_1_0 GenApiSchema_Version_1_0.xsd\">\n"
@@ -68,12 +76,13 @@ class XmlWriter {
             root_, nodes_);
     }
 
-   private:
+ private:
     void list(const std::string& name) { root_ += fmt::format("<pFeature>{}</pFeature>\n", name); }
 
     void int_register(const std::string& name, Register address, bool writable) {
         nodes_ += fmt::format(
-            "<IntReg Name=\"{}Register\"><Address>{:#x}</Address><Length>4</Length><AccessMode>{}</AccessMode>"
+            "<IntReg "
+            "Name=\"{}Register\"><Address>{:#x}</Address><Length>4</Length><AccessMode>{}</AccessMode>"
             "<pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
             name, std::uint32_t{address}, writable ? "RW" : "RO");
     }

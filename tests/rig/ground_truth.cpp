@@ -9,24 +9,27 @@ Expected<std::unique_ptr<GroundTruth>> GroundTruth::create(const std::string& pa
     auto truth = std::make_unique<GroundTruth>();
     if (path.empty()) return truth;
     truth->file_.open(path, std::ios::trunc);
-    if (!truth->file_) return failure(path, "the ground truth cannot be written", "choose another file with --truth");
+    if (!truth->file_)
+        return failure(path, "the ground truth cannot be written", "choose another file with --truth");
     return truth;
 }
 
 void GroundTruth::add(const TrueTrigger& t) {
-    write(fmt::format(R"({{"type":"trigger","camera":"{}","board_life":{},"trigger":{},"at_ns":{},"taken":{}}})", t.camera,
-                      t.board_life, t.trigger, t.at.ns, t.taken));
+    write(fmt::format(
+        R"({{"type":"trigger","camera":"{}","board_life":{},"trigger":{},"at_ns":{},"taken":{}}})", t.camera,
+        t.board_life, t.trigger, t.at.ns, t.taken));
 }
 
 void GroundTruth::add(const TrueExposure& e) {
-    write(fmt::format(R"({{"type":"exposure","camera":"{}","board_life":{},"trigger":{},"serial":{},"block_id":{},)"
-                      R"("start_ns":{},"end_ns":{},"sent":{}}})",
-                      e.camera, e.board_life, e.trigger, e.serial, e.block_id, e.start.ns, e.end.ns, e.sent));
+    write(fmt::format(
+        R"({{"type":"exposure","camera":"{}","board_life":{},"trigger":{},"serial":{},"block_id":{},)"
+        R"("start_ns":{},"end_ns":{},"sent":{}}})",
+        e.camera, e.board_life, e.trigger, e.serial, e.block_id, e.start.ns, e.end.ns, e.sent));
 }
 
 void GroundTruth::add(const TrueImuSample& s) {
-    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})", s.imu, s.board_life,
-                      s.number, s.at.ns));
+    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})", s.imu,
+                      s.board_life, s.number, s.at.ns));
 }
 
 void GroundTruth::write(const std::string& line) {

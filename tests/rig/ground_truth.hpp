@@ -41,7 +41,7 @@ struct TrueImuSample {
 
 /// Thread-safe. Each record is one line, written at once.
 class GroundTruth {
-   public:
+ public:
     /// Empty path: nothing is written.
     static Expected<std::unique_ptr<GroundTruth>> create(const std::string& path);
 
@@ -49,7 +49,7 @@ class GroundTruth {
     void add(const TrueExposure& exposure);
     void add(const TrueImuSample& sample);
 
-   private:
+ private:
     void write(const std::string& line);
 
     std::mutex mutex_;

@@ -29,7 +29,8 @@ using PacketHeader = std::array<std::uint8_t, gvsp_header>;
 template <class T>
 void put(std::vector<std::uint8_t>& out, T value) {
     for (int shift = static_cast<int>(sizeof(T) * 8) - 8; shift >= 0; shift -= 8)
-        out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> static_cast<unsigned>(shift)));
+        out.push_back(
+            static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> static_cast<unsigned>(shift)));
 }
 
 PacketHeader packet_header(std::uint16_t block_id, PacketFormat format, std::uint32_t packet_id) {
@@ -67,7 +68,8 @@ std::chrono::nanoseconds until(HostTime time) { return std::chrono::nanoseconds(
 
 }  // namespace
 
-GvspTransmitter::GvspTransmitter(const std::string& address, double link_mbps, double packet_loss, std::uint64_t seed)
+GvspTransmitter::GvspTransmitter(const std::string& address, double link_mbps, double packet_loss,
+                                 std::uint64_t seed)
     : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)),
       link_mbps_(link_mbps),
       packet_loss_(packet_loss),
@@ -172,8 +174,8 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
     }
 }
 
-void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first,
-                                   std::uint32_t last, bool lossy) {
+void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSettings& settings,
+                                   std::uint32_t first, std::uint32_t last, bool lossy) {
     const std::uint32_t data_size = settings.packet_size - ip_udp_header - gvsp_header;
     const auto data_packets = static_cast<std::uint32_t>((frame.pixels.size() + data_size - 1) / data_size);
     last = std::min(last, data_packets + 1);
@@ -183,7 +185,8 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
     sockaddr_in destination = settings.destination;
     std::size_t count = 0;
     for (std::uint32_t id = first; id <= last && count < batch; ++id) {
-        if (lossy && packet_loss_ > 0 && std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_) continue;
+        if (lossy && packet_loss_ > 0 && std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_)
+            continue;
         std::span<const std::uint8_t> body;
         std::vector<std::uint8_t> made;
         PacketFormat format = payload;
@@ -206,7 +209,8 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
         parts[count][0] = {headers[count].data(), gvsp_header};
         if (!made.empty()) {
             const iovec single[2] = {{headers[count].data(), gvsp_header}, {made.data(), made.size()}};
-            const msghdr message{&destination, sizeof destination, const_cast<iovec*>(single), 2, nullptr, 0, 0};
+            const msghdr message{
+                &destination, sizeof destination, const_cast<iovec*>(single), 2, nullptr, 0, 0};
             if (count > 0) ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
             ::sendmsg(socket_, &message, 0);
             count = 0;
@@ -224,8 +228,8 @@ void GvspTransmitter::resend(std::uint16_t block_id, std::uint32_t first, std::u
     StreamSettings settings;
     {
         const std::lock_guard lock(mutex_);
-        const auto found =
-            std::find_if(sent_.begin(), sent_.end(), [&](const StreamFrame& f) { return f.block_id == block_id; });
+        const auto found = std::find_if(sent_.begin(), sent_.end(),
+                                        [&](const StreamFrame& f) { return f.block_id == block_id; });
         if (found == sent_.end() || host_now() < muted_until_) return;
         frame = *found;
         settings = settings_;
@@ -241,8 +245,8 @@ void GvspTransmitter::send_test_packet() {
         settings = settings_;
     }
     const std::vector<std::uint8_t> packet(settings.packet_size - ip_udp_header);
-    ::sendto(socket_, packet.data(), packet.size(), 0, reinterpret_cast<const sockaddr*>(&settings.destination),
-             sizeof settings.destination);
+    ::sendto(socket_, packet.data(), packet.size(), 0,
+             reinterpret_cast<const sockaddr*>(&settings.destination), sizeof settings.destination);
 }
 
 }  // namespace versavis::rig

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sends frames as GigE Vision stream packets, paced like a real link, and sends lost packets again on request.
+// Sends frames as GigE Vision stream packets, paced like a real link, and sends lost packets again on
+// request.
 #pragma once
 
 #include <netinet/in.h>
@@ -36,7 +37,7 @@ struct StreamSettings {
 
 /// Thread-safe.
 class GvspTransmitter {
-   public:
+ public:
     GvspTransmitter(const std::string& address, double link_mbps, double packet_loss, std::uint64_t seed);
     ~GvspTransmitter();
 
@@ -60,11 +61,11 @@ class GvspTransmitter {
     /// Nothing leaves before `until`.
     void mute(HostTime until);
 
-   private:
+ private:
     void run();
     void transmit(const StreamFrame& frame, const StreamSettings& settings);
-    void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first, std::uint32_t last,
-                      bool lossy);
+    void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first,
+                      std::uint32_t last, bool lossy);
     bool muted() const;
 
     int socket_;

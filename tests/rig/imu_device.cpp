@@ -24,7 +24,8 @@ std::int16_t counts(double value, double lsb) {
 
 }  // namespace
 
-void ImuDevice::burst(HostTime at, std::span<const std::uint8_t> transmitted, std::span<std::uint8_t> received) const {
+void ImuDevice::burst(HostTime at, std::span<const std::uint8_t> transmitted,
+                      std::span<std::uint8_t> received) const {
     std::fill(received.begin(), received.end(), std::uint8_t{0});
     if (received.size() != adis::burst_bytes || transmitted[0] != adis::burst_command) return;
     const double pitch = motion_.pitch_rad(at);

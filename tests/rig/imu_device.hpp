@@ -10,13 +10,14 @@
 namespace versavis::rig {
 
 class ImuDevice {
-   public:
+ public:
     explicit ImuDevice(const Motion& motion) : motion_(motion) {}
 
     /// One full-duplex burst that started at `at`; both spans have the same length.
-    void burst(HostTime at, std::span<const std::uint8_t> transmitted, std::span<std::uint8_t> received) const;
+    void burst(HostTime at, std::span<const std::uint8_t> transmitted,
+               std::span<std::uint8_t> received) const;
 
-   private:
+ private:
     const Motion& motion_;
 };
 

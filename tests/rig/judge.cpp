@@ -25,7 +25,8 @@ using nlohmann::json;
 constexpr double lost_tolerated = 0.01;
 constexpr Duration start_pattern_time = milliseconds(1500);  // with its gaps, a rate would be low
 constexpr double honest_sigmas = 6;
-constexpr double honest_floor_ns = 300e3;  // what a loaded machine may add to a stamp, far below any exposure's period
+constexpr double honest_floor_ns =
+    300e3;  // what a loaded machine may add to a stamp, far below any exposure's period
 constexpr std::int64_t in_flight_ns = 1'000'000'000;
 
 /// One published stamp, brought back to host time, and what it claims to be of.
@@ -44,7 +45,7 @@ struct Recording {
 
 /// Streams of the scenario, read side by side.
 class Recorder {
-   public:
+ public:
     Recorder(const Scenario& scenario, const std::string& instance, clock::OutputClock clock)
         : instance_(instance), clock_(std::move(clock)) {
         for (const CameraScenario& camera : scenario.cameras) frames_[camera.name];
@@ -59,13 +60,15 @@ class Recorder {
                 take(name, *stream, item);
         }
         if (!open(imu_name_, imu_)) return;
-        for (auto item = imu_->next(); item.found != Found::nothing && item.found != Found::gone; item = imu_->next())
+        for (auto item = imu_->next(); item.found != Found::nothing && item.found != Found::gone;
+             item = imu_->next())
             take(item);
     }
 
     bool complete() const {
         return imu_ && recordings_.size() == frames_.size() + 1 &&
-               std::none_of(recordings_.begin(), recordings_.end(), [](auto& r) { return r.second.items.empty(); });
+               std::none_of(recordings_.begin(), recordings_.end(),
+                            [](auto& r) { return r.second.items.empty(); });
     }
 
     std::map<std::string, Recording>& recordings() { return recordings_; }
@@ -78,7 +81,7 @@ class Recorder {
         return names;
     }
 
-   private:
+ private:
     template <class S>
     bool open(const std::string& name, std::optional<S>& stream) {
         if (stream) return true;
@@ -97,14 +100,14 @@ class Recorder {
         if (!stream.intact(item))
             ++recording.unreadable;
         else
-            recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0, item.data.trigger,
-                                       to_host_ns(item.time), item.data.sigma_ns});
+            recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0,
+                                       item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
     }
 
     void take(const Received<ImuMetadata>& item) {
         Recording& recording = recordings_[imu_name_];
         if (item.found == Found::lost) recording.skipped += item.lost;
-        if (item.found == Found::item) 
+        if (item.found == Found::item)
             recording.items.push_back({item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
     }
 
@@ -124,7 +127,7 @@ struct TrueFrame {
 
 struct Truth {
     std::map<std::string, std::map<std::uint64_t, TrueFrame>> frames;  ///< by camera and serial
-    std::multimap<std::uint64_t, std::int64_t> imu;                    ///< by number, of all lives of the board
+    std::multimap<std::uint64_t, std::int64_t> imu;  ///< by number, of all lives of the board
 };
 
 Expected<Truth> load_truth(const std::string& path) {
@@ -155,7 +158,8 @@ void summarise(std::vector<double>& errors, StreamVerdict& verdict) {
     verdict.error_max_ns = errors.back();
 }
 
-/// When the streams were recorded, in host time: the start pattern comes before, and does not count for the rates.
+/// When the streams were recorded, in host time: the start pattern comes before, and does not count for the
+/// rates.
 struct Interval {
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
@@ -169,7 +173,8 @@ void count(const Recording& recording, const Interval& interval, StreamVerdict& 
         if (verdict.items++ == 0) first = item.host_ns;
         last = item.host_ns;
     }
-    if (verdict.items > 1) verdict.rate_hz = static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
+    if (verdict.items > 1)
+        verdict.rate_hz = static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
 }
 
 /// A stamp that is further off than it claims is as wrong as one of another exposure.
@@ -185,8 +190,10 @@ StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint6
     std::set<std::uint64_t> seen;
     for (const Published& item : recording.items) {
         const auto found = truth.find(item.key);
-        const bool paired = found != truth.end() && found->second.trigger == item.trigger && seen.insert(item.key).second;
-        const double error = paired ? std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)) : 0;
+        const bool paired =
+            found != truth.end() && found->second.trigger == item.trigger && seen.insert(item.key).second;
+        const double error =
+            paired ? std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)) : 0;
         if (!paired || !honest(item, error))
             ++verdict.wrong_pairs;
         else
@@ -195,7 +202,8 @@ StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint6
     summarise(errors, verdict);
     if (seen.empty()) return verdict;
     for (auto it = truth.find(*seen.begin()); it != truth.end(); ++it)
-        if (it->second.sent && it->second.middle_ns < interval.end_ns - in_flight_ns && seen.count(it->first) == 0)
+        if (it->second.sent && it->second.middle_ns < interval.end_ns - in_flight_ns &&
+            seen.count(it->first) == 0)
             ++verdict.lost;
     return verdict;
 }
@@ -207,7 +215,8 @@ StreamVerdict judge_imu(const Recording& recording, const Truth& truth, const In
     for (const Published& item : recording.items) {
         double best = 1e18;
         const auto [begin, end] = truth.imu.equal_range(item.key);
-        for (auto it = begin; it != end; ++it) best = std::min(best, std::abs(static_cast<double>(item.host_ns - it->second)));
+        for (auto it = begin; it != end; ++it)
+            best = std::min(best, std::abs(static_cast<double>(item.host_ns - it->second)));
         if (honest(item, best))
             errors.push_back(best);
         else
@@ -225,7 +234,8 @@ json read_status(const std::string& instance) {
     auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
     if (!stream) return {};
     std::string text;
-    for (auto item = stream->next(); item.found == Found::item || item.found == Found::lost; item = stream->next()) {
+    for (auto item = stream->next(); item.found == Found::item || item.found == Found::lost;
+         item = stream->next()) {
         if (item.found != Found::item) continue;
         std::string copy(item.payload_size, '\0');
         if (stream->copy(item, reinterpret_cast<std::byte*>(copy.data()))) text = copy;
@@ -242,15 +252,19 @@ std::uint64_t withheld(const json& status, const std::string& camera) {
 
 /// The clock that the service publishes in, by its status document.
 Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
-    const HostTime deadline = host_now() + Duration{static_cast<std::int64_t>(settings.start_timeout_s * 1e9)};
+    const HostTime deadline =
+        host_now() + Duration{static_cast<std::int64_t>(settings.start_timeout_s * 1e9)};
     for (;;) {
         const json status = read_status(settings.instance);
         if (status.is_object() && status.contains("clock")) {
             using clock::OutputClockKind;
-            for (const auto kind : {OutputClockKind::realtime, OutputClockKind::tai, OutputClockKind::monotonic_raw})
-                if (status["clock"]["output"] == clock::to_string(kind)) return clock::OutputClock::create(kind);
+            for (const auto kind :
+                 {OutputClockKind::realtime, OutputClockKind::tai, OutputClockKind::monotonic_raw})
+                if (status["clock"]["output"] == clock::to_string(kind))
+                    return clock::OutputClock::create(kind);
         }
-        if (host_now() > deadline) return failure(settings.instance, "publishes no status", "is versavisd running?");
+        if (host_now() > deadline)
+            return failure(settings.instance, "publishes no status", "is versavisd running?");
         const timespec pause{0, 20'000'000};
         nanosleep(&pause, nullptr);
     }
@@ -286,9 +300,11 @@ void complain(Verdict& verdict) {
     for (const auto& [name, stream] : verdict.streams) {
         if (stream.items == 0) verdict.complaints.push_back(name + ": nothing was published");
         if (stream.wrong_pairs != 0)
-            verdict.complaints.push_back(fmt::format("{}: {} items carry a wrong stamp", name, stream.wrong_pairs));
+            verdict.complaints.push_back(
+                fmt::format("{}: {} items carry a wrong stamp", name, stream.wrong_pairs));
         if (static_cast<double>(stream.lost) > lost_tolerated * static_cast<double>(stream.items))
-            verdict.complaints.push_back(fmt::format("{}: {} of {} were lost", name, stream.lost, stream.items));
+            verdict.complaints.push_back(
+                fmt::format("{}: {} of {} were lost", name, stream.lost, stream.items));
     }
     verdict.ok = verdict.complaints.empty();
 }
@@ -307,7 +323,8 @@ Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings)
     verdict.seconds = static_cast<double>(interval->end_ns - interval->begin_ns) * 1e-9;
     const json status = read_status(settings.instance);
     for (const CameraScenario& camera : scenario.cameras) {
-        StreamVerdict stream = judge_frames(recorder.recordings()[camera.name], truth->frames[camera.name], *interval);
+        StreamVerdict stream =
+            judge_frames(recorder.recordings()[camera.name], truth->frames[camera.name], *interval);
         stream.unpaired = withheld(status, camera.name);
         verdict.streams[camera.name] = stream;
     }
@@ -319,22 +336,25 @@ Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings)
 std::string to_json(const Verdict& verdict) {
     json streams = json::object();
     for (const auto& [name, s] : verdict.streams)
-        streams[name] = {{"items", s.items},
-                         {"rate_hz", std::round(s.rate_hz * 1000) / 1000},
-                         {"lost", s.lost},
-                         {"unpaired", s.unpaired},
-                         {"wrong_pairs", s.wrong_pairs},
-                         {"stamp_error_ns", {{"p50", s.error_p50_ns}, {"p99", s.error_p99_ns}, {"max", s.error_max_ns}}}};
-    const json document{{"ok", verdict.ok}, {"seconds", std::round(verdict.seconds * 100) / 100}, {"streams", streams}};
+        streams[name] = {
+            {"items", s.items},
+            {"rate_hz", std::round(s.rate_hz * 1000) / 1000},
+            {"lost", s.lost},
+            {"unpaired", s.unpaired},
+            {"wrong_pairs", s.wrong_pairs},
+            {"stamp_error_ns", {{"p50", s.error_p50_ns}, {"p99", s.error_p99_ns}, {"max", s.error_max_ns}}}};
+    const json document{
+        {"ok", verdict.ok}, {"seconds", std::round(verdict.seconds * 100) / 100}, {"streams", streams}};
     return document.dump();
 }
 
 std::string to_table(const Verdict& verdict) {
-    std::string out = fmt::format("{:<8} {:>8} {:>9} {:>6} {:>9} {:>12} {:>30}\n", "stream", "items", "rate/Hz", "lost",
-                                  "unpaired", "wrong pairs", "clock error p50/p99/max, us");
+    std::string out =
+        fmt::format("{:<8} {:>8} {:>9} {:>6} {:>9} {:>12} {:>30}\n", "stream", "items", "rate/Hz", "lost",
+                    "unpaired", "wrong pairs", "clock error p50/p99/max, us");
     for (const auto& [name, s] : verdict.streams)
-        out += fmt::format("{:<8} {:>8} {:>9.3f} {:>6} {:>9} {:>12} {:>30}\n", name, s.items, s.rate_hz, s.lost,
-                           s.unpaired, s.wrong_pairs,
+        out += fmt::format("{:<8} {:>8} {:>9.3f} {:>6} {:>9} {:>12} {:>30}\n", name, s.items, s.rate_hz,
+                           s.lost, s.unpaired, s.wrong_pairs,
                            fmt::format("{:.1f} / {:.1f} / {:.1f}", s.error_p50_ns / 1e3, s.error_p99_ns / 1e3,
                                        s.error_max_ns / 1e3));
     for (const std::string& complaint : verdict.complaints) out += complaint + "\n";

@@ -16,7 +16,7 @@ namespace versavis::rig {
 struct StreamVerdict {
     std::uint64_t items = 0;
     double rate_hz = 0;
-    std::uint64_t lost = 0;         ///< happened and was sent between the first and the last item, but not published
+    std::uint64_t lost = 0;  ///< happened and was sent between the first and the last item, but not published
     std::uint64_t unpaired = 0;     ///< frames that the service received and withheld
     std::uint64_t wrong_pairs = 0;  ///< stamps of another exposure or sample, or further off than they claim
     double error_p50_ns = 0;

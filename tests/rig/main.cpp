@@ -36,7 +36,8 @@ int run(const std::string& scenario_path, const std::string& socket_path, const 
     auto rig = Rig::start(*scenario, socket_path, truth_path);
     if (!rig) return fail(rig.error(), EX_UNAVAILABLE);
     fmt::print("rig ready: board at {}", socket_path);
-    for (const CameraScenario& camera : scenario->cameras) fmt::print(", {} at {}", camera.name, camera.address);
+    for (const CameraScenario& camera : scenario->cameras)
+        fmt::print(", {} at {}", camera.name, camera.address);
     fmt::print("\n");
     std::fflush(stdout);
     int signal = 0;
@@ -57,12 +58,14 @@ std::string status_line(const std::string& instance) {
         const auto status = nlohmann::json::parse(text, nullptr, false);
         if (!status.is_object()) continue;
         line = fmt::format("{} | board {} | clock {} {} us", status["health"].get<std::string>(),
-                           status["board"]["state"].get<std::string>(), status["clock"]["state"].get<std::string>(),
+                           status["board"]["state"].get<std::string>(),
+                           status["clock"]["state"].get<std::string>(),
                            status["clock"]["sigma_ns"].get<std::int64_t>() / 1000);
         for (const auto& stream_status : status["streams"])
             if (stream_status["kind"] == "frames" || stream_status["kind"] == "imu")
                 line += fmt::format(" | {} {} ({:.1f} Hz)", stream_status["name"].get<std::string>(),
-                                    stream_status["items"].get<std::uint64_t>(), stream_status["rate_hz"].get<double>());
+                                    stream_status["items"].get<std::uint64_t>(),
+                                    stream_status["rate_hz"].get<double>());
     }
     return line;
 }
@@ -75,13 +78,16 @@ int run_judge(const std::string& scenario_path, JudgeSettings settings, bool as_
     const bool terminal = isatty(STDOUT_FILENO) != 0;
     settings.stop_requested = [] { return stop_requested != 0; };
     settings.on_second = [&] {
-        fmt::print("{}{}{}", terminal ? "\r\x1b[K" : "", status_line(settings.instance), terminal ? "" : "\n");
+        fmt::print("{}{}{}", terminal ? "\r\x1b[K" : "", status_line(settings.instance),
+                   terminal ? "" : "\n");
         std::fflush(stdout);
     };
     auto verdict = judge(*scenario, settings);
     if (terminal) fmt::print("\n");
     if (!verdict) {
-        if (as_json) fmt::print("{{\"ok\": false, \"error\": {}}}\n", nlohmann::json(verdict.error().message()).dump());
+        if (as_json)
+            fmt::print("{{\"ok\": false, \"error\": {}}}\n",
+                       nlohmann::json(verdict.error().message()).dump());
         return fail(verdict.error(), EX_UNAVAILABLE);
     }
     fmt::print("{}", to_table(*verdict));
@@ -105,10 +111,12 @@ int main(int argc, char** argv) {
     JudgeSettings settings;
     settings.instance = default_instance();
     bool as_json = false;
-    auto* judge_command = app.add_subcommand("judge", "Compare what the service publishes with the ground truth");
+    auto* judge_command =
+        app.add_subcommand("judge", "Compare what the service publishes with the ground truth");
     judge_command->add_option("scenario", scenario_path, "Scenario file that the rig runs")->required();
     judge_command->add_option("--truth", settings.truth_path, "Ground truth that the rig writes")->required();
-    judge_command->add_option("--instance", settings.instance, "Instance of the service")->capture_default_str();
+    judge_command->add_option("--instance", settings.instance, "Instance of the service")
+        ->capture_default_str();
     judge_command->add_option("--seconds", settings.seconds, "How long to record")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

@@ -8,7 +8,8 @@ namespace {
 std::vector<std::uint64_t> board_resets(const Scenario& scenario, const std::string& camera) {
     std::vector<std::uint64_t> exposures;
     for (const Fault& fault : scenario.faults)
-        if (fault.kind == FaultKind::board_reset && fault.camera == camera) exposures.push_back(fault.at_exposure);
+        if (fault.kind == FaultKind::board_reset && fault.camera == camera)
+            exposures.push_back(fault.at_exposure);
     return exposures;
 }
 
@@ -32,7 +33,8 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
     if (!board) return tl::unexpected(board.error());
     rig->board_ = std::move(*board);
     for (GigeCamera* camera : wired)
-        camera->reset_board_at(board_resets(scenario, camera->settings().name), [host = rig->board_.get()] { host->reset(); });
+        camera->reset_board_at(board_resets(scenario, camera->settings().name),
+                               [host = rig->board_.get()] { host->reset(); });
     return rig;
 }
 

@@ -18,18 +18,18 @@ struct BoardScenario {
 
 struct CameraScenario {
     std::string name;
-    std::string address;       ///< loopback address that the camera answers on
-    unsigned output = 0;       ///< board output that triggers it, and input that its exposure line leads to
+    std::string address;  ///< loopback address that the camera answers on
+    unsigned output = 0;  ///< board output that triggers it, and input that its exposure line leads to
     std::string serial;
     std::uint32_t width = 1920;
     std::uint32_t height = 1200;
     double exposure_us = 3000;
-    double exposure_swing = 0;      ///< auto exposure follows a brightness that varies by this fraction ...
-    double exposure_swing_s = 7;    ///< ... with this period
+    double exposure_swing = 0;    ///< auto exposure follows a brightness that varies by this fraction ...
+    double exposure_swing_s = 7;  ///< ... with this period
     double trigger_latency_us = 20;
-    double readout_us = 2000;       ///< end of exposure to first packet
-    double link_mbps = 1000;        ///< packets leave at this pace; 0: as fast as they can
-    double packet_loss = 0;         ///< fraction
+    double readout_us = 2000;  ///< end of exposure to first packet
+    double link_mbps = 1000;   ///< packets leave at this pace; 0: as fast as they can
+    double packet_loss = 0;    ///< fraction
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 
@@ -44,8 +44,9 @@ enum class FaultKind {
 struct Fault {
     FaultKind kind = FaultKind::drop_frame;
     std::string camera;
-    std::uint64_t at_exposure = 0;  ///< happens with this exposure of the camera, counted since the rig's start
-    std::uint64_t count = 1;        ///< that many exposures in a row
+    std::uint64_t at_exposure =
+        0;                    ///< happens with this exposure of the camera, counted since the rig's start
+    std::uint64_t count = 1;  ///< that many exposures in a row
     double seconds = 1;
 };
 

@@ -23,7 +23,9 @@ std::uint8_t cell_brightness(std::uint64_t x, std::uint64_t y, std::uint64_t see
 
 }  // namespace
 
-double Motion::pitch_rad(HostTime at) const { return amplitude_rad * std::sin(nodding_rad_s * seconds(at - zero_)); }
+double Motion::pitch_rad(HostTime at) const {
+    return amplitude_rad * std::sin(nodding_rad_s * seconds(at - zero_));
+}
 
 double Motion::pitch_rate_rad_s(HostTime at) const {
     return amplitude_rad * nodding_rad_s * std::cos(nodding_rad_s * seconds(at - zero_));

@@ -19,25 +19,25 @@ struct FrameMark {
 };
 
 class Motion {
-   public:
+ public:
     explicit Motion(HostTime zero) : zero_(zero) {}
 
     double pitch_rad(HostTime at) const;
     double pitch_rate_rad_s(HostTime at) const;
 
-   private:
+ private:
     HostTime zero_;
 };
 
 /// A textured wall, rendered once and twice as high as the image: a view of it needs no copying.
 class Wall {
-   public:
+ public:
     Wall(std::uint32_t width, std::uint32_t height, std::uint64_t seed);
 
     /// Pixels (8 bit, row by row) that a camera sees at `pitch_rad`.
     std::span<const std::uint8_t> view(double pitch_rad) const;
 
-   private:
+ private:
     std::uint32_t width_;
     std::uint32_t height_;
     std::vector<std::uint8_t> pixels_;

@@ -15,7 +15,7 @@ struct ClockErrors {
 };
 
 class SkewedClock {
-   public:
+ public:
     SkewedClock(HostTime zero, const ClockErrors& errors) : zero_(zero), errors_(errors) {}
 
     /// Device time at `host`.
@@ -24,7 +24,7 @@ class SkewedClock {
     /// Host time at which the clock shows `device_ns`; inverse of device_ns() within 1 ns.
     HostTime host(std::int64_t device_ns) const;
 
-   private:
+ private:
     HostTime zero_;
     ClockErrors errors_;
 };

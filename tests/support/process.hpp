@@ -12,7 +12,7 @@
 namespace versavis::test {
 
 class Process {
-   public:
+ public:
     /// Starts `arguments[0]`; its standard output and error go to `log`. Throws when it cannot be started.
     Process(const std::vector<std::string>& arguments, const std::string& log);
     ~Process();  ///< kills it
@@ -21,7 +21,8 @@ class Process {
 
     void signal(int number) const;
 
-    /// Waits for its end; its exit code, or 128 + the signal that ended it, or -1 when it is still running at `timeout`.
+    /// Waits for its end; its exit code, or 128 + the signal that ended it, or -1 when it is still running at
+    /// `timeout`.
     int wait(Duration timeout);
 
     /// SIGTERM, then wait().
@@ -33,7 +34,7 @@ class Process {
     std::string output() const;
     pid_t pid() const { return pid_; }
 
-   private:
+ private:
     std::string log_;
     pid_t pid_ = -1;
     int code_ = -1;

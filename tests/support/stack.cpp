@@ -11,11 +11,14 @@ namespace versavis::test {
 Stack::Stack(const StackSettings& settings) : settings_(settings) {
     std::string scenario = "imu = \"imu0\"\n";
     const std::string link = settings.link.empty() ? "unix:" + socket_path() : settings.link;
-    std::string configuration = fmt::format("instance = \"{}\"\n[board]\nlink = \"{}\"\n", settings.name, link);
+    std::string configuration =
+        fmt::format("instance = \"{}\"\n[board]\nlink = \"{}\"\n", settings.name, link);
     for (unsigned i = 0; i < settings.cameras; ++i) {
         const std::string address = fmt::format("127.0.{}.{}", settings.subnet, i + 2);
-        scenario += fmt::format("[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = 320\nheight = 240\n{2}\n",
-                                i, address, settings.camera_scenario);
+        scenario += fmt::format(
+            "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = {2}\nheight = "
+            "{3}\n{4}\n",
+            i, address, settings.width, settings.height, settings.camera_scenario);
         configuration += fmt::format(
             "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nrate_hz = {2}\nlatency_us = 20\n"
             "packet_size = 9000\n{3}\n",
@@ -37,15 +40,18 @@ Stack::~Stack() {
 
 void Stack::start_rig() {
     rig_ = std::make_unique<Process>(
-        std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket", socket_path(), "--truth", truth_path()},
+        std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket", socket_path(),
+                                 "--truth", truth_path()},
         log_path("rig.log"));
     if (!rig_->wait_for_output("rig ready", seconds(20))) throw std::runtime_error("rig: " + rig_->output());
 }
 
 void Stack::start_service() {
-    service_ = std::make_unique<Process>(std::vector<std::string>{program("versavisd"), "--config", configuration_path_},
-                                         log_path("versavisd.log"));
-    if (!service_->wait_for_output("serving instance", seconds(20))) throw std::runtime_error("service: " + service_->output());
+    service_ = std::make_unique<Process>(
+        std::vector<std::string>{program("versavisd"), "--config", configuration_path_},
+        log_path("versavisd.log"));
+    if (!service_->wait_for_output("serving instance", seconds(20)))
+        throw std::runtime_error("service: " + service_->output());
 }
 
 void Stack::kill_service() {
@@ -53,7 +59,8 @@ void Stack::kill_service() {
     service_->wait(seconds(10));
 }
 
-nlohmann::json Stack::wait_for_status(const std::function<bool(const nlohmann::json&)>& condition, Duration timeout) {
+nlohmann::json Stack::wait_for_status(const std::function<bool(const nlohmann::json&)>& condition,
+                                      Duration timeout) {
     const HostTime deadline = host_now() + timeout;
     auto stream = wait_for_stream<StatusStream>("status", settings_.name);
     nlohmann::json document;
@@ -65,7 +72,8 @@ nlohmann::json Stack::wait_for_status(const std::function<bool(const nlohmann::j
         document = nlohmann::json::parse(text);
         if (condition(document)) return document;
     }
-    throw std::runtime_error("no such status in time; the last one: " + document.dump(1) + "\n" + service_->output());
+    throw std::runtime_error("no such status in time; the last one: " + document.dump(1) + "\n" +
+                             service_->output());
 }
 
 int Stack::tool(const std::vector<std::string>& arguments, std::string* output) const {

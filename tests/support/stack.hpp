@@ -15,18 +15,20 @@
 namespace versavis::test {
 
 struct StackSettings {
-    std::string name;            ///< of the instance
-    unsigned subnet = 0;         ///< cameras are at 127.0.<subnet>.<2...>
+    std::string name;     ///< of the instance
+    unsigned subnet = 0;  ///< cameras are at 127.0.<subnet>.<2...>
     unsigned cameras = 1;
     double rate_hz = 20;
-    std::string camera_scenario; ///< keys for each camera of the rig
-    std::string faults;          ///< [[fault]] tables of the rig
-    std::string camera_extra;    ///< keys for each camera of the service
-    std::string link{};          ///< of the service to the board; empty: the rig's socket
+    std::string camera_scenario;  ///< keys for each camera of the rig
+    std::string faults;           ///< [[fault]] tables of the rig
+    std::string camera_extra;     ///< keys for each camera of the service
+    std::uint32_t width = 320;
+    std::uint32_t height = 240;
+    std::string link{};  ///< of the service to the board; empty: the rig's socket
 };
 
 class Stack {
-   public:
+ public:
     explicit Stack(const StackSettings& settings);
     ~Stack();
 
@@ -53,7 +55,7 @@ class Stack {
     /// Runs the `versavis` tool on this instance.
     int tool(const std::vector<std::string>& arguments, std::string* output = nullptr) const;
 
-   private:
+ private:
     StackSettings settings_;
     TemporaryDirectory directory_;
     std::string scenario_path_;

@@ -11,11 +11,12 @@
 namespace versavis::test {
 
 class TemporaryDirectory {
-   public:
+ public:
     /// Below `parent`; rings want one in shared memory.
     explicit TemporaryDirectory(const std::string& parent = "/tmp") {
         std::string name = parent + "/versavis-test-XXXXXX";
-        if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory below " + parent);
+        if (mkdtemp(name.data()) == nullptr)
+            throw std::runtime_error("no temporary directory below " + parent);
         path_ = name;
     }
     ~TemporaryDirectory() {
@@ -33,7 +34,7 @@ class TemporaryDirectory {
         return (path_ / name).string();
     }
 
-   private:
+ private:
     std::filesystem::path path_;
 };
 

@@ -63,7 +63,8 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     CHECK(stack.tool({"status"}, &output) == 0);
     CHECK_THAT(output, Catch::Contains("pairing locked"));
     CHECK(stack.tool({"list"}, &output) == 0);
-    for (const auto* name : {"cam0", "cam1", "imu0", "events", "status"}) CHECK_THAT(output, Catch::Contains(name));
+    for (const auto* name : {"cam0", "cam1", "imu0", "events", "status"})
+        CHECK_THAT(output, Catch::Contains(name));
     CHECK(stack.tool({"tail", "cam0", "-n", "3", "--json"}, &output) == 0);
     CHECK_THAT(output, Catch::Contains("\"kind\":\"measured\""));
     CHECK(stack.tool({"tail", "imu0", "-n", "3"}, &output) == 0);
@@ -104,7 +105,8 @@ TEST_CASE("end to end: a reader that is killed disturbs nobody, and comes back")
     stack.start_service();
     stack.wait_for_status(healthy);
     for (int round = 0; round < 3; ++round) {
-        Process reader({program("versavis"), "--instance", "reader", "tail", "cam0"}, stack.log_path("reader.log"));
+        Process reader({program("versavis"), "--instance", "reader", "tail", "cam0"},
+                       stack.log_path("reader.log"));
         REQUIRE(reader.wait_for_output("trigger=", seconds(10)));
         reader.signal(SIGKILL);
         CHECK(reader.wait(seconds(10)) == 128 + SIGKILL);
@@ -131,7 +133,9 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
 }
 
 TEST_CASE("end to end: a camera that stops answering is named, the other goes on, and it comes back") {
-    Stack stack({"mute", 14, 2, 20, "", "[[fault]]\nkind = \"camera_mute\"\ncamera = \"cam1\"\nat_exposure = 60\nseconds = 4\n", ""});
+    Stack stack({"mute", 14, 2, 20, "",
+                 "[[fault]]\nkind = \"camera_mute\"\ncamera = \"cam1\"\nat_exposure = 60\nseconds = 4\n",
+                 ""});
     stack.start_rig();
     stack.start_service();
     const auto broken = stack.wait_for_status([](const auto& s) {
@@ -150,7 +154,9 @@ TEST_CASE("end to end: a camera that stops answering is named, the other goes on
 }
 
 TEST_CASE("end to end: a camera that reboots is set up anew") {
-    Stack stack({"reboot", 15, 1, 20, "", "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam0\"\nat_exposure = 60\nseconds = 1\n", ""});
+    Stack stack({"reboot", 15, 1, 20, "",
+                 "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam0\"\nat_exposure = 60\nseconds = 1\n",
+                 ""});
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status([](const auto& s) { return s["cameras"][0]["connections"] >= 2; }, seconds(60));
@@ -159,12 +165,14 @@ TEST_CASE("end to end: a camera that reboots is set up anew") {
 }
 
 TEST_CASE("end to end: a board that resets begins a new epoch") {
-    Stack stack({"reset", 16, 2, 20, "", "[[fault]]\nkind = \"board_reset\"\ncamera = \"cam0\"\nat_exposure = 60\n", ""});
+    Stack stack({"reset", 16, 2, 20, "",
+                 "[[fault]]\nkind = \"board_reset\"\ncamera = \"cam0\"\nat_exposure = 60\n", ""});
     stack.start_rig();
     stack.start_service();
     auto stream = wait_for_stream<FrameStream>("cam0", "reset");
     const auto first = read_until(stream, is_item);
-    const auto later = read_until(stream, [&](const auto& item) { return is_item(item) && item.data.epoch != first.data.epoch; });
+    const auto later = read_until(
+        stream, [&](const auto& item) { return is_item(item) && item.data.epoch != first.data.epoch; });
     CHECK(later.data.epoch == first.data.epoch + 1);
     CHECK(later.time > first.time);
     const auto status = stack.wait_for_status(healthy);
@@ -176,7 +184,8 @@ TEST_CASE("end to end: a board that resets begins a new epoch") {
 TEST_CASE("end to end: lost frames and ignored triggers are records, and shift nothing") {
     Stack stack({"faults", 17, 1, 20, "",
                  "[[fault]]\nkind = \"drop_frame\"\ncamera = \"cam0\"\nat_exposure = 40\ncount = 2\n"
-                 "[[fault]]\nkind = \"ignore_trigger\"\ncamera = \"cam0\"\nat_exposure = 50\n", ""});
+                 "[[fault]]\nkind = \"ignore_trigger\"\ncamera = \"cam0\"\nat_exposure = 50\n",
+                 ""});
     stack.start_rig();
     stack.start_service();
     auto events = wait_for_stream<EventStream>("events", "faults");
@@ -194,13 +203,14 @@ TEST_CASE("end to end: lost frames and ignored triggers are records, and shift n
     CHECK(status["cameras"][0]["locks"] == 1);
 }
 
-TEST_CASE("end to end: an exposure that outlasts what the board waits for is predicted, says so, and is not called healthy") {
+TEST_CASE(
+    "end to end: an exposure that outlasts what the board waits for is predicted, says so, and is not called "
+    "healthy") {
     Stack stack({"overlong", 23, 1, 10, "exposure_us = 60000", "", "max_exposure_us = 40000.0"});
     stack.start_rig();
     stack.start_service();
-    const auto status = stack.wait_for_status([](const auto& s) {
-        return s["cameras"][0]["pairing"] == "locked" && s["health"] == "degraded";
-    });
+    const auto status = stack.wait_for_status(
+        [](const auto& s) { return s["cameras"][0]["pairing"] == "locked" && s["health"] == "degraded"; });
     CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("max_exposure_us"));
     auto stream = wait_for_stream<FrameStream>("cam0", "overlong");
     const auto frame = read_until(stream, is_item);
@@ -236,7 +246,8 @@ TEST_CASE("end to end: without a board the service says so and waits; it also st
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
     CHECK(status["board"]["state"] == "absent");
-    CHECK_THAT(status["board"]["hint"].template get<std::string>(), Catch::Contains("is the board's process"));
+    CHECK_THAT(status["board"]["hint"].template get<std::string>(),
+               Catch::Contains("is the board's process"));
     CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("no such camera"));
     CHECK(stack.service().terminate() == 0);
 }
@@ -245,27 +256,32 @@ TEST_CASE("end to end: one service per instance") {
     Stack stack({"twice", 20, 1, 20, "", "", ""});
     stack.start_service();
     std::string output;
-    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("second.log"), &output) == 69);
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("second.log"),
+              &output) == 69);
     CHECK_THAT(output, Catch::Contains("another versavisd serves this instance"));
 }
 
 TEST_CASE("end to end: a bad configuration ends with 78 and its place; a good one is said to be") {
     Stack stack({"config", 21, 1, 20, "", "", "rate = 3\n"});
     std::string output;
-    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("bad.log"), &output) == 78);
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("bad.log"),
+              &output) == 78);
     CHECK_THAT(output, Catch::Contains("versavis.toml:11:1: unknown key 'rate'; did you mean 'rate_hz'?"));
     Stack good({"config2", 21, 1, 20, "", "", ""});
-    CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()}, good.log_path("ok.log"), &output) == 0);
+    CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()},
+              good.log_path("ok.log"), &output) == 0);
     CHECK(run({program("versavisd"), "--nonsense"}, good.log_path("usage.log"), &output) == 64);
 }
 
 TEST_CASE("end to end: a camera without a trigger line is stamped on arrival, and says so") {
     // Aravis's own independent camera emulator: it has no line output and no external trigger.
     const TemporaryDirectory directory;
-    Process camera({"arv-fake-gv-camera-0.8", "-i", "127.0.0.1", "-s", "FREE1"}, (directory.path() / "camera.log").string());
-    const std::string path = directory.write("versavis.toml",
-                                             "instance = \"free\"\n[[camera]]\nname = \"cam0\"\ndevice = \"127.0.0.1\"\n"
-                                             "trigger = \"free\"\npacket_size = 1400\n");
+    Process camera({"arv-fake-gv-camera-0.8", "-i", "127.0.0.1", "-s", "FREE1"},
+                   (directory.path() / "camera.log").string());
+    const std::string path =
+        directory.write("versavis.toml",
+                        "instance = \"free\"\n[[camera]]\nname = \"cam0\"\ndevice = \"127.0.0.1\"\n"
+                        "trigger = \"free\"\npacket_size = 1400\n");
     Process service({program("versavisd"), "--config", path}, (directory.path() / "service.log").string());
     auto stream = wait_for_stream<FrameStream>("cam0", "free", seconds(30));
     for (int i = 0; i < 5; ++i) {

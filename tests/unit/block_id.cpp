@@ -22,5 +22,6 @@ TEST_CASE("block_id: gaps over the wrap, late ones and any first number") {
 
 TEST_CASE("block_id: long ids stay as they are") {
     BlockIdUnwrapper ids;
-    for (const std::uint64_t id : {65534ULL, 65535ULL, 65536ULL, 65537ULL, 1ULL << 40U}) CHECK(ids.unwrap(id) == id);
+    for (const std::uint64_t id : {65534ULL, 65535ULL, 65536ULL, 65537ULL, 1ULL << 40U})
+        CHECK(ids.unwrap(id) == id);
 }

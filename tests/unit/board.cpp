@@ -20,11 +20,13 @@ constexpr Nanoseconds latency = 20'000;
 
 /// A board with a camera on output 0 whose exposure is a function of the pulse's number, and a host.
 class Bench {
-   public:
+ public:
     explicit Bench(std::function<Nanoseconds(std::uint64_t)> exposure) : exposure_(std::move(exposure)) {
         Surroundings surroundings;
         surroundings.outputs_changed = [this](Nanoseconds at, std::uint32_t levels) { outputs(at, levels); };
-        surroundings.imu_burst = [](Nanoseconds, auto, auto received) { std::fill(received.begin(), received.end(), 0); };
+        surroundings.imu_burst = [](Nanoseconds, auto, auto received) {
+            std::fill(received.begin(), received.end(), 0);
+        };
         surroundings.reboot = [this](bool to_boot_loader) { rebooted = to_boot_loader ? 2 : 1; };
         board_.emplace(Identity{0xB0A2D, wire::ResetCause::power_on, "TEST"}, std::move(surroundings));
     }
@@ -49,7 +51,14 @@ class Bench {
     wire::Configuration configuration(std::uint32_t rate_uhz) const {
         wire::Configuration c{};
         c.id = 1;
-        c.cameras[0] = {wire::camera_enabled, rate_uhz, 0, 100'000, static_cast<std::uint32_t>(latency), 0, 3 * ms, 40 * ms};
+        c.cameras[0] = {wire::camera_enabled,
+                        rate_uhz,
+                        0,
+                        100'000,
+                        static_cast<std::uint32_t>(latency),
+                        0,
+                        3 * ms,
+                        40 * ms};
         return c;
     }
 
@@ -73,7 +82,7 @@ class Bench {
     std::size_t packets = 0;
     int rebooted = 0;
 
-   private:
+ private:
     void outputs(Nanoseconds at, std::uint32_t levels) {
         const bool rise = (levels & 1U) != 0 && (levels_ & 1U) == 0;
         levels_ = levels;
@@ -162,7 +171,8 @@ TEST_CASE("board: the grid never shifts, whatever the exposure does; one that wa
     const auto error = [&](std::uint64_t trigger) {
         const auto& e = by_trigger.at(trigger);
         const auto& first = by_trigger.at(5);
-        return std::abs(middle_of(e) - middle_of(first) - static_cast<Nanoseconds>(e.tick - first.tick) * 50 * ms);
+        return std::abs(middle_of(e) - middle_of(first) -
+                        static_cast<Nanoseconds>(e.tick - first.tick) * 50 * ms);
     };
     CHECK(error(19) == 0);
     CHECK((by_trigger.at(20).flags & wire::exposure_announced) != 0);
@@ -199,7 +209,8 @@ TEST_CASE("board: the start pattern leaves the gaps of the protocol") {
     bench.begin(20'000'000, wire::start_pattern);
     bench.run(2 * second);
     std::vector<std::uint64_t> gaps;
-    for (std::size_t i = 1; i < 15; ++i) gaps.push_back(bench.exposures[i].tick - bench.exposures[i - 1].tick);
+    for (std::size_t i = 1; i < 15; ++i)
+        gaps.push_back(bench.exposures[i].tick - bench.exposures[i - 1].tick);
     CHECK(gaps == std::vector<std::uint64_t>{1, 2, 1, 3, 2, 2, 3, 3, 1, 1, 1, 1, 1, 1});
     CHECK((bench.exposures[0].flags & wire::exposure_pattern) != 0);
     CHECK((bench.exposures[14].flags & wire::exposure_pattern) == 0);

@@ -36,8 +36,9 @@ TEST_CASE("configuration: an empty file is a service without cameras") {
 }
 
 TEST_CASE("configuration: what the board is told") {
-    const auto configuration =
-        load(camera + "output = 2\nrate_hz = 29.97\nstrobe = \"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
+    const auto configuration = load(
+        camera +
+        "output = 2\nrate_hz = 29.97\nstrobe = \"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
     REQUIRE(configuration);
     const wire::Configuration board = board_configuration(*configuration);
     CHECK(board.cameras[0].flags == 0);
@@ -49,7 +50,8 @@ TEST_CASE("configuration: what the board is told") {
 }
 
 TEST_CASE("configuration: features are kept in text, in their own types") {
-    const auto configuration = load(camera + "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
+    const auto configuration =
+        load(camera + "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
     REQUIRE(configuration);
     const auto& features = configuration->cameras[0].features;
     const auto value = [&](const std::string& name) {
@@ -67,19 +69,22 @@ TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of("instance = \n"), Catch::Contains("versavis.toml:1:"));
     CHECK_THAT(error_of(camera + "rate_hzz = 20\n"),
                Catch::Contains("versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"));
-    CHECK_THAT(error_of(camera + "rate_hz = 2000\n"), Catch::Contains("versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000"));
+    CHECK_THAT(error_of(camera + "rate_hz = 2000\n"),
+               Catch::Contains("versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000"));
     CHECK_THAT(error_of(camera + "rate_hz = \"20\"\n"), Catch::Contains("must be a number"));
     CHECK_THAT(error_of(camera + "output = 4\n"), Catch::Contains("from 0 to 3"));
     CHECK_THAT(error_of(camera + "trigger = \"bord\"\n"), Catch::Contains("must be one of: board, free"));
     CHECK_THAT(error_of("[[camera]]\nname = \"cam0\"\n"), Catch::Contains("needs a 'device'"));
     CHECK_THAT(error_of(camera + camera + "output = 1\n"), Catch::Contains("the name 'cam0' is taken"));
-    CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"), Catch::Contains("uses output 0, which is taken"));
+    CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"),
+               Catch::Contains("uses output 0, which is taken"));
     CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"), Catch::Contains("is no name"));
     CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"), Catch::Contains("is taken"));
     CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("not known"));
     CHECK_THAT(error_of("[board]\nlink = \"tty\"\n"), Catch::Contains("unix:/path"));
     CHECK_THAT(error_of("camera = 3\n"), Catch::Contains("array of tables"));
-    CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(), Catch::Contains("/nowhere/versavis.toml"));
+    CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(),
+               Catch::Contains("/nowhere/versavis.toml"));
 }
 
 TEST_CASE("configuration: every key of the manual is known, and its example loads") {

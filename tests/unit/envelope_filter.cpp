@@ -14,7 +14,7 @@ namespace {
 
 /// A board whose clock is off by a constant skew, behind a link of random delays; all in exact virtual time.
 class Link {
-   public:
+ public:
     Link(double skew_ppm, std::uint64_t seed) : skew_ppm_(skew_ppm), random_(seed) {}
 
     BoardTime board(HostTime host) const {
@@ -36,7 +36,7 @@ class Link {
 
     void jump(Duration by) { offset_ += by.ns; }
 
-   private:
+ private:
     std::int64_t offset_ = 123'456'789'000;
     double skew_ppm_;
     std::mt19937_64 random_;
@@ -56,7 +56,8 @@ TEST_CASE("envelope_filter: nothing is known before the first exchange, and boun
     const Exchange exchange = link.exchange(HostTime{1'000'000'000});
     filter.add(exchange);
     CHECK(filter.initialised());
-    CHECK(std::abs(error_ns(filter, link, exchange.arrived)) <= static_cast<double>(filter.last_round_trip().ns) / 2);
+    CHECK(std::abs(error_ns(filter, link, exchange.arrived)) <=
+          static_cast<double>(filter.last_round_trip().ns) / 2);
     CHECK(filter.translate(exchange.answered).state == ClockState::converging);
 }
 
@@ -90,7 +91,8 @@ TEST_CASE("envelope_filter: sigma grows without contact, and says so") {
     CHECK(after_10_s.state == ClockState::holdover);
     CHECK(at_once.sigma < after_10_s.sigma);
     CHECK(after_10_s.sigma < after_60_s.sigma);
-    CHECK(std::abs(error_ns(filter, link, HostTime{80'000'000'000})) < 5.0 * static_cast<double>(after_60_s.sigma.ns));
+    CHECK(std::abs(error_ns(filter, link, HostTime{80'000'000'000})) <
+          5.0 * static_cast<double>(after_60_s.sigma.ns));
 }
 
 TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {

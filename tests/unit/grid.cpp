@@ -6,7 +6,8 @@
 using versavis::firmware::Grid;
 
 TEST_CASE("grid: no rate drifts, whole or not") {
-    const std::uint32_t rate_uhz = GENERATE(100'000U, 7'000'000U, 14'000'000U, 29'970'000U, 90'000'000U, 1'000'000'000U);
+    const std::uint32_t rate_uhz =
+        GENERATE(100'000U, 7'000'000U, 14'000'000U, 29'970'000U, 90'000'000U, 1'000'000'000U);
     Grid grid(1'000, rate_uhz);
     constexpr std::uint64_t ticks = 1'000'000;
     for (std::uint64_t i = 0; i < ticks; ++i) {

@@ -18,19 +18,22 @@ struct Faults {
     std::set<std::uint64_t> frame_lost;       ///< by pulse
     std::set<std::uint64_t> trigger_ignored;  ///< no exposure, no block id
     std::set<std::uint64_t> record_lost;
-    std::set<std::uint64_t> record_late;      ///< by 100 ms
-    std::uint64_t stale_frames = 0;           ///< frames of nobody before the first
+    std::set<std::uint64_t> record_late;  ///< by 100 ms
+    std::uint64_t stale_frames = 0;       ///< frames of nobody before the first
     std::uint64_t ids_restart_at = 0;
-    bool strobe_wired = true;                 ///< else an ignored trigger looks like any other
+    bool strobe_wired = true;  ///< else an ignored trigger looks like any other
     bool camera_clock = true;
     bool ids_count_ignored = false;
 };
 
 /// Camera, board and link in virtual time: each message is delivered when it would arrive.
 class World : public Outcome {
-   public:
+ public:
     World(double rate_hz, double drift_ppm, Faults faults, std::uint64_t first_block_id = 1)
-        : period_ns_(1e9 / rate_hz), drift_ppm_(drift_ppm), faults_(std::move(faults)), block_id_(first_block_id - 1) {}
+        : period_ns_(1e9 / rate_hz),
+          drift_ppm_(drift_ppm),
+          faults_(std::move(faults)),
+          block_id_(first_block_id - 1) {}
 
     void run(std::uint64_t ticks) {
         Limits limits;
@@ -48,7 +51,8 @@ class World : public Outcome {
                 pattern_tick = 0;
                 ++patterns;
             }
-            const bool gap = pattern_tick < wire::start_pattern_length && (wire::start_pattern_bits >> pattern_tick & 1U) == 0;
+            const bool gap = pattern_tick < wire::start_pattern_length &&
+                             (wire::start_pattern_bits >> pattern_tick & 1U) == 0;
             if (!gap) pulse(now, tick);
         }
         deliver_until(HostTime{INT64_MAX});
@@ -67,7 +71,7 @@ class World : public Outcome {
     std::map<EventReason, std::uint64_t> reasons;
     State final_state = State::searching;
 
-   private:
+ private:
     struct Message {
         HostTime at;
         std::uint64_t order;
@@ -91,8 +95,10 @@ class World : public Outcome {
         exposure.end = BoardTime{end.ns + board_offset};
         exposure.end_on_host = end;
         exposure.exposed = !ignored || !faults_.strobe_wired;
-        const Duration record_delay = faults_.record_late.count(pulse_) != 0 ? milliseconds(100) : microseconds(500);
-        record_at_ = std::max(record_at_, end + record_delay);  // the link keeps the order: later records wait, too
+        const Duration record_delay =
+            faults_.record_late.count(pulse_) != 0 ? milliseconds(100) : microseconds(500);
+        record_at_ =
+            std::max(record_at_, end + record_delay);  // the link keeps the order: later records wait, too
         if (faults_.record_lost.count(pulse_) == 0) queue_.push({record_at_, ++order_, false, exposure, {}});
         if (pulse_ == faults_.ids_restart_at) block_id_ = 0;
         if (!ignored || faults_.ids_count_ignored) ++block_id_;
@@ -282,7 +288,8 @@ TEST_CASE("pairing: random faults, many seeds: never a wrong pair, always locked
         faults.strobe_wired = random() % 2 == 0;
         faults.ids_count_ignored = random() % 2 == 0;
         const double rates[] = {5, 20, 155};
-        World world(rates[random() % 3], static_cast<double>(random() % 201) - 100, faults, 1 + random() % 70000);
+        World world(rates[random() % 3], static_cast<double>(random() % 201) - 100, faults,
+                    1 + random() % 70000);
         world.run(600);
         INFO("seed " << seed);
         CHECK(world.wrong == 0);

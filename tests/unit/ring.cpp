@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <catch2/catch.hpp>
 #include <atomic>
+#include <catch2/catch.hpp>
 #include <cstring>
 #include <thread>
 
@@ -29,7 +29,9 @@ struct Fixture {
     }
 };
 
-void publish(Writer& writer, std::uint64_t value) { writer.publish(OutputTime{static_cast<std::int64_t>(value)}, {value}); }
+void publish(Writer& writer, std::uint64_t value) {
+    writer.publish(OutputTime{static_cast<std::int64_t>(value)}, {value});
+}
 
 void publish_frame(Writer& writer, std::uint8_t fill) {
     const auto slot = writer.acquire();
@@ -56,7 +58,8 @@ TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
 }
 
 TEST_CASE_METHOD(Fixture, "ring: a lapped reader is told how much it lost and goes on half a ring back") {
-    const std::uint64_t start = GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
+    const std::uint64_t start =
+        GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
     Writer writer = inline_writer(start);
     Reader reader = this->reader("numbers");
     for (std::uint64_t i = 0; i < 20; ++i) publish(writer, i);
@@ -109,7 +112,9 @@ TEST_CASE_METHOD(Fixture, "ring: items whose slot is gone count as lost") {
     CHECK(static_cast<std::uint64_t>(item.payload[0]) == item.number + 1);
 }
 
-TEST_CASE_METHOD(Fixture, "ring: slots are handed out until none is left; the oldest goes first, abandoned ones before it") {
+TEST_CASE_METHOD(
+    Fixture,
+    "ring: slots are handed out until none is left; the oldest goes first, abandoned ones before it") {
     Writer writer = frame_writer(3);
     const auto a = writer.acquire();
     const auto b = writer.acquire();
@@ -163,7 +168,8 @@ TEST_CASE_METHOD(Fixture, "ring: a waiting reader is woken [threads]", "[threads
     CHECK(item.metadata[0] == 5);
 }
 
-TEST_CASE_METHOD(Fixture, "ring: a reader that races with the writer never takes torn data [threads]", "[threads]") {
+TEST_CASE_METHOD(Fixture, "ring: a reader that races with the writer never takes torn data [threads]",
+                 "[threads]") {
     Writer writer = *Writer::create(directory.path(), {"race", StreamKind::frames, 4, 3, 4096});
     Reader reader = this->reader("race");
     constexpr std::uint64_t last = 20000;
@@ -199,7 +205,9 @@ TEST_CASE_METHOD(Fixture, "ring: a reader that races with the writer never takes
 
 TEST_CASE_METHOD(Fixture, "ring: what is no ring is refused with a reason") {
     Writer writer = inline_writer();
-    const auto error = [&](const std::string& name) { return Reader::open(directory.path() / name).error().message(); };
+    const auto error = [&](const std::string& name) {
+        return Reader::open(directory.path() / name).error().message();
+    };
     CHECK_THAT(error("absent"), Catch::Contains("no such stream"));
     directory.write("short", "x");
     CHECK_THAT(error("short"), Catch::Contains("not a VersaVIS ring"));
@@ -216,7 +224,8 @@ TEST_CASE_METHOD(Fixture, "ring: what is no ring is refused with a reason") {
     {
         std::fstream file(directory.path() / "newer", std::ios::in | std::ios::out | std::ios::binary);
         const std::uint32_t version = 2;
-        file.seekp(offsetof(Header, abi_major)).write(reinterpret_cast<const char*>(&version), sizeof version);
+        file.seekp(offsetof(Header, abi_major))
+            .write(reinterpret_cast<const char*>(&version), sizeof version);
     }
     CHECK_THAT(error("newer"), Catch::Contains("layout version 2, this program reads version 1"));
 }
@@ -225,7 +234,8 @@ TEST_CASE_METHOD(Fixture, "ring: the directory's owner must own the segment") {
     if (geteuid() != 0) return;  // only root can give files away
     Writer writer = inline_writer();
     REQUIRE(chown((directory.path() / "numbers").c_str(), 12345, 12345) == 0);
-    CHECK_THAT(Reader::open(directory.path() / "numbers").error().message(), Catch::Contains("does not belong"));
+    CHECK_THAT(Reader::open(directory.path() / "numbers").error().message(),
+               Catch::Contains("does not belong"));
 }
 
 TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The unmodified service finds the board through the real libusb, on a simulated bus. Run under umockdev-wrapper.
+// The unmodified service finds the board through the real libusb, on a simulated bus. Run under
+// umockdev-wrapper.
 #include <umockdev.h>
 
 #include <catch2/catch.hpp>
@@ -20,7 +21,7 @@ bool board_absent(const nlohmann::json& status) { return status["board"]["state"
 
 TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes back") {
     const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
-    Stack stack({"usb", 30, 1, 20, "", "", "", "usb"});
+    Stack stack({"usb", 30, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_rig();
     UsbBridge bridge(testbed.get(), stack.socket_path(), "RIG0001");
     stack.start_service();
@@ -51,10 +52,11 @@ TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes b
 
 TEST_CASE("usb: no board, or the wrong one, is said with what to do") {
     const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
-    Stack stack({"nousb", 31, 1, 20, "", "", "", "usb"});
+    Stack stack({"nousb", 31, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
     CHECK(status["board"]["state"] == "absent");
-    CHECK_THAT(status["board"]["hint"].get<std::string>(), Catch::Contains("1209:5653") && Catch::Contains("lsusb"));
+    CHECK_THAT(status["board"]["hint"].get<std::string>(),
+               Catch::Contains("1209:5653") && Catch::Contains("lsusb"));
     CHECK(stack.service().terminate() == 0);
 }

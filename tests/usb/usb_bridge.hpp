@@ -12,7 +12,7 @@
 namespace versavis::test {
 
 class UsbBridge {
-   public:
+ public:
     /// Throws when the rig's socket cannot be reached.
     UsbBridge(UMockdevTestbed* testbed, const std::string& socket_path, const std::string& serial);
     ~UsbBridge();
@@ -23,7 +23,7 @@ class UsbBridge {
     void plug() { device_->plug(); }
     bool line_state_set() const { return device_->line_state_set(); }
 
-   private:
+ private:
     void forward();
 
     int socket_;

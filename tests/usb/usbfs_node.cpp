@@ -21,331 +21,323 @@ constexpr std::size_t setup_size = 8;
 
 // Runs the task once on the thread of the context; dropping the result cancels it.
 GSourcePtr schedule(GMainContext* context, std::chrono::milliseconds delay, Task task) {
-  GSourcePtr source{g_timeout_source_new(static_cast<guint>(delay.count()))};
-  g_source_set_callback(
-      source.get(),
-      [](gpointer data) -> gboolean {
-        (*static_cast<Task*>(data))();
-        return G_SOURCE_REMOVE;
-      },
-      new Task{std::move(task)}, [](gpointer data) { delete static_cast<Task*>(data); });
-  g_source_attach(source.get(), context);
-  return source;
+    GSourcePtr source{g_timeout_source_new(static_cast<guint>(delay.count()))};
+    g_source_set_callback(
+        source.get(),
+        [](gpointer data) -> gboolean {
+            (*static_cast<Task*>(data))();
+            return G_SOURCE_REMOVE;
+        },
+        new Task{std::move(task)}, [](gpointer data) { delete static_cast<Task*>(data); });
+    g_source_attach(source.get(), context);
+    return source;
 }
 
 unsigned interface_of(std::uint8_t endpoint) {
-  return endpoint == UsbFunction::interrupt_in_endpoint ? 0 : 1;
+    return endpoint == UsbFunction::interrupt_in_endpoint ? 0 : 1;
 }
 
 void complete(Client* client, int result) {
-  umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
+    umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
 }
 
 // The ioctl's argument as the struct it points to; null if the pointer is.
 DataPtr resolve_argument(Client* client, std::size_t size) {
-  UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
-  return DataPtr{umockdev_ioctl_data_resolve(argument, 0, size, nullptr)};
+    UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
+    return DataPtr{umockdev_ioctl_data_resolve(argument, 0, size, nullptr)};
 }
 
 template <typename T>
 T read_argument(Client* client, T fallback) {
-  const DataPtr data = resolve_argument(client, sizeof(T));
-  if (data) std::memcpy(&fallback, data->data, sizeof(T));
-  return fallback;
+    const DataPtr data = resolve_argument(client, sizeof(T));
+    if (data) std::memcpy(&fallback, data->data, sizeof(T));
+    return fallback;
 }
 
 template <typename T>
 T pointer_value(const UMockdevIoctlData* data) {
-  T value;
-  std::memcpy(&value, data->data, sizeof value);
-  return value;
+    T value;
+    std::memcpy(&value, data->data, sizeof value);
+    return value;
 }
 
 }  // namespace
 
 std::span<std::uint8_t> UsbfsNode::Urb::payload() const {
-  if (!buffer) return {};
-  return {buffer->data, static_cast<std::size_t>(buffer->data_len)};
+    if (!buffer) return {};
+    return {buffer->data, static_cast<std::size_t>(buffer->data_len)};
 }
 
 void UsbfsNode::attach(std::string path) {
-  const std::lock_guard lock{mutex_};
-  path_ = std::move(path);
+    const std::lock_guard lock{mutex_};
+    path_ = std::move(path);
 }
 
 void UsbfsNode::detach() {
-  {
-    const std::lock_guard lock{mutex_};
-    path_.clear();
-    to_host_.clear();
-  }
-  post_pump();
+    {
+        const std::lock_guard lock{mutex_};
+        path_.clear();
+        to_host_.clear();
+    }
+    post_pump();
 }
 
 void UsbfsNode::send(std::span<const std::byte> bytes) {
-  {
-    const std::lock_guard lock{mutex_};
-    if (path_.empty()) return;
-    for (std::byte byte : bytes) to_host_.push_back(std::to_integer<std::uint8_t>(byte));
-  }
-  post_pump();
+    {
+        const std::lock_guard lock{mutex_};
+        if (path_.empty()) return;
+        for (std::byte byte : bytes) to_host_.push_back(std::to_integer<std::uint8_t>(byte));
+    }
+    post_pump();
 }
 
 // The testbed's context is private; this is the first chance to learn it, and
 // before a client is connected there is no urb to work on.
 void UsbfsNode::on_connected(Client* client) {
-  g_object_weak_ref(
-      G_OBJECT(client),
-      [](gpointer self, GObject* gone) {
-        static_cast<UsbfsNode*>(self)->forget(reinterpret_cast<Client*>(gone));
-      },
-      this);
-  const std::lock_guard lock{mutex_};
-  if (context_ == nullptr) context_ = g_main_context_get_thread_default();
+    g_object_weak_ref(
+        G_OBJECT(client),
+        [](gpointer self, GObject* gone) {
+            static_cast<UsbfsNode*>(self)->forget(reinterpret_cast<Client*>(gone));
+        },
+        this);
+    const std::lock_guard lock{mutex_};
+    if (context_ == nullptr) context_ = g_main_context_get_thread_default();
 }
 
 void UsbfsNode::on_ioctl(Client* client) {
-  const unsigned long request = umockdev_ioctl_client_get_request(client);
-  if (request == USBDEVFS_REAPURB || request == USBDEVFS_REAPURBNDELAY) {
-    reap(client, request == USBDEVFS_REAPURB);
-    return;
-  }
-  complete(client, is_current(client) ? execute(client, request) : -ENODEV);
+    const unsigned long request = umockdev_ioctl_client_get_request(client);
+    if (request == USBDEVFS_REAPURB || request == USBDEVFS_REAPURBNDELAY) {
+        reap(client, request == USBDEVFS_REAPURB);
+        return;
+    }
+    complete(client, is_current(client) ? execute(client, request) : -ENODEV);
 }
 
 // A file descriptor opened before an unplug never becomes useful again.
 bool UsbfsNode::is_current(Client* client) {
-  const std::lock_guard lock{mutex_};
-  return path_ == umockdev_ioctl_client_get_devnode(client);
+    const std::lock_guard lock{mutex_};
+    return path_ == umockdev_ioctl_client_get_devnode(client);
 }
 
 // The process closed the node or died.
 void UsbfsNode::forget(Client* client) {
-  std::erase_if(pending_, [client](const Urb& urb) { return urb.client == client; });
-  std::erase_if(done_, [client](const Urb& urb) { return urb.client == client; });
-  std::erase_if(claims_, [client](const auto& claim) { return claim.second == client; });
-  busy_.erase(client);
+    std::erase_if(pending_, [client](const Urb& urb) { return urb.client == client; });
+    std::erase_if(done_, [client](const Urb& urb) { return urb.client == client; });
+    std::erase_if(claims_, [client](const auto& claim) { return claim.second == client; });
+    busy_.erase(client);
 }
 
 int UsbfsNode::execute(Client* client, unsigned long request) {
-  switch (request) {
-    case USBDEVFS_GET_CAPABILITIES:
-      return capabilities(client);
-    case USBDEVFS_GET_SPEED:
-      return speed_full;
-    case USBDEVFS_CLAIMINTERFACE:
-    case USBDEVFS_DISCONNECT_CLAIM:  // the interface number is its first member
-      return claim(client, read_argument<unsigned>(client, UsbFunction::interface_count));
-    case USBDEVFS_RELEASEINTERFACE:
-      return release(client, read_argument<unsigned>(client, UsbFunction::interface_count));
-    case USBDEVFS_SETCONFIGURATION:
-      return read_argument<unsigned>(client, 0) == 1 ? 0 : -EINVAL;
-    case USBDEVFS_SETINTERFACE:
-      return read_argument(client, usbdevfs_setinterface{}).altsetting == 0 ? 0 : -EINVAL;
-    case USBDEVFS_CLEAR_HALT:
-    case USBDEVFS_RESET:
-      return 0;
-    case USBDEVFS_GETDRIVER:
-    case USBDEVFS_IOCTL:
-      return -ENODATA;  // no kernel driver is ever bound
-    case USBDEVFS_SUBMITURB:
-      return submit(client);
-    case USBDEVFS_DISCARDURB:
-      return discard(client);
-    default:
-      return -ENOTTY;
-  }
+    switch (request) {
+        case USBDEVFS_GET_CAPABILITIES: return capabilities(client);
+        case USBDEVFS_GET_SPEED: return speed_full;
+        case USBDEVFS_CLAIMINTERFACE:
+        case USBDEVFS_DISCONNECT_CLAIM:  // the interface number is its first member
+            return claim(client, read_argument<unsigned>(client, UsbFunction::interface_count));
+        case USBDEVFS_RELEASEINTERFACE:
+            return release(client, read_argument<unsigned>(client, UsbFunction::interface_count));
+        case USBDEVFS_SETCONFIGURATION: return read_argument<unsigned>(client, 0) == 1 ? 0 : -EINVAL;
+        case USBDEVFS_SETINTERFACE:
+            return read_argument(client, usbdevfs_setinterface{}).altsetting == 0 ? 0 : -EINVAL;
+        case USBDEVFS_CLEAR_HALT:
+        case USBDEVFS_RESET: return 0;
+        case USBDEVFS_GETDRIVER:
+        case USBDEVFS_IOCTL: return -ENODATA;  // no kernel driver is ever bound
+        case USBDEVFS_SUBMITURB: return submit(client);
+        case USBDEVFS_DISCARDURB: return discard(client);
+        default: return -ENOTTY;
+    }
 }
 
 // No USBDEVFS_CAP_MMAP: the fake node is a regular file and cannot be mapped.
 int UsbfsNode::capabilities(Client* client) {
-  constexpr std::uint32_t usbfs_capabilities =
-      USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
-      USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
-  const DataPtr data = resolve_argument(client, sizeof usbfs_capabilities);
-  if (!data) return -EFAULT;
-  std::memcpy(data->data, &usbfs_capabilities, sizeof usbfs_capabilities);
-  return 0;
+    constexpr std::uint32_t usbfs_capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
+                                                 USBDEVFS_CAP_BULK_SCATTER_GATHER |
+                                                 USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+    const DataPtr data = resolve_argument(client, sizeof usbfs_capabilities);
+    if (!data) return -EFAULT;
+    std::memcpy(data->data, &usbfs_capabilities, sizeof usbfs_capabilities);
+    return 0;
 }
 
 int UsbfsNode::claim(Client* client, unsigned interface) {
-  if (interface >= UsbFunction::interface_count) return -ENOENT;
-  const auto [claim, added] = claims_.try_emplace(interface, client);
-  return claim->second == client ? 0 : -EBUSY;
+    if (interface >= UsbFunction::interface_count) return -ENOENT;
+    const auto [claim, added] = claims_.try_emplace(interface, client);
+    return claim->second == client ? 0 : -EBUSY;
 }
 
 int UsbfsNode::release(Client* client, unsigned interface) {
-  const auto claim = claims_.find(interface);
-  if (claim == claims_.end() || claim->second != client) return -EINVAL;
-  claims_.erase(claim);
-  return 0;
+    const auto claim = claims_.find(interface);
+    if (claim == claims_.end() || claim->second != client) return -EINVAL;
+    claims_.erase(claim);
+    return 0;
 }
 
 int UsbfsNode::submit(Client* client) {
-  Urb urb{client, resolve_argument(client, sizeof(usbdevfs_urb)), nullptr};
-  if (!urb.data) return -EFAULT;
-  const int length = urb.fields().buffer_length;
-  if (length < 0) return -EINVAL;
-  if (length > 0) {
-    urb.buffer.reset(umockdev_ioctl_data_resolve(urb.data.get(), offsetof(usbdevfs_urb, buffer),
-                                                 static_cast<gsize>(length), nullptr));
-    if (!urb.buffer) return -EFAULT;
-  }
-  return start(std::move(urb));
+    Urb urb{client, resolve_argument(client, sizeof(usbdevfs_urb)), nullptr};
+    if (!urb.data) return -EFAULT;
+    const int length = urb.fields().buffer_length;
+    if (length < 0) return -EINVAL;
+    if (length > 0) {
+        urb.buffer.reset(umockdev_ioctl_data_resolve(urb.data.get(), offsetof(usbdevfs_urb, buffer),
+                                                     static_cast<gsize>(length), nullptr));
+        if (!urb.buffer) return -EFAULT;
+    }
+    return start(std::move(urb));
 }
 
 int UsbfsNode::start(Urb urb) {
-  const usbdevfs_urb& fields = urb.fields();
-  if (fields.type == USBDEVFS_URB_TYPE_CONTROL) {
-    if (urb.payload().size() < setup_size) return -EINVAL;
-    control(urb);
+    const usbdevfs_urb& fields = urb.fields();
+    if (fields.type == USBDEVFS_URB_TYPE_CONTROL) {
+        if (urb.payload().size() < setup_size) return -EINVAL;
+        control(urb);
+        return 0;
+    }
+    const std::uint8_t endpoint = fields.endpoint;
+    if (endpoint != UsbFunction::bulk_out_endpoint && endpoint != UsbFunction::bulk_in_endpoint &&
+        endpoint != UsbFunction::interrupt_in_endpoint) {
+        return -ENOENT;
+    }
+    // Like the kernel, take an interface the caller forgot to claim.
+    const int claimed = claim(urb.client, interface_of(endpoint));
+    if (claimed < 0) return claimed;
+    if (endpoint == UsbFunction::bulk_out_endpoint) {
+        receive(urb);
+        finish(std::move(urb), 0);
+    } else {
+        pending_.push_back(std::move(urb));
+        post_pump();
+    }
     return 0;
-  }
-  const std::uint8_t endpoint = fields.endpoint;
-  if (endpoint != UsbFunction::bulk_out_endpoint && endpoint != UsbFunction::bulk_in_endpoint &&
-      endpoint != UsbFunction::interrupt_in_endpoint) {
-    return -ENOENT;
-  }
-  // Like the kernel, take an interface the caller forgot to claim.
-  const int claimed = claim(urb.client, interface_of(endpoint));
-  if (claimed < 0) return claimed;
-  if (endpoint == UsbFunction::bulk_out_endpoint) {
-    receive(urb);
-    finish(std::move(urb), 0);
-  } else {
-    pending_.push_back(std::move(urb));
-    post_pump();
-  }
-  return 0;
 }
 
 int UsbfsNode::discard(Client* client) {
-  const auto address = pointer_value<gulong>(umockdev_ioctl_client_get_arg(client));
-  const auto urb = std::ranges::find_if(pending_, [&](const Urb& candidate) {
-    return candidate.client == client && candidate.data->client_addr == address;
-  });
-  if (urb == pending_.end()) return -EINVAL;
-  Urb discarded = std::move(*urb);
-  pending_.erase(urb);
-  finish(std::move(discarded), -ENOENT);
-  return 0;
+    const auto address = pointer_value<gulong>(umockdev_ioctl_client_get_arg(client));
+    const auto urb = std::ranges::find_if(pending_, [&](const Urb& candidate) {
+        return candidate.client == client && candidate.data->client_addr == address;
+    });
+    if (urb == pending_.end()) return -EINVAL;
+    Urb discarded = std::move(*urb);
+    pending_.erase(urb);
+    finish(std::move(discarded), -ENOENT);
+    return 0;
 }
 
 void UsbfsNode::control(Urb& urb) {
-  const auto setup = urb.payload().first(setup_size);
-  const auto data = urb.payload().subspan(setup_size);
-  const bool to_host = (setup[0] & 0x80) != 0;
-  std::vector<std::uint8_t> reply;
-  const auto out = to_host ? std::span<std::uint8_t>{} : data;
-  const int status = function_->control(setup, out, reply);
-  std::size_t length = to_host ? std::min(reply.size(), data.size()) : data.size();
-  if (status < 0) length = 0;
-  if (to_host) std::copy_n(reply.begin(), length, data.begin());
-  urb.fields().actual_length = static_cast<int>(length);
-  finish(std::move(urb), status);
+    const auto setup = urb.payload().first(setup_size);
+    const auto data = urb.payload().subspan(setup_size);
+    const bool to_host = (setup[0] & 0x80) != 0;
+    std::vector<std::uint8_t> reply;
+    const auto out = to_host ? std::span<std::uint8_t>{} : data;
+    const int status = function_->control(setup, out, reply);
+    std::size_t length = to_host ? std::min(reply.size(), data.size()) : data.size();
+    if (status < 0) length = 0;
+    if (to_host) std::copy_n(reply.begin(), length, data.begin());
+    urb.fields().actual_length = static_cast<int>(length);
+    finish(std::move(urb), status);
 }
 
 void UsbfsNode::receive(Urb& urb) {
-  urb.fields().actual_length = urb.fields().buffer_length;
-  if (urb.buffer) function_->receive(std::as_bytes(urb.payload()));
+    urb.fields().actual_length = urb.fields().buffer_length;
+    if (urb.buffer) function_->receive(std::as_bytes(urb.payload()));
 }
 
 void UsbfsNode::finish(Urb urb, int status) {
-  urb.fields().status = status;
-  done_.push_back(std::move(urb));
+    urb.fields().status = status;
+    done_.push_back(std::move(urb));
 }
 
 void UsbfsNode::reap(Client* client, bool wait) {
-  if (answer_reap(client)) return;
-  // libusb reaps until nothing is left before it returns to its caller, so the
-  // first such question after an urb must not cost the caller the hold.
-  const bool just_drained = busy_.erase(client) > 0;
-  if (!wait && (just_drained || idle_hold_.count() == 0)) {
-    answer_empty_reap(client);
-  } else {
-    hold_reap(client, wait);
-  }
+    if (answer_reap(client)) return;
+    // libusb reaps until nothing is left before it returns to its caller, so the
+    // first such question after an urb must not cost the caller the hold.
+    const bool just_drained = busy_.erase(client) > 0;
+    if (!wait && (just_drained || idle_hold_.count() == 0)) {
+        answer_empty_reap(client);
+    } else {
+        hold_reap(client, wait);
+    }
 }
 
 bool UsbfsNode::answer_reap(Client* client) {
-  const auto urb = std::ranges::find(done_, client, &Urb::client);
-  if (urb == done_.end()) return false;
-  const DataPtr slot = resolve_argument(client, sizeof(void*));
-  if (slot) umockdev_ioctl_data_set_ptr(slot.get(), 0, urb->data.get());
-  done_.erase(urb);
-  busy_.insert(client);
-  complete(client, slot ? 0 : -EFAULT);
-  return true;
+    const auto urb = std::ranges::find(done_, client, &Urb::client);
+    if (urb == done_.end()) return false;
+    const DataPtr slot = resolve_argument(client, sizeof(void*));
+    if (slot) umockdev_ioctl_data_set_ptr(slot.get(), 0, urb->data.get());
+    done_.erase(urb);
+    busy_.insert(client);
+    complete(client, slot ? 0 : -EFAULT);
+    return true;
 }
 
 void UsbfsNode::answer_empty_reap(Client* client) {
-  complete(client, is_current(client) ? -EAGAIN : -ENODEV);
+    complete(client, is_current(client) ? -EAGAIN : -ENODEV);
 }
 
 void UsbfsNode::hold_reap(Client* client, bool wait) {
-  HeldReap held{GObjectPtr<Client>{static_cast<Client*>(g_object_ref(client))}, nullptr};
-  if (!wait) {
-    held.timeout = schedule(context_, idle_hold_, [self = shared_from_this(), client] {
-      const auto expired = self->held_.extract(client);
-      self->answer_empty_reap(client);
-    });
-  }
-  held_.insert_or_assign(client, std::move(held));
+    HeldReap held{GObjectPtr<Client>{static_cast<Client*>(g_object_ref(client))}, nullptr};
+    if (!wait) {
+        held.timeout = schedule(context_, idle_hold_, [self = shared_from_this(), client] {
+            const auto expired = self->held_.extract(client);
+            self->answer_empty_reap(client);
+        });
+    }
+    held_.insert_or_assign(client, std::move(held));
 }
 
 // Urbs are worked on later on the GLib thread, whoever asks: umockdev copies
 // their memory without a lock while it finishes the current ioctl.
 void UsbfsNode::post_pump() {
-  const std::lock_guard lock{mutex_};
-  if (context_ == nullptr || pump_posted_) return;
-  pump_posted_ = true;
-  // Unreferenced, not destroyed: the context keeps it until it has run.
-  g_source_unref(schedule(context_, std::chrono::milliseconds{0}, [self = shared_from_this()] {
-                   self->pump();
-                 }).release());
+    const std::lock_guard lock{mutex_};
+    if (context_ == nullptr || pump_posted_) return;
+    pump_posted_ = true;
+    // Unreferenced, not destroyed: the context keeps it until it has run.
+    g_source_unref(schedule(context_, std::chrono::milliseconds{0}, [self = shared_from_this()] {
+                       self->pump();
+                   }).release());
 }
 
 void UsbfsNode::pump() {
-  {
-    const std::lock_guard lock{mutex_};
-    pump_posted_ = false;
-  }
-  shut_down_stale_urbs();
-  fill_bulk_in();
-  for (auto held = held_.begin(); held != held_.end();) {
-    const auto next = std::next(held);
-    if (answer_reap(held->first)) held_.erase(held);
-    held = next;
-  }
+    {
+        const std::lock_guard lock{mutex_};
+        pump_posted_ = false;
+    }
+    shut_down_stale_urbs();
+    fill_bulk_in();
+    for (auto held = held_.begin(); held != held_.end();) {
+        const auto next = std::next(held);
+        if (answer_reap(held->first)) held_.erase(held);
+        held = next;
+    }
 }
 
 void UsbfsNode::shut_down_stale_urbs() {
-  std::deque<Urb> kept;
-  for (Urb& urb : std::exchange(pending_, {})) {
-    if (is_current(urb.client)) {
-      kept.push_back(std::move(urb));
-    } else {
-      finish(std::move(urb), -ESHUTDOWN);
+    std::deque<Urb> kept;
+    for (Urb& urb : std::exchange(pending_, {})) {
+        if (is_current(urb.client)) {
+            kept.push_back(std::move(urb));
+        } else {
+            finish(std::move(urb), -ESHUTDOWN);
+        }
     }
-  }
-  pending_ = std::move(kept);
+    pending_ = std::move(kept);
 }
 
 void UsbfsNode::fill_bulk_in() {
-  const std::lock_guard lock{mutex_};
-  for (auto urb = pending_.begin(); urb != pending_.end() && !to_host_.empty();) {
-    if (urb->fields().endpoint != UsbFunction::bulk_in_endpoint) {
-      ++urb;
-      continue;
+    const std::lock_guard lock{mutex_};
+    for (auto urb = pending_.begin(); urb != pending_.end() && !to_host_.empty();) {
+        if (urb->fields().endpoint != UsbFunction::bulk_in_endpoint) {
+            ++urb;
+            continue;
+        }
+        const std::size_t length = std::min(urb->payload().size(), to_host_.size());
+        const auto end = to_host_.begin() + static_cast<std::ptrdiff_t>(length);
+        std::copy(to_host_.begin(), end, urb->payload().begin());
+        to_host_.erase(to_host_.begin(), end);
+        urb->fields().actual_length = static_cast<int>(length);
+        finish(std::move(*urb), 0);
+        urb = pending_.erase(urb);
     }
-    const std::size_t length = std::min(urb->payload().size(), to_host_.size());
-    const auto end = to_host_.begin() + static_cast<std::ptrdiff_t>(length);
-    std::copy(to_host_.begin(), end, urb->payload().begin());
-    to_host_.erase(to_host_.begin(), end);
-    urb->fields().actual_length = static_cast<int>(length);
-    finish(std::move(*urb), 0);
-    urb = pending_.erase(urb);
-  }
 }
 
 }  // namespace versavis::test

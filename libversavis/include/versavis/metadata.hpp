@@ -12,25 +12,27 @@ namespace versavis {
 
 /// Where a frame's stamp comes from, best first.
 enum class StampKind : std::uint32_t {
-    measured_middle = 0,   ///< both edges of the exposure were stamped by hardware
-    predicted_middle = 1,  ///< an edge is missing: start or end follow from the configured or expected exposure
-    trigger_edge = 2,      ///< only the trigger pulse is known
-    arrival = 3,           ///< no trigger: the moment the frame arrived on the host
+    measured_middle = 0,  ///< both edges of the exposure were stamped by hardware
+    predicted_middle =
+        1,             ///< an edge is missing: start or end follow from the configured or expected exposure
+    trigger_edge = 2,  ///< only the trigger pulse is known
+    arrival = 3,       ///< no trigger: the moment the frame arrived on the host
 };
 
 enum ItemFlag : std::uint32_t {
-    stamp_kind_mask = 0x3,        ///< StampKind
-    flag_suspect = 1U << 2U,      ///< the pairing of frame and exposure could not be proved
-    flag_holdover = 1U << 3U,     ///< the clocks were without contact: sigma grows
-    flag_clamped = 1U << 4U,      ///< the stamp was held so that it did not go backwards
-    flag_sensor_error = 1U << 5U, ///< the sensor reported a fault, or its checksum was wrong
+    stamp_kind_mask = 0x3,         ///< StampKind
+    flag_suspect = 1U << 2U,       ///< the pairing of frame and exposure could not be proved
+    flag_holdover = 1U << 3U,      ///< the clocks were without contact: sigma grows
+    flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
+    flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
 };
 
 /// A stamp of sigma `sigma_unknown` has no known accuracy.
 inline constexpr std::uint32_t sigma_unknown = 0xFFFFFFFFU;
 
 struct FrameMetadata {
-    std::uint64_t trigger;   ///< pulses the board had sent to this camera, this frame's included; 0: not triggered
+    std::uint64_t
+        trigger;  ///< pulses the board had sent to this camera, this frame's included; 0: not triggered
     std::uint64_t block_id;  ///< the camera's own frame number
     BoardTime board_time;    ///< middle of the exposure
     HostTime host_time;      ///< middle of the exposure
@@ -44,7 +46,7 @@ struct FrameMetadata {
     std::uint32_t pixel_format;  ///< PFNC code
     std::uint32_t epoch;         ///< trigger numbers and clocks are continuous within one
     std::uint32_t flags;         ///< ItemFlag
-    std::uint32_t tick;          ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
+    std::uint32_t tick;  ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
     std::uint64_t reserved;
 
     StampKind stamp_kind() const { return static_cast<StampKind>(flags & stamp_kind_mask); }
@@ -53,15 +55,15 @@ struct FrameMetadata {
 struct ImuMetadata {
     BoardTime board_time;
     HostTime host_time;
-    std::uint64_t number;   ///< samples since the board's boot
-    float gyro[3];          ///< rad/s
-    float accel[3];         ///< m/s^2
-    float magnetic[3];      ///< tesla; NaN where the part has none
-    float temperature;      ///< degree Celsius
-    float pressure;         ///< pascal; NaN where the part has none
+    std::uint64_t number;  ///< samples since the board's boot
+    float gyro[3];         ///< rad/s
+    float accel[3];        ///< m/s^2
+    float magnetic[3];     ///< tesla; NaN where the part has none
+    float temperature;     ///< degree Celsius
+    float pressure;        ///< pascal; NaN where the part has none
     std::uint32_t sigma_ns;
     std::uint32_t epoch;
-    std::uint32_t flags;    ///< ItemFlag
+    std::uint32_t flags;  ///< ItemFlag
     std::uint64_t reserved[2];
 };
 
@@ -75,31 +77,31 @@ enum class EventKind : std::uint32_t {
     board_lost = 7,
     camera_connected = 8,
     camera_lost = 9,
-    pairing_locked = 10,        ///< value: trigger number of the first proved frame
-    pairing_slipped = 11,       ///< value: trigger number at which it was found
-    edge_overflow = 12,         ///< value: edges lost
+    pairing_locked = 10,   ///< value: trigger number of the first proved frame
+    pairing_slipped = 11,  ///< value: trigger number at which it was found
+    edge_overflow = 12,    ///< value: edges lost
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
 enum class EventReason : std::uint32_t {
     none = 0,
-    frame_incomplete = 1,    ///< packets were lost on the way
-    frame_missing = 2,       ///< nothing arrived in time
-    exposure_missing = 3,    ///< the board's record did not arrive in time
-    unproved = 4,            ///< pairing was not locked, and could not prove it
-    mismatch = 5,            ///< the evidence contradicts the pairing
-    no_buffer = 6,           ///< all slots were taken
-    no_clock = 7,            ///< board time could not be translated
-    wrong_size = 8,          ///< the frame is not of the size the camera announced
-    reset = 9,               ///< camera or board began anew in between
-    trigger_ignored = 10,    ///< the camera did not expose
+    frame_incomplete = 1,  ///< packets were lost on the way
+    frame_missing = 2,     ///< nothing arrived in time
+    exposure_missing = 3,  ///< the board's record did not arrive in time
+    unproved = 4,          ///< pairing was not locked, and could not prove it
+    mismatch = 5,          ///< the evidence contradicts the pairing
+    no_buffer = 6,         ///< all slots were taken
+    no_clock = 7,          ///< board time could not be translated
+    wrong_size = 8,        ///< the frame is not of the size the camera announced
+    reset = 9,             ///< camera or board began anew in between
+    trigger_ignored = 10,  ///< the camera did not expose
 };
 
 struct EventMetadata {
     EventKind kind;
     std::uint32_t source;  ///< camera, IMU or input number
     EventReason reason;
-    std::uint32_t flags;   ///< ItemFlag
+    std::uint32_t flags;  ///< ItemFlag
     std::int64_t value;
     BoardTime board_time;  ///< 0: not an event of the board
     HostTime host_time;

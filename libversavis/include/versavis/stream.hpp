@@ -22,13 +22,14 @@ struct Received : ring::Item {
 /// A typed reader of one stream. Not thread-safe; open one per thread.
 template <class Data, ring::StreamKind kind>
 class Stream {
-   public:
+ public:
     /// Errors: no such stream, no permission, a stream of another kind.
     static Expected<Stream> open(const std::string& name, const std::string& instance = default_instance(),
                                  ring::Reader::From from = ring::Reader::From::newest) {
         auto reader = ring::Reader::open(stream_path(instance, name), from);
         if (!reader) return tl::unexpected<Error>(reader.error());
-        if (reader->kind() != kind) return failure(name, "is a stream of another kind", "see 'versavis list'");
+        if (reader->kind() != kind)
+            return failure(name, "is a stream of another kind", "see 'versavis list'");
         return Stream(std::move(*reader));
     }
 
@@ -41,12 +42,15 @@ class Stream {
     /// True while the payload of `item` is untouched: what was read of it in place before this call is good.
     bool intact(const ring::Item& item) const { return reader_.intact(item); }
 
-    /// Copies the payload to `destination` of item.payload_size bytes; false when the writer overtook the copy.
-    bool copy(const ring::Item& item, std::byte* destination) const { return reader_.copy(item, destination); }
+    /// Copies the payload to `destination` of item.payload_size bytes; false when the writer overtook the
+    /// copy.
+    bool copy(const ring::Item& item, std::byte* destination) const {
+        return reader_.copy(item, destination);
+    }
 
     const ring::Reader& reader() const { return reader_; }
 
-   private:
+ private:
     explicit Stream(ring::Reader reader) : reader_(std::move(reader)) {}
 
     static Received<Data> typed(const ring::Item& item) {

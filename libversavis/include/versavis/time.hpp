@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Instants and durations in integer nanoseconds, one type per clock, so that clocks cannot be mixed by accident.
+// Instants and durations in integer nanoseconds, one type per clock, so that clocks cannot be mixed by
+// accident.
 #pragma once
 
 #include <cstdint>

@@ -72,11 +72,13 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     impossible_ = 0;
     slot_.down_ns = std::min(slot_.down_ns, predicted_ns(exchange.received) - exchange.sent.ns);
     slot_.up_ns = std::min(slot_.up_ns, exchange.arrived.ns - predicted_ns(exchange.answered));
-    const std::int64_t slot_length = std::min((exchange.answered - started_).ns / slots_per_age, longest_slot_ns);
+    const std::int64_t slot_length =
+        std::min((exchange.answered - started_).ns / slots_per_age, longest_slot_ns);
     if ((exchange.answered - slot_.begin).ns >= slot_length) close_slot(exchange.answered);
 }
 
-/// True when an instant would have been seen before it happened, by more than the estimate's own error explains.
+/// True when an instant would have been seen before it happened, by more than the estimate's own error
+/// explains.
 bool EnvelopeFilter::impossible(const Exchange& exchange) const {
     const auto up = static_cast<double>(exchange.arrived.ns - predicted_ns(exchange.answered));
     const auto down = static_cast<double>(predicted_ns(exchange.received) - exchange.sent.ns);
@@ -196,8 +198,8 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     if (!initialised()) return estimate;
     const double dt = to_seconds(board - reference_);
     const double asymmetry = static_cast<double>(smallest_sum_ns_) / 6;
-    const double variance = asymmetry * asymmetry + covariance_(0, 0) + 2 * dt * covariance_(0, 1) + dt * dt * covariance_(1, 1) +
-                            skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
+    const double variance = asymmetry * asymmetry + covariance_(0, 0) + 2 * dt * covariance_(0, 1) +
+                            dt * dt * covariance_(1, 1) + skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
     estimate.time = {predicted_ns(board)};
     estimate.sigma = {std::llround(std::sqrt(std::max(variance, 1.0)))};
     const bool uncertain = slots_ < early_slots || static_cast<double>(estimate.sigma.ns) > locked_sigma_ns;

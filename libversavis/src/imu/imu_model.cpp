@@ -11,10 +11,11 @@ namespace {
 constexpr double radians_per_degree = 3.14159265358979323846 / 180;
 constexpr double standard_gravity = 9.80665;
 
-// ADIS16448: 0.04 deg/s, 1/1200 g, 142.9 microgauss, 20 microbar and 0.07386 degree C per LSB, 31 degree C at zero.
+// ADIS16448: 0.04 deg/s, 1/1200 g, 142.9 microgauss, 20 microbar and 0.07386 degree C per LSB, 31 degree C at
+// zero.
 constexpr std::array<ImuModel, 1> models{{
-    {wire::ImuKind::adis16448b, "adis16448b", 0.04 * radians_per_degree, standard_gravity / 1200, 142.9e-10, 2.0, 0.07386,
-     31.0},
+    {wire::ImuKind::adis16448b, "adis16448b", 0.04 * radians_per_degree, standard_gravity / 1200, 142.9e-10,
+     2.0, 0.07386, 31.0},
 }};
 
 template <class Matches>
@@ -43,8 +44,10 @@ ImuMetadata to_si(const ImuModel& model, const wire::ImuSample& sample) {
         metadata.magnetic[axis] =
             model.magnetic_t == 0 ? none : static_cast<float>(sample.magnetic[axis] * model.magnetic_t);
     }
-    metadata.temperature = static_cast<float>(sample.temperature * model.temperature_c + model.temperature_at_zero_c);
-    metadata.pressure = model.pressure_pa == 0 ? none : static_cast<float>(sample.pressure * model.pressure_pa);
+    metadata.temperature =
+        static_cast<float>(sample.temperature * model.temperature_c + model.temperature_at_zero_c);
+    metadata.pressure =
+        model.pressure_pa == 0 ? none : static_cast<float>(sample.pressure * model.pressure_pa);
     const bool faulty = (sample.flags & (wire::imu_checksum_failed | wire::imu_self_test_failed)) != 0;
     metadata.flags = faulty ? std::uint32_t{flag_sensor_error} : 0;
     return metadata;

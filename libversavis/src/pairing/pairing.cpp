@@ -34,8 +34,9 @@ bool Pairing::arrival_possible(const Arrival& arrival, const Exposure& exposure)
     return after_end >= limits_.earliest_arrival && after_end <= limits_.latest_arrival;
 }
 
-/// How many faults it takes that ids step by `id_step` between these triggers. Cameras count either every trigger or
-/// only those that they took: both counts are right. A trigger without record may have been taken or not.
+/// How many faults it takes that ids step by `id_step` between these triggers. Cameras count either every
+/// trigger or only those that they took: both counts are right. A trigger without record may have been taken
+/// or not.
 unsigned Pairing::step_faults(std::uint64_t id_step, const Record& from, const Record& to) {
     if (to.exposure.trigger <= from.exposure.trigger) return faults_to_refute;
     const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
@@ -43,7 +44,8 @@ unsigned Pairing::step_faults(std::uint64_t id_step, const Record& from, const R
     const std::uint64_t unrecorded = sent - std::min(sent, to.recorded - from.recorded);
     const std::uint64_t silent = to.silent - from.silent - (to.exposure.exposed ? 0 : 1);
     const std::uint64_t taken = sent - std::min(sent - 1, unrecorded + silent);
-    return taken > id_step ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute)) : 0;
+    return taken > id_step ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute))
+                           : 0;
 }
 
 /// Index of the first exposure that starts after `start`.
@@ -73,7 +75,8 @@ bool Pairing::record_lost_near(BoardTime start) const {
 void Pairing::add(const Exposure& exposure) {
     if (!exposures_.empty()) {
         const Exposure& before = exposures_.back().exposure;
-        // Records come in order; one that does not is of another life of the board, and belongs to no frame here.
+        // Records come in order; one that does not is of another life of the board, and belongs to no frame
+        // here.
         if (exposure.trigger <= before.trigger || exposure.start <= before.start)
             return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
         smallest_gap_ns_ = std::min(smallest_gap_ns_, (exposure.start - before.start).ns);
@@ -92,7 +95,8 @@ void Pairing::add(const Arrival& arrival) {
         const bool has_clock = arrival.camera_time.ns != 0;
         while (has_clock != camera_clock_ && !arrivals_.empty()) drop_front(EventReason::unproved);
         camera_clock_ = has_clock;
-        if (arrivals_.size() == std::max(limits_.frames_held, frames_for_proof)) drop_front(EventReason::unproved);
+        if (arrivals_.size() == std::max(limits_.frames_held, frames_for_proof))
+            drop_front(EventReason::unproved);
     } else if (arrivals_.size() == limits_.frames_held) {
         drop_front(EventReason::exposure_missing);
     }
@@ -106,7 +110,8 @@ void Pairing::process() {
     }
 }
 
-/// What must have gone wrong if the frames' clock differs from the board's by `difference_ns`. None: it cannot be.
+/// What must have gone wrong if the frames' clock differs from the board's by `difference_ns`. None: it
+/// cannot be.
 std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) const {
     Alignment alignment;
     const Record* last = nullptr;
@@ -119,7 +124,8 @@ std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) con
             alignment.unknown = true;
             continue;
         }
-        if (record->used || !record->exposure.exposed || !arrival_possible(arrival, record->exposure)) return std::nullopt;
+        if (record->used || !record->exposure.exposed || !arrival_possible(arrival, record->exposure))
+            return std::nullopt;
         if (last != nullptr) alignment.faults += step_faults(arrival.block_id - last_id, *last, *record);
         last = record;
         last_id = arrival.block_id;
@@ -145,7 +151,8 @@ std::vector<std::int64_t> Pairing::candidate_differences() const {
 void Pairing::search() {
     if (arrivals_.size() < frames_for_proof || exposures_.size() < frames_for_proof) return;
     // An exposure whose record is still on its way could explain the frames, too.
-    const HostTime records_complete = exposures_.back().exposure.end_on_host + Duration{smallest_gap_ns_ / 4 * 3};
+    const HostTime records_complete =
+        exposures_.back().exposure.end_on_host + Duration{smallest_gap_ns_ / 4 * 3};
     if (arrivals_.back().arrived > records_complete) return;
     std::optional<Alignment> found;
     for (const std::int64_t difference : candidate_differences()) {
@@ -154,7 +161,8 @@ void Pairing::search() {
         if (alignment->faults > 0 || alignment->unknown || found) return;
         found = std::move(alignment);
     }
-    if (found && irregular(found->triggers.front(), found->triggers.back())) accept_alignment(found->triggers);
+    if (found && irregular(found->triggers.front(), found->triggers.back()))
+        accept_alignment(found->triggers);
 }
 
 /// Regular triggers prove nothing: the true exposures may be those whose records are missing at either end.
@@ -195,7 +203,8 @@ bool Pairing::match_front() {
     }
     const Record* record = near(start);
     if (record != nullptr && !record->exposure.exposed) {
-        drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none: one of them is wrong
+        drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none: one of them
+                                                   // is wrong
     } else if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
         decide_front(*record);
     } else if (record == nullptr && record_lost_near(start)) {
@@ -214,8 +223,9 @@ void Pairing::search_anew(const Arrival& arrival) {
     drop_front(EventReason::mismatch);
 }
 
-/// The front frame is of this exposure by time; publish it only if the ids say the same. They are counted from the
-/// newest frame that was published: counted from the one before, a clock that stepped by a period agrees with itself.
+/// The front frame is of this exposure by time; publish it only if the ids say the same. They are counted
+/// from the newest frame that was published: counted from the one before, a clock that stepped by a period
+/// agrees with itself.
 void Pairing::decide_front(const Record& record) {
     const Arrival arrival = arrivals_.front();
     const bool agrees = step_faults(arrival.block_id - proved_->block_id, proved_->record, record) == 0;
@@ -235,7 +245,8 @@ void Pairing::decide_front(const Record& record) {
 
 BoardTime Pairing::expected_start(const Arrival& arrival) const {
     const BoardTime undrifted{frame_time_ns(arrival) - last_->difference_ns};
-    return undrifted - Duration{std::llround(drift_ * static_cast<double>((undrifted - last_->record.exposure.start).ns))};
+    return undrifted - Duration{std::llround(
+                           drift_ * static_cast<double>((undrifted - last_->record.exposure.start).ns))};
 }
 
 /// Once the pattern is over and every exposure of it is too old for a frame to come.
@@ -298,7 +309,8 @@ void Pairing::drop_oldest_exposure(EventReason reason) {
     const Record record = exposures_.front();
     exposures_.pop_front();
     if (record.used) return;
-    outcome_.exposure_unpaired(record.exposure, record.exposure.exposed ? reason : EventReason::trigger_ignored);
+    outcome_.exposure_unpaired(record.exposure,
+                               record.exposure.exposed ? reason : EventReason::trigger_ignored);
 }
 
 void Pairing::advance(HostTime now) {

@@ -27,13 +27,15 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     std::error_code error;
     const auto parent = path.parent_path();
     if (std::filesystem::create_directories(parent, error)) ::chmod(parent.c_str(), 0755);
-    if (!error && ::mkdir(path.c_str(), 0750) != 0 && errno != EEXIST) error = {errno, std::generic_category()};
+    if (!error && ::mkdir(path.c_str(), 0750) != 0 && errno != EEXIST)
+        error = {errno, std::generic_category()};
     if (error)
         return failure(path.string(), fmt::format("cannot be made: {}", error.message()),
                        "run the service as the user that owns it");
     const int lock = ::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
     if (lock < 0)
-        return failure(path.string(), fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
+        return failure(path.string(),
+                       fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
                        "run the service as the user that owns it");
     if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
         ::close(lock);

@@ -20,7 +20,8 @@ constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
 
 /// Copies with relaxed atomic loads, so that a copy that races with the writer is stale but defined.
 void copy_words(const std::byte* source, std::byte* destination, std::size_t size) {
-    const auto* words = reinterpret_cast<const std::atomic<std::uint64_t>*>(source);  // slots are page-aligned
+    const auto* words =
+        reinterpret_cast<const std::atomic<std::uint64_t>*>(source);  // slots are page-aligned
     std::size_t i = 0;
     for (; i + 8 <= size; i += 8) {
         const std::uint64_t word = words[i / 8].load(std::memory_order_relaxed);
@@ -91,7 +92,8 @@ std::uint32_t Reader::writer_pid() const { return segment_->mapping.header().wri
 
 std::uint64_t Reader::retained() const {
     const Header& header = segment_->mapping.header();
-    return header.slot_count == 0 ? header.descriptor_count : std::min(header.slot_count, header.descriptor_count);
+    return header.slot_count == 0 ? header.descriptor_count
+                                  : std::min(header.slot_count, header.descriptor_count);
 }
 
 HostTime Reader::last_heartbeat() const {
@@ -122,7 +124,8 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     item.slot = static_cast<std::uint32_t>(length_and_slot);
     item.payload_size = static_cast<std::uint32_t>(length_and_slot >> 32U);
     if (item.slot != no_slot) {
-        if (item.slot >= header.slot_count || item.payload_size > header.slot_size || !intact(item)) return item;
+        if (item.slot >= header.slot_count || item.payload_size > header.slot_size || !intact(item))
+            return item;
         item.payload = segment_->mapping.slot(item.slot);
     }
     item.found = Found::item;

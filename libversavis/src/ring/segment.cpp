@@ -29,7 +29,8 @@ bool well_formed(const Header& header, std::size_t size) {
            header.generations_at % generation_stride == 0 && header.slots_at % page_size == 0 &&
            inside(header.descriptors_at, descriptors, sizeof(Descriptor), size) &&
            inside(header.generations_at, header.slot_count, generation_stride, size) &&
-           header.slot_size % page_size == 0 && inside(header.slots_at, header.slot_count, header.slot_size, size) &&
+           header.slot_size % page_size == 0 &&
+           inside(header.slots_at, header.slot_count, header.slot_size, size) &&
            header.name[sizeof header.name - 1] == '\0';
 }
 
@@ -45,7 +46,8 @@ Expected<Mapping> Mapping::open_unchecked(const std::filesystem::path& path, Acc
     } catch (const ipc::interprocess_exception& exception) {
         const bool forbidden = exception.get_error_code() == ipc::security_error;
         return failure(path.string(), fmt::format("cannot be mapped: {}", exception.what()),
-                       forbidden ? "join the group that may read streams (usually 'versavis')" : "is the service running?");
+                       forbidden ? "join the group that may read streams (usually 'versavis')"
+                                 : "is the service running?");
     }
 }
 
@@ -56,9 +58,10 @@ Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access
         return failure(path.string(), "is not a VersaVIS ring");
     const Header& header = mapping->header();
     if (header.abi_major != abi_major)
-        return failure(path.string(),
-                       fmt::format("has layout version {}, this program reads version {}", header.abi_major, abi_major),
-                       "install service and clients of the same release");
+        return failure(
+            path.string(),
+            fmt::format("has layout version {}, this program reads version {}", header.abi_major, abi_major),
+            "install service and clients of the same release");
     if (!well_formed(header, mapping->size())) return failure(path.string(), "has a damaged header");
     return mapping;
 }

@@ -13,7 +13,7 @@ namespace versavis::ring {
 
 /// Owns a mapping of a complete segment. The views stay valid as long as it lives.
 class Mapping {
-   public:
+ public:
     enum class Access { read_only, read_write };
 
     /// Maps and checks `path`; every offset is proved to lie inside the file.
@@ -24,16 +24,19 @@ class Mapping {
 
     Header& header() const { return *static_cast<Header*>(region_.get_address()); }
     Descriptor& descriptor(std::uint64_t number) const {
-        return reinterpret_cast<Descriptor*>(bytes() + header().descriptors_at)[number & (header().descriptor_count - 1)];
+        return reinterpret_cast<Descriptor*>(
+            bytes() + header().descriptors_at)[number & (header().descriptor_count - 1)];
     }
     std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
         return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + header().generations_at +
                                                               slot * generation_stride);
     }
-    std::byte* slot(std::uint32_t slot) const { return bytes() + header().slots_at + slot * header().slot_size; }
+    std::byte* slot(std::uint32_t slot) const {
+        return bytes() + header().slots_at + slot * header().slot_size;
+    }
     std::size_t size() const { return region_.get_size(); }
 
-   private:
+ private:
     std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
 
     boost::interprocess::mapped_region region_;

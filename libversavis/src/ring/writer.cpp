@@ -34,7 +34,9 @@ struct Writer::Segment {
 
 namespace {
 
-std::uint64_t round_up(std::uint64_t value, std::uint64_t multiple) { return (value + multiple - 1) / multiple * multiple; }
+std::uint64_t round_up(std::uint64_t value, std::uint64_t multiple) {
+    return (value + multiple - 1) / multiple * multiple;
+}
 
 std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
 
@@ -82,17 +84,19 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
 }
 
 std::uint64_t total_size(const Shape& shape) {
-    const std::uint64_t words = page_size + shape.descriptor_count * sizeof(Descriptor) +
-                                shape.slot_count * generation_stride;
+    const std::uint64_t words =
+        page_size + shape.descriptor_count * sizeof(Descriptor) + shape.slot_count * generation_stride;
     return round_up(words, page_size) + shape.slot_count * round_up(shape.slot_size, page_size);
 }
 
 }  // namespace
 
 Expected<Writer> Writer::create(const std::filesystem::path& directory, const Shape& shape) {
-    const bool power_of_two = shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
+    const bool power_of_two =
+        shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
     if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
-        return failure(shape.name, "a ring needs a name below 64 characters and a power of two of descriptors");
+        return failure(shape.name,
+                       "a ring needs a name below 64 characters and a power of two of descriptors");
     const auto path = directory / shape.name;
     const auto temporary = directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
@@ -139,12 +143,15 @@ void Writer::abandon(std::uint32_t slot) {
 }
 
 void Writer::publish(std::uint32_t slot, std::uint32_t length, OutputTime time, const Metadata& metadata) {
-    const std::uint64_t generation = segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release) + 1;
+    const std::uint64_t generation =
+        segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release) + 1;
     free_.push_back(slot);
     write_descriptor(generation, (std::uint64_t{length} << 32U) | slot, time, metadata);
 }
 
-void Writer::publish(OutputTime time, const Metadata& metadata) { write_descriptor(0, no_slot, time, metadata); }
+void Writer::publish(OutputTime time, const Metadata& metadata) {
+    write_descriptor(0, no_slot, time, metadata);
+}
 
 void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t length_and_slot, OutputTime time,
                               const Metadata& metadata) {
@@ -156,7 +163,8 @@ void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t lengt
     descriptor.slot_generation.store(slot_generation, std::memory_order_relaxed);
     descriptor.length_and_slot.store(length_and_slot, std::memory_order_relaxed);
     descriptor.output_time_ns.store(time.ns, std::memory_order_relaxed);
-    for (std::size_t i = 0; i < metadata_words; ++i) descriptor.metadata[i].store(metadata[i], std::memory_order_relaxed);
+    for (std::size_t i = 0; i < metadata_words; ++i)
+        descriptor.metadata[i].store(metadata[i], std::memory_order_relaxed);
     descriptor.sequence.store(2 * number + 2, std::memory_order_release);
     header.head.store(number + 1, std::memory_order_release);
     header.wake.fetch_add(1, std::memory_order_release);

@@ -85,7 +85,8 @@ void TableReader::read(std::string_view key, double& value, double minimum, doub
         fail(key, fmt::format("'{}' must be a number from {} to {}", key, minimum, maximum));
 }
 
-void TableReader::read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum, std::int64_t maximum) {
+void TableReader::read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
+                               std::int64_t maximum) {
     const toml::node* node = find(key);
     if (node == nullptr) return;
     const auto number = node->value_exact<std::int64_t>();
@@ -95,7 +96,8 @@ void TableReader::read_integer(std::string_view key, std::int64_t& value, std::i
         fail(key, fmt::format("'{}' must be a whole number from {} to {}", key, minimum, maximum));
 }
 
-std::optional<std::size_t> TableReader::find_choice(std::string_view key, const std::vector<std::string>& names) {
+std::optional<std::size_t> TableReader::find_choice(std::string_view key,
+                                                    const std::vector<std::string>& names) {
     const toml::node* node = find(key);
     if (node == nullptr) return std::nullopt;
     const auto text = node->value_exact<std::string>();

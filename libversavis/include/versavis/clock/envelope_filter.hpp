@@ -27,14 +27,14 @@ struct HostEstimate {
     ClockState state = ClockState::init;
 };
 
-/// Method: within a slot that grows from one exchange to 8 s, the smallest delay residual of each direction is kept;
-/// their half difference measures the offset error, their sum bounds it (|error| <= sum / 2), and the excess of the
-/// sum over its minimum in a window says how much this measurement is worth. No measurement is ever gated out: a
-/// surprising one counts less, and four that agree restart the filter. What no stamp can show, the asymmetry of the
-/// shortest delays, is part of sigma: its bound, half of their sum, counts as three sigma.
-/// A pure function of the exchanges it was given.
+/// Method: within a slot that grows from one exchange to 8 s, the smallest delay residual of each direction
+/// is kept; their half difference measures the offset error, their sum bounds it (|error| <= sum / 2), and
+/// the excess of the sum over its minimum in a window says how much this measurement is worth. No measurement
+/// is ever gated out: a surprising one counts less, and four that agree restart the filter. What no stamp can
+/// show, the asymmetry of the shortest delays, is part of sigma: its bound, half of their sum, counts as
+/// three sigma. A pure function of the exchanges it was given.
 class EnvelopeFilter {
-   public:
+ public:
     /// Stamps must not go backwards from exchange to exchange; one whose round trip is negative is ignored.
     void add(const Exchange& exchange);
 
@@ -51,7 +51,7 @@ class EnvelopeFilter {
     Duration smallest_round_trip() const { return {smallest_sum_ns_}; }
     BoardTime last_contact() const { return last_contact_; }
 
-   private:
+ private:
     struct Slot {
         BoardTime begin;
         std::int64_t up_ns = INT64_MAX;    ///< smallest residual board -> host
@@ -79,15 +79,15 @@ class EnvelopeFilter {
     BoardTime base_board_;
     HostTime base_host_;
     BoardTime reference_;
-    Eigen::Vector2d state_ = Eigen::Vector2d::Zero();           ///< offset ns, skew ns/s
+    Eigen::Vector2d state_ = Eigen::Vector2d::Zero();  ///< offset ns, skew ns/s
     Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();
 
     BoardTime started_;
     BoardTime last_contact_;
     Slot slot_;
-    std::deque<SlotSum> sums_;           ///< of the last ten minutes
+    std::deque<SlotSum> sums_;  ///< of the last ten minutes
     std::int64_t smallest_sum_ns_ = 0;
-    std::deque<double> innovations_;     ///< of the last slots, absolute
+    std::deque<double> innovations_;  ///< of the last slots, absolute
     double outlier_mean_ns_ = 0;
     int outliers_ = 0;
     int impossible_ = 0;

@@ -15,7 +15,7 @@ const char* to_string(OutputClockKind kind);
 
 /// Reads both clocks in a sandwich, so that a preempted read cannot bend the translation.
 class OutputClock {
-   public:
+ public:
     /// Error: TAI was asked for, but the kernel does not know its offset from UTC.
     static Expected<OutputClock> create(OutputClockKind kind);
 
@@ -26,7 +26,7 @@ class OutputClock {
     std::uint32_t steps() const { return steps_; }
     OutputClockKind kind() const { return kind_; }
 
-   private:
+ private:
     explicit OutputClock(OutputClockKind kind);
 
     OutputClockKind kind_;

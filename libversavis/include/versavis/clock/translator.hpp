@@ -40,7 +40,7 @@ struct ClockReport {
 
 /// Thread-safe.
 class Translator {
-   public:
+ public:
     explicit Translator(OutputClock output) : output_(output) {}
 
     /// The board began a new life: what was known of its clock is void, and a new epoch begins.
@@ -59,7 +59,7 @@ class Translator {
 
     ClockReport report();
 
-   private:
+ private:
     std::uint32_t epoch() const {
         return board_lives_ + output_.steps() + static_cast<std::uint32_t>(filter_.restarts());
     }

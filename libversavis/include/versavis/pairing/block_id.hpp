@@ -8,7 +8,7 @@ namespace versavis::pairing {
 
 /// GigE Vision block ids of 16 bits run from 65535 to 1, leaving out 0; longer ones do not wrap.
 class BlockIdUnwrapper {
-   public:
+ public:
     std::uint64_t unwrap(std::uint64_t id) {
         constexpr std::uint64_t cycle = 0xFFFF;
         if (id > cycle) return last_ = id;
@@ -20,7 +20,7 @@ class BlockIdUnwrapper {
         return unwrapped;
     }
 
-   private:
+ private:
     std::uint64_t last_ = 0;
 };
 

@@ -37,7 +37,7 @@ struct Arrival {
 
 /// What pairing decides. Each arrival and each exposure comes back exactly once.
 class Outcome {
-   public:
+ public:
     virtual ~Outcome() = default;
     virtual void paired(const Arrival& arrival, const Exposure& exposure) = 0;
     virtual void frame_unpaired(const Arrival& arrival, EventReason reason) = 0;
@@ -47,27 +47,29 @@ class Outcome {
 };
 
 struct Limits {
-    Duration earliest_arrival = milliseconds(-5);  ///< after the end of exposure; negative: error of translation
-    Duration latest_arrival = milliseconds(500);   ///< after the end of exposure
-    Duration exposure_wait = milliseconds(250);    ///< how long a frame waits for its exposure's record
-    Duration pattern_duration = seconds(1);        ///< how long the board's start pattern takes
-    std::size_t frames_held = 6;                   ///< most frames that wait for proof
+    Duration earliest_arrival =
+        milliseconds(-5);  ///< after the end of exposure; negative: error of translation
+    Duration latest_arrival = milliseconds(500);  ///< after the end of exposure
+    Duration exposure_wait = milliseconds(250);   ///< how long a frame waits for its exposure's record
+    Duration pattern_duration = seconds(1);       ///< how long the board's start pattern takes
+    std::size_t frames_held = 6;                  ///< most frames that wait for proof
 };
 
 enum class State {
     searching,  ///< no relation is known: the gaps between frames are held against those between exposures
-    checking,   ///< a slip was found: frames are matched by camera time, but withheld until all evidence agrees again
+    checking,   ///< a slip was found: frames are matched by camera time, but withheld until all evidence
+                ///< agrees again
     locked,     ///< each frame is verified against ids and times before it is published
 };
 const char* to_string(State state);
 
-/// Method. A frame belongs to the exposure whose start differs from the frame's camera time by the tracked difference
-/// of the two clocks; the step of block ids must agree with the number of exposures since the last pair, and the
-/// arrival must lie in its window. The difference of the clocks is found from an irregular sequence of gaps: it is the
-/// alignment of the last frames with the exposures that needs no fault to explain it, if every other needs two.
-/// Not thread-safe. Times only enter through the arguments.
+/// Method. A frame belongs to the exposure whose start differs from the frame's camera time by the tracked
+/// difference of the two clocks; the step of block ids must agree with the number of exposures since the last
+/// pair, and the arrival must lie in its window. The difference of the clocks is found from an irregular
+/// sequence of gaps: it is the alignment of the last frames with the exposures that needs no fault to explain
+/// it, if every other needs two. Not thread-safe. Times only enter through the arguments.
 class Pairing {
-   public:
+ public:
     Pairing(const Limits& limits, Outcome& outcome) : limits_(limits), outcome_(outcome) {}
 
     void add(const Exposure& exposure);
@@ -88,7 +90,7 @@ class Pairing {
     std::size_t waiting_frames() const { return arrivals_.size(); }
     bool camera_clock_used() const { return camera_clock_; }
 
-   private:
+ private:
     static constexpr int pattern_patience = 8;
     static constexpr std::size_t frames_for_proof = 4;
     static constexpr unsigned faults_to_refute = 2;
@@ -104,9 +106,9 @@ class Pairing {
     struct Alignment {
         std::vector<std::uint64_t> triggers;  ///< of the waiting frames
         unsigned faults = 0;                  ///< ignored triggers that nobody saw, which it takes
-        bool unknown = false;                 ///< a frame falls where a record was lost: neither proved nor refuted
+        bool unknown = false;  ///< a frame falls where a record was lost: neither proved nor refuted
     };
-    struct Pair {  ///< the newest accepted match
+    struct Pair {                    ///< the newest accepted match
         std::int64_t difference_ns;  ///< camera time - board time
         std::uint64_t block_id;
         Record record;
@@ -150,8 +152,8 @@ class Pairing {
     std::int64_t smallest_gap_ns_ = INT64_MAX;
     double drift_ = 0;  ///< camera clock against board clock, relative
     bool camera_clock_ = true;
-    int fruitless_ = 0;       ///< frames that came during the search
-    HostTime next_pattern_;   ///< two patterns within one arrival window could be taken for each other
+    int fruitless_ = 0;      ///< frames that came during the search
+    HostTime next_pattern_;  ///< two patterns within one arrival window could be taken for each other
     int agreeing_ = 0;
 };
 

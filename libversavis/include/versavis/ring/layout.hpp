@@ -43,15 +43,16 @@ struct Header {
     std::uint64_t slots_at;
     char name[64];  ///< zero-terminated
 
-    alignas(128) std::atomic<std::uint64_t> head;       ///< items published since creation
-    alignas(128) std::atomic<std::uint32_t> wake;       ///< futex word: bumped at each publication and state change
-    alignas(128) std::atomic<std::uint32_t> state;      ///< WriterState
+    alignas(128) std::atomic<std::uint64_t> head;  ///< items published since creation
+    alignas(
+        128) std::atomic<std::uint32_t> wake;  ///< futex word: bumped at each publication and state change
+    alignas(128) std::atomic<std::uint32_t> state;        ///< WriterState
     alignas(128) std::atomic<std::int64_t> heartbeat_ns;  ///< host time of the writer's last sign of life
 };
 
 /// One published item. Item n lies in descriptor n % descriptor_count.
 struct alignas(128) Descriptor {
-    std::atomic<std::uint64_t> sequence;         ///< 2n + 2 once item n is complete, 2n + 1 while it is written
+    std::atomic<std::uint64_t> sequence;  ///< 2n + 2 once item n is complete, 2n + 1 while it is written
     std::atomic<std::uint64_t> slot_generation;  ///< the slot's generation word when published
     std::atomic<std::uint64_t> length_and_slot;  ///< length << 32 | slot
     std::atomic<std::int64_t> output_time_ns;
@@ -65,7 +66,9 @@ static_assert(offsetof(Header, slot_size) == 72 && offsetof(Header, descriptors_
 static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104);
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
 static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
-static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128 && offsetof(Descriptor, metadata) == 32);
-static_assert(std::atomic<std::uint64_t>::is_always_lock_free && std::atomic<std::uint32_t>::is_always_lock_free);
+static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128 &&
+              offsetof(Descriptor, metadata) == 32);
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
+              std::atomic<std::uint32_t>::is_always_lock_free);
 
 }  // namespace versavis::ring

@@ -35,10 +35,11 @@ struct Item {
 
 /// Not thread-safe: one thread at a time may call it; any number of readers may exist.
 class Reader {
-   public:
+ public:
     enum class From { newest, oldest };
 
-    /// Maps `directory / name`. Errors: not there, not owned by the directory's owner, not a ring, unknown layout.
+    /// Maps `directory / name`. Errors: not there, not owned by the directory's owner, not a ring, unknown
+    /// layout.
     static Expected<Reader> open(const std::filesystem::path& path, From from = From::newest);
 
     Reader(Reader&&) noexcept;
@@ -51,21 +52,23 @@ class Reader {
     /// The next item, waiting for it up to `timeout` in the kernel.
     Item wait(Duration timeout);
 
-    /// True while the payload of `item` has not been touched by the writer: what was read of it before is good.
+    /// True while the payload of `item` has not been touched by the writer: what was read of it before is
+    /// good.
     bool intact(const Item& item) const;
 
-    /// Copies the payload (item.payload_size bytes) to `destination`; false when the writer overtook the copy.
+    /// Copies the payload (item.payload_size bytes) to `destination`; false when the writer overtook the
+    /// copy.
     bool copy(const Item& item, std::byte* destination) const;
 
     StreamKind kind() const;
     const char* name() const;
-    std::uint64_t head() const;            ///< items published so far
-    std::uint64_t retained() const;        ///< items that can be read at a time
+    std::uint64_t head() const;      ///< items published so far
+    std::uint64_t retained() const;  ///< items that can be read at a time
     HostTime last_heartbeat() const;
     std::uint32_t writer_pid() const;
-    bool writer_alive() const;             ///< its state is live and its heartbeat is younger than three seconds
+    bool writer_alive() const;  ///< its state is live and its heartbeat is younger than three seconds
 
-   private:
+ private:
     struct Segment;
     Reader(std::filesystem::path path, std::unique_ptr<Segment> segment);
     static Expected<std::unique_ptr<Segment>> map(const std::filesystem::path& path);

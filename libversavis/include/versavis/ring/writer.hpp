@@ -21,15 +21,16 @@ struct Shape {
     StreamKind kind = StreamKind::events;
     std::uint32_t descriptor_count = 1024;  ///< a power of two
     std::uint32_t slot_count = 0;
-    std::uint64_t slot_size = 0;  ///< bytes of payload that one slot holds; rounded up to pages
-    std::uint64_t first_item = 0; ///< number of the first item; tests start it near a wrap
+    std::uint64_t slot_size = 0;   ///< bytes of payload that one slot holds; rounded up to pages
+    std::uint64_t first_item = 0;  ///< number of the first item; tests start it near a wrap
 };
 
 /// Not thread-safe: one thread at a time may call it. Readers never block it.
 class Writer {
-   public:
-    /// Makes the segment `directory / shape.name`, its memory allocated and populated; one that a writer before left
-    /// there is marked superseded and its readers are woken. Errors: the directory or the memory cannot be had.
+ public:
+    /// Makes the segment `directory / shape.name`, its memory allocated and populated; one that a writer
+    /// before left there is marked superseded and its readers are woken. Errors: the directory or the memory
+    /// cannot be had.
     static Expected<Writer> create(const std::filesystem::path& directory, const Shape& shape);
 
     Writer(Writer&&) noexcept;
@@ -57,7 +58,7 @@ class Writer {
     /// Tells readers that the writer lives; call it at least once a second.
     void heartbeat(HostTime now);
 
-   private:
+ private:
     struct Segment;
     explicit Writer(std::unique_ptr<Segment> segment);
     void write_descriptor(std::uint64_t slot_generation, std::uint64_t length_and_slot, OutputTime time,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Consistent Overhead Byte Stuffing: packets without zero bytes, so that zero delimits them; freestanding.
-// Source: Cheshire and Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on Networking 7(2), 1999.
+// Source: Cheshire and Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Transactions on Networking 7(2),
+// 1999.
 #pragma once
 
 #include <cstddef>

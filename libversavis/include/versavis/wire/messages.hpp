@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The packets between board and host as fixed little-endian structs (docs/wire-protocol.md); freestanding C++17.
+// The packets between board and host as fixed little-endian structs (docs/wire-protocol.md); freestanding
+// C++17.
 #pragma once
 
 #include <cstddef>
@@ -73,13 +74,13 @@ struct BoardHello {
 };
 
 enum ExposureFlag : std::uint16_t {
-    exposure_measured = 1U << 0U,    ///< both edges were stamped
-    exposure_no_start = 1U << 1U,    ///< the start edge did not come in time
-    exposure_no_end = 1U << 2U,      ///< the end edge did not come in time
-    exposure_late = 1U << 3U,        ///< the trigger left later than the grid asked
-    exposure_pattern = 1U << 4U,     ///< part of the start pattern
-    exposure_announced = 1U << 5U,   ///< trigger placed by an exposure that the host announced
-    exposure_no_strobe = 1U << 6U,   ///< no exposure line is wired: start and end are predicted
+    exposure_measured = 1U << 0U,   ///< both edges were stamped
+    exposure_no_start = 1U << 1U,   ///< the start edge did not come in time
+    exposure_no_end = 1U << 2U,     ///< the end edge did not come in time
+    exposure_late = 1U << 3U,       ///< the trigger left later than the grid asked
+    exposure_pattern = 1U << 4U,    ///< part of the start pattern
+    exposure_announced = 1U << 5U,  ///< trigger placed by an exposure that the host announced
+    exposure_no_strobe = 1U << 6U,  ///< no exposure line is wired: start and end are predicted
 };
 
 /// One record for each trigger pulse that was sent, whatever the camera did.
@@ -155,8 +156,8 @@ struct ClockAnswer {
 struct Health {
     static constexpr Type type = Type::health;
     std::int64_t board_time_ns;
-    std::uint32_t dropped_packets;   ///< not sent because the host did not read
-    std::uint32_t receive_errors;    ///< packets from the host that were malformed
+    std::uint32_t dropped_packets;  ///< not sent because the host did not read
+    std::uint32_t receive_errors;   ///< packets from the host that were malformed
     std::uint32_t imu_errors;
     std::uint32_t late_outputs;
     std::uint32_t lost_edges;
@@ -179,13 +180,13 @@ enum CameraFlag : std::uint32_t {
 };
 
 struct CameraConfiguration {
-    std::uint32_t flags;      ///< bits of CameraFlag
-    std::uint32_t rate_uhz;   ///< grid rate, micro-hertz: 100'000 to 1'000'000'000
-    std::uint32_t phase_ns;   ///< grid points are at start + phase + k / rate
-    std::uint32_t pulse_ns;   ///< trigger pulse width: 1'000 to 10'000'000
-    std::uint32_t latency_ns; ///< trigger to start of exposure: up to 100'000'000
-    std::uint32_t gap_ns;     ///< least time from end of exposure to the next trigger
-    std::int64_t exposure_ns; ///< expected until one was measured or announced
+    std::uint32_t flags;           ///< bits of CameraFlag
+    std::uint32_t rate_uhz;        ///< grid rate, micro-hertz: 100'000 to 1'000'000'000
+    std::uint32_t phase_ns;        ///< grid points are at start + phase + k / rate
+    std::uint32_t pulse_ns;        ///< trigger pulse width: 1'000 to 10'000'000
+    std::uint32_t latency_ns;      ///< trigger to start of exposure: up to 100'000'000
+    std::uint32_t gap_ns;          ///< least time from end of exposure to the next trigger
+    std::int64_t exposure_ns;      ///< expected until one was measured or announced
     std::int64_t max_exposure_ns;  ///< an exposure that lasts longer is given up
 };
 
@@ -263,17 +264,20 @@ struct Reboot {
 };
 inline constexpr std::uint32_t reboot_magic = 0x544F4F42U;
 
-/// The start pattern: grid points 0..19 after start that get a pulse, bit 0 first; afterwards all do. Its gaps are
-/// 1 2 1 3 2 2 3 3 1 1: no two neighbouring gaps stand in it twice, so that three frames name their triggers.
+/// The start pattern: grid points 0..19 after start that get a pulse, bit 0 first; afterwards all do. Its
+/// gaps are 1 2 1 3 2 2 3 3 1 1: no two neighbouring gaps stand in it twice, so that three frames name their
+/// triggers.
 inline constexpr std::uint32_t start_pattern_bits = 0b1110'0100'1010'1001'1011;
 inline constexpr unsigned start_pattern_length = 20;
 
 static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
-static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(Health) == 32 && sizeof(Log) == 96);
+static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(Health) == 32 &&
+              sizeof(Log) == 96);
 static_assert(sizeof(CameraConfiguration) == 40 && sizeof(Configuration) == 176);
 static_assert(sizeof(ConfigurationAnswer) == 200);
-static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 && sizeof(Reboot) == 8);
+static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
+              sizeof(Reboot) == 8);
 
 /// Size of the payload of `type`, or 0 when the type is unknown.
 constexpr std::size_t payload_size(Type type) {

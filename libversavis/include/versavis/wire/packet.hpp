@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Packs structs of messages.hpp into COBS frames with CRC and finds them again in a byte stream; freestanding.
+// Packs structs of messages.hpp into COBS frames with CRC and finds them again in a byte stream;
+// freestanding.
 #pragma once
 
 #include <cstring>
@@ -40,7 +41,8 @@ struct Packet {
 /// Encodes `message` with the sender's nonce and sequence number.
 template <class T>
 void encode(const T& message, std::uint32_t nonce, std::uint32_t sequence, Frame& frame) {
-    static_assert(std::is_trivially_copyable<T>::value && sizeof(T) == payload_size(T::type), "a wire struct");
+    static_assert(std::is_trivially_copyable<T>::value && sizeof(T) == payload_size(T::type),
+                  "a wire struct");
     constexpr std::size_t body = sizeof(Header) + sizeof(T);
     std::uint8_t raw[body + crc_size];
     const Header header{T::type, {}, nonce, sequence};
@@ -54,7 +56,7 @@ void encode(const T& message, std::uint32_t nonce, std::uint32_t sequence, Frame
 
 /// Cuts a byte stream into packets. Malformed input is counted and skipped up to the next delimiter.
 class Decoder {
-   public:
+ public:
     /// Takes `size` bytes and calls on_packet(const Packet&) for each that completes a valid packet.
     template <class OnPacket>
     void feed(const std::uint8_t* data, std::size_t size, OnPacket&& on_packet) {
@@ -80,7 +82,7 @@ class Decoder {
     /// Runs of bytes between delimiters that were no valid packet.
     std::uint32_t errors() const { return errors_; }
 
-   private:
+ private:
     bool open(Packet& packet) {
         const std::size_t size = cobs_decode(encoded_, filled_, decoded_, sizeof decoded_);
         if (size == cobs_invalid || size < sizeof(Header) + crc_size) return false;

@@ -2,9 +2,9 @@
 // Reads the keys of TOML tables with types, ranges and choices; errors name line, column and the nearest key.
 #pragma once
 
+#include <toml++/toml.h>
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 #include <utility>
 #include <vector>
 
@@ -26,7 +26,7 @@ Expected<toml::table> parse_toml(const std::string& path);
 
 /// A key that is absent leaves its value as it is. finish() refuses keys that nobody asked for.
 class TableReader {
-   public:
+ public:
     TableReader(TomlFile& file, const toml::table& table) : file_(file), table_(table) {}
 
     void read(std::string_view key, std::string& value);
@@ -60,7 +60,7 @@ class TableReader {
     void fail(std::string_view key, const std::string& what, const std::string& cure = {});
     void finish();
 
-   private:
+ private:
     const toml::node* find(std::string_view key);
     void read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum, std::int64_t maximum);
     std::optional<std::size_t> find_choice(std::string_view key, const std::vector<std::string>& names);

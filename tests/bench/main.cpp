@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Measures what the README claims, as ratios within one run where it can.
+#include <fmt/format.h>
+#include <sysexits.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "metric.hpp"
+
+namespace {
+
+using versavis::bench::Metric;
+
+const std::map<std::string, std::function<std::vector<Metric>()>> benches{
+    {"ring", versavis::bench::bench_ring}, {"end_to_end", versavis::bench::bench_end_to_end}};
+
+nlohmann::json run(const std::string& only) {
+    nlohmann::json document = nlohmann::json::object();
+    for (const auto& [name, bench] : benches) {
+        if (!only.empty() && only != name) continue;
+        for (const Metric& metric : bench()) {
+            fmt::print("{:<36} {:>12.3f} {:<8} goal {:>10.3f}  {}\n", metric.name, metric.value, metric.unit,
+                       metric.goal, metric.met() ? "met" : "NOT MET");
+            std::fflush(stdout);
+            document[metric.name] = {
+                {"value", metric.value}, {"unit", metric.unit}, {"goal", metric.goal}, {"met", metric.met()}};
+        }
+    }
+    return document;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"Benchmarks of VersaVIS"};
+    std::string only;
+    std::string json_path;
+    app.add_option("name", only, "ring or end_to_end; without it, all")
+        ->check(CLI::IsMember({"ring", "end_to_end"}));
+    app.add_option("--json", json_path, "File for the results");
+    try {
+        app.parse(argc, argv);
+        const nlohmann::json document = run(only);
+        if (json_path.empty()) return EX_OK;
+        std::ofstream file(json_path);
+        file << document.dump(2) << '\n';
+        if (!file.good()) throw std::runtime_error(json_path + " cannot be written");
+        return EX_OK;
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? EX_OK : EX_USAGE;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "bench: {}\n", error.what());
+        return EXIT_FAILURE;
+    }
+}

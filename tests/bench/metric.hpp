@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One measured figure and its goal.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace versavis::bench {
+
+struct Metric {
+    std::string name;
+    double value;
+    std::string unit;
+    double goal;  ///< met when the value is not above it
+
+    bool met() const { return value <= goal; }
+};
+
+/// Publication and reading of rings, within this process.
+std::vector<Metric> bench_ring();
+
+/// The service against Aravis's own test program on the same stream, and its stamps against the rig's truth.
+std::vector<Metric> bench_end_to_end();
+
+}  // namespace versavis::bench
