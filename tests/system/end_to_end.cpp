@@ -76,6 +76,11 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     png.read(magic.data(), 8);
     CHECK(magic == "\x89PNG\r\n\x1a\n");
 
+    // A reader in another language, written from the document.
+    CHECK(run({"python3", VERSAVIS_SOURCE_DIR "/tests/system/read_ring.py", stream_path("e2e", "cam0").string(), "5"},
+              stack.log_path("python.log"), &output) == 0);
+    CHECK_THAT(output, Catch::Contains("320 x 240"));
+
     CHECK(stack.service().terminate() == 0);
     CHECK_THAT(stack.service().output(), !Catch::Contains("CRITICAL"));
     CHECK(stack.tool({"status"}, &output) == 69);

@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads frames of a stream by docs/shm-layout.md alone: prints item number, output time, trigger and size.
+
+read_ring.py FILE COUNT: exit code 0 after COUNT intact frames, 1 when the file is no ring or none come in ten seconds.
+"""
+import mmap
+import os
+import struct
+import sys
+import time
+
+
+def unpack(memory, layout, offset):
+    return struct.unpack_from("<" + layout, memory, offset)
+
+
+def main(path, count):
+    with open(path, "rb") as file:
+        memory = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+    magic, major, _minor, total = unpack(memory, "8sIIQ", 0)
+    if magic != b"VERSAVIS" or major != 1 or total != os.stat(path).st_size:
+        sys.exit("no ring of version 1")
+    descriptors, slots, slot_size, descriptors_at, generations_at, slots_at = unpack(memory, "IIQQQQ", 64)
+    number = unpack(memory, "Q", 256)[0]
+    deadline = time.monotonic() + 10
+    while count > 0 and time.monotonic() < deadline:
+        if unpack(memory, "Q", 256)[0] <= number:
+            time.sleep(0.002)
+            continue
+        at = descriptors_at + number % descriptors * 128
+        sequence, generation, length_and_slot, output_time = unpack(memory, "QQQq", at)
+        trigger, _block_id, _board, _host, _arrival, _exposure, _camera = unpack(memory, "QQqqqqq", at + 32)
+        _sigma, width, height, stride = unpack(memory, "IIII", at + 32 + 56)
+        length, slot = length_and_slot >> 32, length_and_slot & 0xFFFFFFFF
+        complete = sequence == 2 * number + 2 == unpack(memory, "Q", at)[0]
+        if complete and slot < slots and length <= slot_size:
+            begin = slots_at + slot * slot_size
+            pixels = memory[begin : begin + length]
+            if unpack(memory, "Q", generations_at + 64 * slot)[0] == generation and len(pixels) == stride * height:
+                print(f"{number} {output_time} trigger {trigger}: {width} x {height}")
+                count -= 1
+        number += 1
+    return 0 if count == 0 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], int(sys.argv[2])))
