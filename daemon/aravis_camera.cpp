@@ -187,7 +187,7 @@ void AravisStream::enlarge_receive_buffer() const {
     const std::uint16_t port = arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get()));
     std::error_code ignored;
     for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
-        const int descriptor = std::atoi(entry.path().filename().c_str());
+        const int descriptor = static_cast<int>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
         sockaddr_in self{};
         socklen_t size = sizeof self;
         if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&self), &size) != 0) continue;

@@ -13,7 +13,7 @@
 #include "camera_pipeline.hpp"
 #include "configuration.hpp"
 
-struct _ArvCamera;
+struct _ArvCamera;  // NOLINT(bugprone-reserved-identifier): Aravis names it so
 using ArvCamera = _ArvCamera;
 
 namespace versavis::daemon {

@@ -39,6 +39,7 @@ void feed_as_packet(firmware::NativeBoard& board, std::span<const std::uint8_t> 
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-identifier-naming): libFuzzer looks for this name
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     wire::Decoder decoder;
     std::uint32_t packets = 0;

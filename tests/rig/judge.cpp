@@ -47,7 +47,7 @@ struct Recording {
 class Recorder {
  public:
     Recorder(const Scenario& scenario, const std::string& instance, clock::OutputClock clock)
-        : instance_(instance), clock_(std::move(clock)) {
+        : instance_(instance), clock_(clock) {
         for (const CameraScenario& camera : scenario.cameras) frames_[camera.name];
         imu_name_ = scenario.imu;
     }
@@ -314,7 +314,7 @@ void complain(Verdict& verdict) {
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings) {
     auto clock = output_clock(settings);
     if (!clock) return tl::unexpected(clock.error());
-    Recorder recorder(scenario, settings.instance, std::move(*clock));
+    Recorder recorder(scenario, settings.instance, *clock);
     const auto interval = record(recorder, settings);
     if (!interval) return tl::unexpected(interval.error());
     auto truth = load_truth(settings.truth_path);

@@ -77,7 +77,8 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     CHECK(magic == "\x89PNG\r\n\x1a\n");
 
     // A reader in another language, written from the document.
-    CHECK(run({"python3", VERSAVIS_SOURCE_DIR "/tests/system/read_ring.py", stream_path("e2e", "cam0").string(), "5"},
+    CHECK(run({"python3", VERSAVIS_SOURCE_DIR "/tests/system/read_ring.py",
+               stream_path("e2e", "cam0").string(), "5"},
               stack.log_path("python.log"), &output) == 0);
     CHECK_THAT(output, Catch::Contains("320 x 240"));
 

@@ -22,8 +22,8 @@ struct Writer::Segment {
     Mapping mapping;
     std::uint64_t head;
 
-    Segment(std::filesystem::path path_, Mapping mapping_, std::uint64_t head_)
-        : path(std::move(path_)), mapping(std::move(mapping_)), head(head_) {}
+    Segment(std::filesystem::path file, Mapping mapped, std::uint64_t first)
+        : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
     ~Segment() {
         retire(mapping.header(), WriterState::closed);
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
