@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Rig, service and readers as processes, over the real protocols, held against the rig's ground truth.
 #include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -256,6 +259,39 @@ TEST_CASE("end to end: without a board the service says so and waits; it also st
                Catch::Contains("is the board's process"));
     CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("no such camera"));
     CHECK(stack.service().terminate() == 0);
+}
+
+TEST_CASE("end to end: the service manager is told of readiness, life, health and the end") {
+    Stack stack({"notify", 25, 1, 20, "", "", ""});
+    const std::string path = stack.log_path("notify");
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    const int socket = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    REQUIRE(::bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    setenv("NOTIFY_SOCKET", path.c_str(), 1);
+    stack.start_rig();
+    stack.start_service();
+    unsetenv("NOTIFY_SOCKET");
+    std::string told;
+    const auto wait_for = [&](const std::string& text) {
+        const timeval limit{20, 0};
+        ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+        char buffer[256];
+        while (told.find(text) == std::string::npos) {
+            const ssize_t size = ::recv(socket, buffer, sizeof buffer, 0);
+            if (size <= 0) return false;
+            told.append(buffer, static_cast<std::size_t>(size)) += '\n';
+        }
+        return true;
+    };
+    CHECK(wait_for("READY=1"));
+    CHECK(wait_for("WATCHDOG=1"));
+    CHECK(wait_for("STATUS=ok"));
+    stack.service().signal(SIGTERM);
+    CHECK(wait_for("STOPPING=1"));
+    CHECK(stack.service().wait(seconds(20)) == 0);
+    ::close(socket);
 }
 
 TEST_CASE("end to end: one service per instance") {

@@ -24,6 +24,10 @@ struct Faults {
     bool strobe_wired = true;  ///< else an ignored trigger looks like any other
     bool camera_clock = true;
     bool ids_count_ignored = false;
+    std::uint64_t clock_jumps_at = 0;  ///< camera clock, by ...
+    Duration clock_jump;
+    Duration readout{2'500'000};  ///< end of exposure to arrival, +-1.5 ms
+    std::uint64_t reset_at = 0;   ///< pairing is told to begin anew while triggers go on
 };
 
 /// Camera, board and link in virtual time: each message is delivered when it would arrive.
@@ -46,6 +50,7 @@ class World : public Outcome {
             const HostTime now{static_cast<std::int64_t>(1e9 + static_cast<double>(tick) * period_ns_)};
             deliver_until(now);
             pairing.advance(now);
+            if (tick != 0 && tick == faults_.reset_at) pairing.reset();
             if (pairing.wants_pattern(now)) {
                 pairing.pattern_requested(now);
                 pattern_tick = 0;
@@ -101,10 +106,12 @@ class World : public Outcome {
             std::max(record_at_, end + record_delay);  // the link keeps the order: later records wait, too
         if (faults_.record_lost.count(pulse_) == 0) queue_.push({record_at_, ++order_, false, exposure, {}});
         if (pulse_ == faults_.ids_restart_at) block_id_ = 0;
+        if (pulse_ == faults_.clock_jumps_at) camera_offset_ += faults_.clock_jump.ns;
         if (!ignored || faults_.ids_count_ignored) ++block_id_;
         if (ignored || faults_.frame_lost.count(pulse_) != 0) return;
         ++sent;
-        const Duration readout{std::uniform_int_distribution<std::int64_t>(1'000'000, 4'000'000)(random_)};
+        const Duration jitter{std::uniform_int_distribution<std::int64_t>(-1'500'000, 1'500'000)(random_)};
+        const Duration readout = faults_.readout + jitter;
         truth_[++slot_] = pulse_;
         queue_.push({end + readout, ++order_, true, {}, frame(block_id_, start, end + readout)});
     }
@@ -114,7 +121,7 @@ class World : public Outcome {
         arrival.slot = slot_;
         arrival.block_id = block_id;
         const double drifted = static_cast<double>(start.ns) * (1 + drift_ppm_ * 1e-6);
-        if (faults_.camera_clock) arrival.camera_time = {camera_offset + static_cast<std::int64_t>(drifted)};
+        if (faults_.camera_clock) arrival.camera_time = {camera_offset_ + static_cast<std::int64_t>(drifted)};
         arrival.arrived = arrived;
         return arrival;
     }
@@ -153,7 +160,6 @@ class World : public Outcome {
     void slipped(const Arrival& /*at*/) override { ++slips; }
 
     static constexpr std::int64_t board_offset = 77'000'000'000;
-    static constexpr std::int64_t camera_offset = 5'000'000'000'000;
 
     double period_ns_;
     double drift_ppm_;
@@ -163,6 +169,7 @@ class World : public Outcome {
     std::priority_queue<Message> queue_;
     HostTime record_at_;
     std::uint64_t order_ = 0;
+    std::int64_t camera_offset_ = 5'000'000'000'000;
     std::uint64_t pulse_ = 0;
     std::uint64_t block_id_;
     std::uint32_t slot_ = 0;
@@ -268,6 +275,31 @@ TEST_CASE("pairing: ids that begin anew are a slip that camera time repairs") {
     CHECK(world.wrong == 0);
     CHECK(world.slips == 1);
     CHECK(world.withheld <= 5);
+    CHECK(world.final_state == State::locked);
+}
+
+TEST_CASE("pairing: a camera clock that jumps is found, not followed") {
+    Faults faults;
+    faults.clock_jumps_at = 80;
+    faults.clock_jump =
+        GENERATE(milliseconds(50), -milliseconds(50), milliseconds(60), seconds(1), -seconds(1));
+    faults.readout = GENERATE(microseconds(2500), milliseconds(60));  // below and above the period
+    World world(20, 50, faults);
+    world.run(300);
+    INFO(faults.clock_jump.ns << " " << faults.readout.ns);
+    CHECK(world.wrong == 0);
+    CHECK(world.slips >= 1);
+    CHECK(world.final_state == State::locked);
+}
+
+TEST_CASE("pairing: regular triggers prove nothing, even if only one alignment fits") {
+    Faults faults;
+    faults.reset_at = 100;
+    faults.readout = milliseconds(60);
+    World world(20, 50, faults);
+    world.run(300);
+    CHECK(world.wrong == 0);
+    CHECK(world.patterns >= 1);
     CHECK(world.final_state == State::locked);
 }
 
