@@ -7,8 +7,9 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <span>
+#include <stdexcept>
 
 namespace versavis::daemon {
 
@@ -50,6 +51,20 @@ std::string range_text(ArvGcNode* node) {
         return fmt::format("{} to {}", arv_gc_integer_get_min(ARV_GC_INTEGER(node), nullptr),
                            arv_gc_integer_get_max(ARV_GC_INTEGER(node), nullptr));
     return "";
+}
+
+/// The whole text as a number. Throws std::invalid_argument or std::out_of_range.
+double to_real(const std::string& text) {
+    std::size_t used = 0;
+    const double value = std::stod(text, &used);
+    if (used != text.size()) throw std::invalid_argument(text);
+    return value;
+}
+
+gint64 to_integer(const std::string& text) {
+    const double value = to_real(text);
+    if (value != std::floor(value) || std::abs(value) > 9e15) throw std::invalid_argument(text);
+    return static_cast<gint64>(value);
 }
 
 /// Sets a feature that a camera may lack without harm.
@@ -108,21 +123,22 @@ Expected<> set_feature(ArvDevice* device, const std::string& name, const std::st
             arv_device_set_string_feature_value(device, name.c_str(), value.c_str(), error.out());
         } else if (ARV_IS_GC_BOOLEAN(node)) {
             allowed = "true, false";
+            if (value != "true" && value != "false") throw std::invalid_argument(value);
             arv_device_set_boolean_feature_value(device, name.c_str(), value == "true" ? TRUE : FALSE,
                                                  error.out());
         } else if (ARV_IS_GC_FLOAT(node)) {
             allowed = range_text(node);
-            arv_device_set_float_feature_value(device, name.c_str(), std::stod(value), error.out());
+            arv_device_set_float_feature_value(device, name.c_str(), to_real(value), error.out());
         } else if (ARV_IS_GC_INTEGER(node)) {
             allowed = range_text(node);
-            arv_device_set_integer_feature_value(device, name.c_str(), std::stoll(value), error.out());
+            arv_device_set_integer_feature_value(device, name.c_str(), to_integer(value), error.out());
         } else if (ARV_IS_GC_COMMAND(node)) {
             arv_device_execute_command(device, name.c_str(), error.out());
         } else {
             arv_device_set_string_feature_value(device, name.c_str(), value.c_str(), error.out());
         }
     } catch (const std::exception&) {
-        return failure(where, fmt::format("'{}' is no number", value), "allowed: " + allowed);
+        return failure(where, fmt::format("'{}' is of the wrong type", value), "allowed: " + allowed);
     }
     if (error.set())
         return failure(where, fmt::format("'{}' is refused: {}", value, error.text()),
@@ -176,7 +192,7 @@ AravisStream::~AravisStream() {
     closing_ = true;  // buffers that Aravis flushes are not frames
     // Waits for the stream's thread, which may still read stream_: then nobody writes into the slots any
     // more.
-    g_object_unref(stream_.get());
+    if (stream_) g_object_unref(stream_.get());
     static_cast<void>(stream_.release());
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }

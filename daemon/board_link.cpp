@@ -8,6 +8,7 @@ namespace versavis::daemon {
 namespace {
 
 constexpr Duration retry_interval = milliseconds(300);
+constexpr Duration retry_refused = seconds(5);  // only the user can change that
 constexpr Duration answer_timeout = milliseconds(1000);
 constexpr Duration silence_limit = seconds(3);  // the board reports its health every second
 constexpr Duration request_timeout = milliseconds(500);
@@ -115,15 +116,19 @@ void BoardLink::run() {
             const std::lock_guard lock(send_mutex_);
             stream_.reset();
         }
-        const BoardState state = report().state;
-        const bool explained = state == BoardState::incompatible || state == BoardState::refused;
-        if (!ended && !explained) set_state(BoardState::absent, ended.error().message());
-    } while (pause(retry_interval));
+        if (!ended && !explained()) set_state(BoardState::absent, ended.error().message());
+    } while (pause(explained() ? retry_refused : retry_interval));
+}
+
+/// True when the board is there, but of no use until the user changes something.
+bool BoardLink::explained() const {
+    const BoardState state = report().state;
+    return state == BoardState::incompatible || state == BoardState::refused;
 }
 
 /// One connection, from hello to its end. A value: the link was asked to stop.
 Expected<> BoardLink::serve() {
-    set_state(BoardState::handshake, "");
+    if (!explained()) set_state(BoardState::handshake, "");
     if (auto done = handshake(); !done) return done;
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;

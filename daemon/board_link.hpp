@@ -71,6 +71,7 @@ class BoardLink {
 
  private:
     void run();
+    bool explained() const;
     Expected<> serve();
     Expected<> handshake();
     Expected<> configure();

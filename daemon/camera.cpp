@@ -80,6 +80,7 @@ bool Camera::pause(Duration duration) {
 
 void Camera::run() {
     Duration retry = first_retry;
+    set_state(CameraState::opening, "");
     do {
         const HostTime begin = host_now();
         const auto ended = session();

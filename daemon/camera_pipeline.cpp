@@ -36,7 +36,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       translator_(translator),
       events_(events),
       pairing_(limits_of(configuration), *this),
-      start_patience_(seconds(2) + from_us(2e6 / configuration.rate_hz)),
+      start_patience_(seconds(2) + from_us(5e6 / configuration.rate_hz)),
       last_exposure_(from_us(configuration.exposure_us)) {}
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::uint64_t payload_size) {
@@ -91,9 +91,10 @@ void CameraPipeline::add(const wire::Exposure& record) {
     ++unanswered_;
     last_trigger_ = host_now();
     pairing::Exposure exposure = complete(record);
-    const auto end = translator_.to_host(exposure.end);
-    if (!end) return exposure_unpaired(exposure, EventReason::no_clock);
-    exposure.end_on_host = end->time;
+    const bool end_seen = record.end_ns != wire::no_time && (record.flags & wire::exposure_no_strobe) == 0;
+    const auto earliest = translator_.to_host(end_seen ? exposure.end : exposure.start);
+    if (!earliest) return exposure_unpaired(exposure, EventReason::no_clock);
+    exposure.earliest_on_host = earliest->time;
     pairing_.add(exposure);
 }
 
@@ -124,18 +125,20 @@ pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
     return exposure;
 }
 
-/// What the kind of stamp adds to the clock's error: an end that was not seen may be anywhere.
-Duration CameraPipeline::kind_sigma(const pairing::Exposure& exposure) const {
+/// What the kind of stamp adds to the clock's error. An end that was not seen lies before the arrival; no
+/// more is known.
+Duration CameraPipeline::kind_sigma(const pairing::Exposure& exposure, Duration to_arrival) {
     if (exposure.kind == StampKind::measured_middle) return {};
-    return (exposure.end - exposure.start) / 2 + microseconds(100);
+    const Duration half = (exposure.end - exposure.start) / 2 + microseconds(100);
+    return exposure.kind == StampKind::predicted_middle ? std::max(half, to_arrival) : half;
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
     const BoardTime instant = middle(exposure.start, exposure.end);
     auto stamp = translator_.translate(instant);
     if (!stamp) return frame_unpaired(arrival, EventReason::no_clock);
-    const double sigma =
-        std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind_sigma(exposure).ns));
+    const Duration kind = kind_sigma(exposure, arrival.arrived - stamp->host);
+    const double sigma = std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind.ns));
     stamp->sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
     FrameMetadata metadata{};
     metadata.trigger = exposure.trigger;
@@ -149,7 +152,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
 void CameraPipeline::publish_free_run(const pairing::Arrival& arrival) {
     FrameMetadata metadata{};
     metadata.flags = static_cast<std::uint32_t>(StampKind::arrival);
-    publish(arrival, translator_.translate(arrival.arrived, arrival_sigma), metadata);
+    publish(arrival, translator_.translate(arrival.arrived, {}), metadata);
 }
 
 void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,

@@ -72,7 +72,7 @@ class CameraPipeline final : private pairing::Outcome {
     void slipped(const pairing::Arrival& at) override;
 
     pairing::Exposure complete(const wire::Exposure& record);
-    Duration kind_sigma(const pairing::Exposure& exposure) const;
+    static Duration kind_sigma(const pairing::Exposure& exposure, Duration to_arrival);
     void publish(const pairing::Arrival& arrival, const clock::Stamp& stamp, FrameMetadata metadata);
     void publish_free_run(const pairing::Arrival& arrival);
     void journal(EventKind kind, EventReason reason, std::int64_t value, std::optional<BoardTime> at = {});

@@ -15,6 +15,7 @@ namespace versavis::daemon {
 namespace {
 
 constexpr double longest_us = 1e7;
+constexpr double longest_shift_us = 4e6;  // 32 bits of nanoseconds on the wire
 constexpr unsigned spare_slots = 8;  // frames that wait for proof, and the newest that readers still want
 
 bool valid_name(const std::string& name) {
@@ -76,12 +77,12 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     reader.read("output", camera.output, 0, wire::camera_count - 1);
     reader.read("rate_hz", camera.rate_hz, 0.1, 1000);
     const double period_us = 1e6 / camera.rate_hz;
-    reader.read("phase_us", camera.phase_us, 0, std::nextafter(period_us, 0));
+    reader.read("phase_us", camera.phase_us, 0, std::min(longest_shift_us, std::nextafter(period_us, 0)));
     reader.read("exposure_us", camera.exposure_us, 0, longest_us);
     reader.read("max_exposure_us", camera.max_exposure_us, 1, longest_us);
     if (camera.max_exposure_us == 0) camera.max_exposure_us = period_us;
-    reader.read("latency_us", camera.latency_us, 0, 1e5);
-    reader.read("gap_us", camera.gap_us, 0, std::nextafter(period_us, 0));
+    reader.read("latency_us", camera.latency_us, 0, std::min(1e5, std::nextafter(period_us, 0)));
+    reader.read("gap_us", camera.gap_us, 0, std::min(longest_shift_us, std::nextafter(period_us, 0)));
     camera.pulse_us = std::min(camera.pulse_us, period_us / 4);
     reader.read("pulse_us", camera.pulse_us, 1, std::min(1e4, period_us / 2));
     reader.read("trigger_inverted", camera.trigger_inverted);

@@ -34,7 +34,10 @@ void ImuPipeline::add(const wire::ImuSample& sample) {
     metadata.number = number;
     metadata.sigma_ns = stamp->sigma_ns;
     metadata.epoch = stamp->epoch;
-    if ((metadata.flags & flag_sensor_error) != 0) ++report_.faulty;
+    if ((metadata.flags & flag_sensor_error) != 0)
+        ++report_.faulty;
+    else
+        report_.last_sample = stamp->host;
     ring_.publish(guard_.guard(*stamp, metadata.flags), pack(metadata));
     ++report_.published;
 }

@@ -19,6 +19,7 @@ struct ImuReport {
     std::uint64_t lost = 0;      ///< numbers that never arrived
     std::uint64_t no_clock = 0;  ///< withheld: board time could not be translated yet
     std::uint64_t faulty = 0;    ///< published with a sensor error
+    HostTime last_sample;        ///< without an error
 };
 
 /// Thread-safe.

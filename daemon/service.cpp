@@ -97,6 +97,20 @@ Service::~Service() {
     if (board_) board_->stop();
 }
 
+/// How long a camera may go without a frame; how fast one runs freely is not known here.
+Duration Service::frame_patience(const CameraUnit& unit) {
+    if (!unit.pipeline->triggered()) return seconds(5);
+    return seconds(1) + Duration{static_cast<std::int64_t>(5e9 / unit.configuration.rate_hz)};
+}
+
+/// Triggers a camera from its start pattern on.
+void Service::start_camera(CameraUnit& unit) {
+    unit.pipeline->start_requested(host_now());
+    board_->start_cameras(unit.pipeline->board_mask(), true);
+    // Lost meanwhile: its own stop may have overtaken this start.
+    if (!unit.camera->streaming()) board_->stop_cameras(unit.pipeline->board_mask());
+}
+
 Service::CameraUnit* Service::camera_at(unsigned output) {
     for (CameraUnit& unit : cameras_)
         if (unit.pipeline->triggered() && unit.configuration.output == output) return &unit;
@@ -115,8 +129,7 @@ void Service::board_connected() {
     for (CameraUnit& unit : cameras_) {
         if (!unit.pipeline->triggered()) continue;
         unit.pipeline->reset();
-        unit.pipeline->start_requested(host_now());
-        if (unit.camera->streaming()) board_->start_cameras(unit.pipeline->board_mask(), true);
+        if (unit.camera->streaming()) start_camera(unit);
     }
 }
 
@@ -140,8 +153,11 @@ void Service::board_event(const wire::Event& event) {
         }
         return EventKind{};
     }();
-    const CameraUnit* unit = camera_at(event.source);
-    events_->add({kind, EventReason::none, event.source, unit != nullptr ? unit->configuration.name : "board",
+    if (kind == EventKind{}) return;  // of a newer board
+    const bool of_camera = kind == EventKind::trigger_skipped || kind == EventKind::stray_edge;
+    const CameraUnit* unit = of_camera ? camera_at(event.source) : nullptr;
+    const auto index = unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
+    events_->add({kind, EventReason::none, index, unit != nullptr ? unit->configuration.name : "board",
                   event.value, BoardTime{event.time_ns}});
 }
 
@@ -149,10 +165,7 @@ void Service::tick() {
     const HostTime now = host_now();
     for (CameraUnit& unit : cameras_) {
         const bool wants_start = unit.pipeline->advance(now);
-        if (wants_start && unit.camera->streaming() && board_->running()) {
-            unit.pipeline->start_requested(now);
-            board_->start_cameras(unit.pipeline->board_mask(), true);
-        }
+        if (wants_start && unit.camera->streaming() && board_->running()) start_camera(unit);
     }
     if (imu_) imu_->heartbeat(now);
     events_->heartbeat(now);

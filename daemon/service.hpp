@@ -51,6 +51,8 @@ class Service final : private BoardListener {
     void publish_status(HostTime now);
     std::vector<StreamStatus> stream_status(HostTime now);
     CameraUnit* camera_at(unsigned output);
+    void start_camera(CameraUnit& unit);
+    static Duration frame_patience(const CameraUnit& unit);
 
     void board_restarted() override;
     void board_connected() override;

@@ -13,6 +13,7 @@ using nlohmann::json;
 
 constexpr int schema = 1;
 constexpr Duration grace = seconds(5);
+constexpr Duration imu_patience = seconds(3);
 
 bool delivers(const CameraStatus& camera) {
     if (camera.camera.state != CameraState::streaming) return false;
@@ -95,6 +96,7 @@ std::string health(const Status& status) {
     bool ok = !status.board_needed ||
               (status.board.state == BoardState::running && status.clock.state == clock::ClockState::locked);
     for (const CameraStatus& camera : status.cameras) ok = ok && delivers(camera);
+    for (const ImuReport& imu : status.imus) ok = ok && status.now - imu.last_sample < imu_patience;
     if (ok) return "ok";
     return status.now - status.started < grace ? "starting" : "degraded";
 }
@@ -109,7 +111,8 @@ std::string to_json(const Status& status) {
                         {"published", imu.published},
                         {"lost", imu.lost},
                         {"no_clock", imu.no_clock},
-                        {"faulty", imu.faulty}});
+                        {"faulty", imu.faulty},
+                        {"last_sample_ns", imu.last_sample.ns}});
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
         streams.push_back({{"name", stream.name},

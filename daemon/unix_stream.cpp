@@ -27,9 +27,10 @@ class UnixStream final : public ByteStream {
 
     Expected<Chunk> read(Duration timeout) override {
         Chunk chunk;
-        const timespec limit{timeout.ns / 1'000'000'000, timeout.ns % 1'000'000'000};
+        const std::int64_t wait_ns = std::max<std::int64_t>(timeout.ns, 0);
+        const timespec limit{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
         pollfd readable{socket_, POLLIN, 0};
-        if (::ppoll(&readable, 1, timeout.ns > 0 ? &limit : nullptr, nullptr) <= 0) return chunk;
+        if (::ppoll(&readable, 1, &limit, nullptr) <= 0) return chunk;
         chunk.bytes.resize(4096);
         const ssize_t size = ::recv(socket_, chunk.bytes.data(), chunk.bytes.size(), MSG_DONTWAIT);
         chunk.received = host_now();

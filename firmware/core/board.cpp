@@ -148,13 +148,14 @@ void Board::answer_clock(const wire::ClockRequest& request, Nanoseconds received
 }
 
 void Board::poll_edges() {
+    if (const std::uint32_t lost = hal_.edges.take_lost()) {
+        health_.lost_edges += lost;
+        for (CameraChannel& camera : cameras_) camera.edges_lost();
+        event(wire::EventKind::edge_overflow, 0, hal_.clock.now(), lost);
+    }
     Edge edge{};
     while (hal_.edges.pop(edge))
         if (edge.input < camera_count) cameras_[edge.input].edge(edge.at, edge.level);
-    if (const std::uint32_t lost = hal_.edges.take_lost()) {
-        health_.lost_edges += lost;
-        event(wire::EventKind::edge_overflow, 0, hal_.clock.now(), lost);
-    }
     if (const Nanoseconds late = hal_.outputs.take_lateness()) {
         ++health_.late_outputs;
         event(wire::EventKind::output_late, 0, hal_.clock.now(), late);

@@ -146,6 +146,13 @@ void CameraChannel::end_edge(Nanoseconds at) {
     reports_.event(wire::EventKind::stray_edge, camera_, at, 0);
 }
 
+void CameraChannel::edges_lost() {
+    while (flight_count_ > 0 && flights_[0].record.start_ns != wire::no_time) {
+        flights_[0].record.flags |= wire::exposure_no_end;
+        finish(0);
+    }
+}
+
 Nanoseconds CameraChannel::deadline(const Flight& flight) const {
     if (has(wire::camera_no_strobe))
         return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;

@@ -41,6 +41,9 @@ class CameraChannel {
     /// Takes an edge of the exposure line; edges come in order.
     void edge(Nanoseconds at, bool level);
 
+    /// Edges were lost: an end that comes now may belong to another exposure than the start that was seen.
+    void edges_lost();
+
     /// Decides the triggers that are due and gives up exposures that did not happen.
     void poll(Nanoseconds now);
 

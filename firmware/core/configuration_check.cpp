@@ -28,7 +28,7 @@ bool refuse_camera(const wire::CameraConfiguration& camera, wire::ConfigurationA
         {Field::rate, camera.rate_uhz, 100'000, 1'000'000'000},
         {Field::phase, camera.phase_ns, 0, period - 1},
         {Field::pulse, camera.pulse_ns, 1'000, period / 2 < 10'000'000 ? period / 2 : 10'000'000},
-        {Field::latency, camera.latency_ns, 0, 100'000'000},
+        {Field::latency, camera.latency_ns, 0, period - 1 < 100'000'000 ? period - 1 : 100'000'000},
         {Field::gap, camera.gap_ns, 0, period - 1},
         {Field::exposure, camera.exposure_ns, 0, 10'000'000'000},
         {Field::max_exposure, camera.max_exposure_ns, 1'000, 10'000'000'000},

@@ -39,7 +39,6 @@ const char* to_string(EventReason reason) {
         case EventReason::exposure_missing: return "exposure_missing";
         case EventReason::unproved: return "unproved";
         case EventReason::mismatch: return "mismatch";
-        case EventReason::no_buffer: return "no_buffer";
         case EventReason::no_clock: return "no_clock";
         case EventReason::wrong_size: return "wrong_size";
         case EventReason::reset: return "reset";

@@ -39,8 +39,7 @@ struct Published {
 
 struct Recording {
     std::vector<Published> items;
-    std::uint64_t unreadable = 0;  ///< overtaken before the mark was read
-    std::uint64_t skipped = 0;     ///< lost by this reader
+    std::uint64_t missed = 0;  ///< items that this reader was too slow for: no fault of the service
 };
 
 /// Streams of the scenario, read side by side.
@@ -93,12 +92,12 @@ class Recorder {
 
     void take(const std::string& name, const FrameStream& stream, const Received<FrameMetadata>& item) {
         Recording& recording = recordings_[name];
-        if (item.found == Found::lost) recording.skipped += item.lost;
+        if (item.found == Found::lost) recording.missed += item.lost;
         if (item.found != Found::item) return;
         FrameMark mark{};
         if (item.payload_size >= sizeof mark) std::memcpy(&mark, item.payload, sizeof mark);
         if (!stream.intact(item))
-            ++recording.unreadable;
+            ++recording.missed;
         else
             recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0,
                                        item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
@@ -106,7 +105,7 @@ class Recorder {
 
     void take(const Received<ImuMetadata>& item) {
         Recording& recording = recordings_[imu_name_];
-        if (item.found == Found::lost) recording.skipped += item.lost;
+        if (item.found == Found::lost) recording.missed += item.lost;
         if (item.found == Found::item)
             recording.items.push_back({item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
     }
@@ -205,6 +204,7 @@ StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint6
         if (it->second.sent && it->second.middle_ns < interval.end_ns - in_flight_ns &&
             seen.count(it->first) == 0)
             ++verdict.lost;
+    verdict.lost -= std::min(verdict.lost, recording.missed);
     return verdict;
 }
 
@@ -226,6 +226,7 @@ StreamVerdict judge_imu(const Recording& recording, const Truth& truth, const In
     for (std::size_t i = 1; i < recording.items.size(); ++i)
         if (recording.items[i].key > recording.items[i - 1].key)
             verdict.lost += recording.items[i].key - recording.items[i - 1].key - 1;
+    verdict.lost -= std::min(verdict.lost, recording.missed);
     return verdict;
 }
 
@@ -263,7 +264,8 @@ Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
                 if (status["clock"]["output"] == clock::to_string(kind))
                     return clock::OutputClock::create(kind);
         }
-        if (host_now() > deadline)
+        const bool stopped = settings.stop_requested && settings.stop_requested();
+        if (stopped || host_now() > deadline)
             return failure(settings.instance, "publishes no status", "is versavisd running?");
         const timespec pause{0, 20'000'000};
         nanosleep(&pause, nullptr);

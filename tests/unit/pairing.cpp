@@ -98,7 +98,7 @@ class World : public Outcome {
         exposure.tick = tick;
         exposure.start = BoardTime{start.ns + board_offset};
         exposure.end = BoardTime{end.ns + board_offset};
-        exposure.end_on_host = end;
+        exposure.earliest_on_host = end;
         exposure.exposed = !ignored || !faults_.strobe_wired;
         const Duration record_delay =
             faults_.record_late.count(pulse_) != 0 ? milliseconds(100) : microseconds(500);

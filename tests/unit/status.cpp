@@ -24,7 +24,10 @@ Status healthy() {
     camera.camera.state = CameraState::streaming;
     camera.pipeline.pairing = pairing::State::locked;
     status.cameras.push_back(camera);
-    status.imus.push_back({"imu0", "adis16448b"});
+    ImuReport imu;
+    imu.name = "imu0";
+    imu.last_sample = status.now;
+    status.imus.push_back(imu);
     status.streams.push_back({"cam0", "frames", 7, 20.0});
     return status;
 }
@@ -57,6 +60,12 @@ TEST_CASE("status: healthy only if all that is configured delivers") {
     CHECK(health(status) == "degraded");
     status.board_needed = false;
     CHECK(health(status) == "ok");
+    status = healthy();
+    status.imus[0].last_sample = HostTime{50'000'000'000};
+    CHECK(health(status) == "degraded");
+    status = healthy();
+    status.cameras[0].stalled = true;
+    CHECK(health(status) == "degraded");
     status = healthy();
     status.cameras[0].camera.state = CameraState::failed;
     CHECK(health(status) == "degraded");

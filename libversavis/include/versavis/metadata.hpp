@@ -15,13 +15,13 @@ enum class StampKind : std::uint32_t {
     measured_middle = 0,  ///< both edges of the exposure were stamped by hardware
     predicted_middle =
         1,             ///< an edge is missing: start or end follow from the configured or expected exposure
-    trigger_edge = 2,  ///< only the trigger pulse is known
+    trigger_edge = 2,  ///< only the trigger pulse is known: latency and exposure are as configured
     arrival = 3,       ///< no trigger: the moment the frame arrived on the host
 };
 
 enum ItemFlag : std::uint32_t {
     stamp_kind_mask = 0x3,         ///< StampKind
-    flag_suspect = 1U << 2U,       ///< the pairing of frame and exposure could not be proved
+    flag_suspect = 1U << 2U,       ///< reserved: the pairing could not be proved; such frames are withheld
     flag_holdover = 1U << 3U,      ///< the clocks were without contact: sigma grows
     flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
@@ -78,7 +78,7 @@ enum class EventKind : std::uint32_t {
     camera_connected = 8,
     camera_lost = 9,
     pairing_locked = 10,   ///< value: trigger number of the first proved frame
-    pairing_slipped = 11,  ///< value: trigger number at which it was found
+    pairing_slipped = 11,  ///< value: block id of the frame that contradicted it
     edge_overflow = 12,    ///< value: edges lost
 };
 
@@ -90,7 +90,6 @@ enum class EventReason : std::uint32_t {
     exposure_missing = 3,  ///< the board's record did not arrive in time
     unproved = 4,          ///< pairing was not locked, and could not prove it
     mismatch = 5,          ///< the evidence contradicts the pairing
-    no_buffer = 6,         ///< all slots were taken
     no_clock = 7,          ///< board time could not be translated
     wrong_size = 8,        ///< the frame is not of the size the camera announced
     reset = 9,             ///< camera or board began anew in between

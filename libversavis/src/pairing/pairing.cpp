@@ -30,7 +30,7 @@ std::int64_t Pairing::frame_time_ns(const Arrival& arrival) const {
 }
 
 bool Pairing::arrival_possible(const Arrival& arrival, const Exposure& exposure) const {
-    const Duration after_end = arrival.arrived - exposure.end_on_host;
+    const Duration after_end = arrival.arrived - exposure.earliest_on_host;
     return after_end >= limits_.earliest_arrival && after_end <= limits_.latest_arrival;
 }
 
@@ -152,7 +152,7 @@ void Pairing::search() {
     if (arrivals_.size() < frames_for_proof || exposures_.size() < frames_for_proof) return;
     // An exposure whose record is still on its way could explain the frames, too.
     const HostTime records_complete =
-        exposures_.back().exposure.end_on_host + Duration{smallest_gap_ns_ / 4 * 3};
+        exposures_.back().exposure.earliest_on_host + Duration{smallest_gap_ns_ / 4 * 3};
     if (arrivals_.back().arrived > records_complete) return;
     std::optional<Alignment> found;
     for (const std::int64_t difference : candidate_differences()) {
@@ -196,7 +196,7 @@ bool Pairing::match_front() {
     if (exposures_.empty()) return false;
     const Exposure& newest = exposures_.back().exposure;
     if ((start - newest.start).ns > tolerance_ns()) {
-        const HostTime on_host = newest.end_on_host + (start - newest.end);
+        const HostTime on_host = newest.earliest_on_host + (start - newest.end);
         if (arrival.arrived - on_host >= limits_.earliest_arrival) return false;
         search_anew(arrival);  // it would have arrived before it was exposed
         return true;
@@ -319,8 +319,8 @@ void Pairing::advance(HostTime now) {
         drop_front(EventReason::exposure_missing);
     // A search needs the exposures of several frames, however slow the camera.
     const std::size_t keep = state_ == State::searching ? exposures_kept / 4 : 0;
-    while (exposures_.size() > keep &&
-           now - exposures_.front().exposure.end_on_host > limits_.latest_arrival + limits_.exposure_wait)
+    while (exposures_.size() > keep && now - exposures_.front().exposure.earliest_on_host >
+                                           limits_.latest_arrival + limits_.exposure_wait)
         drop_oldest_exposure(state_ == State::searching ? EventReason::unproved : EventReason::frame_missing);
 }
 

@@ -25,7 +25,9 @@ struct Writer::Segment {
     Segment(std::filesystem::path file, Mapping mapped, std::uint64_t first)
         : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
     ~Segment() {
-        retire(mapping.header(), WriterState::closed);
+        const auto live = static_cast<std::uint32_t>(WriterState::live);
+        if (mapping.header().state.load(std::memory_order_relaxed) == live)
+            retire(mapping.header(), WriterState::closed);
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
         auto current = Mapping::open(path, Mapping::Access::read_only);
         if (current && current->header().generation == mapping.header().generation) ::unlink(path.c_str());

@@ -18,7 +18,8 @@ struct Exposure {
     std::uint64_t tick = 0;
     BoardTime start;  ///< start of the exposure, predicted when it was not measured
     BoardTime end;
-    HostTime end_on_host;  ///< `end`, translated: no frame of it can arrive earlier
+    HostTime earliest_on_host;  ///< its end, or its start when the end was not seen: no frame of it can
+                                ///< arrive earlier
     StampKind kind = StampKind::measured_middle;
     bool exposed = true;  ///< false: the exposure line is wired and stayed silent
 };
@@ -86,9 +87,6 @@ class Pairing {
     /// True when regular triggers cannot lead to a lock: the board should repeat its start pattern.
     bool wants_pattern(HostTime now) const;
     void pattern_requested(HostTime now);
-
-    std::size_t waiting_frames() const { return arrivals_.size(); }
-    bool camera_clock_used() const { return camera_clock_; }
 
  private:
     static constexpr int pattern_patience = 8;
