@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_pipeline.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "pipelines.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+constexpr std::uint64_t frame_size = 64 * 48;
+
+CameraConfiguration camera(double rate_hz) {
+    CameraConfiguration configuration;
+    configuration.name = "cam0";
+    configuration.rate_hz = rate_hz;
+    configuration.max_exposure_us = 20000;
+    return configuration;
+}
+
+/// A camera whose triggers and frames the test makes, from `begin` on.
+class Bench : public test::Pipelines {
+   public:
+    explicit Bench(const CameraConfiguration& configuration)
+        : pipeline(configuration, 0, translator, events),
+          period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {
+        REQUIRE(pipeline.prepare(directory.path(), frame_size));
+        exchange(begin);
+    }
+
+    /// The board's record of the trigger at grid point `tick`, measured unless flags say otherwise.
+    void trigger(std::uint64_t tick, std::uint16_t flags = wire::exposure_measured) {
+        const BoardTime at = to_board(begin + period * static_cast<std::int64_t>(tick));
+        wire::Exposure record{};
+        record.trigger = ++triggers;
+        record.tick = tick;
+        record.flags = flags;
+        record.trigger_ns = at.ns;
+        record.start_ns = (flags & wire::exposure_no_start) != 0 ? wire::no_time : at.ns + 20'000;
+        record.end_ns = (flags & wire::exposure_measured) != 0 ? at.ns + 4'020'000 : wire::no_time;
+        pipeline.add(record);
+    }
+
+    void frame(std::uint64_t tick) {
+        const HostTime at = begin + period * static_cast<std::int64_t>(tick);
+        pairing::Arrival arrival;
+        arrival.slot = pipeline.acquire().value();
+        arrival.block_id = ++frames;
+        arrival.camera_time = {at.ns + 777};
+        arrival.arrived = at + milliseconds(15);
+        arrival.width = 64;
+        arrival.height = 48;
+        arrival.size = frame_size;
+        pipeline.add(arrival);
+    }
+
+    const HostTime begin{100'000'000'000};
+    CameraPipeline pipeline;
+    Duration period;
+    std::uint64_t triggers = 0;
+    std::uint64_t frames = 0;
+};
+
+const std::uint64_t pattern[] = {0, 1, 3, 4, 7, 9, 11};
+
+}  // namespace
+
+TEST_CASE("camera_pipeline: a proved frame carries the measured middle, and all that is known of it") {
+    Bench bench(camera(20));
+    auto reader = bench.reader("cam0");
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick);
+        bench.frame(tick);
+    }
+    const ring::Item item = reader.next();
+    REQUIRE(item.found == ring::Found::item);
+    const auto frame = unpack<FrameMetadata>(item.metadata);
+    CHECK(frame.stamp_kind() == StampKind::measured_middle);
+    CHECK(frame.trigger == 1);
+    CHECK(frame.block_id == 1);
+    CHECK(frame.exposure == milliseconds(4));
+    CHECK(absolute(frame.host_time - (bench.begin + microseconds(2020))) <= nanoseconds(1));
+    CHECK(item.time.ns == frame.host_time.ns);
+    CHECK(frame.stride == 64);
+    CHECK(frame.sigma_ns < 20'000);
+    CHECK(bench.pipeline.report().pairing == pairing::State::locked);
+    CHECK(bench.pipeline.report().published == std::size(pattern));
+}
+
+TEST_CASE("camera_pipeline: an end that was not seen costs no pairing, and sigma reaches to the arrival") {
+    Bench bench(camera(20));
+    auto reader = bench.reader("cam0");
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick, tick == 9 ? wire::exposure_no_end : wire::exposure_measured);
+        bench.frame(tick);
+    }
+    std::optional<FrameMetadata> predicted;
+    for (auto item = reader.next(); item.found == ring::Found::item; item = reader.next())
+        if (unpack<FrameMetadata>(item.metadata).tick == 9) predicted = unpack<FrameMetadata>(item.metadata);
+    REQUIRE(predicted);
+    CHECK(predicted->stamp_kind() == StampKind::predicted_middle);
+    CHECK(predicted->exposure.ns == 0);
+    CHECK(predicted->sigma_ns >= 8'000'000);
+    CHECK(bench.pipeline.report().slips == 0);
+    CHECK(bench.pipeline.report().unmeasured == 1);
+}
+
+TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") {
+    Bench bench(camera(20));
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick, tick == 9 ? wire::exposure_no_start : wire::exposure_measured);
+        bench.frame(tick);
+    }
+    CHECK(bench.pipeline.report().frames_without_trigger == 1);
+    CHECK(bench.pipeline.report().published == std::size(pattern) - 1);
+}
+
+TEST_CASE("camera_pipeline: slow cameras are given the time of their pattern before they are started again") {
+    Bench bench(camera(0.4));
+    bench.pipeline.start_requested(host_now());
+    bench.trigger(4);
+    // The pattern's longest gap is three periods of 2.5 s.
+    CHECK_FALSE(bench.pipeline.advance(host_now() + milliseconds(7600)));
+    CHECK(bench.pipeline.advance(host_now() + seconds(15)));
+}
+
+TEST_CASE("camera_pipeline: a camera that runs freely is published as it comes, of unknown accuracy") {
+    auto configuration = camera(20);
+    configuration.trigger = TriggerSource::free_run;
+    Bench bench(configuration);
+    auto reader = bench.reader("cam0");
+    bench.frame(0);
+    const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+    CHECK(frame.stamp_kind() == StampKind::arrival);
+    CHECK(frame.sigma_ns == sigma_unknown);
+    CHECK(frame.trigger == 0);
+    CHECK(frame.host_time == frame.arrival);
+}
