@@ -22,7 +22,7 @@ CameraConfiguration camera(double rate_hz) {
 
 /// A camera whose triggers and frames the test makes, from `begin` on.
 class Bench : public test::Pipelines {
-   public:
+ public:
     explicit Bench(const CameraConfiguration& configuration)
         : pipeline(configuration, 0, translator, events),
           period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {

@@ -14,7 +14,7 @@
 namespace versavis::test {
 
 class Pipelines {
-   public:
+ public:
     Pipelines()
         : translator(*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)),
           events(writer({"events", ring::StreamKind::events, 64}), translator) {}

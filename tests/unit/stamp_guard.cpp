@@ -8,7 +8,8 @@ using daemon::StampGuard;
 
 namespace {
 
-clock::Stamp stamp(std::int64_t ns, std::uint32_t epoch, clock::ClockState state = clock::ClockState::locked) {
+clock::Stamp stamp(std::int64_t ns, std::uint32_t epoch,
+                   clock::ClockState state = clock::ClockState::locked) {
     clock::Stamp stamp;
     stamp.output = {ns};
     stamp.epoch = epoch;
