@@ -9,8 +9,6 @@ namespace versavis::daemon {
 namespace {
 
 constexpr std::uint32_t descriptor_floor = 64;
-constexpr Duration arrival_sigma =
-    milliseconds(5);  // how long frames take after their exposure is not known at all
 
 std::uint32_t power_of_two(std::uint32_t at_least) {
     std::uint32_t value = descriptor_floor;
