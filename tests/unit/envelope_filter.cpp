@@ -112,3 +112,15 @@ TEST_CASE("envelope_filter: an exchange that took no time is not believed") {
     filter.add({{1000}, {500}, {2500}, {1500}});
     CHECK_FALSE(filter.initialised());
 }
+
+TEST_CASE("envelope_filter: a slow link locks, too, with a sigma that owns up to its asymmetry") {
+    EnvelopeFilter filter;
+    constexpr Duration one_way = milliseconds(1);
+    for (HostTime t{0}; t.ns < 30'000'000'000; t = t + milliseconds(100)) {
+        const BoardTime received{t.ns + one_way.ns};
+        filter.add({t, received, received, t + one_way * 2 + nanoseconds(t.ns / 1'000'000 % 7 * 10'000)});
+    }
+    const auto now = filter.translate(filter.last_contact());
+    CHECK(now.state == ClockState::locked);
+    CHECK(now.sigma >= microseconds(300));
+}

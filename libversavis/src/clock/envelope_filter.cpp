@@ -197,12 +197,13 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     HostEstimate estimate;
     if (!initialised()) return estimate;
     const double dt = to_seconds(board - reference_);
+    const double estimated = covariance_(0, 0) + 2 * dt * covariance_(0, 1) + dt * dt * covariance_(1, 1) +
+                             skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
     const double asymmetry = static_cast<double>(smallest_sum_ns_) / 6;
-    const double variance = asymmetry * asymmetry + covariance_(0, 0) + 2 * dt * covariance_(0, 1) +
-                            dt * dt * covariance_(1, 1) + skew_walk * skew_walk * std::abs(dt * dt * dt) / 3;
     estimate.time = {predicted_ns(board)};
-    estimate.sigma = {std::llround(std::sqrt(std::max(variance, 1.0)))};
-    const bool uncertain = slots_ < early_slots || static_cast<double>(estimate.sigma.ns) > locked_sigma_ns;
+    estimate.sigma = {std::llround(std::sqrt(std::max(estimated, 1.0) + asymmetry * asymmetry))};
+    // A slow link's asymmetry stays, however long one waits: it is no lack of convergence.
+    const bool uncertain = slots_ < early_slots || std::sqrt(std::max(estimated, 0.0)) > locked_sigma_ns;
     estimate.state = uncertain ? ClockState::converging : ClockState::locked;
     if ((board - last_contact_).ns > holdover_after_ns) estimate.state = ClockState::holdover;
     return estimate;
