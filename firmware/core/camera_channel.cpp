@@ -123,7 +123,10 @@ void CameraChannel::start_edge(Nanoseconds at) {
     std::size_t found = max_flights;
     for (std::size_t i = 0; i < flight_count_; ++i)
         if (flights_[i].record.trigger_ns <= at && flights_[i].record.start_ns == wire::no_time) found = i;
-    if (found == max_flights) return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
+    if (found == max_flights) {
+        edges_lost();  // the line rose twice: an end in between was missed
+        return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
+    }
     // The line has one level: whatever still waits before this trigger was ignored, or its end edge was lost.
     for (; found > 0; --found) {
         flights_[0].record.flags |=
