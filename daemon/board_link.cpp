@@ -16,21 +16,48 @@ constexpr unsigned exchanges_to_start = 4;
 constexpr Duration longest_read = milliseconds(100);
 constexpr Duration largest_clock_surprise = milliseconds(500);
 
-const char* field_name(wire::ConfigurationField field) {
+/// Key of the configuration file, and the unit in which the board has it.
+std::pair<const char*, const char*> field_name(wire::ConfigurationField field) {
     using Field = wire::ConfigurationField;
     switch (field) {
-        case Field::none: return "";
-        case Field::rate: return "rate_hz";
-        case Field::pulse: return "pulse_us";
-        case Field::latency: return "latency_us";
-        case Field::gap: return "gap_us";
-        case Field::exposure: return "exposure_us";
-        case Field::max_exposure: return "max_exposure_us";
-        case Field::phase: return "phase_us";
-        case Field::imu_kind: return "imu.model";
-        case Field::imu_rate: return "imu.rate_hz";
+        case Field::rate: return {"rate_hz", "micro-hertz"};
+        case Field::pulse: return {"pulse_us", "ns"};
+        case Field::latency: return {"latency_us", "ns"};
+        case Field::gap: return {"gap_us", "ns"};
+        case Field::exposure: return {"exposure_us", "ns"};
+        case Field::max_exposure: return {"max_exposure_us", "ns"};
+        case Field::phase: return {"phase_us", "ns"};
+        case Field::imu_kind: return {"model", "by number"};
+        case Field::imu_rate: return {"rate_hz", "milli-hertz"};
+        case Field::master: return {"master", "output of a camera"};
+        case Field::imu_filter: return {"filter", "strength"};
+        case Field::imu_options: return {"data_ready", "bits"};
+        case Field::cameras: return {"cameras", "bits"};
+        case Field::lead: return {"lead_us", "ns"};
+        case Field::max_on: return {"max_on_us", "ns"};
+        case Field::duty: return {"duty_percent", "ppm"};
+        case Field::inputs: return {"inputs", "bits"};
+        case Field::test: return {"test", "source"};
+        case Field::sync_rate: return {"sync_rate_hz", "micro-hertz"};
+        case Field::port_options: return {"imu_output", "bits; it needs an IMU on the SPI port"};
     }
-    return "";
+    return {"an unknown field", "?"};
+}
+
+std::string describe(const wire::Refusal& refusal) {
+    const char* table = "[ports]";
+    switch (refusal.part) {
+        case wire::ConfigurationPart::camera: table = "the camera at output"; break;
+        case wire::ConfigurationPart::imu: table = "the IMU at port"; break;
+        case wire::ConfigurationPart::illumination: table = "[illumination]"; break;
+        case wire::ConfigurationPart::ports: break;
+    }
+    const bool numbered =
+        refusal.part == wire::ConfigurationPart::camera || refusal.part == wire::ConfigurationPart::imu;
+    const auto [key, unit] = field_name(refusal.field);
+    return fmt::format("'{}' of {}{} is {}: allowed are {} to {} ({})", key, table,
+                       numbered ? fmt::format(" {}", refusal.index) : "", refusal.value, refusal.minimum,
+                       refusal.maximum, unit);
 }
 
 std::string text(const char* padded, std::size_t capacity) { return {padded, strnlen(padded, capacity)}; }
@@ -178,6 +205,7 @@ Expected<> BoardLink::handshake() {
 
 Expected<> BoardLink::configure() {
     answered_ = false;
+    refusals_.clear();
     ++configuration_.id;
     if (auto sent = send(configuration_); !sent) return sent;
     if (auto done =
@@ -185,11 +213,11 @@ Expected<> BoardLink::configure() {
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
-    set_state(
-        BoardState::refused,
-        fmt::format(
-            "it refuses '{}' of output {}: allowed are {} to {} (ns, micro-hertz); change the configuration",
-            field_name(answer_.field), answer_.camera, answer_.minimum, answer_.maximum));
+    std::string reason = answer_.status == wire::ConfigurationStatus::running
+                             ? "its cameras are running: start it anew"
+                             : "change the configuration";
+    for (const std::string& refusal : refusals_) reason = refusal + "; " + reason;
+    set_state(BoardState::refused, reason);
     return failure("board", "refuses its configuration");
 }
 
@@ -255,12 +283,17 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::ClockAnswer answer{};
     wire::Health health{};
     wire::Log line{};
+    wire::Refusal refusal{};
     if (packet.read(exposure)) return listener_.exposure(exposure);
     if (packet.read(sample)) return listener_.imu_sample(sample);
     if (packet.read(event)) return listener_.board_event(event);
     if (packet.read(answer)) return take_answer(answer, received);
     if (packet.read(line))
         return log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
+    if (packet.read(refusal)) {
+        if (refusal.id == configuration_.id) refusals_.push_back(describe(refusal));
+        return;
+    }
     if (packet.read(answer_)) {
         answered_ = answer_.id == configuration_.id;
         return;

@@ -11,6 +11,7 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "byte_stream.hpp"
 #include "configuration.hpp"
@@ -111,6 +112,7 @@ class BoardLink {
     std::uint32_t last_life_ = 0;
     bool answered_ = false;
     wire::ConfigurationAnswer answer_{};
+    std::vector<std::string> refusals_;
     std::uint32_t request_id_ = 0;
     HostTime request_sent_;
     bool request_open_ = false;

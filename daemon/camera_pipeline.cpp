@@ -25,6 +25,11 @@ pairing::Limits limits_of(const CameraConfiguration& configuration) {
     return limits;
 }
 
+/// False: start and end follow from the trigger, or from the exposure line of the master.
+bool own_strobe(const wire::Exposure& record) {
+    return (record.flags & (wire::exposure_predicted | wire::exposure_from_master)) == 0;
+}
+
 }  // namespace
 
 CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
@@ -89,7 +94,7 @@ void CameraPipeline::add(const wire::Exposure& record) {
     ++unanswered_;
     last_trigger_ = host_now();
     pairing::Exposure exposure = complete(record);
-    const bool end_seen = record.end_ns != wire::no_time && (record.flags & wire::exposure_no_strobe) == 0;
+    const bool end_seen = record.end_ns != wire::no_time && own_strobe(record);
     const auto earliest = translator_.to_host(end_seen ? exposure.end : exposure.start);
     if (!earliest) return exposure_unpaired(exposure, EventReason::no_clock);
     exposure.earliest_on_host = earliest->time;
@@ -103,7 +108,7 @@ pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
     exposure.tick = record.tick;
     const bool started = record.start_ns != wire::no_time;
     const bool ended = record.end_ns != wire::no_time;
-    const bool strobe = (record.flags & wire::exposure_no_strobe) == 0;
+    const bool strobe = own_strobe(record);
     exposure.exposed = started || !strobe;
     exposure.start = started ? BoardTime{record.start_ns}
                              : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -44,6 +46,7 @@ void read_board(TableReader& reader, BoardConfiguration& board) {
     reader.read("serial", board.serial);
     reader.read("usb_vendor", board.usb_vendor, 0, 0xFFFF);
     reader.read("usb_product", board.usb_product, 0, 0xFFFF);
+    reader.read("keep_configuration", board.keep_configuration);
     if (board.link != "usb" && board.link.rfind("unix:", 0) != 0)
         reader.fail("link", fmt::format("'{}' is no link", board.link),
                     "use \"usb\" or \"unix:/path/of/socket\"");
@@ -75,6 +78,10 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     reader.choose<TriggerSource>("trigger", camera.trigger,
                                  {{"board", TriggerSource::board}, {"free", TriggerSource::free_run}});
     reader.read("output", camera.output, 0, wire::camera_count - 1);
+    reader.read("master", camera.master);
+    if (!camera.master.empty() && (reader.has("rate_hz") || reader.has("phase_us")))
+        reader.fail(reader.has("rate_hz") ? "rate_hz" : "phase_us", "a slave has its master's rate and phase",
+                    "remove the key, or 'master'");
     reader.read("rate_hz", camera.rate_hz, 0.1, 1000);
     const double period_us = 1e6 / camera.rate_hz;
     reader.read("phase_us", camera.phase_us, 0, std::min(longest_shift_us, std::nextafter(period_us, 0)));
@@ -114,13 +121,51 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
 
 ImuConfiguration read_imu(TableReader& reader) {
     ImuConfiguration imu;
-    std::string model = "adis16448b";
+    std::vector<std::pair<std::string, const imu::ImuModel*>> models;
+    for (const std::string& name : imu::model_names()) models.emplace_back(name, imu::find_model(name));
+    imu.model = models.front().second;
     reader.read("name", imu.name);
-    reader.read("model", model);
-    reader.read("rate_hz", imu.rate_hz, 1, 1000);
-    imu.model = imu::find_model(model);
-    if (imu.model == nullptr) reader.fail("model", fmt::format("the IMU model '{}' is not known", model));
+    reader.choose<const imu::ImuModel*>("model", imu.model, models);
+    reader.read("data_ready", imu.data_ready);
+    // On the board's grid a reading is set up half a millisecond ahead.
+    reader.read("rate_hz", imu.rate_hz, 1, imu.data_ready ? 8000 : 1000);
+    reader.read("filter", imu.filter, 0, 7);
     return imu;
+}
+
+void read_illumination(TableReader& reader, IlluminationConfiguration& light) {
+    reader.read("cameras", light.cameras);
+    reader.read("lead_us", light.lead_us, 0, 1000);
+    reader.read("max_on_us", light.max_on_us, 10 + light.lead_us, 1e6);
+    reader.read("duty_percent", light.duty_percent, 0.0001, 100);
+    reader.read("inverted", light.inverted);
+}
+
+const std::vector<std::string> pulse_input_names{"pps", "aux0", "aux1", "sync"};
+
+std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
+    unsigned mask = 0;
+    for (const std::string& name : names)
+        mask |= 1U << (std::find(pulse_input_names.begin(), pulse_input_names.end(), name) -
+                       pulse_input_names.begin());
+    return static_cast<std::uint8_t>(mask);
+}
+
+void read_ports(TableReader& reader, PortConfiguration& ports) {
+    reader.read("inputs", ports.inputs);
+    reader.read("falling", ports.falling);
+    for (const char* key : {"inputs", "falling"})
+        for (const std::string& name : *key == 'i' ? ports.inputs : ports.falling)
+            if (std::find(pulse_input_names.begin(), pulse_input_names.end(), name) ==
+                pulse_input_names.end())
+                reader.fail(key, fmt::format("'{}' is no input", name),
+                            fmt::format("use some of: {}", fmt::join(pulse_input_names, ", ")));
+    reader.read("imu_output", ports.imu_output);
+    reader.read("test", ports.test);
+    reader.read("sync_rate_hz", ports.sync_rate_hz, 0, 10);
+    reader.read("pulse_us", ports.pulse_us, 1, 1e4);
+    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < 0.1)
+        reader.fail("sync_rate_hz", "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10");
 }
 
 void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cameras) {
@@ -130,6 +175,59 @@ void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cam
             top.fail("camera",
                      fmt::format("camera '{}' uses output {}, which is taken", camera.name, camera.output),
                      "give each triggered camera an 'output' of its own, 0 to 3");
+}
+
+const CameraConfiguration* find_camera(const Configuration& configuration, const std::string& name) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.name == name && camera.trigger == TriggerSource::board) return &camera;
+    return nullptr;
+}
+
+/// A slave takes rate and phase of its master; masters have an exposure line and no master.
+void check_masters(TableReader& top, Configuration& configuration) {
+    for (CameraConfiguration& camera : configuration.cameras) {
+        if (camera.master.empty()) continue;
+        const CameraConfiguration* master = find_camera(configuration, camera.master);
+        if (master == nullptr || master == &camera || !master->master.empty() ||
+            master->strobe == Strobe::none) {
+            top.fail("camera",
+                     fmt::format("camera '{}' cannot have '{}' as its master", camera.name, camera.master),
+                     "name another camera that the board triggers, that has an exposure line and no master");
+            continue;
+        }
+        camera.rate_hz = master->rate_hz;
+        camera.phase_us = master->phase_us;
+        camera.max_exposure_us = master->max_exposure_us;
+    }
+}
+
+void check_imus(TableReader& top, const std::vector<ImuConfiguration>& imus) {
+    std::set<unsigned> taken;
+    for (const ImuConfiguration& imu : imus)
+        if (imu.model != nullptr && !taken.insert(imu.port()).second)
+            top.fail("imu",
+                     fmt::format("the board has one {} port for IMUs", imu.port() == 0 ? "SPI" : "UART"),
+                     "a vn100 is on the UART, all others on the SPI; remove one of the [[imu]] tables");
+}
+
+/// What `test` names, as the board has it; none: there is nothing of that name.
+std::optional<std::uint8_t> test_source(const Configuration& configuration) {
+    if (configuration.ports.test.empty()) return std::uint8_t{wire::test_none};
+    if (const CameraConfiguration* camera = find_camera(configuration, configuration.ports.test))
+        return static_cast<std::uint8_t>(wire::test_camera0 + camera->output);
+    for (const ImuConfiguration& imu : configuration.imus)
+        if (imu.name == configuration.ports.test)
+            return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
+    return std::nullopt;
+}
+
+void check_names(TableReader& top, const Configuration& configuration) {
+    for (const std::string& name : configuration.illumination.cameras)
+        if (find_camera(configuration, name) == nullptr)
+            top.fail("illumination", fmt::format("'{}' is no camera that the board triggers", name));
+    if (!test_source(configuration))
+        top.fail("ports", fmt::format("'test' names '{}', which is no triggered camera and no IMU",
+                                      configuration.ports.test));
 }
 
 std::uint32_t micro_hertz(double hertz) { return static_cast<std::uint32_t>(std::llround(hertz * 1e6)); }
@@ -195,9 +293,20 @@ Expected<Configuration> load_configuration(const std::string& path) {
         names.check(reader, configuration.imus.back().name);
         reader.finish();
     }
-    if (configuration.imus.size() > 1)
-        top.fail("imu", "the board has one IMU port", "remove the other [[imu]] tables");
+    if (const toml::table* table = top.table("illumination")) {
+        TableReader reader(file, *table);
+        read_illumination(reader, configuration.illumination);
+        reader.finish();
+    }
+    if (const toml::table* table = top.table("ports")) {
+        TableReader reader(file, *table);
+        read_ports(reader, configuration.ports);
+        reader.finish();
+    }
+    check_imus(top, configuration.imus);
     check_outputs(top, configuration.cameras);
+    check_masters(top, configuration);
+    check_names(top, configuration);
     top.finish();
     if (!file.result) return tl::unexpected(file.result.error());
     return configuration;
@@ -207,10 +316,33 @@ wire::Configuration board_configuration(const Configuration& configuration) {
     wire::Configuration out{};
     for (const CameraConfiguration& camera : configuration.cameras)
         if (camera.trigger == TriggerSource::board) out.cameras[camera.output] = board_camera(camera);
-    if (!configuration.imus.empty()) {
-        out.imu.kind = configuration.imus[0].model->kind;
-        out.imu.rate_uhz = micro_hertz(configuration.imus[0].rate_hz);
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        if (camera.master.empty()) continue;
+        wire::CameraConfiguration& slave = out.cameras[camera.output];
+        slave.flags |= wire::camera_slave;
+        slave.master = static_cast<std::uint8_t>(find_camera(configuration, camera.master)->output);
     }
+    for (const ImuConfiguration& imu : configuration.imus) {
+        wire::ImuConfiguration& port = out.imus[imu.port()];
+        port.kind = imu.model->kind;
+        port.rate_millihertz = static_cast<std::uint32_t>(std::llround(imu.rate_hz * 1e3));
+        port.filter = static_cast<std::uint8_t>(imu.filter);
+        if (imu.data_ready) port.options |= wire::imu_data_ready;
+    }
+    for (const std::string& name : configuration.illumination.cameras)
+        out.illumination.cameras |= static_cast<std::uint8_t>(1U << find_camera(configuration, name)->output);
+    if (configuration.illumination.inverted) out.illumination.flags |= wire::illumination_inverted;
+    out.illumination.lead_ns = short_ns(configuration.illumination.lead_us);
+    out.illumination.max_on_ns = short_ns(configuration.illumination.max_on_us);
+    out.illumination.duty_ppm =
+        static_cast<std::uint32_t>(std::llround(configuration.illumination.duty_percent * 1e4));
+    out.ports.inputs = pulse_inputs(configuration.ports.inputs);
+    out.ports.falling = pulse_inputs(configuration.ports.falling);
+    if (configuration.ports.imu_output) out.ports.options |= wire::port_imu_output;
+    out.ports.test = test_source(configuration).value_or(wire::test_none);
+    out.ports.sync_rate_uhz = micro_hertz(configuration.ports.sync_rate_hz);
+    out.ports.pulse_ns = short_ns(configuration.ports.pulse_us);
+    if (configuration.board.keep_configuration) out.flags |= wire::configuration_store;
     return out;
 }
 

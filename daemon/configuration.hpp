@@ -21,6 +21,7 @@ struct BoardConfiguration {
     std::string serial;        ///< empty: any
     std::uint16_t usb_vendor = 0x1209;
     std::uint16_t usb_product = 0x5653;
+    bool keep_configuration = false;  ///< it also holds after the board's next power-up
 };
 
 struct ClockConfiguration {
@@ -37,6 +38,7 @@ struct CameraConfiguration {
     std::string device;  ///< what Aravis finds it by: address, serial number or full name
     TriggerSource trigger = TriggerSource::board;
     unsigned output = 0;
+    std::string master;  ///< name of the camera whose exposure line triggers this one; empty: none
     double rate_hz = 20;
     double phase_us = 0;
     double exposure_us = 3000;
@@ -60,6 +62,28 @@ struct ImuConfiguration {
     std::string name = "imu0";
     const imu::ImuModel* model = nullptr;
     double rate_hz = 200;
+    unsigned filter = 0;
+    bool data_ready = false;
+
+    /// IMU port of the board: 0 SPI, 1 UART.
+    std::uint8_t port() const { return model->kind == wire::ImuKind::vn100 ? 1 : 0; }
+};
+
+struct IlluminationConfiguration {
+    std::vector<std::string> cameras;  ///< names; empty: no light
+    double lead_us = 100;
+    double max_on_us = 10000;
+    double duty_percent = 20;
+    bool inverted = false;
+};
+
+struct PortConfiguration {
+    std::vector<std::string> inputs;   ///< of pulse_input_names
+    std::vector<std::string> falling;  ///< those whose falling edge counts
+    bool imu_output = false;
+    std::string test;         ///< name of a camera or an IMU; empty: none
+    double sync_rate_hz = 0;  ///< 0: none
+    double pulse_us = 100;
 };
 
 struct Configuration {
@@ -69,6 +93,8 @@ struct Configuration {
     ClockConfiguration clock;
     std::vector<CameraConfiguration> cameras;
     std::vector<ImuConfiguration> imus;
+    IlluminationConfiguration illumination;
+    PortConfiguration ports;
 };
 
 /// Errors name file, line and column, and the cure.

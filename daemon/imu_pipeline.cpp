@@ -5,7 +5,10 @@ namespace versavis::daemon {
 
 ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
                          clock::Translator& translator)
-    : model_(*configuration.model), ring_(std::move(ring)), translator_(translator) {
+    : model_(*configuration.model),
+      port_(configuration.port()),
+      ring_(std::move(ring)),
+      translator_(translator) {
     report_.name = configuration.name;
     report_.model = model_.name;
 }

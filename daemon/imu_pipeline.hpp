@@ -31,10 +31,13 @@ class ImuPipeline {
     void board_restarted();
     void heartbeat(HostTime now);
     ImuReport report();
+    /// IMU port of the board.
+    std::uint8_t port() const { return port_; }
 
  private:
     std::mutex mutex_;
     const imu::ImuModel& model_;
+    std::uint8_t port_;
     ring::Writer ring_;
     clock::Translator& translator_;
     StampGuard guard_;

@@ -16,6 +16,42 @@ constexpr std::uint32_t status_slots = 8;
 constexpr std::uint32_t imu_items = 16384;  // 16 s at 1 kHz
 constexpr std::uint32_t event_items = 4096;
 
+EventKind event_kind(wire::EventKind kind) {
+    switch (kind) {
+        case wire::EventKind::trigger_skipped: return EventKind::trigger_skipped;
+        case wire::EventKind::stray_edge: return EventKind::stray_edge;
+        case wire::EventKind::output_late: return EventKind::output_late;
+        case wire::EventKind::edge_overflow: return EventKind::edge_overflow;
+        case wire::EventKind::pps: return EventKind::pps;
+        case wire::EventKind::aux_pulse: return EventKind::aux_pulse;
+        case wire::EventKind::sync_pulse: return EventKind::sync_pulse;
+        case wire::EventKind::input_noisy: return EventKind::input_noisy;
+        case wire::EventKind::illumination_limited: return EventKind::illumination_limited;
+        case wire::EventKind::imu_ready: return EventKind::imu_ready;
+        case wire::EventKind::imu_failed: return EventKind::imu_failed;
+        case wire::EventKind::imu_silent: return EventKind::imu_silent;
+    }
+    return {};
+}
+
+EventReason skip_reason(std::uint16_t detail) {
+    switch (static_cast<wire::SkipReason>(detail)) {
+        case wire::SkipReason::busy: return EventReason::camera_busy;
+        case wire::SkipReason::late: return EventReason::too_late;
+        case wire::SkipReason::full: return EventReason::queue_full;
+    }
+    return EventReason::none;
+}
+
+bool of_camera(wire::EventKind kind) {
+    return kind == wire::EventKind::trigger_skipped || kind == wire::EventKind::stray_edge;
+}
+
+bool of_imu(wire::EventKind kind) {
+    return kind == wire::EventKind::imu_ready || kind == wire::EventKind::imu_failed ||
+           kind == wire::EventKind::imu_silent;
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -48,7 +84,7 @@ Expected<> Service::make_parts() {
     for (const ImuConfiguration& imu : configuration_.imus) {
         auto ring = ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
         if (!ring) return tl::unexpected(ring.error());
-        imu_ = std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_);
+        imus_.push_back(std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_));
     }
     for (const CameraConfiguration& camera : configuration_.cameras) add_camera(camera);
     BoardListener& self = *this;
@@ -80,8 +116,8 @@ void Service::add_camera(const CameraConfiguration& configuration) {
 
 void Service::start() {
     const bool board_needed =
-        imu_ || std::any_of(cameras_.begin(), cameras_.end(),
-                            [](const CameraUnit& unit) { return unit.pipeline->triggered(); });
+        !imus_.empty() || std::any_of(cameras_.begin(), cameras_.end(),
+                                      [](const CameraUnit& unit) { return unit.pipeline->triggered(); });
     // Before the cameras make their rings: readers of streams that are no longer configured learn that they
     // are gone.
     std::vector<std::string> configured;
@@ -119,7 +155,7 @@ Service::CameraUnit* Service::camera_at(unsigned output) {
 
 /// Before the clock is: no record of the old life may be translated by the new clock.
 void Service::board_restarted() {
-    if (imu_) imu_->board_restarted();
+    for (auto& imu : imus_) imu->board_restarted();
     for (CameraUnit& unit : cameras_)
         if (unit.pipeline->triggered()) unit.pipeline->reset();
 }
@@ -140,25 +176,31 @@ void Service::exposure(const wire::Exposure& record) {
 }
 
 void Service::imu_sample(const wire::ImuSample& sample) {
-    if (imu_) imu_->add(sample);
+    for (auto& imu : imus_)
+        if (imu->port() == sample.imu) imu->add(sample);
 }
 
 void Service::board_event(const wire::Event& event) {
-    const auto kind = [&] {
-        switch (event.kind) {
-            case wire::EventKind::trigger_skipped: return EventKind::trigger_skipped;
-            case wire::EventKind::stray_edge: return EventKind::stray_edge;
-            case wire::EventKind::output_late: return EventKind::output_late;
-            case wire::EventKind::edge_overflow: return EventKind::edge_overflow;
-        }
-        return EventKind{};
-    }();
-    if (kind == EventKind{}) return;  // of a newer board
-    const bool of_camera = kind == EventKind::trigger_skipped || kind == EventKind::stray_edge;
-    const CameraUnit* unit = of_camera ? camera_at(event.source) : nullptr;
-    const auto index = unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
-    events_->add({kind, EventReason::none, index, unit != nullptr ? unit->configuration.name : "board",
-                  event.value, BoardTime{event.time_ns}});
+    Happening happening;
+    happening.kind = event_kind(event.kind);
+    if (happening.kind == EventKind{}) return;  // of a newer board
+    happening.source = event.source;
+    happening.source_name = "board";
+    happening.value = event.value;
+    happening.board_time = BoardTime{event.time_ns};
+    if (event.kind == wire::EventKind::trigger_skipped) happening.reason = skip_reason(event.detail);
+    if (of_camera(event.kind)) {
+        const CameraUnit* unit = camera_at(event.source);
+        happening.source = unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
+        if (unit != nullptr) happening.source_name = unit->configuration.name;
+    } else if (of_imu(event.kind)) {
+        for (auto& imu : imus_)
+            if (imu->port() == event.source) happening.source_name = imu->report().name;
+        const bool ready = event.kind == wire::EventKind::imu_ready;
+        log(ready ? LogLevel::info : LogLevel::warning, happening.source_name, "{}: step {}, value {}",
+            to_string(happening.kind), event.detail, event.value);
+    }
+    events_->add(happening);
 }
 
 void Service::tick() {
@@ -167,7 +209,7 @@ void Service::tick() {
         const bool wants_start = unit.pipeline->advance(now);
         if (wants_start && unit.camera->streaming() && board_->running()) start_camera(unit);
     }
-    if (imu_) imu_->heartbeat(now);
+    for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);
     status_ring_.heartbeat(now);
     if (now >= next_status_) publish_status(now);
@@ -184,7 +226,7 @@ std::vector<StreamStatus> Service::stream_status(HostTime now) {
         at = now;
     };
     for (CameraUnit& unit : cameras_) add(unit.configuration.name, "frames", unit.pipeline->items());
-    if (imu_) add(imu_->report().name, "imu", imu_->report().published);
+    for (auto& imu : imus_) add(imu->report().name, "imu", imu->report().published);
     add("events", "events", events_->items());
     add("status", "status", status_ring_.head());
     return streams;
@@ -196,7 +238,7 @@ void Service::publish_status(HostTime now) {
     status.instance = configuration_.instance;
     status.started = started_;
     status.now = now;
-    status.board_needed = imu_ != nullptr;
+    status.board_needed = !imus_.empty();
     status.board = board_->report();
     status.clock = translator_.report();
     for (CameraUnit& unit : cameras_) {
@@ -208,7 +250,7 @@ void Service::publish_status(HostTime now) {
         status.cameras.push_back(
             {unit.configuration.name, unit.pipeline->triggered(), stalled, unit.camera->report(), report});
     }
-    if (imu_) status.imus.push_back(imu_->report());
+    for (auto& imu : imus_) status.imus.push_back(imu->report());
     status.streams = stream_status(now);
     health_ = daemon::health(status);
     const std::string document = to_json(status);

@@ -66,7 +66,7 @@ class Service final : private BoardListener {
     clock::Translator translator_;
     ring::Writer status_ring_;
     std::unique_ptr<EventJournal> events_;
-    std::unique_ptr<ImuPipeline> imu_;
+    std::vector<std::unique_ptr<ImuPipeline>> imus_;
     std::vector<CameraUnit> cameras_;
     std::unique_ptr<BoardLink> board_;
     HostTime started_;

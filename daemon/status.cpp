@@ -32,21 +32,58 @@ std::string hint(const CameraStatus& status) {
     return status.stalled ? "triggers are sent but no frames come: check trigger cable and network" : "";
 }
 
+const char* to_string(wire::ResetCause cause) {
+    switch (cause) {
+        case wire::ResetCause::power_on: return "power_on";
+        case wire::ResetCause::pin: return "pin";
+        case wire::ResetCause::watchdog: return "watchdog";
+        case wire::ResetCause::brown_out: return "brown_out";
+        case wire::ResetCause::software: return "software";
+    }
+    return "unknown";
+}
+
+const char* to_string(wire::PpsState state) {
+    switch (state) {
+        case wire::PpsState::none: return "none";
+        case wire::PpsState::acquiring: return "acquiring";
+        case wire::PpsState::good: return "good";
+    }
+    return "unknown";
+}
+
 json board_json(const BoardReport& board, bool needed) {
-    return {{"state", needed ? to_string(board.state) : "unused"},
-            {"since_ns", board.since.ns},
-            {"hint", board.hint},
-            {"serial", board.serial},
-            {"firmware", board.firmware},
-            {"nonce", board.nonce},
-            {"connections", board.connections},
-            {"packets", board.packets},
-            {"lost_packets", board.lost_packets},
-            {"malformed_packets", board.malformed},
-            {"dropped_by_board", board.health.dropped_packets},
-            {"late_outputs", board.health.late_outputs},
-            {"lost_edges", board.health.lost_edges},
-            {"imu_errors", board.health.imu_errors}};
+    const wire::Health& health = board.health;
+    return {
+        {"state", needed ? to_string(board.state) : "unused"},
+        {"since_ns", board.since.ns},
+        {"hint", board.hint},
+        {"serial", board.serial},
+        {"firmware", board.firmware},
+        {"nonce", board.nonce},
+        {"connections", board.connections},
+        {"packets", board.packets},
+        {"lost_packets", board.lost_packets},
+        {"malformed_packets", board.malformed},
+        {"dropped_by_board", health.dropped_exposures + health.dropped_clock_answers + health.dropped_events +
+                                 health.dropped_imu_samples + health.dropped_logs},
+        {"dropped",
+         {{"exposures", health.dropped_exposures},
+          {"clock_answers", health.dropped_clock_answers},
+          {"events", health.dropped_events},
+          {"imu_samples", health.dropped_imu_samples},
+          {"logs", health.dropped_logs}}},
+        {"late_outputs", health.late_outputs},
+        {"lost_edges", health.lost_edges},
+        {"stray_edges", health.stray_edges},
+        {"noisy_inputs", health.noisy_inputs},
+        {"skipped_triggers", health.skipped_triggers},
+        {"imu_errors", health.imu_errors[0] + health.imu_errors[1]},
+        {"imu_restarts", health.imu_restarts},
+        {"loop_max_ns", health.loop_max_ns},
+        {"reset_cause", to_string(health.reset_cause)},
+        {"pps", to_string(health.pps_state)},
+        {"pps_error_ppb", health.pps_error_ppb}};
 }
 
 json clock_json(const clock::ClockReport& clock) {

@@ -3,53 +3,88 @@
 
 #include <cstring>
 
-#include "configuration_check.hpp"
+#include "imu/imu_output.hpp"
 
 namespace versavis::firmware {
 
 namespace {
 
-constexpr Nanoseconds commit_ahead = 1'000'000;
 constexpr Nanoseconds health_interval = 1'000'000'000;
-constexpr Nanoseconds start_delay = 5'000'000;  // from the command to the grid's origin
+constexpr Nanoseconds feed_interval = 200'000'000;
+constexpr Nanoseconds stuck_limit = 500'000'000;   // the output hardware moves on, or the watchdog bites
+constexpr Nanoseconds longest_wait = 200'000'000;  // for exposures, before a new configuration
+constexpr Nanoseconds stray_interval = 100'000'000;
+constexpr Nanoseconds default_sync_period = 1'000'000'000;
+constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
+
+constexpr std::uint32_t capabilities = wire::capability_exposure_compensation | wire::capability_imu |
+                                       wire::capability_start_pattern | wire::capability_slaves |
+                                       wire::capability_illumination | wire::capability_pulse_inputs |
+                                       wire::capability_sync | wire::capability_imu_output;
+
+Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
 }  // namespace
 
 Board::Board(const Hal& hal, const Identity& identity)
     : hal_(hal),
       identity_(identity),
+      transmitter_(hal_.link, hal_.clock, identity.nonce),
+      noise_(hal_.edges),
       outputs_(hal_.outputs),
-      cameras_{{0, outputs_, *this}, {1, outputs_, *this}, {2, outputs_, *this}, {3, outputs_, *this}},
-      imu_(hal_.imu_bus) {}
+      cameras_{{0, grid_clock_, outputs_, *this},
+               {1, grid_clock_, outputs_, *this},
+               {2, grid_clock_, outputs_, *this},
+               {3, grid_clock_, outputs_, *this}},
+      light_(outputs_, *this),
+      spi_imu_(0, hal_.imu_bus, *this),
+      uart_imu_(1, hal_.imu_uart, *this),
+      sync_(output_sync, outputs_),
+      test_(output_test, outputs_) {
+    health_.reset_cause = identity.reset_cause;
+    noise_.listen(0);
+    restore();
+}
 
 void Board::poll() {
+    const Nanoseconds began = hal_.clock.now();
     poll_link();
-    poll_edges();
+    poll_edges(began);
     const Nanoseconds now = hal_.clock.now();
     for (CameraChannel& camera : cameras_) camera.poll(now);
-    outputs_.commit(now + commit_ahead);
-    poll_imu(now);
+    light_.poll(now);
+    sync_.poll(now);
+    test_.poll(now);
+    poll_outputs(now);
+    poll_imus(now);
     poll_health(now);
+    transmitter_.pump();
+    polled_ = hal_.clock.now();
+    const Nanoseconds took = polled_ - (due_ < began ? due_ : began);
+    if (took > health_.loop_max_ns) health_.loop_max_ns = static_cast<std::uint32_t>(took);
+    due_ = next_wake();
 }
 
 Nanoseconds Board::next_wake() const {
-    Nanoseconds wake = greeted_ ? next_health_ : INT64_MAX;
+    Nanoseconds wake = polled_ + feed_interval;
     const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
+    if (greeted_) sooner(next_health_);
+    if (configuring_) sooner(configure_at_);
     for (const CameraChannel& camera : cameras_) sooner(camera.next_wake());
-    sooner(imu_.next_wake());
-    if (outputs_.next() != INT64_MAX) sooner(outputs_.next() - commit_ahead + 1);
+    sooner(light_.next_wake());
+    sooner(sync_.next_wake());
+    sooner(test_.next_wake());
+    sooner(spi_imu_.next_wake());
+    sooner(uart_imu_.next_wake());
+    sooner(noise_.next_wake());
+    // When the hardware's queue is full, the next word that leaves it calls.
+    if (!outputs_.empty() && !outputs_blocked_) sooner(outputs_.next() - OutputQueue::horizon + 1);
     return wake;
 }
 
 template <class T>
 void Board::send(const T& message) {
-    if (!greeted_) return;  // silent until the host has said hello
-    wire::encode(message, identity_.nonce, sequence_++, frame_);
-    // A number that is never sent shows the host that something was dropped here.
-    if (hal_.link.free_space() < frame_.size)
-        ++health_.dropped_packets;
-    else
-        hal_.link.write(frame_.bytes, frame_.size);
+    if (greeted_) transmitter_.send(message);  // silent until the host has said hello
 }
 
 void Board::poll_link() {
@@ -69,7 +104,7 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     wire::Reboot reboot;
     if (packet.read(hello)) return greet(hello);
     if (!greeted_) return;
-    if (packet.read(request)) return answer_clock(request, received);
+    if (packet.read(request)) return send(wire::ClockAnswer{request.id, 0, received, 0});
     if (packet.read(configuration)) return configure(configuration);
     if (packet.read(begin)) return start(begin);
     if (packet.read(end)) return stop(end.cameras);
@@ -85,14 +120,15 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
 void Board::greet(const wire::HostHello& hello) {
     // A board of another major version still says who it is: the host then tells the user what to update.
     greeted_ = true;
+    configuring_ = false;
     stop(0xFF);
+    transmitter_.begin();
     wire::BoardHello answer{};
     answer.major = wire::protocol_major;
     answer.minor = wire::protocol_minor;
     answer.cameras = camera_count;
     answer.reset_cause = identity_.reset_cause;
-    answer.capabilities =
-        wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern;
+    answer.capabilities = capabilities;
     answer.board_time_ns = hal_.clock.now();
     std::memcpy(answer.serial, identity_.serial, sizeof answer.serial);
     const char version[] = "versavis 0.1.0";
@@ -103,20 +139,115 @@ void Board::greet(const wire::HostHello& hello) {
 }
 
 void Board::configure(const wire::Configuration& configuration) {
+    if (any_running()) return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
+    wanted_ = configuration;
+    refused_ = 0;
+    check(configuration, *this);
+    if (refused_ != 0) return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
+    // Pulses that were decided end first, and their exposures: none is cut, and each has its record.
+    sync_.stop();
+    test_.stop();
+    configuring_ = true;
+    configure_at_ = hal_.clock.now() + longest_wait;
+}
+
+void Board::refuse(const wire::Refusal& refusal) {
+    wire::Refusal message = refusal;
+    message.id = wanted_.id;
+    ++refused_;
+    send(message);
+}
+
+void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus status) {
     wire::ConfigurationAnswer answer{};
-    answer.id = configuration.id;
-    if (any_running())
-        answer.status = wire::ConfigurationStatus::running;
-    else
-        check(configuration, answer);
-    if (answer.status == wire::ConfigurationStatus::taken) {
-        const Nanoseconds now = hal_.clock.now();
-        configuration_ = configuration;
-        for (std::size_t i = 0; i < camera_count; ++i) cameras_[i].configure(configuration.cameras[i], now);
-        imu_.configure(configuration.imu, now);
-    }
+    answer.id = id;
+    answer.status = status;
+    answer.refused = refused_;
     answer.taken = configuration_;
+    refused_ = 0;
     send(answer);
+}
+
+void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
+    apply_imus(configuration, now);
+    configuration_ = configuration;
+    for (std::size_t port = 0; port < wire::imu_count; ++port) {
+        wire::ImuConfiguration& imu = configuration_.imus[port];
+        imu.rate_millihertz = port == 0                         ? SpiImu::true_rate(imu)
+                              : imu.kind == wire::ImuKind::none ? imu.rate_millihertz
+                                                                : Vn100::true_rate(imu.rate_millihertz);
+    }
+    std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        cameras_[i].give_up();
+        cameras_[i].configure(configuration.cameras[i]);
+        outputs_.rest(i, cameras_[i].trigger_inverted(), now);
+        if (cameras_[i].has_strobe()) inputs |= 1U << i;
+    }
+    for (unsigned port = 0; port < wire::imu_count; ++port)
+        if ((configuration.imus[port].options & wire::imu_data_ready) != 0)
+            inputs |= 1U << (input_imu_ready + port);
+    noise_.listen(inputs);
+    light_.configure(configuration.illumination, now);
+    grid_clock_.begin(now, 0);
+    apply_routes();
+    begin_trains(now);
+}
+
+/// An IMU whose settings did not change goes on sampling.
+void Board::apply_imus(const wire::Configuration& configuration, Nanoseconds now) {
+    const auto changed = [&](std::size_t port, std::uint32_t true_rate) {
+        wire::ImuConfiguration wanted = configuration.imus[port];
+        wanted.rate_millihertz = true_rate;
+        return std::memcmp(&wanted, &configuration_.imus[port], sizeof wanted) != 0;
+    };
+    const wire::ImuConfiguration& spi = configuration.imus[0];
+    const wire::ImuConfiguration& uart = configuration.imus[1];
+    if (changed(0, SpiImu::true_rate(spi))) spi_imu_.configure(spi, now);
+    if (changed(1, Vn100::true_rate(uart.rate_millihertz))) uart_imu_.configure(uart, now);
+}
+
+void Board::apply_routes() {
+    Routes routes;
+    routes.light_cameras = configuration_.illumination.cameras;
+    routes.light_limit = configuration_.illumination.max_on_ns;
+    routes.light_inverted = (configuration_.illumination.flags & wire::illumination_inverted) != 0;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        const auto bit = static_cast<std::uint8_t>(1U << i);
+        if (!cameras_[i].has_strobe())
+            routes.light_cameras = static_cast<std::uint8_t>(routes.light_cameras & ~bit);
+        if (!cameras_[i].exposing(true)) routes.inverted_exposures |= bit;
+        if (cameras_[i].running()) routes.master[i] = cameras_[i].master();
+        if (cameras_[i].trigger_inverted()) routes.inverted_triggers |= bit;
+    }
+    const std::uint8_t test = configuration_.ports.test;
+    if (test >= wire::test_imu0) {
+        const auto port = static_cast<std::uint8_t>(test - wire::test_imu0);
+        if ((configuration_.imus[port].options & wire::imu_data_ready) != 0)
+            routes.test_input = static_cast<std::uint8_t>(input_imu_ready + port);
+    }
+    hal_.routing.route(routes);
+}
+
+void Board::begin_trains(Nanoseconds now) {
+    const wire::PortConfiguration& ports = configuration_.ports;
+    sync_.stop();
+    test_.stop();
+    if (ports.sync_rate_uhz != 0) sync_.begin(Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
+    const bool paced = (configuration_.imus[0].options & wire::imu_data_ready) == 0;
+    if (ports.test == wire::test_imu0 && paced && configuration_.imus[0].kind != wire::ImuKind::none)
+        test_.begin(spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
+}
+
+/// What was stored is in force from power-up: IMU and its output need no host.
+void Board::restore() {
+    wire::Configuration stored{};
+    std::uint8_t bytes[sizeof stored];
+    if (hal_.persist.load(bytes, sizeof bytes) != sizeof stored) return;
+    std::memcpy(&stored, bytes, sizeof stored);
+    check(stored, *this);
+    if (refused_ == 0) apply(stored, hal_.clock.now());
+    refused_ = 0;
 }
 
 bool Board::any_running() const {
@@ -125,68 +256,166 @@ bool Board::any_running() const {
     return false;
 }
 
+bool Board::all_idle() const {
+    for (const CameraChannel& camera : cameras_)
+        if (!camera.idle()) return false;
+    return true;
+}
+
 void Board::start(const wire::Start& start) {
-    const Nanoseconds now = hal_.clock.now();
-    // One grid for all: it begins with the first camera and goes on while any runs.
-    if (!any_running()) grid_origin_ = now + start_delay;
+    if (configuring_) return;  // it belongs to a configuration that was not answered yet
+    if ((start.flags & wire::start_on_sync) != 0 && !any_running())
+        on_sync_ = start;
+    else
+        start_cameras(start.cameras, start.flags);
+}
+
+void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
     for (unsigned i = 0; i < camera_count; ++i)
-        if ((start.cameras >> i & 1U) != 0)
-            cameras_[i].start(grid_origin_, now, (start.flags & wire::start_pattern) != 0);
+        if ((cameras >> i & 1U) != 0) cameras_[i].start(hal_.clock.now(), flags);
+    apply_routes();
 }
 
 void Board::stop(std::uint8_t cameras) {
+    on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~cameras);
     for (unsigned i = 0; i < camera_count; ++i)
         if ((cameras >> i & 1U) != 0) cameras_[i].stop();
+    apply_routes();
 }
 
-void Board::answer_clock(const wire::ClockRequest& request, Nanoseconds received) {
-    wire::ClockAnswer answer{};
-    answer.id = request.id;
-    answer.received_ns = received;
-    answer.sent_ns = hal_.clock.now();
-    send(answer);
-}
-
-void Board::poll_edges() {
+void Board::poll_edges(Nanoseconds now) {
+    noise_.poll(now);
     if (const std::uint32_t lost = hal_.edges.take_lost()) {
         health_.lost_edges += lost;
         for (CameraChannel& camera : cameras_) camera.edges_lost();
-        event(wire::EventKind::edge_overflow, 0, hal_.clock.now(), lost);
+        event(wire::EventKind::edge_overflow, 0, now, lost, 0);
     }
     Edge edge{};
-    while (hal_.edges.pop(edge))
-        if (edge.input < camera_count) cameras_[edge.input].edge(edge.at, edge.level);
-    if (const Nanoseconds late = hal_.outputs.take_lateness()) {
-        ++health_.late_outputs;
-        event(wire::EventKind::output_late, 0, hal_.clock.now(), late);
+    while (hal_.edges.pop(edge)) {
+        if (noise_.take(edge)) {
+            take_edge(edge, now);
+            continue;
+        }
+        ++health_.noisy_inputs;
+        if (edge.input < camera_count) cameras_[edge.input].edges_lost();
+        event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
     }
 }
 
-void Board::poll_imu(Nanoseconds now) {
+void Board::take_edge(const Edge& edge, Nanoseconds now) {
+    if (edge.input < camera_count) return take_exposure_edge(edge, now);
+    if (edge.input >= input_pulse) {
+        const auto input = static_cast<wire::PulseInput>(edge.input - input_pulse);
+        const bool falling = (configuration_.ports.falling >> input & 1U) != 0;
+        if (edge.level != falling) take_pulse(input, edge.at);
+    } else if (edge.level && edge.input == input_imu_ready) {
+        spi_imu_.ready_edge(edge.at, now);
+    } else if (edge.level) {
+        uart_imu_.ready_edge(edge.at);
+    }
+}
+
+void Board::take_exposure_edge(const Edge& edge, Nanoseconds now) {
+    CameraChannel& master = cameras_[edge.input];
+    const bool exposing = master.exposing(edge.level);
+    const std::uint64_t tick = master.tick_at(edge.at);
+    master.edge(edge.at, edge.level);
+    for (CameraChannel& slave : cameras_)
+        if (slave.enabled() && slave.master() == edge.input) slave.master_edge(edge.at, exposing, tick);
+    light_.edge(edge.input, exposing, now);
+}
+
+void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
+    const std::uint32_t number = ++pulses_[input];
+    switch (input) {
+        case wire::pulse_pps: pps_.pulse(at); return event(wire::EventKind::pps, 0, at, number, 0);
+        case wire::pulse_aux0:
+        case wire::pulse_aux1:
+            return event(wire::EventKind::aux_pulse, static_cast<std::uint8_t>(input - wire::pulse_aux0), at,
+                         number, 0);
+        case wire::pulse_sync: break;
+    }
+    event(wire::EventKind::sync_pulse, 0, at, number, 0);
+    if (on_sync_.cameras == 0) {
+        grid_clock_.sync_pulse(at);
+        return;
+    }
+    const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
+    grid_clock_.begin(at, rate == 0 ? default_sync_period : uhz_ns / rate);
+    begin_trains(hal_.clock.now());
+    start_cameras(on_sync_.cameras, on_sync_.flags);
+    on_sync_ = {};
+}
+
+void Board::poll_outputs(Nanoseconds now) {
+    outputs_blocked_ = !outputs_.commit(now);
+    if (!outputs_blocked_) output_progress_ = now;
+    if (now - output_progress_ < stuck_limit) hal_.watchdog.feed();
+    OutputSchedule::Late late{};
+    while (hal_.outputs.take_late(late)) {
+        ++health_.late_outputs;
+        for (CameraChannel& camera : cameras_) camera.left_late(late.asked, late.left);
+        light_.left_late(late.asked, late.left);
+        event(wire::EventKind::output_late, 0, late.asked, late.left - late.asked, 0);
+    }
+    const bool ready = configuring_ && (all_idle() || now >= configure_at_);
+    if (ready) light_.stop(now);
+    if (!ready || !outputs_.empty()) return;
+    configuring_ = false;
+    apply(wanted_, now);
+    if ((wanted_.flags & wire::configuration_store) != 0)
+        hal_.persist.store(reinterpret_cast<const std::uint8_t*>(&wanted_), sizeof wanted_);
+    answer_configuration(wanted_.id, wire::ConfigurationStatus::taken);
+}
+
+void Board::poll_imus(Nanoseconds now) {
     wire::ImuSample sample;
-    if (imu_.poll(now, sample)) send(sample);
+    if (spi_imu_.poll(now, sample)) {
+        send(sample);
+        ImuImage image;
+        const bool serves = (configuration_.ports.options & wire::port_imu_output) != 0;
+        if (serves && adis16448_image(sample, image)) hal_.imu_output.publish(image);
+    }
+    while (uart_imu_.poll(now, sample)) send(sample);
 }
 
 void Board::poll_health(Nanoseconds now) {
     if (!greeted_ || now < next_health_) return;
-    next_health_ += health_interval;
+    next_health_ = max(next_health_ + health_interval, now);
     health_.board_time_ns = now;
+    transmitter_.count_drops(health_);
     health_.receive_errors = decoder_.errors();
-    health_.imu_errors = imu_.errors();
-    health_.output_queue_max = static_cast<std::uint32_t>(outputs_.high_water());
+    health_.imu_errors[0] = spi_imu_.errors();
+    health_.imu_errors[1] = uart_imu_.errors();
+    health_.imu_restarts = spi_imu_.restarts() + uart_imu_.restarts();
+    health_.skipped_triggers = 0;
+    for (const CameraChannel& camera : cameras_) health_.skipped_triggers += camera.skipped();
+    health_.output_queue_max = static_cast<std::uint32_t>(outputs_.take_high_water());
+    health_.link_queue_max = transmitter_.take_high_water();
+    health_.pps_state = pps_.state(now);
+    health_.pps_error_ppb = pps_.error_ppb();
     send(health_);
+    health_.loop_max_ns = 0;
 }
 
 void Board::exposure(const wire::Exposure& record) { send(record); }
 
-void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value) {
-    wire::Event message{};
-    message.kind = kind;
-    message.source = source;
-    message.sequence = event_sequence_++;
-    message.time_ns = at;
-    message.value = value;
-    send(message);
+void Board::exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) {
+    light_.plan(camera, start, duration, cameras_[camera].has_strobe(), hal_.clock.now());
+    if (configuration_.ports.test != wire::test_camera0 + camera) return;
+    const Nanoseconds middle = outputs_.set(start + duration / 2, output_test, true);
+    outputs_.set(middle + configuration_.ports.pulse_ns, output_test, false);
+}
+
+void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+                  std::uint16_t detail) {
+    if (kind == wire::EventKind::stray_edge) {
+        // A line that floats makes many; all are counted, some are told.
+        ++health_.stray_edges;
+        if (at < next_stray_) return;
+        next_stray_ = at + stray_interval;
+    }
+    send(wire::Event{kind, source, detail, event_sequence_++, at, value});
 }
 
 }  // namespace versavis::firmware

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board: link, cameras and IMU behind one poll(), on any port that offers the HAL.
+// The board: link, cameras, IMUs, light and pulses behind one poll(), on any port that offers the HAL.
 #pragma once
 
 #include "camera_channel.hpp"
+#include "configuration_check.hpp"
 #include "hal.hpp"
-#include "imu_sampler.hpp"
+#include "illumination.hpp"
+#include "imu/spi_imu.hpp"
+#include "imu/vn100.hpp"
+#include "noise_guard.hpp"
 #include "output_queue.hpp"
-#include "versavis/wire/packet.hpp"
+#include "pps_monitor.hpp"
+#include "pulse_train.hpp"
+#include "transmitter.hpp"
 
 namespace versavis::firmware {
 
@@ -16,48 +22,80 @@ struct Identity {
     char serial[16] = {};
 };
 
-class Board final : private ChannelReports {
+class Board final : private ChannelReports, private RefusalSink {
  public:
     Board(const Hal& hal, const Identity& identity);
     Board(const Board&) = delete;
     Board& operator=(const Board&) = delete;
 
-    /// Does all that is due. Call it at next_wake(), when bytes or edges came, and when a burst completed.
+    /// Does all that is due. Call it at next_wake(); when bytes, edges or an output word came or went; and
+    /// when a transfer completed.
     void poll();
 
     Nanoseconds next_wake() const;
 
  private:
     void exposure(const wire::Exposure& record) override;
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value) override;
+    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+               std::uint16_t detail) override;
+    void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) override;
+    void refuse(const wire::Refusal& refusal) override;
 
     void poll_link();
-    void poll_edges();
-    void poll_imu(Nanoseconds now);
+    void poll_edges(Nanoseconds now);
+    void poll_outputs(Nanoseconds now);
+    void poll_imus(Nanoseconds now);
     void poll_health(Nanoseconds now);
+    void take_edge(const Edge& edge, Nanoseconds now);
+    void take_exposure_edge(const Edge& edge, Nanoseconds now);
+    void take_pulse(wire::PulseInput input, Nanoseconds at);
     void handle(const wire::Packet& packet, Nanoseconds received);
     void greet(const wire::HostHello& hello);
     void configure(const wire::Configuration& configuration);
+    void apply(const wire::Configuration& configuration, Nanoseconds now);
+    void apply_imus(const wire::Configuration& configuration, Nanoseconds now);
+    void apply_routes();
+    void begin_trains(Nanoseconds now);
+    void restore();
+    void answer_configuration(std::uint32_t id, wire::ConfigurationStatus status);
     void start(const wire::Start& start);
+    void start_cameras(std::uint8_t cameras, std::uint8_t flags);
     void stop(std::uint8_t cameras);
-    void answer_clock(const wire::ClockRequest& request, Nanoseconds received);
     bool any_running() const;
+    bool all_idle() const;
     template <class T>
     void send(const T& message);
 
     Hal hal_;
     Identity identity_;
+    Transmitter transmitter_;
+    NoiseGuard noise_;
     OutputQueue outputs_;
+    GridClock grid_clock_;
+    GridClock board_clock_;  ///< passes as board time does
     CameraChannel cameras_[camera_count];
-    ImuSampler imu_;
-    wire::Configuration configuration_{};
+    Illumination light_;
+    SpiImu spi_imu_;
+    Vn100 uart_imu_;
+    PulseTrain sync_;
+    PulseTrain test_;
+    PpsMonitor pps_;
     wire::Decoder decoder_;
-    wire::Frame frame_{};
+    wire::Configuration configuration_{};  ///< in force
+    wire::Configuration wanted_{};         ///< waits for the last pulses and exposures to end
+    bool configuring_ = false;
+    Nanoseconds configure_at_ = 0;  ///< at the latest
+    wire::Start on_sync_{};         ///< waits for a sync pulse
+    std::uint8_t refused_ = 0;
     bool greeted_ = false;
-    Nanoseconds grid_origin_ = 0;
+    bool outputs_blocked_ = false;
+    Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
-    std::uint32_t sequence_ = 0;
+    Nanoseconds due_ = never;
+    Nanoseconds polled_ = 0;
+    Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be told
     std::uint32_t event_sequence_ = 0;
+    std::uint32_t pulses_[wire::pulse_input_count] = {};
     wire::Health health_{};
 };
 

@@ -1,93 +1,90 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One camera: places its triggers so that the middles of its exposures lie on the grid, and records what it
-// did.
+// One camera: places its triggers so that the middles of its exposures lie on the grid, or follows its
+// master, and records what it did.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
+#include "announcements.hpp"
+#include "exposure_tracker.hpp"
 #include "grid.hpp"
-#include "hal.hpp"
+#include "grid_clock.hpp"
 #include "output_queue.hpp"
-#include "versavis/wire/messages.hpp"
 
 namespace versavis::firmware {
 
-/// Where a channel reports to.
-struct ChannelReports {
-    virtual void exposure(const wire::Exposure& record) = 0;
-    virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value) = 0;
-
- protected:
-    ~ChannelReports() = default;
-};
-
 class CameraChannel {
  public:
-    CameraChannel(std::uint8_t camera, OutputQueue& outputs, ChannelReports& reports)
-        : camera_(camera), outputs_(outputs), reports_(reports) {}
+    CameraChannel(std::uint8_t camera, const GridClock& clock, OutputQueue& outputs, ChannelReports& reports)
+        : camera_(camera), clock_(clock), outputs_(outputs), reports_(reports), tracker_(camera, reports) {}
 
-    void configure(const wire::CameraConfiguration& configuration, Nanoseconds now);
+    /// Only while stopped and idle. Numbers go on.
+    void configure(const wire::CameraConfiguration& configuration);
 
-    /// Begins triggering on the grid through `origin`, the first tick not before `now`; numbers go on.
-    void start(Nanoseconds origin, Nanoseconds now, bool pattern);
+    /// Begins triggering at the first grid point that can be met after `now`; flags: wire::StartFlag. A
+    /// channel that runs begins its pattern anew.
+    void start(Nanoseconds now, std::uint8_t flags);
 
     /// Pulses that were decided are still sent, and recorded.
     void stop() { running_ = false; }
     bool running() const { return running_; }
+    /// True: no exposure is waited for.
+    bool idle() const { return tracker_.empty(); }
+    /// Ends the wait for exposures.
+    void give_up() { tracker_.give_up(); }
 
+    /// From `trigger` on, exposures last for `exposure`, until others are measured.
     void announce(std::uint64_t trigger, Nanoseconds exposure);
 
     /// Takes an edge of the exposure line; edges come in order.
     void edge(Nanoseconds at, bool level);
 
-    /// Edges were lost: an end that comes now may belong to another exposure than the start that was seen.
-    void edges_lost();
+    /// The exposure line of this slave's master changed; `tick` is the master's.
+    void master_edge(Nanoseconds at, bool exposing, std::uint64_t tick);
+
+    void edges_lost() { tracker_.edges_lost(); }
+    void left_late(Nanoseconds asked, Nanoseconds left) { tracker_.left_late(asked, left); }
 
     /// Decides the triggers that are due and gives up exposures that did not happen.
     void poll(Nanoseconds now);
 
-    /// When poll() has something to do next; INT64_MAX: never.
+    /// When poll() has something to do next.
     Nanoseconds next_wake() const;
 
- private:
-    /// A trigger that was sent and whose record is not complete.
-    struct Flight {
-        wire::Exposure record;
-        Nanoseconds expected;  ///< duration
-    };
-    static constexpr std::size_t max_flights = 4;
+    bool enabled() const { return has(wire::camera_enabled); }
+    bool exposing(bool level) const { return level != has(wire::camera_strobe_inverted); }
+    bool has_strobe() const { return enabled() && !has(wire::camera_no_strobe); }
+    /// Camera whose exposure line triggers this one; not_routed: none.
+    std::uint8_t master() const { return has(wire::camera_slave) ? configuration_.master : not_routed; }
+    bool trigger_inverted() const { return has(wire::camera_trigger_inverted); }
+    std::uint64_t tick_at(Nanoseconds at) const { return tracker_.tick_at(at); }
+    std::uint32_t skipped() const { return skipped_; }
 
-    Nanoseconds trigger_time() const;
+ private:
+    Nanoseconds period() const { return grid_.period(); }
     Nanoseconds expected_exposure() const;
-    Nanoseconds busy_until(Nanoseconds now) const;
-    Nanoseconds deadline(const Flight& flight) const;
-    bool in_pattern_gap() const;
+    Nanoseconds trigger_time() const;
+    bool wanted(std::uint64_t tick) const;
     void decide(Nanoseconds now);
+    void skip(wire::SkipReason reason, Nanoseconds at);
     void send_trigger(Nanoseconds at, Nanoseconds now);
-    void start_edge(Nanoseconds at);
-    void end_edge(Nanoseconds at);
-    void expire(Nanoseconds now);
-    void finish(std::size_t index);
-    void predict_edges(Flight& flight) const;
+    std::uint16_t phase_flags() const;
+    wire::Exposure new_record(Nanoseconds at, std::uint64_t tick);
     bool has(wire::CameraFlag flag) const { return (configuration_.flags & flag) != 0; }
 
     std::uint8_t camera_;
+    const GridClock& clock_;
     OutputQueue& outputs_;
     ChannelReports& reports_;
+    ExposureTracker tracker_;
     wire::CameraConfiguration configuration_{};
-    Grid grid_;
+    Grid grid_;  ///< in grid time
     bool running_ = false;
+    std::uint8_t start_flags_ = 0;
     std::uint64_t trigger_ = 0;     ///< pulses sent since boot
     std::uint64_t first_tick_ = 0;  ///< of this run, where the pattern begins
-    bool pattern_ = false;
     Nanoseconds expected_ = 0;
     std::uint64_t expected_since_ = 0;  ///< trigger that set `expected_`
-    std::uint64_t announced_from_ = 0;  ///< 0: nothing announced
-    Nanoseconds announced_ = 0;
-    Nanoseconds last_end_ = INT64_MIN / 2;  ///< end of the newest finished exposure
-    Flight flights_[max_flights] = {};
-    std::size_t flight_count_ = 0;
+    Announcements announcements_;
+    std::uint32_t skipped_ = 0;
 };
 
 }  // namespace versavis::firmware

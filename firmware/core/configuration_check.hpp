@@ -6,7 +6,14 @@
 
 namespace versavis::firmware {
 
-/// Fills status, refused field and its range; `taken` is the caller's.
-void check(const wire::Configuration& configuration, wire::ConfigurationAnswer& answer);
+/// Takes what is refused, field by field.
+struct RefusalSink {
+    virtual void refuse(const wire::Refusal& refusal) = 0;
+
+ protected:
+    ~RefusalSink() = default;
+};
+
+void check(const wire::Configuration& configuration, RefusalSink& sink);
 
 }  // namespace versavis::firmware

@@ -13,9 +13,10 @@ Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level) {
     return at;
 }
 
-void OutputQueue::commit(Nanoseconds until) {
+bool OutputQueue::commit(Nanoseconds now) {
     std::size_t taken = 0;
-    while (taken < size_ && edges_[taken].at < until) {
+    bool accepted = true;
+    while (taken < size_ && edges_[taken].at < now + horizon) {
         const Nanoseconds at = edges_[taken].at;
         std::uint32_t levels = levels_;
         std::size_t end = taken;
@@ -23,22 +24,23 @@ void OutputQueue::commit(Nanoseconds until) {
             const std::uint32_t bit = 1U << edges_[end].output;
             levels = edges_[end].level ? levels | bit : levels & ~bit;
         }
-        if (!hardware_.push(at, levels)) break;  // the hardware's queue is full: try again at the next poll
+        accepted = hardware_.push(at, levels);
+        if (!accepted) break;  // it is tried again at the next poll
         levels_ = levels;
         committed_until_ = at;
         taken = end;
     }
     for (std::size_t i = taken; i < size_; ++i) edges_[i - taken] = edges_[i];
     size_ -= taken;
+    return accepted;
 }
 
-void OutputQueue::cancel(unsigned output, bool idle, Nanoseconds now) {
+bool OutputQueue::cancel(unsigned output) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size_; ++i)
         if (edges_[i].output != output) edges_[kept++] = edges_[i];
     size_ = kept;
-    const bool level = (levels_ >> output & 1U) != 0;
-    if (level != idle) set(now, output, idle);
+    return (levels_ >> output & 1U) != 0;
 }
 
 }  // namespace versavis::firmware

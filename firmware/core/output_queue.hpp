@@ -11,25 +11,40 @@ namespace versavis::firmware {
 
 class OutputQueue {
  public:
+    /// What is set to leave sooner than this after now goes to the hardware, and stays.
+    static constexpr Nanoseconds horizon = 1'000'000;
+
     explicit OutputQueue(OutputSchedule& hardware) : hardware_(hardware) {}
 
-    /// True while both edges of a pulse can be set.
-    bool has_room() const { return size_ + 2 <= capacity; }
+    /// True while the edges of a camera's pulse, its light and the test output can be set.
+    bool has_room() const { return size_ + 8 <= capacity; }
+    bool empty() const { return size_ == 0; }
 
     /// Sets the level of `output` at `at`, or as soon as possible after what was already committed. Returns
     /// the instant. Without room nothing is set.
     Nanoseconds set(Nanoseconds at, unsigned output, bool level);
 
-    /// Hands to the hardware what is due before `until`.
-    void commit(Nanoseconds until);
+    /// Hands to the hardware what is due within the horizon. False: its queue is full.
+    bool commit(Nanoseconds now);
 
-    /// Instant of the first edge that is not committed; INT64_MAX: none.
-    Nanoseconds next() const { return size_ == 0 ? INT64_MAX : edges_[0].at; }
+    /// Instant of the first edge that is not committed; never: none.
+    Nanoseconds next() const { return size_ == 0 ? never : edges_[0].at; }
 
-    /// Removes the edges of `output` that are not committed; its level goes to `idle` at once.
-    void cancel(unsigned output, bool idle, Nanoseconds now);
+    /// Removes the edges of `output` that are not committed. Returns the level that it is left at.
+    bool cancel(unsigned output);
 
-    std::size_t high_water() const { return high_water_; }
+    /// cancel(), and to `level` as soon as possible. Returns when it will be there at the latest.
+    Nanoseconds rest(unsigned output, bool level, Nanoseconds now) {
+        if (cancel(output) != level) return set(now, output, level);
+        return committed_until_ > now ? committed_until_ : now;
+    }
+
+    /// Most edges that waited since the last call.
+    std::size_t take_high_water() {
+        const std::size_t most = high_water_;
+        high_water_ = size_;
+        return most;
+    }
 
  private:
     struct PendingEdge {
@@ -37,7 +52,7 @@ class OutputQueue {
         std::uint8_t output;
         bool level;
     };
-    static constexpr std::size_t capacity = 32;  // 4 outputs x 2 edges x 3 triggers ahead, with room
+    static constexpr std::size_t capacity = 64;  // 8 outputs x 2 edges x 3 pulses ahead, with room
 
     OutputSchedule& hardware_;
     PendingEdge edges_[capacity] = {};

@@ -15,42 +15,76 @@
 
 namespace versavis::firmware {
 
+/// Pins that are outputs, as Surroundings sees them. The triggers of cameras 0 to 3 are bits 0 to 3.
+enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
+
 /// What is connected to the board. Called from run_until(), with the instants at which the hardware would
-/// act.
+/// act. What is not set is not connected.
 struct Surroundings {
-    std::function<void(Nanoseconds at, std::uint32_t levels)> outputs_changed;
-    /// A burst that started at `at`: fills `received`, as long as `transmitted`.
-    std::function<void(Nanoseconds at, std::span<const std::uint8_t> transmitted,
-                       std::span<std::uint8_t> received)>
-        imu_burst;
+    std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
+    /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
+    std::function<void(Nanoseconds at, const ImuTransfer& transfer, std::span<std::uint8_t> received)>
+        imu_transfer;
+    std::function<void(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes)> uart_sent;
+    std::function<void(Nanoseconds at)> imu_output_ready;
     std::function<void(bool to_boot_loader)> reboot;
+    /// What the board stores, and finds when it begins.
+    std::vector<std::uint8_t>* flash = nullptr;
 };
 
 /// Events happen at the instants of the model, not when the process wakes up: after a late call of
 /// run_until() all that lies in between is made up for, in order. Not thread-safe.
-class NativeBoard final : Clock64, OutputSchedule, EdgeStream, ImuBus, ByteLink, Rebooter {
+class NativeBoard final : Clock64,
+                          OutputSchedule,
+                          EdgeStream,
+                          Routing,
+                          ImuBus,
+                          ImuOutput,
+                          ByteLink,
+                          Persist,
+                          Rebooter,
+                          Watchdog {
  public:
-    NativeBoard(const Identity& identity, Surroundings surroundings);
+    NativeBoard(const Identity& identity, Surroundings surroundings, Nanoseconds boot = 0);
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
 
-    /// An edge of an exposure line, not before the current time.
+    /// An edge at an input, not before the current time.
     void schedule_edge(const Edge& edge) { edges_.push(edge); }
+
+    /// Level of an input at rest, before its first edge.
+    void set_level(std::uint8_t input, bool level);
 
     /// Bytes of the host that entered the board at `at`; handled by the next run_until().
     void receive(std::span<const std::uint8_t> bytes, Nanoseconds at);
 
+    /// Bytes of the IMU on the UART whose last one arrives at `at`, in the order of time.
+    void uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at);
+
     /// Runs everything up to and including `until`.
     void run_until(Nanoseconds until);
+
+    /// From now on the code stands still and the hardware goes on, or both go on.
+    void set_stalled(bool stalled) { stalled_ = stalled; }
+    /// True: it stood still for longer than the watchdog allows.
+    bool watchdog_bit() const { return watchdog_bit_; }
+
+    /// From now on no IMU transfer completes, or all do again.
+    void set_imu_bus_stuck(bool stuck) { imu_bus_stuck_ = stuck; }
 
     /// When run_until() has something to do next, if no bytes come.
     Nanoseconds next_wake() const;
 
-    /// Bytes for the host that were not consumed yet; at `link_capacity` of them the core drops packets.
+    /// Bytes for the host that were not consumed yet; at the capacity the core has to wait.
     std::span<const std::uint8_t> transmitted() const { return transmitted_; }
     void consume(std::size_t size);
+    void set_link_capacity(std::size_t bytes) { link_capacity_ = bytes; }
 
-    static constexpr std::size_t link_capacity = 64 * 1024;
+    /// What another SPI master reads from the second port in one selection.
+    std::vector<std::uint16_t> read_imu_output(std::span<const std::uint16_t> words);
+
+    static constexpr Nanoseconds routing_latency = 50;
+    static constexpr Nanoseconds watchdog_limit = 1'000'000'000;
 
  private:
     struct Later {
@@ -62,33 +96,79 @@ class NativeBoard final : Clock64, OutputSchedule, EdgeStream, ImuBus, ByteLink,
     };
     struct Burst {
         Nanoseconds at;
-        std::vector<std::uint8_t> transmitted;
+        ImuTransfer transfer;
+    };
+    struct UartBytes {
+        Nanoseconds at;
+        std::vector<std::uint8_t> bytes;
     };
     static constexpr std::size_t word_capacity = 64;
+    static constexpr std::size_t edge_capacity = 256;
 
     Nanoseconds now() override { return now_; }
     bool push(Nanoseconds at, std::uint32_t levels) override;
-    Nanoseconds take_lateness() override;
+    bool take_late(Late& late) override;
+    void listen(std::uint32_t inputs) override { listened_ = inputs; }
     bool pop(Edge& edge) override;
-    std::uint32_t take_lost() override { return 0; }
-    bool start(Nanoseconds at, const std::uint8_t* transmit, std::size_t size) override;
-    bool complete(Transfer& transfer) override;
-    std::size_t free_space() override { return link_capacity - transmitted_.size(); }
-    void write(const std::uint8_t* data, std::size_t size) override;
+    std::uint32_t take_lost() override;
+    void route(const Routes& routes) override;
+    bool start(Nanoseconds at, const ImuTransfer& transfer) override;
+    bool complete(ImuReply& reply) override;
+    void abort() override { burst_.reset(); }
     std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
-    void reboot(bool to_boot_loader) override { surroundings_.reboot(to_boot_loader); }
+    void write(const std::uint8_t* data, std::size_t size) override;
+    std::size_t free_space() override;
+    void publish(const ImuImage& image) override;
+    std::size_t load(std::uint8_t* data, std::size_t capacity) override;
+    void store(const std::uint8_t* data, std::size_t size) override;
+    void reboot(bool to_boot_loader) override;
+    void feed() override { fed_ = now_; }
+
+    /// Apart, since its functions have the names of the link's.
+    struct Uart final : ImuUart {
+        explicit Uart(NativeBoard& of) : board(of) {}
+        void set_baud(std::uint32_t baud) override { board.baud_ = baud; }
+        void write(const std::uint8_t* data, std::size_t size) override;
+        std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
+        NativeBoard& board;
+    };
 
     Nanoseconds burst_end() const;
+    void advance_hardware();
+    void set_input(std::uint8_t input, bool level);
+    void apply(const Edge& edge);
+    Nanoseconds light_cut() const;
+    void drive_pins(Nanoseconds at);
+    bool exposing(unsigned camera) const;
 
     Surroundings surroundings_;
-    Nanoseconds now_ = 0;
-    Nanoseconds lateness_ = 0;
+    Uart uart_{*this};
+    Nanoseconds now_;
+    Nanoseconds fed_;
+    bool watchdog_bit_ = false;
+    bool attention_ = true;  ///< the core has something to do at once
     std::deque<Word> words_;
+    std::uint32_t levels_ = 0;  ///< of the schedule
+    std::deque<Late> late_;
+    Routes routes_;
+    std::uint32_t inputs_ = 0;  ///< levels
+    std::uint32_t pins_ = 0;
+    Nanoseconds lit_since_ = never;  ///< never: it is dark
+    bool light_cut_ = false;         ///< the limit was reached
+    std::uint32_t listened_ = 0;
     std::priority_queue<Edge, std::vector<Edge>, Later> edges_;
+    std::deque<Edge> stamped_;
+    std::uint32_t lost_edges_ = 0;
     std::optional<Burst> burst_;
+    bool imu_bus_stuck_ = false;
+    bool stalled_ = false;
+    std::uint32_t baud_ = 115'200;
+    std::deque<UartBytes> uart_bytes_;
+    ImuImage image_;
     std::deque<std::uint8_t> received_;
     Nanoseconds received_at_ = 0;
     std::vector<std::uint8_t> transmitted_;
+    std::size_t link_capacity_ = std::size_t{64} * 1024;
     Board board_;
 };
 

@@ -27,6 +27,14 @@ const char* to_string(EventKind kind) {
         case EventKind::pairing_locked: return "pairing_locked";
         case EventKind::pairing_slipped: return "pairing_slipped";
         case EventKind::edge_overflow: return "edge_overflow";
+        case EventKind::pps: return "pps";
+        case EventKind::aux_pulse: return "aux_pulse";
+        case EventKind::sync_pulse: return "sync_pulse";
+        case EventKind::input_noisy: return "input_noisy";
+        case EventKind::illumination_limited: return "illumination_limited";
+        case EventKind::imu_ready: return "imu_ready";
+        case EventKind::imu_failed: return "imu_failed";
+        case EventKind::imu_silent: return "imu_silent";
     }
     return "unknown";
 }
@@ -43,6 +51,9 @@ const char* to_string(EventReason reason) {
         case EventReason::wrong_size: return "wrong_size";
         case EventReason::reset: return "reset";
         case EventReason::trigger_ignored: return "trigger_ignored";
+        case EventReason::camera_busy: return "camera_busy";
+        case EventReason::too_late: return "too_late";
+        case EventReason::queue_full: return "queue_full";
     }
     return "unknown";
 }

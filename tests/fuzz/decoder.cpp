@@ -13,14 +13,43 @@ namespace {
 
 constexpr firmware::Nanoseconds step_ns = 200'000;
 
-firmware::Surroundings nothing_connected() {
+/// An IMU that answers with its input bytes over and over.
+firmware::Surroundings babbling(std::span<const std::uint8_t> bytes) {
     firmware::Surroundings surroundings;
-    surroundings.outputs_changed = [](auto, auto) {};
-    surroundings.imu_burst = [](auto, auto, auto received) {
-        std::fill(received.begin(), received.end(), std::uint8_t{0});
+    surroundings.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&, auto received) mutable {
+        for (std::uint8_t& byte : received) byte = bytes.empty() ? 0xFF : bytes[next++ % bytes.size()];
     };
-    surroundings.reboot = [](bool) {};
     return surroundings;
+}
+
+/// Something of everything.
+wire::Configuration full_configuration(std::uint8_t choice) {
+    wire::Configuration configuration{};
+    for (unsigned i = 0; i < wire::camera_count; ++i)
+        configuration.cameras[i] = {wire::camera_enabled | (choice >> i & 1U) << 1U,
+                                    200'000'000,
+                                    0,
+                                    10'000,
+                                    0,
+                                    0,
+                                    1'000'000,
+                                    4'000'000,
+                                    0,
+                                    {}};
+    configuration.cameras[3].flags |= wire::camera_slave;
+    configuration.imus[0] = {static_cast<wire::ImuKind>(1 + choice % 7), 0,
+                             static_cast<std::uint8_t>(choice & 1U), 0, 1'000'000};
+    configuration.imus[1] = {wire::ImuKind::vn100, 0, 1, 0, 800'000};
+    configuration.illumination = {15, 0, 0, 100'000, 2'000'000, 300'000};
+    configuration.ports = {15, 0, wire::port_imu_output, wire::test_camera0, 10'000'000, 10'000, 0};
+    return configuration;
+}
+
+template <class T>
+void send(firmware::NativeBoard& board, const T& message) {
+    wire::Frame frame{};
+    wire::encode(message, 1, 0, frame);
+    board.receive({frame.bytes, frame.size}, 0);
 }
 
 /// Wraps the input as a packet with a valid CRC, so that what lies behind it is reached, too.
@@ -51,21 +80,30 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     });
     if (packets + decoder.errors() > size) std::abort();
 
-    firmware::NativeBoard board({1, wire::ResetCause::power_on, "FUZZ"}, nothing_connected());
-    wire::Frame hello{};
-    wire::encode(wire::HostHello{wire::protocol_major, 0, {}}, 1, 0, hello);
-    board.receive({hello.bytes, hello.size}, 0);
+    const std::span<const std::uint8_t> bytes(data, size);
+    firmware::NativeBoard board({1, wire::ResetCause::power_on, "FUZZ"}, babbling(bytes));
+    send(board, wire::HostHello{wire::protocol_major, 0, {}});
+    send(board, full_configuration(size == 0 ? 0 : data[0]));
     board.run_until(0);
+    send(board, wire::Start{15, 0, {}});
     firmware::Nanoseconds now = 0;
-    // Each packet is as long as its first byte says.
-    for (std::span<const std::uint8_t> rest(data, size); !rest.empty();) {
-        const std::size_t length = std::min<std::size_t>(rest.size(), 1 + rest[0]);
-        feed_as_packet(board, rest.subspan(1, length - 1), now);
+    // A chunk is an edge, bytes of the IMU on the UART, or a packet, as its first byte says.
+    for (std::span<const std::uint8_t> rest = bytes; !rest.empty();) {
+        const std::uint8_t head = rest[0];
+        const std::size_t wanted = head >= 0xE0 ? 1 : head >= 0xC0 ? head & 0x1FU : 2 * std::size_t{head};
+        const auto chunk = rest.subspan(1, std::min(rest.size() - 1, wanted));
+        if (head >= 0xE0)
+            board.schedule_edge({now, static_cast<std::uint8_t>((head >> 1U & 0xFU) % firmware::input_count),
+                                 (head & 1U) != 0});
+        else if (head >= 0xC0)
+            board.uart_receive(chunk, now);
+        else
+            feed_as_packet(board, chunk, now);
         now += step_ns;
         board.run_until(now);
         board.consume(board.transmitted().size());
-        rest = rest.subspan(length);
+        rest = rest.subspan(1 + chunk.size());
     }
-    board.run_until(now + 10 * step_ns);
+    board.run_until(now + 100 * step_ns);
     return 0;
 }

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <random>
 #include <system_error>
@@ -19,6 +20,17 @@ namespace versavis::rig {
 namespace {
 
 constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is seen after that
+
+devices::Inertial felt(const Motion& motion, HostTime at) {
+    constexpr double degrees = 180 / 3.14159265358979;
+    const double pitch = motion.pitch_rad(at);
+    devices::Inertial felt;
+    felt.gyro_deg_s = {motion.pitch_rate_rad_s(at) * degrees, 0, 0};
+    felt.accel_g = {0, std::sin(pitch), std::cos(pitch)};
+    felt.magnetic_gauss = {0.2, 0, 0.4};
+    felt.temperature_c = 36;
+    return felt;
+}
 
 }  // namespace
 
@@ -50,7 +62,8 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
       clock_errors_(scenario.board.clock),
       imu_name_(scenario.imu),
       socket_path_(std::move(socket_path)),
-      imu_(motion),
+      imu_(devices::AdisModel::adis16448b,
+           [&motion](firmware::Nanoseconds at) { return felt(motion, HostTime{at}); }),
       truth_(truth),
       cameras_(std::move(cameras)),
       listener_(listener) {
@@ -72,19 +85,16 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
                                                 static_cast<std::uint64_t>(host_now().ns));
     serial_.copy(identity.serial, sizeof identity.serial - 1);
     clock_ = std::make_unique<SkewedClock>(zero, clock);
-    levels_ = 0;
+    pins_ = 0;
     imu_samples_ = 0;
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
     firmware::Surroundings surroundings;
-    surroundings.outputs_changed = [this](auto at, auto levels) { outputs_changed(at, levels); };
-    surroundings.imu_burst = [this](auto at, auto transmitted, auto received) {
-        const HostTime instant = clock_->host(at);
-        imu_.burst(instant, transmitted, received);
-        truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++, instant});
+    surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
+    surroundings.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+        imu_transfer(at, transfer, received);
     };
     surroundings.reboot = [this](bool) { reset(); };
-    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings));
-    board_->run_until(board_now());
+    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings), board_now());
 }
 
 void BoardHost::restart() {
@@ -94,14 +104,22 @@ void BoardHost::restart() {
     boot({0, wire::ResetCause::software, {}}, from_zero, host_now());
 }
 
-void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t levels) {
-    const std::uint32_t changed = levels ^ levels_;
-    levels_ = levels;
+void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
+                             std::span<std::uint8_t> received) {
+    const HostTime instant = clock_->host(at);
+    imu_.transfer(instant.ns, transfer, received);
+    const bool sample = transfer.word_gap_ns == 0;  // register accesses have gaps
+    if (sample) truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++, instant});
+}
+
+void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
+    const std::uint32_t changed = pins ^ pins_;
+    pins_ = pins;
     const HostTime instant = clock_->host(at);
     for (GigeCamera* camera : cameras_) {
         const unsigned output = camera->settings().output;
         if ((changed >> output & 1U) == 0) continue;
-        const bool level = (levels >> output & 1U) != 0;
+        const bool level = (pins >> output & 1U) != 0;
         if (level) ++pulses_[output];
         const auto interval = camera->trigger_line(level, {life_, pulses_[output], instant});
         if (!interval) continue;

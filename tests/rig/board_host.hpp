@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "adis_device.hpp"
 #include "gige_camera.hpp"
-#include "imu_device.hpp"
 #include "native_board.hpp"
 
 namespace versavis::rig {
@@ -39,7 +39,9 @@ class BoardHost {
     void exchange_bytes();
     void accept_host();
     void drop_host();
-    void outputs_changed(firmware::Nanoseconds at, std::uint32_t levels);
+    void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
+    void imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
+                      std::span<std::uint8_t> received);
     firmware::Nanoseconds board_now() const { return clock_->device_ns(host_now()); }
 
     std::string serial_;
@@ -47,7 +49,7 @@ class BoardHost {
     ClockErrors clock_errors_;
     std::string imu_name_;
     std::string socket_path_;
-    ImuDevice imu_;
+    devices::AdisDevice imu_;
     GroundTruth& truth_;
     std::vector<GigeCamera*> cameras_;
     int listener_;
@@ -56,7 +58,7 @@ class BoardHost {
     std::unique_ptr<SkewedClock> clock_;
     std::unique_ptr<firmware::NativeBoard> board_;
     std::uint64_t life_ = 0;
-    std::uint32_t levels_ = 0;
+    std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
     std::atomic<bool> reset_pending_{false};

@@ -45,8 +45,42 @@ TEST_CASE("configuration: what the board is told") {
     CHECK(board.cameras[2].flags == (wire::camera_enabled | wire::camera_strobe_inverted));
     CHECK(board.cameras[2].rate_uhz == 29'970'000);
     CHECK(board.cameras[2].latency_ns == 12'500);
-    CHECK(board.imu.kind == wire::ImuKind::adis16448b);
-    CHECK(board.imu.rate_uhz == 200'000'000);
+    CHECK(board.imus[0].kind == wire::ImuKind::adis16448b);
+    CHECK(board.imus[0].rate_millihertz == 200'000);
+    CHECK(board.imus[1].kind == wire::ImuKind::none);
+}
+
+TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is told") {
+    const auto configuration = load(
+        camera +
+        "rate_hz = 50\n[[camera]]\nname = \"cam1\"\ndevice = \"x\"\noutput = 3\nmaster = \"cam0\"\n" +
+        "[[imu]]\nmodel = \"icm42688p\"\nrate_hz = 8000\ndata_ready = true\nfilter = 3\n" +
+        "[[imu]]\nname = \"imu1\"\nmodel = \"vn100\"\n" +
+        "[illumination]\ncameras = [\"cam0\", \"cam1\"]\nlead_us = 50\nmax_on_us = 8000\nduty_percent = "
+        "30\n" +
+        "[ports]\ninputs = [\"pps\", \"sync\"]\nfalling = [\"sync\"]\nimu_output = true\ntest = \"cam1\"\n"
+        "sync_rate_hz = 1\npulse_us = 20\n[board]\nkeep_configuration = true\n");
+    REQUIRE(configuration);
+    const wire::Configuration board = board_configuration(*configuration);
+    CHECK(board.flags == wire::configuration_store);
+    CHECK(board.cameras[3].flags == (wire::camera_enabled | wire::camera_slave));
+    CHECK(board.cameras[3].master == 0);
+    CHECK(board.cameras[3].rate_uhz == 50'000'000);
+    CHECK(board.imus[0].kind == wire::ImuKind::icm42688p);
+    CHECK(board.imus[0].rate_millihertz == 8'000'000);
+    CHECK(board.imus[0].options == wire::imu_data_ready);
+    CHECK(board.imus[0].filter == 3);
+    CHECK(board.imus[1].kind == wire::ImuKind::vn100);
+    CHECK(board.illumination.cameras == 0b1001);
+    CHECK(board.illumination.lead_ns == 50'000);
+    CHECK(board.illumination.max_on_ns == 8'000'000);
+    CHECK(board.illumination.duty_ppm == 300'000);
+    CHECK(board.ports.inputs == 0b1001);
+    CHECK(board.ports.falling == 0b1000);
+    CHECK(board.ports.options == wire::port_imu_output);
+    CHECK(board.ports.test == wire::test_camera0 + 3);
+    CHECK(board.ports.sync_rate_uhz == 1'000'000);
+    CHECK(board.ports.pulse_ns == 20'000);
 }
 
 TEST_CASE("configuration: features are kept in text, in their own types") {
@@ -80,7 +114,17 @@ TEST_CASE("configuration: errors name line, column and cure") {
                Catch::Contains("uses output 0, which is taken"));
     CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"), Catch::Contains("is no name"));
     CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"), Catch::Contains("is taken"));
-    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("not known"));
+    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("must be one of: adis16448b"));
+    CHECK_THAT(error_of("[[imu]]\n[[imu]]\nname = \"b\"\n"), Catch::Contains("one SPI port"));
+    CHECK_THAT(error_of("[[imu]]\nrate_hz = 2000\n"), Catch::Contains("from 1 to 1000"));
+    CHECK_THAT(error_of(camera + "master = \"cam9\"\n"), Catch::Contains("cannot have 'cam9' as its master"));
+    CHECK_THAT(error_of(camera + "master = \"cam0\"\n"), Catch::Contains("as its master"));
+    CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"), Catch::Contains("its master's rate"));
+    CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"), Catch::Contains("is no camera"));
+    CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"), Catch::Contains("list of texts"));
+    CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is no input"));
+    CHECK_THAT(error_of("[ports]\ntest = \"nobody\"\n"), Catch::Contains("'test' names 'nobody'"));
+    CHECK_THAT(error_of("[ports]\nsync_rate_hz = 0.01\n"), Catch::Contains("0.1 to 10"));
     CHECK_THAT(error_of("[board]\nlink = \"tty\"\n"), Catch::Contains("unix:/path"));
     CHECK_THAT(error_of("camera = 3\n"), Catch::Contains("array of tables"));
     CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(),

@@ -34,7 +34,7 @@ TEST_CASE("imu_pipeline: nothing before the clock is known; numbers go on over 3
     bench.exchange(begin);
     pipeline.add(sample(0xFFFFFFFE, at(1)));
     pipeline.add(sample(1, at(4)));
-    pipeline.add(sample(2, at(5), wire::imu_checksum_failed));
+    pipeline.add(sample(2, at(5), wire::imu_check_failed));
     const auto first = unpack<ImuMetadata>(reader.next().metadata);
     const auto second = unpack<ImuMetadata>(reader.next().metadata);
     const auto third = unpack<ImuMetadata>(reader.next().metadata);

@@ -18,7 +18,7 @@ struct Hardware final : OutputSchedule {
         words.emplace_back(at, levels);
         return true;
     }
-    Nanoseconds take_lateness() override { return 0; }
+    bool take_late(Late& /*late*/) override { return false; }
 };
 
 using Words = std::vector<std::pair<Nanoseconds, std::uint32_t>>;
@@ -32,21 +32,22 @@ TEST_CASE("output_queue: edges of all outputs leave in order, those of one insta
     queue.set(100, 0, true);
     queue.set(100, 2, true);
     queue.set(150, 1, true);
-    queue.commit(151);
+    queue.commit(151 - OutputQueue::horizon);
     CHECK(hardware.words == Words{{100, 0b101}, {150, 0b111}});
     CHECK(queue.next() == 200);
-    queue.commit(1000);
+    CHECK(queue.commit(1000));
     CHECK(hardware.words.back() == std::pair<Nanoseconds, std::uint32_t>{200, 0b110});
-    CHECK(queue.next() == INT64_MAX);
+    CHECK(queue.next() == never);
 }
 
 TEST_CASE("output_queue: what comes too late is put behind what is committed, and says so") {
     Hardware hardware;
     OutputQueue queue(hardware);
     queue.set(100, 0, true);
-    queue.commit(101);
+    queue.commit(0);
     CHECK(queue.set(90, 1, true) == 101);
     CHECK(queue.set(300, 1, false) == 300);
+    CHECK(queue.rest(0, false, 50) == 101);
 }
 
 TEST_CASE("output_queue: a full hardware queue delays nothing but the commit") {
@@ -55,7 +56,7 @@ TEST_CASE("output_queue: a full hardware queue delays nothing but the commit") {
     OutputQueue queue(hardware);
     queue.set(1, 0, true);
     queue.set(2, 0, false);
-    queue.commit(10);
+    CHECK_FALSE(queue.commit(10));
     CHECK(queue.next() == 2);
     hardware.capacity = 2;
     queue.commit(10);
@@ -66,11 +67,11 @@ TEST_CASE("output_queue: cancelling leaves the output idle and the others alone"
     Hardware hardware;
     OutputQueue queue(hardware);
     queue.set(10, 0, true);
-    queue.commit(11);
+    queue.commit(11 - OutputQueue::horizon);
     queue.set(50, 0, false);
     queue.set(60, 0, true);
     queue.set(55, 1, true);
-    queue.cancel(0, false, 20);
-    queue.commit(1000);
+    CHECK(queue.rest(0, false, 20) == 20);
+    CHECK(queue.commit(1000));
     CHECK(hardware.words == Words{{10, 1}, {20, 0}, {55, 0b10}});
 }

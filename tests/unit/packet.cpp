@@ -45,6 +45,20 @@ std::string hex(const Bytes& bytes) {
     return out.str();
 }
 
+Configuration example_configuration() {
+    Configuration configuration{};
+    configuration.id = 1;
+    configuration.cameras[0].flags = camera_enabled;
+    configuration.cameras[0].rate_uhz = 20'000'000;
+    configuration.cameras[0].pulse_ns = 100'000;
+    configuration.cameras[0].latency_ns = 20'000;
+    configuration.cameras[0].exposure_ns = 3'000'000;
+    configuration.cameras[0].max_exposure_ns = 40'000'000;
+    configuration.imus[0] = {ImuKind::adis16448b, 0, imu_data_ready, 0, 819'200};
+    configuration.ports.inputs = 1U << pulse_pps;
+    return configuration;
+}
+
 /// The line "name: bytes" of the test vectors in the protocol document.
 std::string documented(const std::string& name) {
     std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/wire-protocol.md");
@@ -62,6 +76,10 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
           documented("clock-answer"));
+    CHECK(hex(encoded(Start{0b0101, start_pattern, {}}, 0x11223344, 4)) == documented("start"));
+    CHECK(hex(encoded(Event{EventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
+          documented("event"));
+    CHECK(hex(encoded(example_configuration(), 0x11223344, 1)) == documented("configuration"));
 }
 
 TEST_CASE("packet: comes back as it was sent") {

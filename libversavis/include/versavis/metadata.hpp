@@ -77,9 +77,17 @@ enum class EventKind : std::uint32_t {
     board_lost = 7,
     camera_connected = 8,
     camera_lost = 9,
-    pairing_locked = 10,   ///< value: trigger number of the first proved frame
-    pairing_slipped = 11,  ///< value: block id of the frame that contradicted it
-    edge_overflow = 12,    ///< value: edges lost
+    pairing_locked = 10,        ///< value: trigger number of the first proved frame
+    pairing_slipped = 11,       ///< value: block id of the frame that contradicted it
+    edge_overflow = 12,         ///< value: edges lost
+    pps = 13,                   ///< an edge of the PPS input; value: edges since the board's boot
+    aux_pulse = 14,             ///< an edge of an auxiliary input; source: 0 or 1; value: as for pps
+    sync_pulse = 15,            ///< an edge of the sync input; value: as for pps
+    input_noisy = 16,           ///< an input is not listened to for a second; source: input of the board
+    illumination_limited = 17,  ///< the light was cut, or stayed dark; value: ns that it was on
+    imu_ready = 18,             ///< value: identity of the part
+    imu_failed = 19,            ///< the part is not what it should be; value: what it said
+    imu_silent = 20,            ///< no data-ready edge, no end of a transfer or no bytes came
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
@@ -94,6 +102,9 @@ enum class EventReason : std::uint32_t {
     wrong_size = 8,        ///< the frame is not of the size the camera announced
     reset = 9,             ///< camera or board began anew in between
     trigger_ignored = 10,  ///< the camera did not expose
+    camera_busy = 11,      ///< it was, or would have been, still exposing
+    too_late = 12,         ///< the instant had gone by before the board came to it
+    queue_full = 13,       ///< too many pulses waited on the board
 };
 
 struct EventMetadata {

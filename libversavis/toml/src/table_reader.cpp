@@ -85,6 +85,16 @@ void TableReader::read(std::string_view key, double& value, double minimum, doub
         fail(key, fmt::format("'{}' must be a number from {} to {}", key, minimum, maximum));
 }
 
+void TableReader::read(std::string_view key, std::vector<std::string>& values) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const toml::array* array = node->as_array();
+    if (array == nullptr || !(array->empty() || array->is_homogeneous(toml::node_type::string)))
+        return fail(key, fmt::format("'{}' must be a list of texts in quotes: [\"...\", \"...\"]", key));
+    values.clear();
+    for (const toml::node& entry : *array) values.push_back(*entry.value_exact<std::string>());
+}
+
 void TableReader::read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
                                std::int64_t maximum) {
     const toml::node* node = find(key);

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "versavis/metadata.hpp"
 #include "versavis/wire/messages.hpp"
@@ -21,6 +22,9 @@ struct ImuModel {
     double temperature_c = 0;  ///< per LSB
     double temperature_at_zero_c = 0;
 };
+
+/// Names of all models, as the configuration has them.
+std::vector<std::string> model_names();
 
 /// The model of a part, by the kind on the wire or by the name in the configuration; null when there is none.
 const ImuModel* find_model(wire::ImuKind kind);

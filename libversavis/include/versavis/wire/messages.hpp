@@ -3,40 +3,15 @@
 // C++17.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <type_traits>
 
-static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire structs are copied as they lie in memory");
+#include "versavis/wire/configuration.hpp"
+#include "versavis/wire/type.hpp"
 
 namespace versavis::wire {
 
-inline constexpr std::uint8_t protocol_major = 1;
-inline constexpr std::uint8_t protocol_minor = 0;
-inline constexpr std::size_t camera_count = 4;
 inline constexpr std::size_t max_packet_size = 512;  ///< header + payload + CRC, before COBS
 inline constexpr std::size_t max_log_text = 96;
-
-/// Time fields of value `no_time` say that the instant was not observed.
-inline constexpr std::int64_t no_time = INT64_MIN;
-
-enum class Type : std::uint8_t {
-    board_hello = 0x01,
-    exposure = 0x02,
-    imu_sample = 0x03,
-    event = 0x04,
-    clock_answer = 0x05,
-    health = 0x06,
-    log = 0x07,
-    configuration_answer = 0x08,
-    host_hello = 0x81,
-    configuration = 0x82,
-    start = 0x83,
-    stop = 0x84,
-    clock_request = 0x85,
-    expected_exposure = 0x86,
-    reboot = 0x87,
-};
 
 /// First bytes of every packet.
 struct Header {
@@ -59,6 +34,11 @@ enum Capability : std::uint32_t {
     capability_exposure_compensation = 1U << 0U,
     capability_imu = 1U << 1U,
     capability_start_pattern = 1U << 2U,
+    capability_slaves = 1U << 3U,
+    capability_illumination = 1U << 4U,
+    capability_pulse_inputs = 1U << 5U,
+    capability_sync = 1U << 6U,
+    capability_imu_output = 1U << 7U,
 };
 
 struct BoardHello {
@@ -80,7 +60,11 @@ enum ExposureFlag : std::uint16_t {
     exposure_late = 1U << 3U,       ///< the trigger left later than the grid asked
     exposure_pattern = 1U << 4U,    ///< part of the start pattern
     exposure_announced = 1U << 5U,  ///< trigger placed by an exposure that the host announced
-    exposure_no_strobe = 1U << 6U,  ///< no exposure line is wired: start and end are predicted
+    exposure_predicted = 1U << 6U,  ///< no exposure line is wired: start and end follow from the trigger
+    exposure_overlong = 1U << 7U,   ///< longer than the maximum exposure (no end), or than the period
+    exposure_clipped = 1U << 8U,    ///< more was announced than the maximum exposure, which was expected then
+    exposure_from_master = 1U << 9U,  ///< a slave without exposure line: start and end are the master's
+    exposure_slow = 1U << 10U,        ///< part of the slow start
 };
 
 /// One record for each trigger pulse that was sent, whatever the camera did.
@@ -97,21 +81,21 @@ struct Exposure {
     std::int64_t end_ns;    ///< or no_time
 };
 
-enum class ImuKind : std::uint8_t { none = 0, adis16448b = 1 };
-
 enum ImuFlag : std::uint16_t {
-    imu_checksum_failed = 1U << 0U,
+    imu_check_failed = 1U << 0U,      ///< CRC, checksum, second reading or identity of the part was wrong
     imu_self_test_failed = 1U << 1U,  ///< the sensor's own diagnosis
-    imu_overrun = 1U << 2U,           ///< the sample before was not read in time
+    imu_overrun = 1U << 2U,           ///< samples before were not read in time: their numbers are missing
+    imu_stamped = 1U << 3U,           ///< the time is that of the part's data-ready edge
+    imu_repeated = 1U << 4U,          ///< the part had no new data since the sample before
 };
 
 /// Raw sensor words, sign-extended; the host scales them.
 struct ImuSample {
     static constexpr Type type = Type::imu_sample;
     ImuKind kind;
-    std::uint8_t imu;
+    std::uint8_t imu;      ///< port
     std::uint16_t flags;   ///< bits of ImuFlag
-    std::uint32_t number;  ///< samples taken since boot, modulo 2^32
+    std::uint32_t number;  ///< samples that were due since boot, modulo 2^32
     std::int64_t time_ns;
     std::int32_t gyro[3];
     std::int32_t accel[3];
@@ -123,17 +107,31 @@ struct ImuSample {
 };
 
 enum class EventKind : std::uint8_t {
-    trigger_skipped = 1,  ///< the camera was busy; value: the grid tick that got no pulse
-    stray_edge = 2,       ///< an exposure edge that belongs to no trigger; value: level
-    output_late = 3,      ///< an output word was committed too late; value: ns late
-    edge_overflow = 4,    ///< edges came faster than they were read; value: edges lost
+    trigger_skipped = 1,       ///< detail: SkipReason; value: the grid tick that got no pulse
+    stray_edge = 2,            ///< an exposure edge that belongs to no trigger; value: level
+    output_late = 3,           ///< an output word left too late; value: ns late
+    edge_overflow = 4,         ///< edges came faster than they were read; value: edges lost
+    pps = 5,                   ///< value: pulses of this input since boot
+    aux_pulse = 6,             ///< source: 0 or 1; value: pulses of this input since boot
+    sync_pulse = 7,            ///< value: pulses of this input since boot
+    input_noisy = 8,           ///< an input is not listened to for a second; source: input of the board
+    illumination_limited = 9,  ///< the light would have been on for too long; value: ns that it stays dark
+    imu_ready = 10,            ///< the part answers and is set up; value: what identifies it
+    imu_failed = 11,           ///< the part is not what it should be; detail: step; value: what it said
+    imu_silent = 12,           ///< no data-ready edge, no end of a transfer or no bytes came
+};
+
+enum class SkipReason : std::uint16_t {
+    busy = 0,  ///< the camera was, or would have been, exposing
+    late = 1,  ///< the instant had gone by
+    full = 2,  ///< too many pulses wait already
 };
 
 struct Event {
     static constexpr Type type = Type::event;
     EventKind kind;
-    std::uint8_t source;  ///< camera or input number
-    std::uint16_t reserved;
+    std::uint8_t source;     ///< camera, IMU or input number
+    std::uint16_t detail;    ///< see EventKind
     std::uint32_t sequence;  ///< events since boot
     std::int64_t time_ns;
     std::int64_t value;
@@ -153,15 +151,32 @@ struct ClockAnswer {
     std::int64_t sent_ns;      ///< this answer, stamped as it left
 };
 
+enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
+
+/// Once a second; counters since boot, high-water marks since the report before.
 struct Health {
     static constexpr Type type = Type::health;
     std::int64_t board_time_ns;
-    std::uint32_t dropped_packets;  ///< not sent because the host did not read
-    std::uint32_t receive_errors;   ///< packets from the host that were malformed
-    std::uint32_t imu_errors;
+    std::uint32_t dropped_exposures;  ///< records that were replaced by newer ones: the host did not read
+    std::uint32_t dropped_clock_answers;
+    std::uint32_t dropped_events;
+    std::uint32_t dropped_imu_samples;
+    std::uint32_t dropped_logs;
+    std::uint32_t receive_errors;         ///< packets from the host that were malformed
+    std::uint32_t imu_errors[imu_count];  ///< samples with a failed check
+    std::uint32_t imu_restarts;           ///< times that an IMU had to be set up again
     std::uint32_t late_outputs;
     std::uint32_t lost_edges;
-    std::uint32_t output_queue_max;  ///< high-water mark
+    std::uint32_t stray_edges;
+    std::uint32_t skipped_triggers;
+    std::uint32_t noisy_inputs;      ///< times that an input was not listened to for a second
+    std::uint32_t output_queue_max;  ///< edges that waited
+    std::uint32_t link_queue_max;    ///< packets that waited
+    std::uint32_t loop_max_ns;       ///< longest time from when something was due to when it was done
+    std::int32_t pps_error_ppb;      ///< board clock against PPS: positive runs fast
+    PpsState pps_state;
+    ResetCause reset_cause;
+    std::uint16_t reserved;
 };
 
 enum class LogLevel : std::uint8_t { error = 3, warning = 4, info = 6, debug = 7 };
@@ -172,67 +187,10 @@ struct Log {
     char text[max_log_text - 1];  ///< zero-padded
 };
 
-enum CameraFlag : std::uint32_t {
-    camera_enabled = 1U << 0U,
-    camera_trigger_inverted = 1U << 1U,  ///< pulses are low
-    camera_strobe_inverted = 1U << 2U,   ///< the exposure line is low while exposing
-    camera_no_strobe = 1U << 3U,         ///< no exposure line is wired
-};
-
-struct CameraConfiguration {
-    std::uint32_t flags;           ///< bits of CameraFlag
-    std::uint32_t rate_uhz;        ///< grid rate, micro-hertz: 100'000 to 1'000'000'000
-    std::uint32_t phase_ns;        ///< grid points are at start + phase + k / rate
-    std::uint32_t pulse_ns;        ///< trigger pulse width: 1'000 to 10'000'000
-    std::uint32_t latency_ns;      ///< trigger to start of exposure: up to 100'000'000
-    std::uint32_t gap_ns;          ///< least time from end of exposure to the next trigger
-    std::int64_t exposure_ns;      ///< expected until one was measured or announced
-    std::int64_t max_exposure_ns;  ///< an exposure that lasts longer is given up
-};
-
-struct ImuConfiguration {
-    ImuKind kind;
-    std::uint8_t reserved[3];
-    std::uint32_t rate_uhz;  ///< sample rate, micro-hertz: 1'000'000 to 1'000'000'000
-};
-
-/// The whole configuration; taken as a whole or not at all, and only while stopped.
-struct Configuration {
-    static constexpr Type type = Type::configuration;
-    std::uint32_t id;  ///< repeated in the answer
-    std::uint32_t reserved;
-    CameraConfiguration cameras[camera_count];
-    ImuConfiguration imu;
-};
-
-enum class ConfigurationStatus : std::uint8_t { taken = 0, out_of_range = 1, unknown_imu = 2, running = 3 };
-enum class ConfigurationField : std::uint8_t {
-    none = 0,
-    rate = 1,
-    pulse = 2,
-    latency = 3,
-    gap = 4,
-    exposure = 5,
-    max_exposure = 6,
-    phase = 7,
-    imu_kind = 8,
-    imu_rate = 9,
-};
-
-struct ConfigurationAnswer {
-    static constexpr Type type = Type::configuration_answer;
-    std::uint32_t id;
-    ConfigurationStatus status;
-    std::uint8_t camera;  ///< of the refused field
-    ConfigurationField field;
-    std::uint8_t reserved;
-    std::int64_t minimum;  ///< of the refused field
-    std::int64_t maximum;
-    Configuration taken;  ///< what is in force after this answer
-};
-
 enum StartFlag : std::uint8_t {
     start_pattern = 1U << 0U,  ///< begin with the pattern of irregular gaps
+    start_slow = 1U << 1U,     ///< one pulse a second at most, until started again without it
+    start_on_sync = 1U << 2U,  ///< begin the grid at the next pulse of the sync input, and follow them
 };
 
 /// Starts the cameras of the mask; one that runs already begins its pattern anew.
@@ -272,10 +230,8 @@ inline constexpr unsigned start_pattern_length = 20;
 
 static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
-static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(Health) == 32 &&
+static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(Health) == 88 &&
               sizeof(Log) == 96);
-static_assert(sizeof(CameraConfiguration) == 40 && sizeof(Configuration) == 176);
-static_assert(sizeof(ConfigurationAnswer) == 200);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
               sizeof(Reboot) == 8);
 
@@ -290,6 +246,7 @@ constexpr std::size_t payload_size(Type type) {
         case Type::health: return sizeof(Health);
         case Type::log: return sizeof(Log);
         case Type::configuration_answer: return sizeof(ConfigurationAnswer);
+        case Type::refusal: return sizeof(Refusal);
         case Type::host_hello: return sizeof(HostHello);
         case Type::configuration: return sizeof(Configuration);
         case Type::start: return sizeof(Start);

@@ -31,6 +31,7 @@ class TableReader {
 
     void read(std::string_view key, std::string& value);
     void read(std::string_view key, bool& value);
+    void read(std::string_view key, std::vector<std::string>& values);
 
     /// Whole numbers are taken for real ones, too.
     void read(std::string_view key, double& value, double minimum, double maximum);

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Exposures that the host announced for triggers to come.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "hal.hpp"
+
+namespace versavis::firmware {
+
+struct Announcement {
+    std::uint64_t trigger = 0;  ///< holds from this one on
+    Nanoseconds exposure = 0;
+    bool clipped = false;
+};
+
+/// In the order of their triggers; at most eight, then the farthest is forgotten.
+class Announcements {
+ public:
+    void clear() { count_ = 0; }
+
+    /// Replaces what was announced for the same trigger or later ones.
+    void add(const Announcement& announcement) {
+        while (count_ > 0 && entries_[count_ - 1].trigger >= announcement.trigger) --count_;
+        if (count_ == capacity) --count_;
+        entries_[count_++] = announcement;
+    }
+
+    /// The newest that holds for `trigger`; null: none does.
+    const Announcement* find(std::uint64_t trigger) const {
+        const Announcement* found = nullptr;
+        for (std::size_t i = 0; i < count_ && entries_[i].trigger <= trigger; ++i) found = &entries_[i];
+        return found;
+    }
+
+    /// Forgets what holds for `trigger`: it was used.
+    void used(std::uint64_t trigger) {
+        std::size_t taken = 0;
+        while (taken < count_ && entries_[taken].trigger <= trigger) ++taken;
+        count_ -= taken;
+        for (std::size_t i = 0; i < count_; ++i) entries_[i] = entries_[i + taken];
+    }
+
+ private:
+    static constexpr std::size_t capacity = 8;
+
+    Announcement entries_[capacity] = {};
+    std::size_t count_ = 0;
+};
+
+}  // namespace versavis::firmware

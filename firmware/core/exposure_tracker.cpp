@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "exposure_tracker.hpp"
+
+namespace versavis::firmware {
+
+void ExposureTracker::configure(const wire::CameraConfiguration& configuration, Nanoseconds patience) {
+    configuration_ = configuration;
+    patience_ = patience;
+    period_ = configuration.rate_uhz == 0 ? never : 1'000'000'000'000'000 / configuration.rate_uhz;
+    last_end_ = INT64_MIN / 2;
+}
+
+void ExposureTracker::add(const wire::Exposure& record, Nanoseconds expected) {
+    flights_[count_++] = {record, expected};
+}
+
+void ExposureTracker::left_late(Nanoseconds asked, Nanoseconds left) {
+    for (std::size_t i = 0; i < count_; ++i) {
+        if (flights_[i].record.trigger_ns != asked) continue;
+        flights_[i].record.trigger_ns = left;
+        flights_[i].record.flags |= wire::exposure_late;
+    }
+}
+
+ExposureTracker::Completed ExposureTracker::edge(Nanoseconds at, bool exposing) {
+    expire(at);
+    if (!exposing) return end_edge(at);
+    start_edge(at);
+    return {};
+}
+
+/// The edge belongs to the newest trigger before it: older ones that wait for a start were ignored by the
+/// camera.
+void ExposureTracker::start_edge(Nanoseconds at) {
+    std::size_t found = count_;
+    for (std::size_t i = 0; i < count_; ++i)
+        if (flights_[i].record.trigger_ns <= at && !started(flights_[i])) found = i;
+    if (found == count_) {
+        edges_lost();  // the line rose twice: an end in between was missed
+        return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
+    }
+    // The line has one level: whatever still waits before this trigger was ignored, or its end edge was lost.
+    for (; found > 0; --found)
+        finish_first(started(flights_[0]) ? wire::exposure_no_end : wire::exposure_no_start);
+    flights_[0].record.start_ns = at;
+}
+
+ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
+    if (count_ == 0 || !started(flights_[0])) {
+        reports_.event(wire::EventKind::stray_edge, camera_, at, 0);
+        return {};
+    }
+    wire::Exposure& record = flights_[0].record;
+    record.end_ns = at;
+    const Completed completed{record.trigger, at - record.start_ns};
+    const bool overlong = completed.duration > period_;
+    finish_first(static_cast<std::uint16_t>(overlong ? wire::exposure_measured | wire::exposure_overlong
+                                                     : wire::exposure_measured));
+    return completed;
+}
+
+void ExposureTracker::edges_lost() {
+    while (count_ > 0 && started(flights_[0])) finish_first(wire::exposure_no_end);
+}
+
+Nanoseconds ExposureTracker::busy_until(Nanoseconds now) const {
+    if (count_ == 0) return last_end_;
+    const Flight& newest = flights_[count_ - 1];
+    const Nanoseconds start =
+        started(newest) ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
+    const Nanoseconds end = start + newest.expected;
+    return started(newest) && end < now ? never / 2 : end;  // overdue: it may last for any time
+}
+
+std::uint64_t ExposureTracker::tick_at(Nanoseconds at) const {
+    std::uint64_t tick = 0;
+    for (std::size_t i = 0; i < count_; ++i)
+        if (flights_[i].record.trigger_ns <= at) tick = flights_[i].record.tick;
+    return tick;
+}
+
+Nanoseconds ExposureTracker::deadline(const Flight& flight) const {
+    if (has(wire::camera_no_strobe))
+        return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;
+    if (started(flight)) return flight.record.start_ns + configuration_.max_exposure_ns;
+    return flight.record.trigger_ns + configuration_.latency_ns + patience_;
+}
+
+Nanoseconds ExposureTracker::next_deadline() const { return count_ == 0 ? never : deadline(flights_[0]); }
+
+void ExposureTracker::expire(Nanoseconds now) {
+    while (count_ > 0 && deadline(flights_[0]) <= now) {
+        if (has(wire::camera_no_strobe)) {
+            predict_edges(flights_[0]);
+            finish_first(wire::exposure_predicted);
+        } else if (started(flights_[0])) {
+            const Nanoseconds given_up = deadline(flights_[0]);
+            finish_first(wire::exposure_no_end | wire::exposure_overlong);
+            last_end_ = given_up;
+        } else {
+            finish_first(wire::exposure_no_start);
+        }
+    }
+}
+
+void ExposureTracker::give_up() {
+    while (count_ > 0) {
+        if (has(wire::camera_no_strobe)) predict_edges(flights_[0]);
+        finish_first(has(wire::camera_no_strobe) ? wire::exposure_predicted
+                     : started(flights_[0])      ? wire::exposure_no_end
+                                                 : wire::exposure_no_start);
+    }
+}
+
+void ExposureTracker::predict_edges(Flight& flight) const {
+    flight.record.start_ns = flight.record.trigger_ns + configuration_.latency_ns;
+    flight.record.end_ns = flight.record.start_ns + flight.expected;
+}
+
+void ExposureTracker::finish_first(std::uint16_t flags) {
+    wire::Exposure record = flights_[0].record;
+    record.flags = static_cast<std::uint16_t>(record.flags | flags);
+    if (record.end_ns != wire::no_time) last_end_ = record.end_ns;
+    --count_;
+    for (std::size_t i = 0; i < count_; ++i) flights_[i] = flights_[i + 1];
+    reports_.exposure(record);
+}
+
+}  // namespace versavis::firmware

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Joins the edges of one exposure line with the triggers that were sent: one record for each trigger,
+// whatever comes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "hal.hpp"
+#include "versavis/wire/messages.hpp"
+
+namespace versavis::firmware {
+
+/// Where a channel reports to.
+struct ChannelReports {
+    virtual void exposure(const wire::Exposure& record) = 0;
+    virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+                       std::uint16_t detail = 0) = 0;
+    /// A trigger was decided: an exposure of `duration` is expected at `start`.
+    virtual void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) = 0;
+
+ protected:
+    ~ChannelReports() = default;
+};
+
+class ExposureTracker {
+ public:
+    ExposureTracker(std::uint8_t camera, ChannelReports& reports) : camera_(camera), reports_(reports) {}
+
+    /// `patience`: how long after it was expected a start may still come.
+    void configure(const wire::CameraConfiguration& configuration, Nanoseconds patience);
+
+    bool full() const { return count_ == max_flights; }
+    bool empty() const { return count_ == 0; }
+
+    /// A trigger that was sent, or is set to leave; times increase.
+    void add(const wire::Exposure& record, Nanoseconds expected);
+
+    /// The word of `asked` left later.
+    void left_late(Nanoseconds asked, Nanoseconds left);
+
+    /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure that it
+    /// completed, with its duration; trigger 0: it completed none.
+    struct Completed {
+        std::uint64_t trigger = 0;
+        Nanoseconds duration = 0;
+    };
+    Completed edge(Nanoseconds at, bool exposing);
+
+    /// Edges were lost: an end that comes now may belong to another exposure than the start that was seen.
+    void edges_lost();
+
+    /// Gives up what did not happen.
+    void expire(Nanoseconds now);
+
+    /// Ends the wait for all.
+    void give_up();
+
+    /// When the newest exposure will have ended, as far as it is known now.
+    Nanoseconds busy_until(Nanoseconds now) const;
+
+    /// Grid point of the newest trigger before `at`; 0: there is none.
+    std::uint64_t tick_at(Nanoseconds at) const;
+
+    /// When expire() has something to do next.
+    Nanoseconds next_deadline() const;
+
+ private:
+    /// A trigger whose record is not complete.
+    struct Flight {
+        wire::Exposure record;
+        Nanoseconds expected;  ///< duration
+    };
+    static constexpr std::size_t max_flights = 4;
+
+    bool has(wire::CameraFlag flag) const { return (configuration_.flags & flag) != 0; }
+    bool started(const Flight& flight) const { return flight.record.start_ns != wire::no_time; }
+    Nanoseconds deadline(const Flight& flight) const;
+    void start_edge(Nanoseconds at);
+    Completed end_edge(Nanoseconds at);
+    void predict_edges(Flight& flight) const;
+    void finish_first(std::uint16_t flags);
+
+    std::uint8_t camera_;
+    ChannelReports& reports_;
+    wire::CameraConfiguration configuration_{};
+    Nanoseconds patience_ = 0;
+    Nanoseconds period_ = 0;
+    Nanoseconds last_end_ = INT64_MIN / 2;  ///< when the newest finished exposure ended, or was given up
+    Flight flights_[max_flights] = {};
+    std::size_t count_ = 0;
+};
+
+}  // namespace versavis::firmware

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "illumination.hpp"
+
+namespace versavis::firmware {
+
+namespace {
+
+constexpr Nanoseconds lead_overlap = 50'000;       // the lead lasts into the exposure: no gap when it begins
+constexpr Nanoseconds start_patience = 2'000'000;  // a camera that exposes so late still gets light
+constexpr Nanoseconds shortest_light = 10'000;
+constexpr std::int64_t million = 1'000'000;
+
+Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
+Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
+
+}  // namespace
+
+void Illumination::configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now) {
+    stop(now);
+    configuration_ = configuration;
+    saved_ = configuration.max_on_ns;
+    saved_at_ = now;
+}
+
+void Illumination::stop(Nanoseconds now) {
+    plan_count_ = 0;
+    exposing_ = 0;
+    outputs_.rest(output_light_lead, false, now);
+    close_gate(now);
+}
+
+/// On-time that a span of time earns.
+Nanoseconds Illumination::earned(Nanoseconds span) const {
+    span = min(span, configuration_.max_on_ns * million);  // enough for all, and no overflow
+    return span / million * configuration_.duty_ppm + span % million * configuration_.duty_ppm / million;
+}
+
+/// What may be spent at `at`: never more than one longest light.
+Nanoseconds Illumination::budget(Nanoseconds at) const {
+    return min(configuration_.max_on_ns, saved_ + earned(at - saved_at_));
+}
+
+void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe,
+                        Nanoseconds now) {
+    if (!lights(camera)) return;
+    forget_past(now);
+    if (plan_count_ == max_plans)
+        return reports_.event(wire::EventKind::illumination_limited, camera, start, duration);
+    const Nanoseconds on = start - configuration_.lead_ns;
+    const Nanoseconds lead_off = start + (has_strobe ? lead_overlap : duration);
+    std::size_t i = plan_count_++;
+    for (; i > 0 && plans_[i - 1].on > on; --i) plans_[i] = plans_[i - 1];
+    plans_[i] = {on, lead_off};
+    set_leads(now);
+    open_next(now);
+}
+
+/// The leads of all plans as one; where they overlap there is no edge.
+void Illumination::set_leads(Nanoseconds now) {
+    outputs_.cancel(output_light_lead);
+    for (std::size_t i = 0; i < plan_count_;) {
+        const Nanoseconds on = plans_[i].on;
+        Nanoseconds off = plans_[i].lead_off;
+        for (++i; i < plan_count_ && plans_[i].on <= off; ++i) off = max(off, plans_[i].lead_off);
+        outputs_.set(max(on, now), output_light_lead, true);
+        outputs_.set(off, output_light_lead, false);
+    }
+}
+
+void Illumination::edge(std::uint8_t camera, bool exposing, Nanoseconds now) {
+    if (!lights(camera)) return;
+    const std::uint8_t bit = static_cast<std::uint8_t>(1U << camera);
+    exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
+    if (exposing_ != 0 || !open() || now < gate_on_) return;
+    forget_past(now);
+    // While another lead is on, the gate stays open; poll() closes it.
+    for (std::size_t i = 0; i < plan_count_; ++i)
+        if (plans_[i].on <= now) return;
+    close_gate(now);
+    open_next(now);
+}
+
+void Illumination::forget_past(Nanoseconds now) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < plan_count_; ++i)
+        if (plans_[i].lead_off > now) plans_[kept++] = plans_[i];
+    plan_count_ = kept;
+}
+
+void Illumination::open_next(Nanoseconds now) {
+    if (!open() && plan_count_ > 0) open_gate(max(max(plans_[0].on, dark_until_), now), now);
+}
+
+void Illumination::open_gate(Nanoseconds on, Nanoseconds now) {
+    const Nanoseconds allowed = budget(on);
+    if (allowed < shortest_light + configuration_.lead_ns) {
+        reports_.event(wire::EventKind::illumination_limited, output_light_gate, on, 0);
+        plans_[0].lead_off = now;  // it stays dark
+        return forget_past(now);
+    }
+    gate_on_ = outputs_.set(on, output_light_gate, true);
+    gate_off_ = outputs_.set(gate_on_ + allowed, output_light_gate, false);
+    last_off_ = gate_off_;
+    saved_ = earned(allowed);  // all is spent, until it is known that less was
+    saved_at_ = gate_off_;
+}
+
+void Illumination::close_gate(Nanoseconds now) {
+    if (!open()) return;
+    const Nanoseconds closed = min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
+    last_off_ = closed;
+    saved_ = gate_off_ - closed + earned(max(0, closed - gate_on_));
+    saved_at_ = closed;
+    gate_off_ = never;
+}
+
+void Illumination::left_late(Nanoseconds asked, Nanoseconds left) {
+    if (asked == last_off_) saved_ -= min(left - asked, configuration_.max_on_ns);
+}
+
+void Illumination::poll(Nanoseconds now) {
+    if (open() && gate_off_ <= now) {
+        if (exposing_ != 0) {
+            reports_.event(wire::EventKind::illumination_limited, output_light_gate, gate_off_,
+                           gate_off_ - gate_on_);
+            dark_until_ = gate_off_ + configuration_.max_on_ns / 10;
+        }
+        gate_off_ = never;
+        forget_past(now);
+    } else if (open() && exposing_ == 0 && next_wake() <= now) {
+        forget_past(now);
+        close_gate(now);
+    }
+    open_next(now);
+}
+
+Nanoseconds Illumination::next_wake() const {
+    if (!open()) return never;
+    if (exposing_ != 0) return gate_off_;
+    // No exposure came: the gate need not stay open.
+    Nanoseconds last = gate_on_;
+    for (std::size_t i = 0; i < plan_count_; ++i) last = max(last, plans_[i].lead_off);
+    return min(gate_off_, last + start_patience);
+}
+
+}  // namespace versavis::firmware

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Light while any camera exposes, never for longer than it may: the hardware lets the exposure lines through
+// only while the gate is open, and the end of the gate is set before it opens.
+#pragma once
+
+#include "exposure_tracker.hpp"
+#include "output_queue.hpp"
+
+namespace versavis::firmware {
+
+class Illumination {
+ public:
+    Illumination(OutputQueue& outputs, ChannelReports& reports) : outputs_(outputs), reports_(reports) {}
+
+    void configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now);
+
+    /// Dark at once; what was planned is forgotten.
+    void stop(Nanoseconds now);
+
+    /// A camera will expose; without an exposure line the light follows the plan alone.
+    void plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe, Nanoseconds now);
+
+    /// An exposure line changed.
+    void edge(std::uint8_t camera, bool exposing, Nanoseconds now);
+
+    /// The word of `asked` left later: the light was on for longer.
+    void left_late(Nanoseconds asked, Nanoseconds left);
+
+    void poll(Nanoseconds now);
+    Nanoseconds next_wake() const;
+
+ private:
+    struct Plan {
+        Nanoseconds on;
+        Nanoseconds lead_off;
+    };
+    static constexpr std::size_t max_plans = 8;
+
+    bool lights(std::uint8_t camera) const { return (configuration_.cameras >> camera & 1U) != 0; }
+    bool open() const { return gate_off_ != never; }
+    Nanoseconds earned(Nanoseconds span) const;
+    Nanoseconds budget(Nanoseconds at) const;
+    void set_leads(Nanoseconds now);
+    void open_next(Nanoseconds now);
+    void open_gate(Nanoseconds on, Nanoseconds now);
+    void close_gate(Nanoseconds now);
+    void forget_past(Nanoseconds now);
+
+    OutputQueue& outputs_;
+    ChannelReports& reports_;
+    wire::IlluminationConfiguration configuration_{};
+    Plan plans_[max_plans] = {};
+    std::size_t plan_count_ = 0;
+    std::uint8_t exposing_ = 0;  ///< cameras whose line says so
+    Nanoseconds gate_on_ = 0;
+    Nanoseconds gate_off_ = never;        ///< never: the gate is closed
+    Nanoseconds dark_until_ = INT64_MIN;  ///< after the limit was reached
+    Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last told to close
+    Nanoseconds saved_ = 0;               ///< on-time that may be spent, as of saved_at_
+    Nanoseconds saved_at_ = 0;
+};
+
+}  // namespace versavis::firmware

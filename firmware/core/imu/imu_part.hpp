@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a kind of IMU on the SPI bus needs: how it is set up, how a sample is read, and how it is checked.
+#pragma once
+
+#include "hal.hpp"
+#include "versavis/wire/messages.hpp"
+
+namespace versavis::firmware {
+
+/// One register access while the part is set up.
+struct SetupStep {
+    enum class Action : std::uint8_t { write, expect };
+    Action action = Action::write;
+    std::uint8_t chip = 0;
+    std::uint8_t address = 0;
+    std::uint16_t value = 0;     ///< to write, or that a read must give
+    std::uint32_t pause_us = 0;  ///< before the next step
+};
+
+/// Steps from power-up to samples, in order.
+class Setup {
+ public:
+    static constexpr std::size_t capacity = 20;
+
+    void write(std::uint8_t chip, std::uint8_t address, std::uint16_t value, std::uint32_t pause_us = 0) {
+        add({SetupStep::Action::write, chip, address, value, pause_us});
+    }
+    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value, std::uint32_t pause_us = 0) {
+        add({SetupStep::Action::expect, chip, address, value, pause_us});
+    }
+
+    std::size_t size() const { return size_; }
+    const SetupStep& operator[](std::size_t index) const { return steps_[index]; }
+
+ private:
+    void add(const SetupStep& step) {
+        if (size_ < capacity) steps_[size_++] = step;
+    }
+
+    SetupStep steps_[capacity] = {};
+    std::size_t size_ = 0;
+};
+
+enum class Verdict : std::uint8_t {
+    taken,   ///< the sample is filled, with flags for what is wrong
+    unsure,  ///< one more reading is needed to tell
+};
+
+inline constexpr unsigned max_readings = 3;
+
+class ImuPart {
+ public:
+    virtual wire::ImuKind kind() const = 0;
+    /// What identifies the part, as an `imu_ready` event tells it.
+    virtual std::uint16_t identity() const = 0;
+    virtual std::uint32_t fastest_millihertz() const = 0;
+    virtual std::uint8_t strongest_filter() const = 0;
+    /// Its slowest rate that is not below `wanted_millihertz`, or its fastest.
+    virtual std::uint32_t rate(std::uint32_t wanted_millihertz) const = 0;
+
+    /// `rate_millihertz` is one of its rates.
+    virtual void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const = 0;
+    virtual void access(const SetupStep& step, ImuTransfer& transfer) const = 0;
+    /// What the register held that `asked` read.
+    virtual std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const = 0;
+
+    /// Transfers that make a sample.
+    virtual unsigned readings() const = 0;
+    virtual void reading(unsigned index, ImuTransfer& transfer) const = 0;
+    /// Fills the raw words and flags of `sample` from `count` replies.
+    virtual Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const = 0;
+
+ protected:
+    ~ImuPart() = default;
+};
+
+/// The part of a kind; null: the kind is none on the SPI bus.
+const ImuPart* find_part(wire::ImuKind kind);
+
+}  // namespace versavis::firmware

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Sensor words out of the bytes of a transfer, and rates out of a table.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace versavis::firmware {
+
+inline std::uint16_t big_endian(const std::uint8_t* bytes, std::size_t word) {
+    return static_cast<std::uint16_t>(bytes[2 * word] << 8U | bytes[2 * word + 1]);
+}
+
+inline std::uint16_t little_endian(const std::uint8_t* bytes, std::size_t word) {
+    return static_cast<std::uint16_t>(bytes[2 * word + 1] << 8U | bytes[2 * word]);
+}
+
+inline std::int16_t signed_word(std::uint16_t word) { return static_cast<std::int16_t>(word); }
+
+struct RateCode {
+    std::uint32_t millihertz;
+    std::uint8_t code;
+};
+
+/// The slowest entry that is not below `wanted_millihertz`, or the first; entries from fast to slow.
+template <std::size_t N>
+const RateCode& slowest_not_below(const RateCode (&rates)[N], std::uint32_t wanted_millihertz) {
+    std::size_t found = 0;
+    for (std::size_t i = 1; i < N; ++i)
+        if (rates[i].millihertz >= wanted_millihertz) found = i;
+    return rates[found];
+}
+
+}  // namespace versavis::firmware

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "imu/vn100.hpp"
+
+#include <cstring>
+
+#include "imu/text_line.hpp"
+
+namespace versavis::firmware {
+
+namespace {
+
+constexpr std::uint32_t slow_baud = 115'200;  // after its power-up
+constexpr std::uint32_t fast_baud = 921'600;
+constexpr std::uint32_t fastest_at_slow_baud_millihertz = 160'000;
+constexpr Nanoseconds answer_patience = 300'000'000;
+constexpr Nanoseconds silence_floor = 100'000'000;
+constexpr Nanoseconds settle = 20'000'000;  // after a change of baud rate
+
+constexpr std::uint8_t sync = 0xFA;
+constexpr std::uint8_t header[] = {sync, 0x01, 0x01, 0x06};  // common group: time, IMU, magnetic and pressure
+constexpr std::size_t time_at = 4;
+constexpr std::size_t accel_at = 12;
+constexpr std::size_t gyro_at = 24;
+constexpr std::size_t magnetic_at = 36;
+constexpr std::size_t temperature_at = 48;
+constexpr std::size_t pressure_at = 52;
+constexpr unsigned steps = 6;
+
+std::uint32_t word32(const std::uint8_t* bytes) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, bytes, sizeof word);
+    return word;
+}
+
+std::uint8_t text_checksum(const char* text, std::size_t size) {
+    std::uint8_t sum = 0;
+    for (std::size_t i = 0; i < size; ++i)
+        sum = static_cast<std::uint8_t>(sum ^ static_cast<std::uint8_t>(text[i]));
+    return sum;
+}
+
+template <class Narrow>
+bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowest, std::int32_t highest,
+            Narrow& out) {
+    std::int32_t wide = 0;
+    if (!fixed_point(float_bits, fraction_bits, wide)) return false;
+    out = static_cast<Narrow>(wide < lowest ? lowest : wide > highest ? highest : wide);
+    return true;
+}
+
+}  // namespace
+
+std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size) {
+    std::uint16_t crc = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+        crc = static_cast<std::uint16_t>(crc ^ data[i] << 8U);
+        for (int bit = 0; bit < 8; ++bit)
+            crc = static_cast<std::uint16_t>((crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U);
+    }
+    return crc;
+}
+
+bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t& out) {
+    const bool negative = (float_bits >> 31U) != 0;
+    const int exponent = static_cast<int>(float_bits >> 23U & 0xFFU);
+    if (exponent == 0xFF) return false;
+    const std::int64_t mantissa = (float_bits & 0x7FFFFFU) | (exponent == 0 ? 0U : 0x800000U);
+    const int shift = exponent - 127 - 23 + static_cast<int>(fraction_bits);
+    std::int64_t value = 0;
+    if (shift >= 0)
+        value = shift > 8 ? (mantissa == 0 ? 0 : INT32_MAX) : mantissa << shift;
+    else if (shift > -32)
+        value = (mantissa + (std::int64_t{1} << (-shift - 1))) >> -shift;
+    if (value > INT32_MAX) value = INT32_MAX;
+    out = static_cast<std::int32_t>(negative ? -value : value);
+    return true;
+}
+
+std::uint32_t Vn100::true_rate(std::uint32_t wanted_millihertz) {
+    const std::uint32_t parts = vn100::fastest_millihertz / (wanted_millihertz == 0 ? 1 : wanted_millihertz);
+    return vn100::fastest_millihertz / (parts == 0 ? 1 : parts);
+}
+
+std::uint32_t Vn100::divider() const {
+    const std::uint32_t parts = vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
+    return parts == 0 ? 1 : parts;
+}
+
+void Vn100::configure(const wire::ImuConfiguration& configuration, Nanoseconds now) {
+    configuration_ = configuration;
+    state_ = State::off;
+    wake_ = never;
+    if (configuration.kind != wire::ImuKind::vn100) return;
+    period_ = 1'000'000'000'000 / true_rate(configuration.rate_millihertz);
+    fast_first_ = baud_ == fast_baud;
+    begin_setup(now);
+}
+
+void Vn100::begin_setup(Nanoseconds at) {
+    state_ = State::set_up;
+    step_ = 0;
+    waiting_ = false;
+    wake_ = at;
+}
+
+void Vn100::send_step(Nanoseconds now) {
+    if (step_ == 0) {
+        baud_ = fast_first_ ? fast_baud : slow_baud;
+        uart_.set_baud(baud_);
+        filled_ = 0;
+    }
+    TextLine text;
+    const bool fast = configuration_.rate_millihertz > fastest_at_slow_baud_millihertz;
+    switch (step_) {
+        case 0: text << "VNASY,0"; break;
+        case 1: text << "VNWRG,05," << (fast ? fast_baud : slow_baud); break;
+        case 2: text << "VNWRG,06,0"; break;  // no text output
+        case 3:  // a pulse at the start of each sample that will be sent, 100 us long, high
+            text << "VNWRG,32,3,0,0,0,1,1," << (divider() - 1) << ",100000,0";
+            break;
+        case 4: text << "VNWRG,75,1," << divider() << ",01,0601"; break;
+        default: text << "VNASY,1"; break;
+    }
+    TextLine line;
+    line << "$";
+    uart_.write(reinterpret_cast<const std::uint8_t*>(line.data()), line.size());
+    uart_.write(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+    TextLine end;
+    end << "*";
+    end.hex(text_checksum(text.data(), text.size())) << "\r\n";
+    uart_.write(reinterpret_cast<const std::uint8_t*>(end.data()), end.size());
+    waiting_ = true;
+    wake_ = now + answer_patience;
+}
+
+void Vn100::next_step(Nanoseconds now) {
+    waiting_ = false;
+    wake_ = now;
+    if (step_ == 1) {
+        baud_ = configuration_.rate_millihertz > fastest_at_slow_baud_millihertz ? fast_baud : slow_baud;
+        uart_.set_baud(baud_);
+        wake_ = now + settle;
+    }
+    if (++step_ < steps) return;
+    state_ = State::running;
+    startup_ns_ = 0;
+    wake_ = now + silence_floor + 20 * period_;
+    tell(wire::EventKind::imu_ready, now, 100);
+}
+
+void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
+    tell_failure(kind, now, value, static_cast<std::uint16_t>(state_ == State::running ? 0xFFFFU : step_));
+    fast_first_ = !fast_first_;
+    begin_setup(now + retry_interval);
+}
+
+void Vn100::ready_edge(Nanoseconds at) {
+    edge_before_ = edge_;
+    edge_ = at;
+}
+
+void Vn100::drop(std::size_t size) {
+    for (std::size_t i = size; i < filled_; ++i) bytes_[i - size] = bytes_[i];
+    filled_ -= size;
+}
+
+/// Of the line that stands first, its end included; 0: none ends soon.
+std::size_t Vn100::line_length() const {
+    for (std::size_t i = 0; i < filled_ && i < max_line; ++i)
+        if (bytes_[i] == '\n') return i + 1;
+    return 0;
+}
+
+/// The answer to the step that was sent, or an error; anything else is ignored.
+void Vn100::take_line(Nanoseconds now) {
+    const std::size_t end = line_length() - 1;
+    const char* line = reinterpret_cast<const char*>(bytes_);
+    const bool error = end > 8 && std::memcmp(line, "$VNERR,", 7) == 0;
+    const bool answer = end > 6 && std::memcmp(line, step_ == 0 || step_ == 5 ? "$VNASY" : "$VNWRG", 6) == 0;
+    std::size_t star = 0;
+    while (star < end && line[star] != '*') ++star;
+    TextLine sum;
+    sum.hex(text_checksum(line + 1, star == 0 ? 0 : star - 1));
+    const bool intact = star + 2 < end && std::memcmp(line + star + 1, sum.data(), 2) == 0;
+    const std::int64_t code = line[7] * 256 + line[8];
+    drop(end + 1);
+    if (state_ != State::set_up || !waiting_ || !intact) return;
+    if (error) return fail(wire::EventKind::imu_failed, now, code);
+    if (answer) next_step(now);
+}
+
+bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
+    using namespace vn100;
+    // The bytes behind it, and its own, went over the line at the baud rate, ten bits each.
+    const Nanoseconds first_byte =
+        received_ - static_cast<Nanoseconds>(filled_) * 10'000'000'000 / static_cast<Nanoseconds>(baud_);
+    const std::uint8_t* packet = bytes_;
+    std::uint64_t startup = 0;
+    std::memcpy(&startup, packet + time_at, sizeof startup);
+    sample = {};
+    sample.kind = wire::ImuKind::vn100;
+    bool good = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        good = fixed_point(word32(packet + gyro_at + 4 * axis), gyro_bits, sample.gyro[axis]) && good;
+        good = fixed_point(word32(packet + accel_at + 4 * axis), accel_bits, sample.accel[axis]) && good;
+        good = narrow(word32(packet + magnetic_at + 4 * axis), magnetic_bits, INT16_MIN, INT16_MAX,
+                      sample.magnetic[axis]) &&
+               good;
+    }
+    good =
+        narrow(word32(packet + temperature_at), temperature_bits, INT16_MIN, INT16_MAX, sample.temperature) &&
+        good;
+    good = narrow(word32(packet + pressure_at), pressure_bits, 0, UINT16_MAX, sample.pressure) && good;
+    drop(packet_size);
+    if (state_ != State::running) return false;
+    if (!good) sample.flags |= wire::imu_self_test_failed;
+    count(startup);
+    stamp(first_byte, sample);
+    wake_ = now + silence_floor + 20 * period_;
+    finish(sample);
+    return true;
+}
+
+/// The part's own clock tells how many samples were lost on the way.
+void Vn100::count(std::uint64_t startup_ns) {
+    if (startup_ns_ != 0 && startup_ns > startup_ns_) {
+        const std::uint64_t period = static_cast<std::uint64_t>(period_);
+        const std::uint64_t periods = (startup_ns - startup_ns_ + period / 2) / period;
+        if (periods > 1) miss(static_cast<std::uint32_t>(periods - 1));
+    }
+    startup_ns_ = startup_ns;
+}
+
+/// A packet leaves within a period of its sample: the newest edge before it is that sample's.
+void Vn100::stamp(Nanoseconds first_byte, wire::ImuSample& sample) {
+    const Nanoseconds edge = edge_ < first_byte ? edge_ : edge_before_;
+    const bool wired = (configuration_.options & wire::imu_data_ready) != 0;
+    if (wired && edge < first_byte && first_byte - edge < period_) {
+        sample.time_ns = edge;
+        sample.flags |= wire::imu_stamped;
+    } else {
+        sample.time_ns = first_byte;
+    }
+}
+
+/// Takes what stands first among the bytes. True: it was a sample.
+bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
+    while (filled_ > 0) {
+        if (bytes_[0] == sync) {
+            const std::size_t head = filled_ < sizeof header ? filled_ : sizeof header;
+            if (std::memcmp(bytes_, header, head) == 0) {
+                if (filled_ < vn100::packet_size) return false;
+                if (vn100_crc(bytes_ + 1, vn100::packet_size - 1) == 0) {
+                    if (take_packet(now, sample)) return true;
+                    continue;
+                }
+                if (state_ == State::running) count_error();
+            }
+        } else if (bytes_[0] == '$') {
+            if (line_length() != 0) {
+                take_line(now);
+                continue;
+            }
+            if (filled_ < max_line) return false;
+        }
+        drop(1);
+    }
+    return false;
+}
+
+bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
+    if (state_ == State::off) return false;
+    // What was read is looked at before more is: `received_` belongs to the last byte.
+    if (parse(now, sample)) return true;
+    while (const std::size_t size = uart_.read(bytes_ + filled_, sizeof bytes_ - filled_, received_)) {
+        filled_ += size;
+        if (parse(now, sample)) return true;
+    }
+    if (now < wake_) return false;
+    if (state_ == State::running || waiting_)
+        fail(wire::EventKind::imu_silent, now, 0);
+    else
+        send_step(now);
+    return false;
+}
+
+Nanoseconds Vn100::next_wake() const { return state_ == State::off ? never : wake_; }
+
+}  // namespace versavis::firmware

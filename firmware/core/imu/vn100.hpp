@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// VectorNav VN-100 on the UART: set up by its text commands, read as binary packets, by the user manual UM001
+// v2.22.
+#pragma once
+
+#include "imu/imu_port.hpp"
+
+namespace versavis::firmware {
+
+/// CRC-16 with the polynomial 0x1021, from zero; over a packet with its CRC it is zero.
+std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size);
+
+/// An IEEE float as a whole number of 2^-`fraction_bits`, without floating point; saturates. False: it is not
+/// a number.
+bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t& out);
+
+namespace vn100 {
+// Raw words of its samples are whole numbers of these.
+inline constexpr unsigned gyro_bits = 24;        ///< 2^-24 rad/s
+inline constexpr unsigned accel_bits = 20;       ///< 2^-20 m/s^2
+inline constexpr unsigned magnetic_bits = 13;    ///< 2^-13 gauss
+inline constexpr unsigned temperature_bits = 7;  ///< 2^-7 degree C
+inline constexpr unsigned pressure_bits = 8;     ///< 2^-8 kPa
+inline constexpr std::uint32_t fastest_millihertz = 800'000;
+inline constexpr std::size_t packet_size = 58;  ///< with time, IMU, magnetic and pressure fields
+}  // namespace vn100
+
+class Vn100 final : public ImuPort {
+ public:
+    Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports) : ImuPort(port, reports), uart_(uart) {}
+
+    void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
+
+    /// Its sync output rose: it takes a sample.
+    void ready_edge(Nanoseconds at);
+
+    /// Does what is due. True: `sample` holds a new sample; call again for more.
+    bool poll(Nanoseconds now, wire::ImuSample& sample);
+
+    Nanoseconds next_wake() const;
+
+    static std::uint32_t true_rate(std::uint32_t wanted_millihertz);
+
+ private:
+    enum class State : std::uint8_t { off, set_up, running };
+    static constexpr std::size_t max_line = 64;
+
+    std::uint32_t divider() const;
+    void begin_setup(Nanoseconds at);
+    void send_step(Nanoseconds now);
+    void next_step(Nanoseconds now);
+    std::size_t line_length() const;
+    void take_line(Nanoseconds now);
+    bool take_packet(Nanoseconds now, wire::ImuSample& sample);
+    void stamp(Nanoseconds first_byte, wire::ImuSample& sample);
+    void count(std::uint64_t startup_ns);
+    bool parse(Nanoseconds now, wire::ImuSample& sample);
+    void drop(std::size_t size);
+    void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value);
+
+    ImuUart& uart_;
+    wire::ImuConfiguration configuration_{};
+    State state_ = State::off;
+    std::uint32_t baud_ = 0;
+    bool fast_first_ = false;  ///< the part may still talk as fast as it was told before
+    unsigned step_ = 0;
+    bool waiting_ = false;      ///< for the answer of the step
+    Nanoseconds wake_ = never;  ///< the next attempt, or the end of patience
+    Nanoseconds period_ = 0;
+    Nanoseconds edge_ = INT64_MIN / 2;  ///< newest of the sync output
+    Nanoseconds edge_before_ = INT64_MIN / 2;
+    std::uint64_t startup_ns_ = 0;  ///< the part's clock at the newest sample; 0: none yet
+    Nanoseconds received_ = 0;      ///< when the last of the bytes had arrived
+    std::uint8_t bytes_[2 * vn100::packet_size] = {};
+    std::size_t filled_ = 0;
+};
+
+}  // namespace versavis::firmware

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How fast the board's clock runs against pulses that come once a second.
+#pragma once
+
+#include "hal.hpp"
+#include "versavis/wire/messages.hpp"
+
+namespace versavis::firmware {
+
+/// Slope over the last pulses, up to 32 s: with edges good to r ns the error is r / 32 ppb.
+class PpsMonitor {
+ public:
+    void pulse(Nanoseconds at);
+
+    /// none: no good pulse within the last seconds before `now`.
+    wire::PpsState state(Nanoseconds now) const;
+    std::int32_t error_ppb() const { return error_ppb_; }
+
+ private:
+    static constexpr std::size_t capacity = 33;
+
+    Nanoseconds pulses_[capacity] = {};     ///< oldest first; whole seconds apart
+    std::uint16_t seconds_[capacity] = {};  ///< from the pulse before
+    std::size_t count_ = 0;
+    std::int32_t error_ppb_ = 0;
+};
+
+}  // namespace versavis::firmware

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transmitter.hpp"
+
+namespace versavis::firmware {
+
+void Transmitter::begin() {
+    hellos_.clear();
+    refusals_.clear();
+    answers_.clear();
+    clock_answers_.clear();
+    exposures_.clear();
+    events_.clear();
+    healths_.clear();
+    samples_.clear();
+    logs_.clear();
+    frame_.bytes[0] = 0;  // ends the packet that was being written
+    frame_.size = 1;
+    written_ = 0;
+}
+
+std::size_t Transmitter::waiting_packets() const {
+    return hellos_.size() + refusals_.size() + answers_.size() + clock_answers_.size() + exposures_.size() +
+           events_.size() + healths_.size() + samples_.size() + logs_.size();
+}
+
+template <class Queue>
+bool Transmitter::stage_first_of(Queue& queue) {
+    if (queue.empty()) return false;
+    wire::encode(queue.front(), nonce_, sequence_++, frame_);
+    written_ = 0;
+    queue.pop();
+    return true;
+}
+
+bool Transmitter::stage() {
+    if (stage_first_of(hellos_)) return true;
+    if (!clock_answers_.empty()) clock_answers_.front().sent_ns = clock_.now();
+    return stage_first_of(clock_answers_) || stage_first_of(refusals_) || stage_first_of(answers_) ||
+           stage_first_of(exposures_) || stage_first_of(events_) || stage_first_of(healths_) ||
+           stage_first_of(samples_) || stage_first_of(logs_);
+}
+
+void Transmitter::pump() {
+    const std::size_t waiting = waiting_packets();
+    if (waiting > high_water_) high_water_ = waiting;
+    for (std::size_t space = link_.free_space(); space > 0; space = link_.free_space()) {
+        if (written_ == frame_.size && !stage()) return;
+        const std::size_t left = frame_.size - written_;
+        const std::size_t size = left < space ? left : space;
+        link_.write(frame_.bytes + written_, size);
+        written_ += size;
+    }
+}
+
+void Transmitter::count_drops(wire::Health& health) const {
+    health.dropped_exposures = exposures_.dropped();
+    health.dropped_clock_answers = clock_answers_.dropped();
+    health.dropped_events = events_.dropped();
+    health.dropped_imu_samples = samples_.dropped();
+    health.dropped_logs = logs_.dropped();
+}
+
+std::uint32_t Transmitter::take_high_water() {
+    const std::size_t most = high_water_;
+    high_water_ = 0;
+    return static_cast<std::uint32_t>(most);
+}
+
+}  // namespace versavis::firmware

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A VN-100 as the other end of its UART sees it: text commands in, text and binary packets out.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "inertial.hpp"
+
+namespace versavis::devices {
+
+class Vn100Device {
+ public:
+    explicit Vn100Device(World world) : world_(std::move(world)) {}
+
+    struct Burst {
+        Nanoseconds complete;  ///< when its last byte has been sent
+        std::vector<std::uint8_t> bytes;
+    };
+
+    /// Takes bytes sent at `baud`; returns answers.
+    std::vector<Burst> receive(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
+
+    /// When the next sample begins, where its sync output rises; none: it sends no samples.
+    std::optional<Nanoseconds> next_sample(Nanoseconds after) const;
+
+    /// The packet of the sample that began at `at`.
+    Burst packet(Nanoseconds at);
+
+    bool pulses() const { return sync_mode_ == 1; }
+    std::uint32_t baud() const { return baud_; }
+    /// Text that it sends on its own, as after its power-up.
+    Burst chatter(Nanoseconds at) const;
+
+    void mute(bool muted) { muted_ = muted; }
+    void corrupt(unsigned packets) { corrupted_ = packets; }
+
+ private:
+    std::optional<std::string> execute(const std::string& command);
+    Burst send(Nanoseconds at, std::vector<std::uint8_t> bytes, std::uint32_t baud) const;
+
+    World world_;
+    std::string line_;
+    std::uint32_t baud_ = 115'200;
+    bool paused_ = false;
+    unsigned text_output_ = 14;
+    unsigned divider_ = 0;  ///< 0: no binary output
+    unsigned sync_mode_ = 6;
+    bool muted_ = false;
+    unsigned corrupted_ = 0;
+};
+
+}  // namespace versavis::devices

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_model.hpp"
+
+namespace versavis::scenario {
+
+void CameraModel::emit(Edges& edges, Nanoseconds at, bool exposing) const {
+    if (settings_.strobe) edges.push_back({at, settings_.input, exposing != settings_.strobe_inverted});
+}
+
+CameraModel::Edges CameraModel::trigger_line(Nanoseconds at, bool level) {
+    const bool active = level != settings_.trigger_inverted;
+    if (active) return begin(at);
+    Edges edges;
+    if (settings_.trigger_width && width_start_) {
+        TruePulse& pulse = pulses_.back();
+        pulse.end = at + settings_.latency;
+        free_at_ = pulse.end + settings_.readout;
+        emit(edges, pulse.end, false);
+        width_start_.reset();
+    }
+    return edges;
+}
+
+CameraModel::Edges CameraModel::begin(Nanoseconds at) {
+    Edges edges;
+    TruePulse pulse;
+    pulse.at = at;
+    pulse.fault = settings_.fault(pulses_.size() + 1);
+    pulse.into_busy = at < free_at_;
+    pulse.taken = !pulse.into_busy && pulse.fault != Fault::ignored;
+    if (pulse.taken) {
+        Nanoseconds latency = settings_.latency;
+        if (settings_.jitter > 0)
+            latency +=
+                std::uniform_int_distribution<Nanoseconds>(-settings_.jitter, settings_.jitter)(random_);
+        if (pulse.fault == Fault::late_start) latency += ms;
+        pulse.start = at + latency;
+        if (settings_.trigger_width) {
+            width_start_ = pulse.start;
+            free_at_ = firmware::never;
+            emit(edges, pulse.start, true);
+        } else {
+            pulse.end = pulse.start + settings_.exposure(pulses_.size() + 1, pulse.start);
+            free_at_ = pulse.end + settings_.readout;
+            const bool silent = pulse.fault == Fault::no_strobe;
+            if (!silent && pulse.fault != Fault::start_lost) emit(edges, pulse.start, true);
+            if (!silent && pulse.fault != Fault::end_lost) emit(edges, pulse.end, false);
+        }
+    }
+    pulses_.push_back(pulse);
+    return edges;
+}
+
+}  // namespace versavis::scenario

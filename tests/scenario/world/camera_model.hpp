@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A camera at the board's trigger output: exposes after a latency, ignores triggers while it is busy, and
+// remembers what it truly did.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "hal.hpp"
+
+namespace versavis::scenario {
+
+using firmware::Nanoseconds;
+
+inline constexpr Nanoseconds us = 1'000;
+inline constexpr Nanoseconds ms = 1'000'000;
+inline constexpr Nanoseconds second = 1'000'000'000;
+
+/// What is wrong with one exposure.
+enum class Fault {
+    none,
+    ignored,     ///< the camera does not take the trigger
+    no_strobe,   ///< neither edge is seen
+    start_lost,  ///< the start edge is not seen
+    end_lost,    ///< the line falls with the start of the next exposure only, unseen
+    late_start,  ///< it starts a millisecond late
+};
+
+struct CameraSettings {
+    Nanoseconds latency = 20 * us;
+    Nanoseconds jitter = 0;   ///< of the latency, to both sides
+    Nanoseconds readout = 0;  ///< after an exposure no trigger is taken for so long
+    bool trigger_inverted = false;
+    bool strobe_inverted = false;
+    bool strobe = true;          ///< the exposure line is wired
+    bool trigger_width = false;  ///< it exposes as long as the trigger is active
+    std::uint8_t input = 0;      ///< of the board, for the exposure line
+    /// Exposure of pulse 1, 2, ... at a time: constant, or an auto exposure.
+    std::function<Nanoseconds(std::uint64_t pulse, Nanoseconds at)> exposure = [](auto, auto) {
+        return 3 * ms;
+    };
+    std::function<Fault(std::uint64_t pulse)> fault = [](auto) { return Fault::none; };
+};
+
+struct TruePulse {
+    Nanoseconds at = 0;
+    bool taken = false;
+    bool into_busy = false;  ///< it came while the camera exposed or read out
+    Fault fault = Fault::none;
+    Nanoseconds start = 0;
+    Nanoseconds end = 0;
+};
+
+class CameraModel {
+ public:
+    CameraModel(CameraSettings settings, std::uint64_t seed)
+        : settings_(std::move(settings)), random_(seed) {}
+
+    using Edges = std::vector<firmware::Edge>;
+
+    /// The trigger line changed. Returns edges of the exposure line, of now and to come.
+    Edges trigger_line(Nanoseconds at, bool level);
+
+    const CameraSettings& settings() const { return settings_; }
+    CameraSettings& settings() { return settings_; }
+    const std::vector<TruePulse>& pulses() const { return pulses_; }
+
+ private:
+    void emit(Edges& edges, Nanoseconds at, bool exposing) const;
+    Edges begin(Nanoseconds at);
+
+    CameraSettings settings_;
+    std::mt19937_64 random_;
+    std::vector<TruePulse> pulses_;
+    Nanoseconds free_at_ = 0;
+    std::optional<Nanoseconds> width_start_;
+};
+
+}  // namespace versavis::scenario

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// World::judge(): what was reported against what happened.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "versavis/imu/imu_model.hpp"
+#include "world.hpp"
+
+namespace versavis::scenario {
+
+namespace {
+
+constexpr std::size_t longest_report = 2000;
+
+template <class... Args>
+void complain(std::string& out, fmt::format_string<Args...> text, Args&&... args) {
+    if (out.size() < longest_report) out += fmt::format(text, std::forward<Args>(args)...) + "\n";
+}
+
+bool has(const wire::Exposure& record, wire::ExposureFlag flag) { return (record.flags & flag) != 0; }
+
+}  // namespace
+
+std::string World::judge() {
+    std::string out;
+    for (const auto& [output, model] : cameras_) judge_camera(output, out);
+    judge_imu(0, out);
+    judge_imu(1, out);
+    judge_pulses(out);
+    judge_light(out);
+    if (inbox().lost != 0) complain(out, "{} packets are missing by their numbers", inbox().lost);
+    if (spi_imu_ && spi_imu_->breaches() != 0)
+        complain(out, "{} breaches of the IMU's rules", spi_imu_->breaches());
+    if (board_->watchdog_bit()) complain(out, "the watchdog bit");
+    return out;
+}
+
+void World::judge_camera(unsigned camera, std::string& out) {
+    const std::vector<TruePulse>& pulses = cameras_.at(camera)->pulses();
+    const std::vector<wire::Exposure>& records = inbox().exposures[camera];
+    std::uint64_t last = 0;
+    for (const wire::Exposure& record : records) {
+        if (record.trigger <= last)
+            complain(out, "camera {}: trigger {} after {}", camera, record.trigger, last);
+        if (record.trigger != last + 1 && !drops_allowed)
+            complain(out, "camera {}: trigger {} comes after {}", camera, record.trigger, last);
+        last = record.trigger;
+        if (record.trigger == 0 || record.trigger > pulses.size())
+            complain(out, "camera {}: there was no pulse {}", camera, record.trigger);
+        else
+            judge_record(record, pulses[record.trigger - 1], out);
+    }
+    if (last != pulses.size() && !drops_allowed)
+        complain(out, "camera {}: {} pulses, but the last record is {}", camera, pulses.size(), last);
+    for (std::size_t i = 0; i < pulses.size() && !busy_allowed; ++i)
+        if (pulses[i].into_busy)
+            complain(out, "camera {}: pulse {} was sent into a busy camera", camera, i + 1);
+    judge_ticks(camera, out);
+}
+
+void World::judge_record(const wire::Exposure& record, const TruePulse& pulse, std::string& out) const {
+    const wire::CameraConfiguration& camera = configuration.cameras[record.camera];
+    const bool slave = (camera.flags & wire::camera_slave) != 0;
+    const bool strobe = (camera.flags & wire::camera_no_strobe) == 0;
+    const auto wrong = [&](const char* what) {
+        complain(out, "camera {} trigger {}: {} (flags {:#x}, trigger {}, start {}, end {}; true {}, {}, {})",
+                 record.camera, record.trigger, what, record.flags, record.trigger_ns, record.start_ns,
+                 record.end_ns, pulse.at, pulse.start, pulse.end);
+    };
+    const Nanoseconds off = std::abs(record.trigger_ns - pulse.at);
+    if (off > (slave ? firmware::routing_latency_limit : 0)) wrong("trigger time");
+    if (!strobe && slave) {
+        if (!has(record, wire::exposure_from_master)) wrong("not said to be the master's");
+        return;
+    }
+    if (!strobe) {
+        if (!has(record, wire::exposure_predicted) || has(record, wire::exposure_measured))
+            wrong("not predicted");
+        return;
+    }
+    const bool overlong = pulse.taken && pulse.end - pulse.start > camera.max_exposure_ns;
+    const bool sees_start =
+        pulse.taken && pulse.fault != Fault::no_strobe && pulse.fault != Fault::start_lost;
+    const bool sees_end = sees_start && pulse.fault != Fault::end_lost && !overlong;
+    if (has(record, wire::exposure_measured) != sees_end) wrong("measured or not");
+    if (has(record, wire::exposure_no_start) == sees_start) wrong("start seen or not");
+    if (sees_start && record.start_ns != pulse.start) wrong("start");
+    if (!sees_start && record.start_ns != wire::no_time) wrong("start invented");
+    if (sees_end && record.end_ns != pulse.end) wrong("end");
+    if (!sees_end && record.end_ns != wire::no_time) wrong("end invented");
+    if (overlong && !has(record, wire::exposure_overlong)) wrong("not overlong");
+}
+
+/// Each grid point from the first to the last has a record or an event.
+void World::judge_ticks(unsigned camera, std::string& out) {
+    if (drops_allowed || gaps_allowed || (configuration.cameras[camera].flags & wire::camera_slave) != 0)
+        return;
+    std::multiset<std::uint64_t> ticks;
+    for (const wire::Exposure& record : inbox().exposures[camera]) ticks.insert(record.tick);
+    for (const wire::Event& event : inbox().events_of(wire::EventKind::trigger_skipped))
+        if (event.source == camera) ticks.insert(static_cast<std::uint64_t>(event.value));
+    std::uint64_t expected = ticks.empty() ? 0 : *ticks.begin();
+    for (const std::uint64_t tick : ticks)
+        if (tick != expected++)
+            return complain(out, "camera {}: tick {} is not accounted for", camera, expected - 1);
+}
+
+void World::judge_imu(unsigned port, std::string& out) {
+    const std::vector<wire::ImuSample>& samples = inbox().samples[port];
+    if (samples.empty()) {
+        if (configuration.imus[port].kind != wire::ImuKind::none) complain(out, "IMU {}: no samples", port);
+        return;
+    }
+    const imu::ImuModel& model = *imu::find_model(samples[0].kind);
+    const std::vector<Nanoseconds>& ready = ready_times_[port];
+    const bool paced = (configuration.imus[port].options & wire::imu_data_ready) != 0;
+    const auto index_of = [&ready](Nanoseconds at) {
+        const auto found = std::lower_bound(ready.begin(), ready.end(), at);
+        return found != ready.end() && *found == at ? found - ready.begin() : std::ptrdiff_t{-1};
+    };
+    std::ptrdiff_t last_index = -1;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const wire::ImuSample& sample = samples[i];
+        const std::uint32_t step = i == 0 ? 1 : sample.number - samples[i - 1].number;
+        if (step != 1 && (sample.flags & wire::imu_overrun) == 0 && !drops_allowed)
+            complain(out, "IMU {}: {} numbers are missing before {}", port, step - 1, sample.number);
+        Nanoseconds taken = sample.time_ns;
+        if (paced) {
+            const std::ptrdiff_t index = index_of(sample.time_ns);
+            if (index < 0)
+                complain(out, "IMU {} sample {}: stamped {} without an edge", port, sample.number, taken);
+            if ((sample.flags & wire::imu_stamped) == 0)
+                complain(out, "IMU {} sample {}: not stamped by its edge", port, sample.number);
+            const bool begins_anew = drops_allowed && (sample.flags & wire::imu_overrun) != 0;
+            if (last_index >= 0 && index >= 0 && index - last_index != step && !begins_anew)
+                complain(out, "IMU {} sample {}: {} edges after the one before", port, sample.number,
+                         index - last_index);
+            last_index = index;
+        } else if (spi_imu_ && port == 0) {
+            const devices::UpdateTimes times = spi_imu_->updates();
+            taken = times.time(times.index_at(taken));
+        }
+        if ((sample.flags & wire::imu_check_failed) != 0 || (port == 1 && !paced)) continue;
+        const ImuMetadata si = imu::to_si(model, sample);
+        const devices::Inertial felt = motion(taken);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const double rate = felt.gyro_deg_s[axis] * 3.14159265358979 / 180;
+            const double acceleration = felt.accel_g[axis] * 9.80665;
+            if (std::abs(si.gyro[axis] - rate) > 0.6 * model.gyro_rad_s + 1e-6)
+                complain(out, "IMU {} sample {}: gyro {} is {}, not {}", port, sample.number, axis,
+                         si.gyro[axis], rate);
+            if (std::abs(si.accel[axis] - acceleration) > 0.7 * model.accel_m_s2 + 1e-5)
+                complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port, sample.number, axis,
+                         si.accel[axis], acceleration);
+        }
+        if (std::abs(si.temperature - felt.temperature_c) > 0.6 * model.temperature_c)
+            complain(out, "IMU {} sample {}: temperature is {}", port, sample.number, si.temperature);
+    }
+}
+
+void World::judge_pulses(std::string& out) {
+    for (const PulseSource& source : pulses_) {
+        const unsigned input = source.input - firmware::input_pulse;
+        const auto kind = input == wire::pulse_pps    ? wire::EventKind::pps
+                          : input == wire::pulse_sync ? wire::EventKind::sync_pulse
+                                                      : wire::EventKind::aux_pulse;
+        std::vector<wire::Event> events = inbox().events_of(kind);
+        std::erase_if(events, [&](const wire::Event& event) {
+            return kind == wire::EventKind::aux_pulse && event.source != input - wire::pulse_aux0;
+        });
+        for (std::size_t i = 1; i < events.size(); ++i)
+            if (events[i].value != events[i - 1].value + 1 && !drops_allowed)
+                complain(out, "input {}: pulse {} after {}", input, events[i].value, events[i - 1].value);
+        std::set<Nanoseconds> edges(source.fired.begin(), source.fired.end());
+        for (const wire::Event& event : events)
+            if (edges.erase(event.time_ns) == 0)
+                complain(out, "input {}: no edge at {}", input, event.time_ns);
+        if (!drops_allowed && events.size() + 3 < source.fired.size())
+            complain(out, "input {}: {} events of {} pulses", input, events.size(), source.fired.size());
+    }
+}
+
+void World::judge_light(std::string& out) {
+    const wire::IlluminationConfiguration& light = configuration.illumination;
+    if (light.cameras == 0) return;
+    double saved = light.max_on_ns;  // what may still be spent, as on-time
+    Nanoseconds before = 0;
+    for (const Interval& interval : lights_) {
+        const double duty = static_cast<double>(light.duty_ppm) * 1e-6;
+        const Nanoseconds on = interval.off - interval.on;
+        if (interval.off == firmware::never) {
+            complain(out, "the light was left on at {}", interval.on);
+            break;
+        }
+        if (on > light.max_on_ns) complain(out, "the light was on for {} ns at {}", on, interval.on);
+        saved = std::min<double>(light.max_on_ns, saved + static_cast<double>(interval.on - before) * duty);
+        saved += static_cast<double>(on) * (duty - 1);
+        before = interval.off;
+        // Code that hangs can cost one longest light, which is made up for later.
+        if (saved < -1000 - (drops_allowed ? light.max_on_ns : 0.0))
+            complain(out, "the light was on for too much of the time at {}", interval.on);
+    }
+    if (!inbox().events_of(wire::EventKind::illumination_limited).empty()) return;
+    for (const auto& [output, model] : cameras_) {
+        if ((light.cameras >> output & 1U) == 0) continue;
+        for (const TruePulse& pulse : model->pulses()) {
+            if (!pulse.taken || pulse.end == 0 || pulse.fault == Fault::no_strobe) continue;
+            const bool lit = std::any_of(lights_.begin(), lights_.end(), [&](const Interval& interval) {
+                const Nanoseconds latest = pulse.start - light.lead_ns + model->settings().jitter;
+                return interval.on <= latest && interval.off >= pulse.end;
+            });
+            if (!lit)
+                complain(out, "camera {}: the exposure at {} was not lit throughout", output, pulse.start);
+        }
+    }
+}
+
+}  // namespace versavis::scenario

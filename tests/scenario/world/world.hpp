@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The board in virtual time, wired to models of cameras, IMUs and pulse sources, and to a host; keeps what
+// truly happened, and judges what was reported by it.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera_model.hpp"
+#include "host_model.hpp"
+#include "inertial.hpp"
+#include "native_board.hpp"
+#include "trace.hpp"
+#include "vn100_device.hpp"
+
+namespace versavis::scenario {
+
+/// Regular pulses into the board, such as PPS.
+struct PulseSource {
+    std::uint8_t input;
+    Nanoseconds origin;
+    double period_ns;  ///< in board time
+    Nanoseconds width = 100 * us;
+    bool falling = false;  ///< low pulses
+    std::uint64_t count = 0;
+    std::vector<Nanoseconds> fired{};
+
+    Nanoseconds next() const;
+};
+
+struct Interval {
+    Nanoseconds on;
+    Nanoseconds off;
+};
+
+class World {
+ public:
+    explicit World(std::uint64_t seed = 1);
+
+    /// A motion that is easy to recognise, slow against every IMU.
+    static devices::Inertial motion(Nanoseconds at);
+
+    // What is there; before connect().
+    CameraModel& add_camera(unsigned output, CameraSettings settings = {},
+                            std::uint32_t rate_uhz = 20'000'000);
+    void add_imu(std::unique_ptr<devices::SpiImuDevice> device, wire::ImuKind kind, double rate_hz,
+                 bool data_ready);
+    devices::Vn100Device& add_vn100(double rate_hz, bool data_ready);
+    void add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns,
+                    Nanoseconds width = 100 * us);
+    /// Edges without end at an input, `period` apart.
+    void add_noise(std::uint8_t input, Nanoseconds period, Nanoseconds from, Nanoseconds to);
+
+    // What the host does.
+    template <class T>
+    void send(const T& message) {
+        wire::Frame frame{};
+        wire::encode(message, host_nonce_, host_sequence_++, frame);
+        send_bytes({frame.bytes, frame.size});
+    }
+    void send_bytes(std::span<const std::uint8_t> bytes);
+    void connect();
+    /// Sends `configuration`. False: it was not taken.
+    bool configure();
+    void start(std::uint8_t cameras = 0xF, std::uint8_t flags = 0);
+    void stop(std::uint8_t cameras = 0xF);
+    /// connect(), configure() and start().
+    bool begin(std::uint8_t flags = 0);
+    /// Nothing is read for `duration` from now.
+    void stall_host(Nanoseconds duration) { host_reads_from_ = now_ + duration; }
+    /// Bytes that the host reads, how often, and what the board can hold of them.
+    void set_link(Nanoseconds interval, std::size_t bytes, std::size_t capacity);
+
+    void run(Nanoseconds duration);
+    /// Stops the cameras, and waits for all that is still to come.
+    void finish();
+    /// The board's code stands still for `duration`; all else goes on.
+    void stall_board(Nanoseconds duration);
+    /// The board begins anew; what the host knows stays.
+    void reboot(wire::ResetCause cause);
+
+    Nanoseconds now() const { return now_; }
+    firmware::NativeBoard& board() { return *board_; }
+    Inbox& inbox() { return host_.inbox; }
+    CameraModel& camera(unsigned output) { return *cameras_.at(output); }
+    Trace& trace() { return trace_; }
+    const std::vector<Interval>& lights() const { return lights_; }
+    const std::vector<Nanoseconds>& rises(unsigned pin) const { return rises_[pin]; }
+    int reboots() const { return reboots_; }
+
+    /// True time of a grid point.
+    Nanoseconds grid_time(unsigned camera, std::uint64_t tick) const;
+    /// Middle of a measured exposure against its grid point.
+    Nanoseconds grid_error(const wire::Exposure& record) const;
+    const wire::Exposure& record(unsigned camera, std::uint64_t trigger);
+
+    // What judge() puts up with.
+    bool drops_allowed = false;  ///< records and events that the board had to drop
+    bool busy_allowed = false;   ///< triggers into a busy camera that nobody could foresee
+    bool gaps_allowed = false;   ///< grid points without pulse or event: pattern, slow start, restarts
+
+    /// Everything that was reported against everything that happened; empty: all is right.
+    std::string judge();
+
+    wire::Configuration configuration{};
+
+ private:
+    void outputs_changed(Nanoseconds at, std::uint32_t pins);
+    void make_board(wire::ResetCause cause);
+    void step(Nanoseconds until);
+    void read_link();
+    Nanoseconds next_event() const;
+    void fire_events();
+    void fire_spi_ready();
+    void fire_uart_sample();
+    void uart_sent(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
+
+    void judge_camera(unsigned camera, std::string& out);
+    void judge_record(const wire::Exposure& record, const TruePulse& pulse, std::string& out) const;
+    void judge_ticks(unsigned camera, std::string& out);
+    void judge_imu(unsigned port, std::string& out);
+    void judge_pulses(std::string& out);
+    void judge_light(std::string& out);
+
+    std::uint64_t seed_;
+    Nanoseconds now_ = 0;
+    std::vector<std::uint8_t> flash_;
+    std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
+    std::unique_ptr<devices::SpiImuDevice> spi_imu_;
+    std::optional<devices::Vn100Device> uart_imu_;
+    std::uint32_t uart_baud_ = 0;
+    std::vector<PulseSource> pulses_;
+    Nanoseconds next_ready_ = firmware::never;
+    bool ready_fires_ = false;
+    Nanoseconds next_sample_ = firmware::never;
+    std::vector<Nanoseconds> ready_times_[2];
+    HostModel host_;
+    std::uint32_t host_nonce_ = 0x4057;
+    std::uint32_t host_sequence_ = 0;
+    Nanoseconds next_read_ = ms;
+    Nanoseconds read_interval_ = ms;
+    std::size_t read_size_ = 832;  ///< of the 1216 that a millisecond of full speed can carry
+    std::size_t link_capacity_ = 512;
+    Nanoseconds host_reads_from_ = 0;
+    Nanoseconds grid_origin_ = 0;
+    std::uint32_t pins_ = 0;
+    std::vector<Interval> lights_;
+    std::vector<Nanoseconds> rises_[8];
+    int reboots_ = 0;
+    Trace trace_;
+    std::unique_ptr<firmware::NativeBoard> board_;
+};
+
+}  // namespace versavis::scenario

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transmitter.hpp"
+
+#include <catch2/catch.hpp>
+#include <vector>
+
+using namespace versavis;
+using namespace versavis::firmware;
+
+namespace {
+
+struct Link final : ByteLink {
+    std::size_t space = 0;
+    std::vector<std::uint8_t> bytes;
+    std::size_t free_space() override { return space; }
+    void write(const std::uint8_t* data, std::size_t size) override {
+        bytes.insert(bytes.end(), data, data + size);
+        space -= size;
+    }
+    std::size_t read(std::uint8_t* /*data*/, std::size_t /*capacity*/, Nanoseconds& /*received*/) override {
+        return 0;
+    }
+};
+
+struct Clock final : Clock64 {
+    Nanoseconds time = 0;
+    Nanoseconds now() override { return time; }
+};
+
+struct Bench {
+    Link link;
+    Clock clock;
+    Transmitter transmitter{link, clock, 7};
+
+    /// What the host has received by now.
+    std::vector<wire::Header> headers() {
+        std::vector<wire::Header> out;
+        wire::Decoder decoder;
+        decoder.feed(link.bytes.data(), link.bytes.size(),
+                     [&](const wire::Packet& packet) { out.push_back(packet.header); });
+        return out;
+    }
+};
+
+wire::Exposure exposure(std::uint64_t trigger) {
+    wire::Exposure record{};
+    record.trigger = trigger;
+    return record;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "transmitter: what matters most leaves first, numbered as it leaves, in pieces as small as the link "
+    "takes") {
+    Bench bench;
+    bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
+    bench.transmitter.send(wire::ImuSample{});
+    bench.transmitter.send(exposure(1));
+    bench.transmitter.send(wire::ClockAnswer{1, 0, 0, 0});
+    CHECK(bench.transmitter.waiting());
+    while (bench.transmitter.waiting()) {
+        bench.link.space = 7;
+        bench.clock.time += 1000;
+        bench.transmitter.pump();
+    }
+    const auto headers = bench.headers();
+    REQUIRE(headers.size() == 4);
+    const wire::Type order[] = {wire::Type::clock_answer, wire::Type::exposure, wire::Type::imu_sample,
+                                wire::Type::log};
+    for (std::uint32_t i = 0; i < 4; ++i) {
+        CHECK(headers[i].type == order[i]);
+        CHECK(headers[i].sequence == i);
+    }
+}
+
+TEST_CASE("transmitter: of a class that is full the newest stay, and the others are counted") {
+    Bench bench;
+    for (std::uint64_t trigger = 1; trigger <= 300; ++trigger) bench.transmitter.send(exposure(trigger));
+    bench.link.space = 1'000'000;
+    bench.transmitter.pump();
+    std::vector<std::uint64_t> triggers;
+    wire::Decoder decoder;
+    decoder.feed(bench.link.bytes.data(), bench.link.bytes.size(), [&](const wire::Packet& packet) {
+        wire::Exposure record{};
+        if (packet.read(record)) triggers.push_back(record.trigger);
+    });
+    REQUIRE(triggers.size() == 256);
+    CHECK(triggers.front() == 45);
+    CHECK(triggers.back() == 300);
+    wire::Health health{};
+    bench.transmitter.count_drops(health);
+    CHECK(health.dropped_exposures == 44);
+    CHECK(health.dropped_imu_samples == 0);
+}
+
+TEST_CASE("transmitter: a new connection hears nothing of the one before, not even the rest of a packet") {
+    Bench bench;
+    bench.transmitter.send(exposure(1));
+    bench.transmitter.send(exposure(2));
+    bench.link.space = 20;
+    bench.transmitter.pump();
+    bench.transmitter.begin();
+    bench.transmitter.send(wire::BoardHello{});
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    const auto headers = bench.headers();
+    REQUIRE(headers.size() == 1);
+    CHECK(headers[0].type == wire::Type::board_hello);
+}
+
+TEST_CASE("transmitter: the time of sending is that at which the answer leaves") {
+    Bench bench;
+    bench.transmitter.send(wire::ClockAnswer{1, 0, 500, 0});
+    bench.transmitter.pump();
+    bench.clock.time = 90'000;
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    wire::ClockAnswer answer{};
+    wire::Decoder decoder;
+    decoder.feed(bench.link.bytes.data(), bench.link.bytes.size(),
+                 [&](const wire::Packet& packet) { packet.read(answer); });
+    CHECK(answer.received_ns == 500);
+    CHECK(answer.sent_ns == 90'000);
+}
