@@ -60,12 +60,12 @@ void Board::poll() {
     poll_health(now);
     transmitter_.pump();
     polled_ = hal_.clock.now();
-    const Nanoseconds took = polled_ - (due_ < began ? due_ : began);
+    const Nanoseconds took = polled_ - (due_ < began && due_ != 0 ? due_ : began);
     if (took > health_.loop_max_ns) health_.loop_max_ns = static_cast<std::uint32_t>(took);
-    due_ = next_wake();
+    due_ = find_next_wake();
 }
 
-Nanoseconds Board::next_wake() const {
+Nanoseconds Board::find_next_wake() const {
     Nanoseconds wake = polled_ + feed_interval;
     const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
     if (greeted_) sooner(next_health_);

@@ -32,7 +32,7 @@ class Board final : private ChannelReports, private RefusalSink {
     /// when a transfer completed.
     void poll();
 
-    Nanoseconds next_wake() const;
+    Nanoseconds next_wake() const { return due_; }
 
  private:
     void exposure(const wire::Exposure& record) override;
@@ -41,6 +41,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) override;
     void refuse(const wire::Refusal& refusal) override;
 
+    Nanoseconds find_next_wake() const;
     void poll_link();
     void poll_edges(Nanoseconds now);
     void poll_outputs(Nanoseconds now);
@@ -91,7 +92,7 @@ class Board final : private ChannelReports, private RefusalSink {
     bool outputs_blocked_ = false;
     Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
-    Nanoseconds due_ = never;
+    Nanoseconds due_ = 0;  ///< when poll() has something to do next
     Nanoseconds polled_ = 0;
     Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be told
     std::uint32_t event_sequence_ = 0;

@@ -58,7 +58,7 @@ struct Edge {
     bool level;
 };
 
-/// Edges of the inputs, stamped by hardware, in order.
+/// Edges of the inputs, stamped by hardware, in order; of data-ready inputs only those that rise.
 struct EdgeStream {
     /// Edges of inputs outside of the mask cost nothing and are not reported.
     virtual void listen(std::uint32_t inputs) = 0;
@@ -128,7 +128,7 @@ struct ImuBus {
 struct ImuUart {
     virtual void set_baud(std::uint32_t baud) = 0;
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
-    /// `received` is when the last of the bytes had arrived.
+    /// `received` is when the last of the bytes had arrived. One call never spans a pause on the line.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
 
  protected:

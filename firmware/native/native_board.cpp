@@ -94,6 +94,8 @@ void NativeBoard::apply(const Edge& edge) {
     set_input(edge.input, edge.level);
     drive_pins(edge.at + routing_latency);
     if ((listened_ >> edge.input & 1U) == 0) return;
+    const bool data_ready = edge.input >= input_imu_ready && edge.input < input_pulse;
+    if (data_ready && !edge.level) return;
     if (stamped_.size() == edge_capacity)
         ++lost_edges_;
     else

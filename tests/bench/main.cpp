@@ -17,7 +17,9 @@ namespace {
 using versavis::bench::Metric;
 
 const std::map<std::string, std::function<std::vector<Metric>()>> benches{
-    {"ring", versavis::bench::bench_ring}, {"end_to_end", versavis::bench::bench_end_to_end}};
+    {"ring", versavis::bench::bench_ring},
+    {"end_to_end", versavis::bench::bench_end_to_end},
+    {"firmware", versavis::bench::bench_firmware}};
 
 nlohmann::json run(const std::string& only) {
     nlohmann::json document = nlohmann::json::object();
@@ -40,8 +42,8 @@ int main(int argc, char** argv) {
     CLI::App app{"Benchmarks of VersaVIS"};
     std::string only;
     std::string json_path;
-    app.add_option("name", only, "ring or end_to_end; without it, all")
-        ->check(CLI::IsMember({"ring", "end_to_end"}));
+    app.add_option("name", only, "ring, end_to_end or firmware; without it, all")
+        ->check(CLI::IsMember({"ring", "end_to_end", "firmware"}));
     app.add_option("--json", json_path, "File for the results");
     try {
         app.parse(argc, argv);

@@ -22,4 +22,7 @@ std::vector<Metric> bench_ring();
 /// The service against Aravis's own test program on the same stream, and its stamps against the rig's truth.
 std::vector<Metric> bench_end_to_end();
 
+/// Instructions and memory of the firmware's core.
+std::vector<Metric> bench_firmware();
+
 }  // namespace versavis::bench

@@ -13,12 +13,14 @@ enum class AdisModel { adis16445, adis16448a, adis16448b, adis16460, adis16470 }
 
 class AdisDevice final : public SpiImuDevice {
  public:
-    AdisDevice(AdisModel model, World world, Nanoseconds power_on = 0);
+    /// It answers from 290 ms after power-up on, as the slowest of them.
+    AdisDevice(AdisModel model, World world, Nanoseconds answers_from = 290'000'000);
 
     void transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
                   std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+    void brown_out(Nanoseconds at) override { reset(at + map_.reset); }
 
     /// The next `bursts` have a flipped bit.
     void corrupt(unsigned bursts) { corrupted_ = bursts; }
@@ -37,6 +39,7 @@ class AdisDevice final : public SpiImuDevice {
         bool octaves;
         bool magnetic;
         Nanoseconds stall, reset;
+        Nanoseconds word_interval;  ///< least time from word to word, outside of bursts
         std::uint16_t control_default, rate_default, filter_default;
     };
     static const Map& map(AdisModel model);
@@ -53,6 +56,7 @@ class AdisDevice final : public SpiImuDevice {
     Nanoseconds ready_at_ = 0;
     std::map<unsigned, std::uint16_t> registers_;
     std::uint16_t response_ = 0;
+    Nanoseconds last_end_ = -1'000'000'000;
     std::uint16_t diagnosis_ = 0;
     unsigned corrupted_ = 0;
 };

@@ -17,6 +17,10 @@ class Icm42688pDevice final : public SpiImuDevice {
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
 
+    void brown_out(Nanoseconds at) override {
+        reset();
+        ready_at_ = at + 1'000'000;
+    }
     /// The bus reads all ones: the part has come off.
     void unplug(bool unplugged) { unplugged_ = unplugged; }
 
@@ -45,6 +49,11 @@ class Bmi088Device final : public SpiImuDevice {
                   std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+    /// Of the accelerometer alone: the gyro goes on.
+    void brown_out(Nanoseconds at) override {
+        reset_accel(at);
+        accel_spi_ = true;
+    }
 
  private:
     void reset_gyro(Nanoseconds at);
@@ -59,6 +68,7 @@ class Bmi088Device final : public SpiImuDevice {
     std::array<std::uint8_t, 128> accel_{};
     Nanoseconds gyro_ready_ = 0;
     Nanoseconds accel_ready_ = 0;
+    Nanoseconds accel_on_at_ = 0;
     Nanoseconds last_write_[2] = {-1'000'000'000, -1'000'000'000};
     bool accel_spi_ = false;  ///< it wakes up on I2C
 };

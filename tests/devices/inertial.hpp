@@ -47,6 +47,9 @@ class SpiImuDevice {
     /// False: the data-ready line does not pulse, as it is set up now.
     virtual bool signals(Nanoseconds at) const = 0;
 
+    /// The part loses its settings, as after a brown-out.
+    virtual void brown_out(Nanoseconds at) = 0;
+
     /// Breaches of the data sheet's rules: clock, gaps, accesses at the wrong time.
     unsigned breaches() const { return breaches_; }
 

@@ -11,7 +11,6 @@ namespace versavis::devices {
 namespace {
 
 constexpr Nanoseconds base_period = 1'250'000;  // 800 Hz
-constexpr Nanoseconds compute_time = 400'000;   // from the sample to the first byte
 constexpr Nanoseconds answer_time = 1'000'000;
 constexpr double gravity = 9.80665;
 constexpr double radians = 3.14159265358979 / 180;
@@ -62,8 +61,12 @@ std::optional<std::string> Vn100Device::execute(const std::string& command) {
         case 32:
             if (part.size() != 11) return "VNERR,05";
             sync_mode_ = static_cast<unsigned>(std::stoul(part[6]));
+            sync_skip_ = static_cast<unsigned>(std::stoul(part[8]));
             return text;
         case 75:
+        case 76:
+        case 77:
+            if (part[2] == "0") return text;
             if (part.size() != 6 || part[4] != "01" || part[5] != "0601") return "VNERR,07";
             divider_ = static_cast<unsigned>(std::stoul(part[3]));
             if (58.0 * 10 * 800 / divider_ > baud_) return "VNERR,0C";
@@ -98,10 +101,16 @@ Vn100Device::Burst Vn100Device::chatter(Nanoseconds at) const {
 }
 
 std::optional<Nanoseconds> Vn100Device::next_sample(Nanoseconds after) const {
-    if (muted_ || paused_ || divider_ == 0) return std::nullopt;
-    const Nanoseconds period = base_period * divider_;
-    return (after / period + 1) * period;
+    if (muted_ || paused_) return std::nullopt;
+    return (after / base_period + 1) * base_period;
 }
+
+bool Vn100Device::pulses(Nanoseconds at) const {
+    // Skipped pulses and skipped packets have nothing to do with each other.
+    return sync_mode_ == 1 && at / base_period % (sync_skip_ + 1) == sync_skip_ / 2;
+}
+
+bool Vn100Device::sends(Nanoseconds at) const { return divider_ != 0 && at / base_period % divider_ == 0; }
 
 Vn100Device::Burst Vn100Device::packet(Nanoseconds at) {
     const Inertial felt = world_(at);
@@ -129,7 +138,7 @@ Vn100Device::Burst Vn100Device::packet(Nanoseconds at) {
         --corrupted_;
         bytes[20] ^= 0x10U;
     }
-    return send(at + compute_time, std::move(bytes), baud_);
+    return send(at + delay_, std::move(bytes), baud_);
 }
 
 }  // namespace versavis::devices

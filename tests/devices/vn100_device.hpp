@@ -22,17 +22,22 @@ class Vn100Device {
     /// Takes bytes sent at `baud`; returns answers.
     std::vector<Burst> receive(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
 
-    /// When the next sample begins, where its sync output rises; none: it sends no samples.
+    /// When it takes its next sample, at 800 Hz; none: it is mute or paused.
     std::optional<Nanoseconds> next_sample(Nanoseconds after) const;
+    /// True: the sync output rises with the sample that begins at `at`.
+    bool pulses(Nanoseconds at) const;
+    /// True: that sample is sent.
+    bool sends(Nanoseconds at) const;
 
     /// The packet of the sample that began at `at`.
     Burst packet(Nanoseconds at);
 
-    bool pulses() const { return sync_mode_ == 1; }
     std::uint32_t baud() const { return baud_; }
     /// Text that it sends on its own, as after its power-up.
     Burst chatter(Nanoseconds at) const;
 
+    /// From a sample to the first byte of its packet.
+    void delay(Nanoseconds delay) { delay_ = delay; }
     void mute(bool muted) { muted_ = muted; }
     void corrupt(unsigned packets) { corrupted_ = packets; }
 
@@ -47,6 +52,8 @@ class Vn100Device {
     unsigned text_output_ = 14;
     unsigned divider_ = 0;  ///< 0: no binary output
     unsigned sync_mode_ = 6;
+    unsigned sync_skip_ = 0;
+    Nanoseconds delay_ = 400'000;
     bool muted_ = false;
     unsigned corrupted_ = 0;
 };

@@ -76,3 +76,50 @@ TEST_CASE("025-wrong-part: another part than configured is refused by its identi
     CHECK(failures[0].value == 16445);
     CHECK(world.inbox().samples[0].empty());
 }
+
+TEST_CASE("025-dead-bus: zeros or ones are no data, whatever the part; it is told, and set up again") {
+    const std::uint8_t level = GENERATE(std::uint8_t{0x00}, std::uint8_t{0xFF});
+    const bool data_ready = GENERATE(true, false);
+    for (const wire::ImuKind kind : spi_imu_kinds) {
+        INFO("kind " << int(kind) << ", level " << int(level));
+        Scenario world;
+        world.add_imu(make_imu(kind), kind, 200, data_ready);
+        REQUIRE(world.begin());
+        world.run(2 * second);
+        world.set_dead_bus(level);
+        const std::size_t before = world.inbox().samples[0].size();
+        world.run(3 * second);
+        const auto& samples = world.inbox().samples[0];
+        for (std::size_t i = before + 3; i < samples.size(); ++i)
+            REQUIRE((samples[i].flags & wire::imu_check_failed) != 0);
+        CHECK_FALSE(world.inbox().events_of(wire::EventKind::imu_failed).empty());
+        world.set_dead_bus(std::nullopt);
+        world.run(3 * second);
+        CHECK(samples.size() > before + 250);
+        CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
+        world.drops_allowed = true;  // the time without it has no samples
+        // On the board's grid the judge does not know when the part took its data before it was set up again.
+        if (data_ready) CHECK(world.judge() == "");
+    }
+}
+
+TEST_CASE("025-brown-out: a part that lost its settings is found out and set up again") {
+    const bool data_ready = GENERATE(true, false);
+    for (const wire::ImuKind kind : spi_imu_kinds) {
+        const bool adis = kind != wire::ImuKind::icm42688p && kind != wire::ImuKind::bmi088;
+        if (adis && !data_ready && kind != wire::ImuKind::adis16448b) continue;  // its data is as good
+        INFO("kind " << int(kind));
+        Scenario world;
+        world.add_imu(make_imu(kind), kind, 200, data_ready);
+        REQUIRE(world.begin());
+        world.run(2 * second);
+        world.spi_imu().brown_out(world.now());
+        world.run(3 * second);
+        CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
+        const std::size_t before = world.inbox().samples[0].size();
+        world.run(second);
+        const std::size_t rate = world.inbox().samples[0].size() - before;
+        CHECK(rate >= 195);
+        CHECK(rate <= 260);
+    }
+}

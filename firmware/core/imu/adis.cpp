@@ -86,7 +86,7 @@ bool Adis::check(const std::uint16_t* words, const std::uint8_t* bytes) const {
     if (facts_.check == AdisFacts::Check::crc) return words[last] == adis16448_crc(words + 1);
     std::uint16_t sum = 0;
     for (std::size_t i = 0; i < 2 * last; ++i) sum = static_cast<std::uint16_t>(sum + bytes[i]);
-    return words[last] == sum;
+    return sum != 0 && words[last] == sum;  // zeros are a dead bus
 }
 
 void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
@@ -114,14 +114,15 @@ Verdict Adis::parse(const ImuReply* replies, unsigned count, wire::ImuSample& sa
         return Verdict::taken;
     }
     const std::uint8_t* before = replies[count - 2].bytes + 2;
-    words[0] = static_cast<std::uint16_t>(words[0] | big_endian(before, 0));  // reading clears its flags
+    for (unsigned i = 0; i + 1 < count; ++i)  // reading clears its flags
+        words[0] = static_cast<std::uint16_t>(words[0] | big_endian(replies[i].bytes + 2, 0));
     bool equal = true;
     bool alive = false;
     for (std::size_t i = 1; i < facts_.words; ++i) {
         equal = equal && words[i] == big_endian(before, i);
         alive = alive || (words[i] != 0 && words[i] != 0xFFFF);
     }
-    // An update may lie between two readings, never between all three.
+    // An update may lie between two readings, or within one.
     if (!equal && count < max_readings) return Verdict::unsure;
     fill(words, sample);
     if (!equal || !alive) sample.flags |= wire::imu_check_failed;

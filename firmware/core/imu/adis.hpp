@@ -48,6 +48,7 @@ class Adis final : public ImuPart {
     void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
     void access(const SetupStep& step, ImuTransfer& transfer) const override;
     std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const override;
+    Nanoseconds pause() const override { return facts_.word_gap_ns; }
     unsigned readings() const override { return facts_.check == AdisFacts::Check::twice ? 2 : 1; }
     void reading(unsigned index, ImuTransfer& transfer) const override;
     Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const override;

@@ -15,7 +15,7 @@ class Bmi088 final : public ByteRegisterPart {
     std::uint8_t strongest_filter() const override { return 2; }
     std::uint32_t rate(std::uint32_t wanted_millihertz) const override;
     void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
-    unsigned readings() const override { return 2; }
+    unsigned readings() const override { return 3; }
     void reading(unsigned index, ImuTransfer& transfer) const override;
     Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const override;
 

@@ -18,6 +18,8 @@ class ByteRegisterPart : public ImuPart {
         if (!reads) transfer.bytes[1] = static_cast<std::uint8_t>(step.value);
     }
 
+    Nanoseconds pause() const final { return 0; }
+
     std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const final {
         return reply.bytes[asked.size - 1];
     }

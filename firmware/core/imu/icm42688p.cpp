@@ -23,6 +23,7 @@ enum Register : std::uint8_t {
 constexpr std::size_t burst_registers = 17;
 constexpr std::size_t status_at = 1 + 16;
 constexpr std::uint8_t data_ready = 0x08;
+constexpr std::uint8_t both_low_noise = 0x0F;
 constexpr std::uint32_t fast_millihertz = 4'000'000;
 
 constexpr RateCode rates[] = {{8'000'000, 3}, {4'000'000, 4}, {2'000'000, 5}, {1'000'000, 6}, {500'000, 15},
@@ -45,16 +46,17 @@ void Icm42688p::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup&
     setup.write(0, gyro_accel_config0, static_cast<std::uint16_t>(filter << 4U | filter));
     setup.write(0, gyro_config0, code);
     setup.write(0, accel_config0, code);
-    setup.write(0, pwr_mgmt0, 0x0F, 50'000);  // both low noise; the gyro needs 45 ms
-    setup.expect(0, pwr_mgmt0, 0x0F);
+    setup.write(0, pwr_mgmt0, both_low_noise, 50'000);  // the gyro needs 45 ms
+    setup.expect(0, pwr_mgmt0, both_low_noise);
 }
 
-/// The second reading proves that the part is there: all ones or zeros of a dead bus look like data.
+/// The second reading proves that the part is there and has not reset itself: ones or zeros of a dead bus
+/// look like data, and so does what a part shows that is switched off.
 void Icm42688p::reading(unsigned index, ImuTransfer& transfer) const {
     if (index == 0)
         burst(0, temp_data1, burst_registers, transfer);
     else
-        burst(0, who_am_i, 1, transfer);
+        burst(0, pwr_mgmt0, 1, transfer);
 }
 
 Verdict Icm42688p::parse(const ImuReply* replies, unsigned /*count*/, wire::ImuSample& sample) const {
@@ -64,7 +66,7 @@ Verdict Icm42688p::parse(const ImuReply* replies, unsigned /*count*/, wire::ImuS
         sample.accel[axis] = signed_word(big_endian(data, 1 + axis));
         sample.gyro[axis] = signed_word(big_endian(data, 4 + axis));
     }
-    if (replies[1].bytes[1] != identity())
+    if (replies[1].bytes[1] != both_low_noise)
         sample.flags |= wire::imu_check_failed;
     else if ((replies[0].bytes[status_at] & data_ready) == 0)
         sample.flags |= wire::imu_repeated;

@@ -46,7 +46,7 @@ enum class Verdict : std::uint8_t {
     unsure,  ///< one more reading is needed to tell
 };
 
-inline constexpr unsigned max_readings = 3;
+inline constexpr unsigned max_readings = 5;
 
 class ImuPart {
  public:
@@ -64,6 +64,8 @@ class ImuPart {
     /// What the register held that `asked` read.
     virtual std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const = 0;
 
+    /// Least time between two transfers.
+    virtual Nanoseconds pause() const = 0;
     /// Transfers that make a sample.
     virtual unsigned readings() const = 0;
     virtual void reading(unsigned index, ImuTransfer& transfer) const = 0;

@@ -7,6 +7,8 @@ namespace {
 
 constexpr Nanoseconds set_ahead = 500'000;          // of 1 ms at the highest rate on a grid
 constexpr Nanoseconds transfer_limit = 10'000'000;  // none takes so long, unless the bus hangs
+constexpr Nanoseconds power_up_time = 300'000'000;  // of the slowest part
+constexpr unsigned max_fast_edges = 20;
 constexpr Nanoseconds silence_floor = 100'000'000;
 constexpr std::uint16_t while_running = 0xFFFF;
 
@@ -36,8 +38,10 @@ void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds 
     if (!paced_by_part()) grid_ = Grid(now + set_ahead, configuration.rate_millihertz * 1000);
     patience_ = silence_floor + 20'000'000'000'000 / configuration.rate_millihertz;  // 20 samples
     setup_ = {};
-    part_->setup(part_rate(*part_, configuration), configuration.filter, setup_);
-    begin_setup(now);
+    const std::uint32_t rate = part_rate(*part_, configuration);
+    part_->setup(rate, configuration.filter, setup_);
+    period_ = 1'000'000'000'000 / rate;
+    begin_setup(max(now, power_up_time));
 }
 
 void SpiImu::begin_setup(Nanoseconds at) {
@@ -47,6 +51,7 @@ void SpiImu::begin_setup(Nanoseconds at) {
 }
 
 bool SpiImu::start(Nanoseconds at, Nanoseconds now) {
+    at = max(at, completed_ + part_->pause());
     pending_ = bus_.start(at, transfer_);
     pending_until_ = max(at, now) + transfer_limit;
     return pending_;
@@ -79,6 +84,7 @@ void SpiImu::run(Nanoseconds now) {
     }
     expect_edge(now);
     served_ = edge_count_;
+    fast_edges_ = 0;
     tell(wire::EventKind::imu_ready, now, part_->identity());
 }
 
@@ -102,6 +108,7 @@ void SpiImu::start_reading(Nanoseconds at, Nanoseconds now) {
 void SpiImu::ready_edge(Nanoseconds at, Nanoseconds now) {
     if (state_ != State::running || !paced_by_part()) return;
     expect_edge(now);
+    fast_edges_ = at - newest_edge_ < period_ * 3 / 4 ? fast_edges_ + 1 : 0;
     newest_edge_ = at;
     ++edge_count_;
     for (Edges& edges : edges_)
@@ -160,6 +167,7 @@ bool SpiImu::poll(Nanoseconds now, wire::ImuSample& sample) {
     ImuReply reply;
     if (pending_ && bus_.complete(reply)) {
         pending_ = false;
+        completed_ = now;
         if (state_ == State::set_up) check_step(reply, now);
         if (state_ == State::running) taken = take(reply, now, sample);
     }
@@ -167,6 +175,9 @@ bool SpiImu::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (state_ == State::set_up && !pending_ && now >= resume_) next_step(now);
     if (state_ == State::running && paced_by_part() && now >= silent_at_)
         fail(wire::EventKind::imu_silent, now, 0, while_running);
+    // A part that has reset itself goes on at another rate.
+    if (state_ == State::running && fast_edges_ >= max_fast_edges)
+        fail(wire::EventKind::imu_failed, now, 0, while_running);
     if (state_ == State::running && !paced_by_part()) pace(now);
     if (state_ == State::running && paced_by_part() && !pending_ && served_ != edge_count_)
         start_reading(now, now);

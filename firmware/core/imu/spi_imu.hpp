@@ -69,6 +69,9 @@ class SpiImu final : public ImuPort {
     unsigned reading_ = 0;           ///< of the sample that is being read
     ImuReply replies_[max_readings];
     Edges edges_[max_readings];  ///< as each reading of the sample began
+    Nanoseconds completed_ = 0;  ///< when the newest transfer was found complete
+    Nanoseconds period_ = 0;     ///< of the edges, as the part was told
+    unsigned fast_edges_ = 0;    ///< in a row that came sooner
     Nanoseconds newest_edge_ = 0;
     std::uint32_t edge_count_ = 0;
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed

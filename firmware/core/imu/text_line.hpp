@@ -13,6 +13,10 @@ class TextLine {
         while (*text != '\0') put(*text++);
         return *this;
     }
+    TextLine& operator<<(const TextLine& line) {
+        for (std::size_t i = 0; i < line.size_; ++i) put(line.text_[i]);
+        return *this;
+    }
     TextLine& operator<<(std::uint32_t number) {
         char digits[10];
         std::size_t count = 0;

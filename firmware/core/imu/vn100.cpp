@@ -24,7 +24,8 @@ constexpr std::size_t gyro_at = 24;
 constexpr std::size_t magnetic_at = 36;
 constexpr std::size_t temperature_at = 48;
 constexpr std::size_t pressure_at = 52;
-constexpr unsigned steps = 6;
+constexpr Nanoseconds base_period = 1'250'000;  // of its own samples
+constexpr Nanoseconds power_up_time = 300'000'000;
 
 std::uint32_t word32(const std::uint8_t* bytes) {
     std::uint32_t word = 0;
@@ -93,55 +94,63 @@ void Vn100::configure(const wire::ImuConfiguration& configuration, Nanoseconds n
     if (configuration.kind != wire::ImuKind::vn100) return;
     period_ = 1'000'000'000'000 / true_rate(configuration.rate_millihertz);
     fast_first_ = baud_ == fast_baud;
-    begin_setup(now);
+    begin_setup(now > power_up_time ? now : power_up_time);
 }
 
 void Vn100::begin_setup(Nanoseconds at) {
     state_ = State::set_up;
-    step_ = 0;
+    step_ = Step::quiet;
     waiting_ = false;
     wake_ = at;
 }
 
 void Vn100::send_step(Nanoseconds now) {
-    if (step_ == 0) {
-        baud_ = fast_first_ ? fast_baud : slow_baud;
-        uart_.set_baud(baud_);
+    if (step_ == Step::quiet) {
+        set_baud(fast_first_ ? fast_baud : slow_baud);
         filled_ = 0;
     }
     TextLine text;
-    const bool fast = configuration_.rate_millihertz > fastest_at_slow_baud_millihertz;
     switch (step_) {
-        case 0: text << "VNASY,0"; break;
-        case 1: text << "VNWRG,05," << (fast ? fast_baud : slow_baud); break;
-        case 2: text << "VNWRG,06,0"; break;  // no text output
-        case 3:  // a pulse at the start of each sample that will be sent, 100 us long, high
-            text << "VNWRG,32,3,0,0,0,1,1," << (divider() - 1) << ",100000,0";
-            break;
-        case 4: text << "VNWRG,75,1," << divider() << ",01,0601"; break;
-        default: text << "VNASY,1"; break;
+        case Step::quiet: text << "VNASY,0"; break;
+        // No output of another program may be left: it could be too much for the line.
+        case Step::no_text: text << "VNWRG,06,0"; break;
+        case Step::no_binary1: text << "VNWRG,75,0,8,01,0001"; break;
+        case Step::no_binary2: text << "VNWRG,76,0,8,01,0001"; break;
+        case Step::no_binary3: text << "VNWRG,77,0,8,01,0001"; break;
+        case Step::baud: text << "VNWRG,05," << wanted_baud(); break;
+        // A pulse at the start of each sample, sent or not, 100 us long, high: skipped pulses would not be
+        // those of skipped packets.
+        case Step::pulses: text << "VNWRG,32,3,0,0,0,1,1,0,100000,0"; break;
+        case Step::packets: text << "VNWRG,75,1," << divider() << ",01,0601"; break;
+        case Step::go: text << "VNASY,1"; break;
+        case Step::end: return;
     }
     TextLine line;
-    line << "$";
+    line << "$" << text << "*";
+    line.hex(text_checksum(text.data(), text.size())) << "\r\n";
     uart_.write(reinterpret_cast<const std::uint8_t*>(line.data()), line.size());
-    uart_.write(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
-    TextLine end;
-    end << "*";
-    end.hex(text_checksum(text.data(), text.size())) << "\r\n";
-    uart_.write(reinterpret_cast<const std::uint8_t*>(end.data()), end.size());
     waiting_ = true;
     wake_ = now + answer_patience;
+}
+
+std::uint32_t Vn100::wanted_baud() const {
+    return configuration_.rate_millihertz > fastest_at_slow_baud_millihertz ? fast_baud : slow_baud;
+}
+
+void Vn100::set_baud(std::uint32_t baud) {
+    baud_ = baud;
+    uart_.set_baud(baud);
 }
 
 void Vn100::next_step(Nanoseconds now) {
     waiting_ = false;
     wake_ = now;
-    if (step_ == 1) {
-        baud_ = configuration_.rate_millihertz > fastest_at_slow_baud_millihertz ? fast_baud : slow_baud;
-        uart_.set_baud(baud_);
+    if (step_ == Step::baud) {
+        set_baud(wanted_baud());
         wake_ = now + settle;
     }
-    if (++step_ < steps) return;
+    step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
+    if (step_ != Step::end) return;
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
@@ -149,14 +158,15 @@ void Vn100::next_step(Nanoseconds now) {
 }
 
 void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
-    tell_failure(kind, now, value, static_cast<std::uint16_t>(state_ == State::running ? 0xFFFFU : step_));
+    tell_failure(kind, now, value,
+                 state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
     fast_first_ = !fast_first_;
     begin_setup(now + retry_interval);
 }
 
 void Vn100::ready_edge(Nanoseconds at) {
-    edge_before_ = edge_;
-    edge_ = at;
+    for (std::size_t i = max_edges - 1; i > 0; --i) edges_[i] = edges_[i - 1];
+    edges_[0] = at;
 }
 
 void Vn100::drop(std::size_t size) {
@@ -171,22 +181,26 @@ std::size_t Vn100::line_length() const {
     return 0;
 }
 
-/// The answer to the step that was sent, or an error; anything else is ignored.
-void Vn100::take_line(Nanoseconds now) {
+/// The answer to the step that was sent, or an error. False: what stands there is no intact line.
+bool Vn100::take_line(Nanoseconds now) {
     const std::size_t end = line_length() - 1;
     const char* line = reinterpret_cast<const char*>(bytes_);
-    const bool error = end > 8 && std::memcmp(line, "$VNERR,", 7) == 0;
-    const bool answer = end > 6 && std::memcmp(line, step_ == 0 || step_ == 5 ? "$VNASY" : "$VNWRG", 6) == 0;
     std::size_t star = 0;
     while (star < end && line[star] != '*') ++star;
     TextLine sum;
     sum.hex(text_checksum(line + 1, star == 0 ? 0 : star - 1));
-    const bool intact = star + 2 < end && std::memcmp(line + star + 1, sum.data(), 2) == 0;
+    if (star + 2 >= end || std::memcmp(line + star + 1, sum.data(), 2) != 0) return false;
+    const bool error = end > 8 && std::memcmp(line, "$VNERR,", 7) == 0;
     const std::int64_t code = line[7] * 256 + line[8];
+    const bool command = step_ == Step::quiet || step_ == Step::go;
+    const bool answer = end > 6 && std::memcmp(line, command ? "$VNASY" : "$VNWRG", 6) == 0;
     drop(end + 1);
-    if (state_ != State::set_up || !waiting_ || !intact) return;
-    if (error) return fail(wire::EventKind::imu_failed, now, code);
-    if (answer) next_step(now);
+    if (state_ != State::set_up || !waiting_) return true;
+    if (error)
+        fail(wire::EventKind::imu_failed, now, code);
+    else if (answer)
+        next_step(now);
+    return true;
 }
 
 bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
@@ -214,33 +228,38 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     drop(packet_size);
     if (state_ != State::running) return false;
     if (!good) sample.flags |= wire::imu_self_test_failed;
-    count(startup);
-    stamp(first_byte, sample);
+    stamp(first_byte, count(startup), sample);
     wake_ = now + silence_floor + 20 * period_;
     finish(sample);
     return true;
 }
 
-/// The part's own clock tells how many samples were lost on the way.
-void Vn100::count(std::uint64_t startup_ns) {
-    if (startup_ns_ != 0 && startup_ns > startup_ns_) {
-        const std::uint64_t period = static_cast<std::uint64_t>(period_);
-        const std::uint64_t periods = (startup_ns - startup_ns_ + period / 2) / period;
-        if (periods > 1) miss(static_cast<std::uint32_t>(periods - 1));
-    }
+/// The part's own clock tells how many samples were lost on the way. Returns the time since the sample
+/// before; 0: there was none.
+Nanoseconds Vn100::count(std::uint64_t startup_ns) {
+    const auto since = static_cast<Nanoseconds>(startup_ns - startup_ns_);
+    const bool first = startup_ns_ == 0 || since <= 0;
     startup_ns_ = startup_ns;
+    if (first) return 0;
+    const Nanoseconds periods = (since + period_ / 2) / period_;
+    if (periods > 1) miss(static_cast<std::uint32_t>(periods - 1));
+    return since;
 }
 
-/// A packet leaves within a period of its sample: the newest edge before it is that sample's.
-void Vn100::stamp(Nanoseconds first_byte, wire::ImuSample& sample) {
-    const Nanoseconds edge = edge_ < first_byte ? edge_ : edge_before_;
-    const bool wired = (configuration_.options & wire::imu_data_ready) != 0;
-    if (wired && edge < first_byte && first_byte - edge < period_) {
-        sample.time_ns = edge;
-        sample.flags |= wire::imu_stamped;
-    } else {
-        sample.time_ns = first_byte;
-    }
+/// A packet leaves within a base period of its sample: the newest edge before it is that sample's, if the
+/// part's clock agrees.
+void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSample& sample) {
+    sample.time_ns = first_byte;
+    if ((configuration_.options & wire::imu_data_ready) == 0) return;
+    std::size_t newest = 0;
+    while (newest < max_edges && edges_[newest] >= first_byte) ++newest;
+    if (newest == max_edges || first_byte - edges_[newest] >= base_period) return;
+    const Nanoseconds off = edges_[newest] - stamp_ - since_last;
+    const bool agrees = off < base_period / 2 && -off < base_period / 2;
+    stamp_ = edges_[newest];
+    if (since_last == 0 || !agrees) return;
+    sample.time_ns = stamp_;
+    sample.flags |= wire::imu_stamped;
 }
 
 /// Takes what stands first among the bytes. True: it was a sample.
@@ -257,11 +276,9 @@ bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
                 if (state_ == State::running) count_error();
             }
         } else if (bytes_[0] == '$') {
-            if (line_length() != 0) {
-                take_line(now);
-                continue;
-            }
-            if (filled_ < max_line) return false;
+            const bool whole = line_length() != 0;
+            if (whole && take_line(now)) continue;
+            if (!whole && filled_ < max_line) return false;
         }
         drop(1);
     }
@@ -277,10 +294,11 @@ bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
         if (parse(now, sample)) return true;
     }
     if (now < wake_) return false;
-    if (state_ == State::running || waiting_)
+    if (state_ == State::set_up && waiting_ && step_ == Step::baud && baud_ != wanted_baud())
+        set_baud(wanted_baud());  // it may have changed before it answered: ask again
+    else if (state_ == State::running || waiting_)
         fail(wire::EventKind::imu_silent, now, 0);
-    else
-        send_step(now);
+    if (state_ == State::set_up && now >= wake_) send_step(now);
     return false;
 }
 

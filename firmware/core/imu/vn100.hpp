@@ -43,17 +43,32 @@ class Vn100 final : public ImuPort {
 
  private:
     enum class State : std::uint8_t { off, set_up, running };
+    enum class Step : std::uint8_t {
+        quiet,
+        no_text,
+        no_binary1,
+        no_binary2,
+        no_binary3,
+        baud,
+        pulses,
+        packets,
+        go,
+        end
+    };
     static constexpr std::size_t max_line = 64;
+    static constexpr std::size_t max_edges = 16;
 
     std::uint32_t divider() const;
     void begin_setup(Nanoseconds at);
     void send_step(Nanoseconds now);
     void next_step(Nanoseconds now);
     std::size_t line_length() const;
-    void take_line(Nanoseconds now);
+    bool take_line(Nanoseconds now);
+    std::uint32_t wanted_baud() const;
+    void set_baud(std::uint32_t baud);
     bool take_packet(Nanoseconds now, wire::ImuSample& sample);
-    void stamp(Nanoseconds first_byte, wire::ImuSample& sample);
-    void count(std::uint64_t startup_ns);
+    void stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSample& sample);
+    Nanoseconds count(std::uint64_t startup_ns);
     bool parse(Nanoseconds now, wire::ImuSample& sample);
     void drop(std::size_t size);
     void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value);
@@ -63,14 +78,14 @@ class Vn100 final : public ImuPort {
     State state_ = State::off;
     std::uint32_t baud_ = 0;
     bool fast_first_ = false;  ///< the part may still talk as fast as it was told before
-    unsigned step_ = 0;
+    Step step_ = Step::quiet;
     bool waiting_ = false;      ///< for the answer of the step
     Nanoseconds wake_ = never;  ///< the next attempt, or the end of patience
     Nanoseconds period_ = 0;
-    Nanoseconds edge_ = INT64_MIN / 2;  ///< newest of the sync output
-    Nanoseconds edge_before_ = INT64_MIN / 2;
-    std::uint64_t startup_ns_ = 0;  ///< the part's clock at the newest sample; 0: none yet
-    Nanoseconds received_ = 0;      ///< when the last of the bytes had arrived
+    Nanoseconds edges_[max_edges] = {};  ///< of the sync output, the newest first
+    Nanoseconds stamp_ = 0;              ///< edge of the newest sample
+    std::uint64_t startup_ns_ = 0;       ///< the part's clock at the newest sample; 0: none yet
+    Nanoseconds received_ = 0;           ///< when the last of the bytes had arrived
     std::uint8_t bytes_[2 * vn100::packet_size] = {};
     std::size_t filled_ = 0;
 };

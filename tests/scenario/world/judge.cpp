@@ -127,6 +127,11 @@ void World::judge_imu(unsigned port, std::string& out) {
         const std::uint32_t step = i == 0 ? 1 : sample.number - samples[i - 1].number;
         if (step != 1 && (sample.flags & wire::imu_overrun) == 0 && !drops_allowed)
             complain(out, "IMU {}: {} numbers are missing before {}", port, step - 1, sample.number);
+        // The first of a VN-100 has nothing that its edge could be held against, and says so.
+        if (port == 1 && (sample.flags & wire::imu_stamped) == 0) {
+            last_index = -1;
+            continue;
+        }
         Nanoseconds taken = sample.time_ns;
         if (paced) {
             const std::ptrdiff_t index = index_of(sample.time_ns);
@@ -143,7 +148,7 @@ void World::judge_imu(unsigned port, std::string& out) {
             const devices::UpdateTimes times = spi_imu_->updates();
             taken = times.time(times.index_at(taken));
         }
-        if ((sample.flags & wire::imu_check_failed) != 0 || (port == 1 && !paced)) continue;
+        if ((sample.flags & wire::imu_check_failed) != 0) continue;
         const ImuMetadata si = imu::to_si(model, sample);
         const devices::Inertial felt = motion(taken);
         for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -56,7 +56,7 @@ std::string Trace::svg(const Window& window) const {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" font-family=\"sans-serif\" "
         "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
         "<text x=\"10\" y=\"18\" font-size=\"14\">{}</text>\n",
-        label + width + 20, bottom + 30, window.title);
+        label + width + 40, bottom + 30, window.title);
     for (std::int64_t at = window.from_ns; at <= window.to_ns; at += window.tick_ns)
         out += fmt::format(
             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" stroke=\"#ddd\"/>\n"

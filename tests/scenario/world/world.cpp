@@ -30,8 +30,8 @@ void World::make_board(wire::ResetCause cause) {
     firmware::Surroundings surroundings;
     surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
     surroundings.imu_transfer = [this](auto at, const auto& transfer, auto received) {
-        if (spi_imu_) return spi_imu_->transfer(at, transfer, received);
-        std::fill(received.begin(), received.end(), std::uint8_t{0xFF});
+        if (spi_imu_ && !dead_bus_) return spi_imu_->transfer(at, transfer, received);
+        std::fill(received.begin(), received.end(), dead_bus_.value_or(0xFF));
     };
     surroundings.uart_sent = [this](auto at, auto baud, auto bytes) { uart_sent(at, baud, bytes); };
     surroundings.reboot = [this](bool) { ++reboots_; };
@@ -93,6 +93,10 @@ void World::add_noise(std::uint8_t input, Nanoseconds period, Nanoseconds from, 
         board_->schedule_edge({at, input, level});
 }
 
+void World::show(const std::string& line, Nanoseconds at, bool level) {
+    if (tracing_) trace_.set(line, at, level);
+}
+
 void World::outputs_changed(Nanoseconds at, std::uint32_t pins) {
     const std::uint32_t changed = pins ^ pins_;
     pins_ = pins;
@@ -102,13 +106,13 @@ void World::outputs_changed(Nanoseconds at, std::uint32_t pins) {
         if (level) rises_[pin].push_back(at);
         static constexpr const char* names[] = {"trigger0", "trigger1", "trigger2", "trigger3",
                                                 "light",    "",         "sync",     "test"};
-        trace_.set(names[pin], at, level);
+        show(names[pin], at, level);
         const auto found = cameras_.find(pin);
         if (found == cameras_.end()) continue;
         for (const firmware::Edge& edge : found->second->trigger_line(at, level)) {
             board_->schedule_edge(edge);
-            trace_.set(fmt::format("exposure{}", edge.input), edge.at,
-                       edge.level != found->second->settings().strobe_inverted);
+            show(fmt::format("exposure{}", edge.input), edge.at,
+                 edge.level != found->second->settings().strobe_inverted);
         }
     }
     if ((changed >> firmware::pin_light & 1U) == 0) return;
@@ -178,6 +182,8 @@ void World::fire_spi_ready() {
         board_->schedule_edge(
             {now_ + std::llround(std::min(1e5, period / 4)), firmware::input_imu_ready, false});
         ready_times_[0].push_back(now_);
+        show("imu_ready", now_, true);
+        show("imu_ready", now_ + std::llround(std::min(1e5, period / 4)), false);
     }
     ready_fires_ = spi_imu_->signals(now_);
     const devices::UpdateTimes times = spi_imu_->updates();
@@ -187,13 +193,15 @@ void World::fire_spi_ready() {
 void World::fire_uart_sample() {
     if (!uart_imu_ || now_ < next_sample_) return;
     const Nanoseconds at = now_;
-    if (uart_imu_->pulses()) {
+    if (uart_imu_->pulses(at)) {
         board_->schedule_edge({at, firmware::input_imu_ready + 1, true});
         board_->schedule_edge({at + 100 * us, firmware::input_imu_ready + 1, false});
     }
-    ready_times_[1].push_back(at);
-    const devices::Vn100Device::Burst packet = uart_imu_->packet(at);
-    board_->uart_receive(packet.bytes, packet.complete);
+    if (uart_imu_->sends(at)) {
+        ready_times_[1].push_back(at);
+        const devices::Vn100Device::Burst packet = uart_imu_->packet(at);
+        board_->uart_receive(packet.bytes, packet.complete);
+    }
     next_sample_ = uart_imu_->next_sample(at).value_or(never);
 }
 
@@ -214,6 +222,9 @@ void World::fire_events() {
     for (PulseSource& source : pulses_) {
         const Nanoseconds at = source.next();
         if (at > now_) continue;
+        static constexpr const char* names[] = {"pps", "aux0", "aux1", "sync_in"};
+        show(names[source.input - firmware::input_pulse], at, !source.falling);
+        show(names[source.input - firmware::input_pulse], at + source.width, source.falling);
         board_->schedule_edge({at, source.input, !source.falling});
         board_->schedule_edge({at + source.width, source.input, source.falling});
         source.fired.push_back(at);

@@ -86,10 +86,15 @@ class World {
     firmware::NativeBoard& board() { return *board_; }
     Inbox& inbox() { return host_.inbox; }
     CameraModel& camera(unsigned output) { return *cameras_.at(output); }
-    Trace& trace() { return trace_; }
+    /// Lines over time, once it was asked for.
+    const Trace& trace() const { return trace_; }
+    void record_trace() { tracing_ = true; }
     const std::vector<Interval>& lights() const { return lights_; }
     const std::vector<Nanoseconds>& rises(unsigned pin) const { return rises_[pin]; }
     int reboots() const { return reboots_; }
+    devices::SpiImuDevice& spi_imu() { return *spi_imu_; }
+    /// The SPI bus reads this byte alone, or what the part says.
+    void set_dead_bus(std::optional<std::uint8_t> level) { dead_bus_ = level; }
 
     /// True time of a grid point.
     Nanoseconds grid_time(unsigned camera, std::uint64_t tick) const;
@@ -111,6 +116,7 @@ class World {
     void outputs_changed(Nanoseconds at, std::uint32_t pins);
     void make_board(wire::ResetCause cause);
     void step(Nanoseconds until);
+    void show(const std::string& line, Nanoseconds at, bool level);
     void read_link();
     Nanoseconds next_event() const;
     void fire_events();
@@ -131,7 +137,7 @@ class World {
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
     std::unique_ptr<devices::SpiImuDevice> spi_imu_;
     std::optional<devices::Vn100Device> uart_imu_;
-    std::uint32_t uart_baud_ = 0;
+    std::optional<std::uint8_t> dead_bus_;
     std::vector<PulseSource> pulses_;
     Nanoseconds next_ready_ = firmware::never;
     bool ready_fires_ = false;
@@ -151,6 +157,7 @@ class World {
     std::vector<Nanoseconds> rises_[8];
     int reboots_ = 0;
     Trace trace_;
+    bool tracing_ = false;
     std::unique_ptr<firmware::NativeBoard> board_;
 };
 

@@ -86,7 +86,7 @@ enum ImuFlag : std::uint16_t {
     imu_self_test_failed = 1U << 1U,  ///< the sensor's own diagnosis
     imu_overrun = 1U << 2U,           ///< samples before were not read in time: their numbers are missing
     imu_stamped = 1U << 3U,           ///< the time is that of the part's data-ready edge
-    imu_repeated = 1U << 4U,          ///< the part had no new data since the sample before
+    imu_repeated = 1U << 4U,          ///< the part says that it had no new data since the sample before
 };
 
 /// Raw sensor words, sign-extended; the host scales them.
