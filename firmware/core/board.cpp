@@ -15,6 +15,7 @@ constexpr Nanoseconds stuck_limit = 500'000'000;   // the output hardware moves 
 constexpr Nanoseconds longest_wait = 200'000'000;  // for exposures, before a new configuration
 constexpr Nanoseconds stray_interval = 100'000'000;
 constexpr Nanoseconds default_sync_period = 1'000'000'000;
+constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: more than two crystals differ
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
 constexpr std::uint32_t capabilities = wire::capability_exposure_compensation | wire::capability_imu |
@@ -48,14 +49,17 @@ Board::Board(const Hal& hal, const Identity& identity)
 
 void Board::poll() {
     const Nanoseconds began = hal_.clock.now();
-    poll_link();
+    // First what happened, then what is wanted: edges belong to what was in force when they came.
+    poll_outputs(began);
     poll_edges(began);
+    poll_link();
     const Nanoseconds now = hal_.clock.now();
     for (CameraChannel& camera : cameras_) camera.poll(now);
     light_.poll(now);
     sync_.poll(now);
     test_.poll(now);
     poll_outputs(now);
+    poll_configuration(now);
     poll_imus(now);
     poll_health(now);
     transmitter_.pump();
@@ -69,7 +73,7 @@ Nanoseconds Board::find_next_wake() const {
     Nanoseconds wake = polled_ + feed_interval;
     const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
     if (greeted_) sooner(next_health_);
-    if (configuring_) sooner(configure_at_);
+    if (configuring_ && configure_at_ > polled_) sooner(configure_at_);
     for (const CameraChannel& camera : cameras_) sooner(camera.next_wake());
     sooner(light_.next_wake());
     sooner(sync_.next_wake());
@@ -120,6 +124,7 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
 void Board::greet(const wire::HostHello& hello) {
     // A board of another major version still says who it is: the host then tells the user what to update.
     greeted_ = true;
+    if (configuring_) begin_trains(hal_.clock.now());
     configuring_ = false;
     stop(0xFF);
     transmitter_.begin();
@@ -140,10 +145,12 @@ void Board::greet(const wire::HostHello& hello) {
 
 void Board::configure(const wire::Configuration& configuration) {
     if (any_running()) return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
-    wanted_ = configuration;
     refused_ = 0;
+    checked_id_ = configuration.id;
     check(configuration, *this);
     if (refused_ != 0) return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
+    wanted_ = configuration;
+    on_sync_ = {};
     // Pulses that were decided end first, and their exposures: none is cut, and each has its record.
     sync_.stop();
     test_.stop();
@@ -153,7 +160,7 @@ void Board::configure(const wire::Configuration& configuration) {
 
 void Board::refuse(const wire::Refusal& refusal) {
     wire::Refusal message = refusal;
-    message.id = wanted_.id;
+    message.id = checked_id_;
     ++refused_;
     send(message);
 }
@@ -180,7 +187,8 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
     for (unsigned i = 0; i < camera_count; ++i) {
         cameras_[i].give_up();
-        cameras_[i].configure(configuration.cameras[i]);
+        const bool lit = (configuration.illumination.cameras >> i & 1U) != 0;
+        cameras_[i].configure(configuration.cameras[i], lit ? configuration.illumination.lead_ns : 0);
         outputs_.rest(i, cameras_[i].trigger_inverted(), now);
         if (cameras_[i].has_strobe()) inputs |= 1U << i;
     }
@@ -188,6 +196,8 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
         if ((configuration.imus[port].options & wire::imu_data_ready) != 0)
             inputs |= 1U << (input_imu_ready + port);
     noise_.listen(inputs);
+    exposing_ = 0;
+    slaves_ = 0;
     light_.configure(configuration.illumination, now);
     grid_clock_.begin(now, 0);
     apply_routes();
@@ -252,44 +262,68 @@ void Board::restore() {
 
 bool Board::any_running() const {
     for (const CameraChannel& camera : cameras_)
-        if (camera.running()) return true;
-    return false;
+        if (camera.running() && !camera.is_slave()) return true;
+    return slaves_ != 0;
 }
 
 bool Board::all_idle() const {
     for (const CameraChannel& camera : cameras_)
-        if (!camera.idle()) return false;
+        if (!camera.idle() || camera.running()) return false;
     return true;
 }
 
 void Board::start(const wire::Start& start) {
     if (configuring_) return;  // it belongs to a configuration that was not answered yet
-    if ((start.flags & wire::start_on_sync) != 0 && !any_running())
-        on_sync_ = start;
-    else
+    if ((start.flags & wire::start_on_sync) != 0 && !any_running()) {
+        on_sync_.cameras |= start.cameras;
+        on_sync_.flags = start.flags;
+    } else {
+        on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~start.cameras);
         start_cameras(start.cameras, start.flags);
+    }
 }
 
 void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
-    for (unsigned i = 0; i < camera_count; ++i)
-        if ((cameras >> i & 1U) != 0) cameras_[i].start(hal_.clock.now(), flags);
-    apply_routes();
+    for (unsigned i = 0; i < camera_count; ++i) {
+        if ((cameras >> i & 1U) == 0) continue;
+        if (cameras_[i].is_slave())
+            slaves_ = static_cast<std::uint8_t>(slaves_ | 1U << i);
+        else
+            cameras_[i].start(hal_.clock.now(), flags);
+    }
+    switch_slaves();
+}
+
+/// A slave is switched on and off while its master does not expose: each of its pulses is whole, and counted.
+void Board::switch_slaves() {
+    bool changed = false;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        CameraChannel& slave = cameras_[i];
+        const bool wanted = (slaves_ >> i & 1U) != 0 && slave.enabled();
+        if (!slave.is_slave() || slave.running() == wanted || (exposing_ >> slave.master() & 1U) != 0)
+            continue;
+        if (wanted)
+            slave.start(hal_.clock.now(), 0);
+        else
+            slave.stop();
+        changed = true;
+    }
+    if (changed) apply_routes();
 }
 
 void Board::stop(std::uint8_t cameras) {
     on_sync_.cameras = static_cast<std::uint8_t>(on_sync_.cameras & ~cameras);
+    slaves_ = static_cast<std::uint8_t>(slaves_ & ~cameras);
     for (unsigned i = 0; i < camera_count; ++i)
-        if ((cameras >> i & 1U) != 0) cameras_[i].stop();
-    apply_routes();
+        if ((cameras >> i & 1U) != 0 && !cameras_[i].is_slave()) cameras_[i].stop();
+    switch_slaves();
 }
 
 void Board::poll_edges(Nanoseconds now) {
     noise_.poll(now);
-    if (const std::uint32_t lost = hal_.edges.take_lost()) {
-        health_.lost_edges += lost;
-        for (CameraChannel& camera : cameras_) camera.edges_lost();
-        event(wire::EventKind::edge_overflow, 0, now, lost, 0);
-    }
+    // Some of those that are still to be read came before, some after those that were lost.
+    const std::uint32_t lost = hal_.edges.take_lost();
+    if (lost != 0) edges_lost();
     Edge edge{};
     while (hal_.edges.pop(edge)) {
         if (noise_.take(edge)) {
@@ -300,6 +334,16 @@ void Board::poll_edges(Nanoseconds now) {
         if (edge.input < camera_count) cameras_[edge.input].edges_lost();
         event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
     }
+    if (lost == 0) return;
+    edges_lost();
+    health_.lost_edges += lost;
+    event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+}
+
+void Board::edges_lost() {
+    for (CameraChannel& camera : cameras_) camera.edges_lost();
+    light_.edges_lost();
+    exposing_ = 0;
 }
 
 void Board::take_edge(const Edge& edge, Nanoseconds now) {
@@ -323,6 +367,9 @@ void Board::take_exposure_edge(const Edge& edge, Nanoseconds now) {
     for (CameraChannel& slave : cameras_)
         if (slave.enabled() && slave.master() == edge.input) slave.master_edge(edge.at, exposing, tick);
     light_.edge(edge.input, exposing, now);
+    const auto bit = static_cast<std::uint8_t>(1U << edge.input);
+    exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
+    if (!exposing) switch_slaves();
 }
 
 void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
@@ -336,13 +383,20 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         case wire::pulse_sync: break;
     }
     event(wire::EventKind::sync_pulse, 0, at, number, 0);
-    if (on_sync_.cameras == 0) {
+    const Nanoseconds since = at - last_sync_;
+    last_sync_ = at;
+    if (on_sync_.cameras == 0 || configuring_) {
         grid_clock_.sync_pulse(at);
         return;
     }
-    const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
-    grid_clock_.begin(at, rate == 0 ? default_sync_period : uhz_ns / rate);
-    begin_trains(hal_.clock.now());
+    if (!any_running()) {
+        // Two that are a period apart are pulses; one may be anything.
+        const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
+        const Nanoseconds period = rate == 0 ? default_sync_period : uhz_ns / rate;
+        if (since < period - period / sync_tolerance || since > period + period / sync_tolerance) return;
+        grid_clock_.begin(at, period);
+        begin_trains(hal_.clock.now());
+    }
     start_cameras(on_sync_.cameras, on_sync_.flags);
     on_sync_ = {};
 }
@@ -352,15 +406,20 @@ void Board::poll_outputs(Nanoseconds now) {
     if (!outputs_blocked_) output_progress_ = now;
     if (now - output_progress_ < stuck_limit) hal_.watchdog.feed();
     OutputSchedule::Late late{};
-    while (hal_.outputs.take_late(late)) {
+    while (outputs_.take_late(late)) {
         ++health_.late_outputs;
         for (CameraChannel& camera : cameras_) camera.left_late(late.asked, late.left);
         light_.left_late(late.asked, late.left);
         event(wire::EventKind::output_late, 0, late.asked, late.left - late.asked, 0);
     }
-    const bool ready = configuring_ && (all_idle() || now >= configure_at_);
-    if (ready) light_.stop(now);
-    if (!ready || !outputs_.empty()) return;
+}
+
+void Board::poll_configuration(Nanoseconds now) {
+    if (!configuring_ || (!all_idle() && now < configure_at_)) return;
+    light_.stop(now);
+    outputs_.rest(output_sync, false, now);
+    outputs_.rest(output_test, false, now);
+    if (!outputs_.empty()) return;
     configuring_ = false;
     apply(wanted_, now);
     if ((wanted_.flags & wire::configuration_store) != 0)
@@ -401,10 +460,13 @@ void Board::poll_health(Nanoseconds now) {
 void Board::exposure(const wire::Exposure& record) { send(record); }
 
 void Board::exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) {
-    light_.plan(camera, start, duration, cameras_[camera].has_strobe(), hal_.clock.now());
-    if (configuration_.ports.test != wire::test_camera0 + camera) return;
-    const Nanoseconds middle = outputs_.set(start + duration / 2, output_test, true);
-    outputs_.set(middle + configuration_.ports.pulse_ns, output_test, false);
+    const Nanoseconds now = hal_.clock.now();
+    light_.plan(camera, start, duration, cameras_[camera].has_strobe(), now);
+    for (std::uint8_t i = 0; i < camera_count; ++i)
+        if (cameras_[i].running() && cameras_[i].master() == camera)
+            light_.plan(i, start, duration, cameras_[i].has_strobe(), now);
+    if (configuration_.ports.test == wire::test_camera0 + camera)
+        outputs_.pulse(start + duration / 2, output_test, true, configuration_.ports.pulse_ns);
 }
 
 void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,

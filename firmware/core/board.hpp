@@ -45,6 +45,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void poll_link();
     void poll_edges(Nanoseconds now);
     void poll_outputs(Nanoseconds now);
+    void poll_configuration(Nanoseconds now);
     void poll_imus(Nanoseconds now);
     void poll_health(Nanoseconds now);
     void take_edge(const Edge& edge, Nanoseconds now);
@@ -62,6 +63,8 @@ class Board final : private ChannelReports, private RefusalSink {
     void start(const wire::Start& start);
     void start_cameras(std::uint8_t cameras, std::uint8_t flags);
     void stop(std::uint8_t cameras);
+    void switch_slaves();
+    void edges_lost();
     bool any_running() const;
     bool all_idle() const;
     template <class T>
@@ -87,7 +90,11 @@ class Board final : private ChannelReports, private RefusalSink {
     bool configuring_ = false;
     Nanoseconds configure_at_ = 0;  ///< at the latest
     wire::Start on_sync_{};         ///< waits for a sync pulse
+    Nanoseconds last_sync_ = INT64_MIN / 2;
+    std::uint32_t checked_id_ = 0;
     std::uint8_t refused_ = 0;
+    std::uint8_t exposing_ = 0;  ///< cameras whose exposure line says so
+    std::uint8_t slaves_ = 0;    ///< slaves that shall run
     bool greeted_ = false;
     bool outputs_blocked_ = false;
     Nanoseconds output_progress_ = 0;

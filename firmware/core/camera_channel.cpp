@@ -16,8 +16,10 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 }  // namespace
 
-void CameraChannel::configure(const wire::CameraConfiguration& configuration) {
+void CameraChannel::configure(const wire::CameraConfiguration& configuration, Nanoseconds lead) {
     configuration_ = configuration;
+    lead_ = lead > configuration.latency_ns ? lead - configuration.latency_ns : 0;
+    next_tick_ = 0;
     expected_ = min(configuration.exposure_ns, configuration.max_exposure_ns);
     expected_since_ = 0;
     announcements_.clear();
@@ -33,10 +35,10 @@ void CameraChannel::configure(const wire::CameraConfiguration& configuration) {
 
 void CameraChannel::start(Nanoseconds now, std::uint8_t flags) {
     if (!enabled()) return;
-    if (!running_) {
+    if (!running_ && !is_slave()) {
         grid_ = Grid(configuration_.phase_ns, configuration_.rate_uhz);
         grid_.skip_before(clock_.grid_time(now));
-        while (trigger_time() < now + OutputQueue::horizon ||
+        while (decision_time() < now || grid_.tick() < next_tick_ ||
                clock_.board_time(grid_.next()) < now + start_delay)
             grid_.advance();
     }
@@ -75,7 +77,8 @@ void CameraChannel::decide(Nanoseconds now) {
     if (wanted(grid_.tick())) {
         if (at < now - min(latest_trigger, period() / 16))
             skip(wire::SkipReason::late, at);
-        else if (tracker_.busy_until(now) + configuration_.gap_ns > at)
+        else if (tracker_.busy_until(now) + configuration_.gap_ns > at ||
+                 pulse_end_ + OutputQueue::shortest_pause > at)
             skip(wire::SkipReason::busy, at);
         else if (tracker_.full() || !outputs_.has_room())
             skip(wire::SkipReason::full, at);
@@ -83,6 +86,7 @@ void CameraChannel::decide(Nanoseconds now) {
             send_trigger(at, now);
     }
     grid_.advance();
+    next_tick_ = grid_.tick();
 }
 
 void CameraChannel::skip(wire::SkipReason reason, Nanoseconds at) {
@@ -110,8 +114,8 @@ wire::Exposure CameraChannel::new_record(Nanoseconds at, std::uint64_t tick) {
 
 void CameraChannel::send_trigger(Nanoseconds at, Nanoseconds now) {
     const bool active = !trigger_inverted();
-    const Nanoseconds sent = outputs_.set(max(at, now), camera_, active);
-    outputs_.set(sent + configuration_.pulse_ns, camera_, !active);
+    const Nanoseconds sent = outputs_.pulse(max(at, now), camera_, active, configuration_.pulse_ns);
+    pulse_end_ = sent + configuration_.pulse_ns;
     const Nanoseconds exposure = expected_exposure();
     wire::Exposure record = new_record(sent, grid_.tick());
     record.flags = phase_flags();
@@ -148,13 +152,12 @@ void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tic
 
 void CameraChannel::poll(Nanoseconds now) {
     tracker_.expire(now);
-    if (has(wire::camera_slave)) return;
-    while (running_ && trigger_time() - OutputQueue::horizon <= now) decide(now);
+    if (is_slave()) return;
+    while (running_ && decision_time() <= now) decide(now);
 }
 
 Nanoseconds CameraChannel::next_wake() const {
-    const bool decides = running_ && !has(wire::camera_slave);
-    return min(decides ? trigger_time() - OutputQueue::horizon : never, tracker_.next_deadline());
+    return min(running_ && !is_slave() ? decision_time() : never, tracker_.next_deadline());
 }
 
 }  // namespace versavis::firmware

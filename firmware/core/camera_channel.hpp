@@ -16,8 +16,9 @@ class CameraChannel {
     CameraChannel(std::uint8_t camera, const GridClock& clock, OutputQueue& outputs, ChannelReports& reports)
         : camera_(camera), clock_(clock), outputs_(outputs), reports_(reports), tracker_(camera, reports) {}
 
-    /// Only while stopped and idle. Numbers go on.
-    void configure(const wire::CameraConfiguration& configuration);
+    /// Only while stopped and idle. Numbers go on. Triggers are decided `lead` sooner than the outputs ask
+    /// for.
+    void configure(const wire::CameraConfiguration& configuration, Nanoseconds lead);
 
     /// Begins triggering at the first grid point that can be met after `now`; flags: wire::StartFlag. A
     /// channel that runs begins its pattern anew.
@@ -26,6 +27,7 @@ class CameraChannel {
     /// Pulses that were decided are still sent, and recorded.
     void stop() { running_ = false; }
     bool running() const { return running_; }
+    bool is_slave() const { return has(wire::camera_slave); }
     /// True: no exposure is waited for.
     bool idle() const { return tracker_.empty(); }
     /// Ends the wait for exposures.
@@ -60,6 +62,7 @@ class CameraChannel {
 
  private:
     Nanoseconds period() const { return grid_.period(); }
+    Nanoseconds decision_time() const { return trigger_time() - OutputQueue::horizon - lead_; }
     Nanoseconds expected_exposure() const;
     Nanoseconds trigger_time() const;
     bool wanted(std::uint64_t tick) const;
@@ -79,8 +82,11 @@ class CameraChannel {
     Grid grid_;  ///< in grid time
     bool running_ = false;
     std::uint8_t start_flags_ = 0;
-    std::uint64_t trigger_ = 0;     ///< pulses sent since boot
-    std::uint64_t first_tick_ = 0;  ///< of this run, where the pattern begins
+    std::uint64_t trigger_ = 0;              ///< pulses sent since boot
+    std::uint64_t first_tick_ = 0;           ///< of this run, where the pattern begins
+    std::uint64_t next_tick_ = 0;            ///< the first that was not decided yet
+    Nanoseconds pulse_end_ = INT64_MIN / 2;  ///< of the newest pulse
+    Nanoseconds lead_ = 0;
     Nanoseconds expected_ = 0;
     std::uint64_t expected_since_ = 0;  ///< trigger that set `expected_`
     Announcements announcements_;

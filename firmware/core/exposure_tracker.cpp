@@ -3,6 +3,12 @@
 
 namespace versavis::firmware {
 
+namespace {
+
+constexpr Nanoseconds certain_latency = 200'000;  // shorter ones may vary by as much as they are
+
+}  // namespace
+
 void ExposureTracker::configure(const wire::CameraConfiguration& configuration, Nanoseconds patience) {
     configuration_ = configuration;
     patience_ = patience;
@@ -29,14 +35,16 @@ ExposureTracker::Completed ExposureTracker::edge(Nanoseconds at, bool exposing) 
     return {};
 }
 
-/// The edge belongs to the newest trigger before it: older ones that wait for a start were ignored by the
-/// camera.
+/// The edge belongs to the newest trigger that can have caused it: older ones that wait for a start were
+/// ignored by the camera.
 void ExposureTracker::start_edge(Nanoseconds at) {
+    const Nanoseconds latency = configuration_.latency_ns;
+    const Nanoseconds soonest = latency > certain_latency ? latency / 2 : 0;
     std::size_t found = count_;
     for (std::size_t i = 0; i < count_; ++i)
-        if (flights_[i].record.trigger_ns <= at && !started(flights_[i])) found = i;
+        if (flights_[i].record.trigger_ns + soonest <= at && !started(flights_[i])) found = i;
     if (found == count_) {
-        edges_lost();  // the line rose twice: an end in between was missed
+        edges_lost();  // if the line rose twice, an end in between was missed
         return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
     }
     // The line has one level: whatever still waits before this trigger was ignored, or its end edge was lost.
@@ -65,15 +73,17 @@ void ExposureTracker::edges_lost() {
 
 Nanoseconds ExposureTracker::busy_until(Nanoseconds now) const {
     if (count_ == 0) return last_end_;
+    for (std::size_t i = 0; i < count_; ++i)  // overdue: it may last for any time
+        if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < now)
+            return never / 2;
     const Flight& newest = flights_[count_ - 1];
     const Nanoseconds start =
         started(newest) ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
-    const Nanoseconds end = start + newest.expected;
-    return started(newest) && end < now ? never / 2 : end;  // overdue: it may last for any time
+    return start + newest.expected;
 }
 
 std::uint64_t ExposureTracker::tick_at(Nanoseconds at) const {
-    std::uint64_t tick = 0;
+    std::uint64_t tick = last_tick_;
     for (std::size_t i = 0; i < count_; ++i)
         if (flights_[i].record.trigger_ns <= at) tick = flights_[i].record.tick;
     return tick;
@@ -121,6 +131,7 @@ void ExposureTracker::finish_first(std::uint16_t flags) {
     wire::Exposure record = flights_[0].record;
     record.flags = static_cast<std::uint16_t>(record.flags | flags);
     if (record.end_ns != wire::no_time) last_end_ = record.end_ns;
+    last_tick_ = record.tick;
     --count_;
     for (std::size_t i = 0; i < count_; ++i) flights_[i] = flights_[i + 1];
     reports_.exposure(record);

@@ -59,7 +59,7 @@ class ExposureTracker {
     /// When the newest exposure will have ended, as far as it is known now.
     Nanoseconds busy_until(Nanoseconds now) const;
 
-    /// Grid point of the newest trigger before `at`; 0: there is none.
+    /// Grid point of the newest trigger before `at`; 0: there was none.
     std::uint64_t tick_at(Nanoseconds at) const;
 
     /// When expire() has something to do next.
@@ -87,6 +87,7 @@ class ExposureTracker {
     Nanoseconds patience_ = 0;
     Nanoseconds period_ = 0;
     Nanoseconds last_end_ = INT64_MIN / 2;  ///< when the newest finished exposure ended, or was given up
+    std::uint64_t last_tick_ = 0;           ///< of the newest finished record
     Flight flights_[max_flights] = {};
     std::size_t count_ = 0;
 };

@@ -7,19 +7,23 @@ namespace {
 
 constexpr std::int64_t largest_pace = 2000;  // 1 / 2000: no crystals differ by more than 500 ppm
 
+constexpr Nanoseconds longest_first_gap = 4;  // in periods, before the pace is known
+
 }  // namespace
 
 bool GridClock::sync_pulse(Nanoseconds at) {
     if (period_ == 0) return false;
-    const Nanoseconds since = at - anchor_;
-    const Nanoseconds periods = (since + period_ / 2) / period_;
-    if (periods <= 0) return periods == 0 && since == 0;
+    const Nanoseconds periods = (at - anchor_ + period_ / 2) / period_;
+    if (periods <= 0) return false;
     const Nanoseconds nominal = periods * period_;
-    const Nanoseconds off = since - nominal;
-    if (off > nominal / largest_pace || -off > nominal / largest_pace) return false;
+    // Pulses may be missing. Once the pace is known, it says when the next one comes, however long that is.
+    const Nanoseconds off = at - board_time(anchor_grid_ + nominal);
+    const Nanoseconds doubtful = pace_known_ || periods > longest_first_gap ? period_ : nominal;
+    if (off > doubtful / largest_pace || -off > doubtful / largest_pace) return false;
+    pace_ppb_ = (at - anchor_ - nominal) * 1'000'000 / (nominal / 1000);
+    pace_known_ = true;
     anchor_ = at;
     anchor_grid_ += nominal;
-    pace_ppb_ = off * 1'000'000 / (nominal / 1000);
     return true;
 }
 

@@ -24,8 +24,14 @@ class GridClock {
         return anchor_ + since + whole;
     }
 
-    /// About: a place to begin a search with.
-    Nanoseconds grid_time(Nanoseconds board_time) const { return anchor_grid_ + (board_time - anchor_); }
+    /// Not after the true one, and close before it: a place to begin a search with.
+    Nanoseconds grid_time(Nanoseconds board_time) const {
+        const Nanoseconds since = board_time - anchor_;
+        if (pace_ppb_ == 0) return anchor_grid_ + since;
+        const Nanoseconds margin = (since < 0 ? -since : since) / 1'000'000 + 1;
+        return anchor_grid_ + since - since / billion * pace_ppb_ - since % billion * pace_ppb_ / billion -
+               margin;
+    }
 
     /// False: the pulse is none of the sender's, and is not followed.
     bool sync_pulse(Nanoseconds at);
@@ -38,6 +44,7 @@ class GridClock {
     Nanoseconds anchor_ = 0;       ///< board time of the newest pulse
     Nanoseconds anchor_grid_ = 0;  ///< its grid time
     std::int64_t pace_ppb_ = 0;    ///< board time passes so much faster than grid time
+    bool pace_known_ = false;
 };
 
 }  // namespace versavis::firmware

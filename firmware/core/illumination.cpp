@@ -17,9 +17,12 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 void Illumination::configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now) {
     stop(now);
-    configuration_ = configuration;
-    saved_ = configuration.max_on_ns;
+    // Another configuration is no reason for more light; the first finds a full store.
+    saved_ =
+        configuration_.max_on_ns == 0 ? configuration.max_on_ns : min(budget(now), configuration.max_on_ns);
     saved_at_ = now;
+    if (configuration.cameras != 0) configuration_ = configuration;
+    configuration_.cameras = configuration.cameras;
 }
 
 void Illumination::stop(Nanoseconds now) {
@@ -114,13 +117,18 @@ void Illumination::close_gate(Nanoseconds now) {
     gate_off_ = never;
 }
 
+void Illumination::edges_lost() { exposing_ = 0; }
+
 void Illumination::left_late(Nanoseconds asked, Nanoseconds left) {
     if (asked == last_off_) saved_ -= min(left - asked, configuration_.max_on_ns);
 }
 
 void Illumination::poll(Nanoseconds now) {
     if (open() && gate_off_ <= now) {
-        if (exposing_ != 0) {
+        bool wanted = exposing_ != 0;
+        for (std::size_t i = 0; i < plan_count_; ++i)
+            wanted = wanted || (plans_[i].on < gate_off_ && plans_[i].lead_off > gate_off_);
+        if (wanted) {
             reports_.event(wire::EventKind::illumination_limited, output_light_gate, gate_off_,
                            gate_off_ - gate_on_);
             dark_until_ = gate_off_ + configuration_.max_on_ns / 10;

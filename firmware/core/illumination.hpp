@@ -23,6 +23,9 @@ class Illumination {
     /// An exposure line changed.
     void edge(std::uint8_t camera, bool exposing, Nanoseconds now);
 
+    /// What the lines say is not known any more, until they change.
+    void edges_lost();
+
     /// The word of `asked` left later: the light was on for longer.
     void left_late(Nanoseconds asked, Nanoseconds left);
 

@@ -3,36 +3,69 @@
 
 namespace versavis::firmware {
 
-Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level) {
+Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold) {
     if (at <= committed_until_) at = committed_until_ + 1;
     if (size_ == capacity) return at;
-    std::size_t i = size_++;
-    for (; i > 0 && edges_[i - 1].at > at; --i) edges_[i] = edges_[i - 1];
-    edges_[i] = {at, static_cast<std::uint8_t>(output), level};
+    insert({at, at, hold, static_cast<std::uint8_t>(output), level});
     if (size_ > high_water_) high_water_ = size_;
     return at;
 }
 
+void OutputQueue::insert(const PendingEdge& edge) {
+    std::size_t i = size_++;
+    for (; i > 0 && edges_[i - 1].at > edge.at; --i) edges_[i] = edges_[i - 1];
+    edges_[i] = edge;
+}
+
+void OutputQueue::remove_first(std::size_t count) {
+    for (std::size_t i = count; i < size_; ++i) edges_[i - count] = edges_[i];
+    size_ -= count;
+}
+
+/// True: the first edge cannot leave when it should, and was put off.
+bool OutputQueue::postpone_first(Nanoseconds now) {
+    PendingEdge edge = edges_[0];
+    Nanoseconds leaves = edge.at > now ? edge.at : now;
+    const Nanoseconds held = changed_[edge.output] + edge.hold;
+    if (edge.hold > 0 && leaves < held) leaves = held;
+    if (leaves == edge.at) return false;
+    remove_first(1);
+    edge.at = leaves;
+    insert(edge);
+    return true;
+}
+
 bool OutputQueue::commit(Nanoseconds now) {
-    std::size_t taken = 0;
-    bool accepted = true;
-    while (taken < size_ && edges_[taken].at < now + horizon) {
-        const Nanoseconds at = edges_[taken].at;
+    while (size_ > 0 && edges_[0].at <= now + horizon) {
+        if (postpone_first(now)) continue;
+        // An edge that would undo another of the same word waits for the next, which it is put off to.
+        const Nanoseconds at = edges_[0].at;
         std::uint32_t levels = levels_;
-        std::size_t end = taken;
+        std::uint32_t changed = 0;
+        std::size_t end = 0;
         for (; end < size_ && edges_[end].at == at; ++end) {
             const std::uint32_t bit = 1U << edges_[end].output;
+            if ((changed & bit) != 0 && edges_[end].hold > 0) break;
+            changed |= bit;
             levels = edges_[end].level ? levels | bit : levels & ~bit;
         }
-        accepted = hardware_.push(at, levels);
-        if (!accepted) break;  // it is tried again at the next poll
+        if (!hardware_.push(at, levels)) return false;  // it is tried again at the next poll
+        for (std::size_t i = 0; i < end; ++i) {
+            changed_[edges_[i].output] = at;
+            if (at > edges_[i].asked && late_count_ < late_capacity)
+                late_[late_count_++] = {edges_[i].asked, at};
+        }
         levels_ = levels;
         committed_until_ = at;
-        taken = end;
+        remove_first(end);
     }
-    for (std::size_t i = taken; i < size_; ++i) edges_[i - taken] = edges_[i];
-    size_ -= taken;
-    return accepted;
+    return true;
+}
+
+bool OutputQueue::take_late(OutputSchedule::Late& late) {
+    if (late_count_ == 0) return hardware_.take_late(late);
+    late = late_[--late_count_];
+    return true;
 }
 
 bool OutputQueue::cancel(unsigned output) {

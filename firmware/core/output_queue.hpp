@@ -20,9 +20,22 @@ class OutputQueue {
     bool has_room() const { return size_ + 8 <= capacity; }
     bool empty() const { return size_ == 0; }
 
-    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed. Returns
-    /// the instant. Without room nothing is set.
-    Nanoseconds set(Nanoseconds at, unsigned output, bool level);
+    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed, and not
+    /// sooner than `hold` after its level before: a pulse that is late keeps its width. Returns the instant
+    /// that is asked for. Without room nothing is set.
+    Nanoseconds set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold = 0);
+
+    /// A pulse of `width` and, before it, the shortest pause that tells it from the one before.
+    Nanoseconds pulse(Nanoseconds at, unsigned output, bool active, Nanoseconds width) {
+        const Nanoseconds begins = set(at, output, active, shortest_pause);
+        set(begins + width, output, !active, width);
+        return begins;
+    }
+
+    static constexpr Nanoseconds shortest_pause = 10'000;
+
+    /// An edge that leaves later than it was asked for; each is told once.
+    bool take_late(OutputSchedule::Late& late);
 
     /// Hands to the hardware what is due within the horizon. False: its queue is full.
     bool commit(Nanoseconds now);
@@ -49,9 +62,17 @@ class OutputQueue {
  private:
     struct PendingEdge {
         Nanoseconds at;
+        Nanoseconds asked;
+        Nanoseconds hold;
         std::uint8_t output;
         bool level;
     };
+    void insert(const PendingEdge& edge);
+    void remove_first(std::size_t count);
+    bool postpone_first(Nanoseconds now);
+
+    static constexpr std::size_t output_count = 8;
+    static constexpr std::size_t late_capacity = 16;
     static constexpr std::size_t capacity = 64;  // 8 outputs x 2 edges x 3 pulses ahead, with room
 
     OutputSchedule& hardware_;
@@ -60,6 +81,9 @@ class OutputQueue {
     std::size_t high_water_ = 0;
     Nanoseconds committed_until_ = INT64_MIN;
     std::uint32_t levels_ = 0;
+    Nanoseconds changed_[output_count] = {};  ///< when its level changed last
+    OutputSchedule::Late late_[late_capacity] = {};
+    std::size_t late_count_ = 0;
 };
 
 }  // namespace versavis::firmware

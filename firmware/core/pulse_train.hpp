@@ -26,8 +26,7 @@ class PulseTrain {
         // One that is too late would be taken for one at its time: it is left out.
         if (at() < now) skip(now);
         while (at() - OutputQueue::horizon <= now && outputs_.has_room()) {
-            const Nanoseconds begins = outputs_.set(at(), output_, true);
-            outputs_.set(begins + width_, output_, false);
+            outputs_.pulse(at(), output_, true, width_);
             grid_.advance();
         }
     }

@@ -83,7 +83,7 @@ class Transmitter {
     std::size_t written_ = 0;  ///< of its bytes
 
     MessageQueue<wire::BoardHello, 1> hellos_;
-    MessageQueue<wire::Refusal, 32> refusals_;
+    MessageQueue<wire::Refusal, 48> refusals_;
     MessageQueue<wire::ConfigurationAnswer, 1> answers_;
     MessageQueue<wire::ClockAnswer, 8> clock_answers_;
     MessageQueue<wire::Exposure, 256> exposures_;

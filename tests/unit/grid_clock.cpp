@@ -9,6 +9,16 @@ namespace {
 constexpr Nanoseconds second = 1'000'000'000;
 }
 
+TEST_CASE("grid_clock: what lies before a board time is found, whatever the pace") {
+    GridClock clock;
+    clock.begin(5 * second, second);
+    REQUIRE(clock.sync_pulse(6 * second + 300'000));
+    for (const Nanoseconds at : {6 * second, 100 * second, 100'000 * second}) {
+        CHECK(clock.board_time(clock.grid_time(at)) <= at);
+        CHECK(clock.board_time(clock.grid_time(at)) >= at - at / 500'000 - 10);
+    }
+}
+
 TEST_CASE("grid_clock: without pulses grid time passes as board time does") {
     GridClock clock;
     clock.begin(5 * second, 0);

@@ -10,6 +10,8 @@ void CameraModel::emit(Edges& edges, Nanoseconds at, bool exposing) const {
 CameraModel::Edges CameraModel::trigger_line(Nanoseconds at, bool level) {
     const bool active = level != settings_.trigger_inverted;
     if (active) return begin(at);
+    inactive_at_ = at;
+    if (!pulses_.empty()) pulses_.back().width = at - pulses_.back().at;
     Edges edges;
     if (settings_.trigger_width && width_start_) {
         TruePulse& pulse = pulses_.back();
@@ -25,6 +27,7 @@ CameraModel::Edges CameraModel::begin(Nanoseconds at) {
     Edges edges;
     TruePulse pulse;
     pulse.at = at;
+    pulse.pause = at - inactive_at_;
     pulse.fault = settings_.fault(pulses_.size() + 1);
     pulse.into_busy = at < free_at_;
     pulse.taken = !pulse.into_busy && pulse.fault != Fault::ignored;

@@ -51,6 +51,8 @@ struct TruePulse {
     Fault fault = Fault::none;
     Nanoseconds start = 0;
     Nanoseconds end = 0;
+    Nanoseconds width = 0;       ///< of the trigger pulse
+    Nanoseconds pause = second;  ///< since the pulse before
 };
 
 class CameraModel {
@@ -76,6 +78,7 @@ class CameraModel {
     std::vector<TruePulse> pulses_;
     Nanoseconds free_at_ = 0;
     std::optional<Nanoseconds> width_start_;
+    Nanoseconds inactive_at_ = -second;
 };
 
 }  // namespace versavis::scenario
