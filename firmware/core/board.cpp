@@ -331,7 +331,7 @@ void Board::poll_edges(Nanoseconds now) {
             continue;
         }
         ++health_.noisy_inputs;
-        if (edge.input < camera_count) cameras_[edge.input].edges_lost();
+        if (edge.input < camera_count) edges_lost();
         event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
     }
     if (lost == 0) return;

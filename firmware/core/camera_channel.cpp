@@ -43,6 +43,7 @@ void CameraChannel::start(Nanoseconds now, std::uint8_t flags) {
             grid_.advance();
     }
     running_ = true;
+    uncounted_ = false;
     start_flags_ = flags;
     first_tick_ = grid_.tick();
 }
@@ -145,6 +146,7 @@ void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tic
         if (tracker_.full()) tracker_.give_up();
         wire::Exposure record = new_record(at, tick);
         if (!own_strobe) record.flags |= wire::exposure_from_master;
+        if (uncounted_) record.flags |= wire::exposure_uncounted;
         tracker_.add(record, expected_);
     }
     if (!own_strobe && !tracker_.empty()) tracker_.edge(at, exposing);

@@ -42,7 +42,10 @@ class CameraChannel {
     /// The exposure line of this slave's master changed; `tick` is the master's.
     void master_edge(Nanoseconds at, bool exposing, std::uint64_t tick);
 
-    void edges_lost() { tracker_.edges_lost(); }
+    void edges_lost() {
+        tracker_.edges_lost();
+        uncounted_ = is_slave() && running_;
+    }
     void left_late(Nanoseconds asked, Nanoseconds left) { tracker_.left_late(asked, left); }
 
     /// Decides the triggers that are due and gives up exposures that did not happen.
@@ -81,6 +84,7 @@ class CameraChannel {
     wire::CameraConfiguration configuration_{};
     Grid grid_;  ///< in grid time
     bool running_ = false;
+    bool uncounted_ = false;  ///< pulses of this slave may have been missed
     std::uint8_t start_flags_ = 0;
     std::uint64_t trigger_ = 0;              ///< pulses sent since boot
     std::uint64_t first_tick_ = 0;           ///< of this run, where the pattern begins

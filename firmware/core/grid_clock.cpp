@@ -7,7 +7,8 @@ namespace {
 
 constexpr std::int64_t largest_pace = 2000;  // 1 / 2000: no crystals differ by more than 500 ppm
 
-constexpr Nanoseconds longest_first_gap = 4;  // in periods, before the pace is known
+constexpr std::int64_t largest_change = 20'000;  // 50 ppm: of two crystals that warm up
+constexpr Nanoseconds longest_first_gap = 4;     // in periods, before the pace is known
 
 }  // namespace
 
@@ -18,8 +19,9 @@ bool GridClock::sync_pulse(Nanoseconds at) {
     const Nanoseconds nominal = periods * period_;
     // Pulses may be missing. Once the pace is known, it says when the next one comes, however long that is.
     const Nanoseconds off = at - board_time(anchor_grid_ + nominal);
-    const Nanoseconds doubtful = pace_known_ || periods > longest_first_gap ? period_ : nominal;
-    if (off > doubtful / largest_pace || -off > doubtful / largest_pace) return false;
+    Nanoseconds tolerance = (periods > longest_first_gap ? period_ : nominal) / largest_pace;
+    if (pace_known_) tolerance = period_ / largest_change;
+    if (off > tolerance || -off > tolerance) return false;
     pace_ppb_ = (at - anchor_ - nominal) * 1'000'000 / (nominal / 1000);
     pace_known_ = true;
     anchor_ = at;

@@ -57,7 +57,7 @@ void World::judge_camera(unsigned camera, std::string& out) {
         complain(out, "camera {}: {} pulses, but the last record is {}", camera, pulses.size(), last);
     const wire::CameraConfiguration& settings = configuration.cameras[camera];
     for (std::size_t i = 0; i < pulses.size() && (settings.flags & wire::camera_slave) == 0; ++i)
-        if (pulses[i].width != settings.pulse_ns || pulses[i].pause < 10 * us)
+        if (pulses[i].width < settings.pulse_ns || pulses[i].pause < 10 * us)
             complain(out, "camera {}: pulse {} is {} ns wide, {} ns after the one before", camera, i + 1,
                      pulses[i].width, pulses[i].pause);
     for (std::size_t i = 0; i < pulses.size() && !busy_allowed; ++i)

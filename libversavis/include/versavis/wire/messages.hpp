@@ -65,6 +65,7 @@ enum ExposureFlag : std::uint16_t {
     exposure_clipped = 1U << 8U,    ///< more was announced than the maximum exposure, which was expected then
     exposure_from_master = 1U << 9U,  ///< a slave without exposure line: start and end are the master's
     exposure_slow = 1U << 10U,        ///< part of the slow start
+    exposure_uncounted = 1U << 11U,   ///< of a slave: edges were lost, and its number may be too small since
 };
 
 /// One record for each trigger pulse that was sent, whatever the camera did.
