@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board_link.hpp"
 
+#include <fmt/ranges.h>
+
 #include <cstring>
 
 namespace versavis::daemon {
@@ -213,11 +215,10 @@ Expected<> BoardLink::configure() {
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
-    std::string reason = answer_.status == wire::ConfigurationStatus::running
-                             ? "its cameras are running: start it anew"
-                             : "change the configuration";
-    for (const std::string& refusal : refusals_) reason = refusal + "; " + reason;
-    set_state(BoardState::refused, reason);
+    refusals_.emplace_back(answer_.status == wire::ConfigurationStatus::running
+                               ? "its cameras are running: reset it"
+                               : "change the configuration");
+    set_state(BoardState::refused, fmt::format("{}", fmt::join(refusals_, "; ")));
     return failure("board", "refuses its configuration");
 }
 

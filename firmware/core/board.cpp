@@ -286,10 +286,11 @@ void Board::start(const wire::Start& start) {
 void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
     for (unsigned i = 0; i < camera_count; ++i) {
         if ((cameras >> i & 1U) == 0) continue;
-        if (cameras_[i].is_slave())
-            slaves_ = static_cast<std::uint8_t>(slaves_ | 1U << i);
-        else
-            cameras_[i].start(hal_.clock.now(), flags);
+        CameraChannel& camera = cameras_[i].is_slave() ? cameras_[cameras_[i].master()] : cameras_[i];
+        if (cameras_[i].is_slave()) slaves_ = static_cast<std::uint8_t>(slaves_ | 1U << i);
+        // The gaps of a slave are its master's.
+        if (&camera == &cameras_[i] || (camera.running() && (flags & wire::start_pattern) != 0))
+            camera.start(hal_.clock.now(), flags);
     }
     switch_slaves();
 }

@@ -22,16 +22,26 @@ void OutputQueue::remove_first(std::size_t count) {
     size_ -= count;
 }
 
-/// True: the first edge cannot leave when it should, and was put off.
+/// True: the first edge cannot leave when it should, and was put off, with those of its output behind it.
 bool OutputQueue::postpone_first(Nanoseconds now) {
-    PendingEdge edge = edges_[0];
-    Nanoseconds leaves = edge.at > now ? edge.at : now;
-    const Nanoseconds held = changed_[edge.output] + edge.hold;
-    if (edge.hold > 0 && leaves < held) leaves = held;
-    if (leaves == edge.at) return false;
-    remove_first(1);
-    edge.at = leaves;
-    insert(edge);
+    const std::uint8_t output = edges_[0].output;
+    const auto earliest = [&](const PendingEdge& edge, Nanoseconds before) {
+        const Nanoseconds held = edge.hold > 0 ? before + edge.hold : before;
+        const Nanoseconds at = edge.at > now ? edge.at : now;
+        return at > held ? at : held;
+    };
+    if (earliest(edges_[0], changed_[output]) == edges_[0].at) return false;
+    PendingEdge moved[capacity];
+    std::size_t count = 0;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < size_; ++i)
+        (edges_[i].output == output ? moved[count++] : edges_[kept++]) = edges_[i];
+    size_ = kept;
+    Nanoseconds before = changed_[output];
+    for (std::size_t i = 0; i < count; ++i) {
+        before = moved[i].at = earliest(moved[i], before);
+        insert(moved[i]);
+    }
     return true;
 }
 

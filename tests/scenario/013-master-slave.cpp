@@ -53,6 +53,28 @@ TEST_CASE("013-master-slave: slaves expose as long as their master, whatever its
     }
 }
 
+TEST_CASE("013-slave-pattern: a slave that asks for the start pattern gets it by its master") {
+    Scenario world;
+    world.add_camera(0);
+    make_slave(world, 1, true, false);
+    world.gaps_allowed = true;
+    world.connect();
+    REQUIRE(world.configure());
+    world.start(1);
+    world.run(second);
+    world.start(2, wire::start_pattern);
+    world.run(3 * second);
+    world.finish();
+    CHECK(world.judge() == "");
+    CHECK(count(world.inbox().exposures[0], wire::exposure_pattern) == 11);
+    const auto& slave = world.inbox().exposures[1];
+    const std::size_t first =
+        slave[0].tick + 1 == slave[1].tick && slave[1].tick + 1 == slave[2].tick ? 1 : 0;
+    std::vector<std::uint64_t> gaps;
+    for (std::size_t i = first; i < first + 10; ++i) gaps.push_back(slave[i + 1].tick - slave[i].tick);
+    CHECK(gaps == std::vector<std::uint64_t>{1, 2, 1, 3, 2, 2, 3, 3, 1, 1});
+}
+
 TEST_CASE("013-slave-stops: a slave that is stopped gets no more pulses") {
     Scenario world;
     world.add_camera(0);

@@ -19,10 +19,13 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
             "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = {2}\nheight = "
             "{3}\n{4}\n",
             i, address, settings.width, settings.height, settings.camera_scenario);
+        const bool slave = i > 0 && !settings.slave_extra.empty();
         configuration += fmt::format(
-            "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nrate_hz = {2}\nlatency_us = 20\n"
-            "packet_size = 9000\n{3}\n",
-            i, address, settings.rate_hz, settings.camera_extra);
+            "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nlatency_us = 20\npacket_size = "
+            "9000\n"
+            "{2}\n{3}\n",
+            i, address, slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
+            settings.camera_extra);
     }
     configuration += "[[imu]]\nname = \"imu0\"\n";
     scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);

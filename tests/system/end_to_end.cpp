@@ -91,6 +91,17 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     CHECK_FALSE(std::filesystem::exists(stream_path("e2e", "cam0")));
 }
 
+TEST_CASE("end to end: a slave is exposed by its master, and its stamps are its own") {
+    StackSettings settings{"slave", 29, 2, 20, "exposure_us = 4000", "", ""};
+    settings.slave_extra = "master = \"cam0\"";
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const rig::Verdict verdict = judge(stack, 6);
+    for (const auto& name : {"cam0", "cam1"}) CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(2));
+    stack.wait_for_status(healthy);
+}
+
 TEST_CASE("end to end: both cameras' frames of one tick carry the same time") {
     Stack stack({"sync", 11, 2, 25, "exposure_us = 2000", "", ""});
     stack.start_rig();

@@ -44,7 +44,7 @@ std::uint32_t Adis::rate(std::uint32_t wanted_millihertz) const {
 void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
     const std::uint16_t code = rate_code(rate_millihertz);
     // In octaves the rate stands in the high byte, beside the bit that chooses the internal clock.
-    const auto rate = static_cast<std::uint16_t>(facts_.octaves ? code << 8U | 1U : code);
+    const auto rate = static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
     const auto filters = static_cast<std::uint16_t>(facts_.filter_base | filter);
     constexpr std::uint32_t settle_us = 300;
     setup.write(0, facts_.command_register, reset_command, facts_.reset_us);

@@ -16,7 +16,7 @@ constexpr double pressure_pa = 2.0;
 constexpr double temperature_c = 0.07386;
 constexpr double temperature_at_zero_c = 31.0;
 
-constexpr std::int64_t q32(double ratio) { return static_cast<std::int64_t>(ratio * 4294967296.0 + 0.5); }
+constexpr std::int64_t q32(double ratio) { return static_cast<std::int64_t>(ratio * 4294967296.0); }
 
 /// Raw words of a kind in those of an ADIS16448, times 2^32.
 struct Scale {

@@ -52,13 +52,12 @@ bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowes
 }  // namespace
 
 std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size) {
-    std::uint16_t crc = 0;
+    std::uint32_t crc = 0;
     for (std::size_t i = 0; i < size; ++i) {
-        crc = static_cast<std::uint16_t>(crc ^ data[i] << 8U);
-        for (int bit = 0; bit < 8; ++bit)
-            crc = static_cast<std::uint16_t>((crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U);
+        crc ^= std::uint32_t{data[i]} << 8U;
+        for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
     }
-    return crc;
+    return static_cast<std::uint16_t>(crc);
 }
 
 bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t& out) {
