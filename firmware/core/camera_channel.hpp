@@ -27,7 +27,7 @@ class CameraChannel {
     /// Pulses that were decided are still sent, and recorded.
     void stop() { running_ = false; }
     bool running() const { return running_; }
-    bool is_slave() const { return has(wire::camera_slave); }
+    bool is_slave() const { return enabled() && has(wire::camera_slave); }
     /// True: no exposure is waited for.
     bool idle() const { return tracker_.empty(); }
     /// Ends the wait for exposures.
@@ -58,7 +58,7 @@ class CameraChannel {
     bool exposing(bool level) const { return level != has(wire::camera_strobe_inverted); }
     bool has_strobe() const { return enabled() && !has(wire::camera_no_strobe); }
     /// Camera whose exposure line triggers this one; not_routed: none.
-    std::uint8_t master() const { return has(wire::camera_slave) ? configuration_.master : not_routed; }
+    std::uint8_t master() const { return is_slave() ? configuration_.master : not_routed; }
     bool trigger_inverted() const { return has(wire::camera_trigger_inverted); }
     std::uint64_t tick_at(Nanoseconds at) const { return tracker_.tick_at(at); }
     std::uint32_t skipped() const { return skipped_; }

@@ -40,6 +40,17 @@ TEST_CASE(
     CHECK(std::memcmp(&answer.taken, &good, sizeof good) == 0);  // what was in force stays
 }
 
+TEST_CASE("031-disabled-nonsense: what a camera that is not enabled is told does not matter") {
+    Scenario world;
+    world.add_camera(0);
+    world.configuration.cameras[2].flags = wire::camera_slave;
+    world.configuration.cameras[2].master = 200;
+    REQUIRE(world.begin());
+    world.run(second);
+    world.finish();
+    CHECK(world.judge() == "");
+}
+
 TEST_CASE("031-while-running: a configuration is refused while cameras run") {
     Scenario world;
     world.add_camera(0);
