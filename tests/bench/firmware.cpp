@@ -21,7 +21,7 @@ namespace {
 using scenario::ms;
 
 constexpr long breakpoint = 0xCC;
-constexpr std::size_t most_calls = 1'200;  // stepping is slow; more than a period of the cameras
+constexpr std::size_t most_calls = 4'000;  // stepping is slow; many periods of the cameras
 
 /// Full load: 8 kHz IMU, four cameras at 200 Hz with light, PPS and clock requests.
 void work_at_full_load(bool traced) {
@@ -39,7 +39,7 @@ void work_at_full_load(bool traced) {
     world.set_link(76'923, 64, 128);
     if (traced) ::raise(SIGSTOP);
     world.send(wire::ClockRequest{1, 0});
-    world.run(20 * ms);
+    world.run(60 * ms);
 }
 
 /// A child that is stepped through: how many instructions each call of `function` takes, what it calls
