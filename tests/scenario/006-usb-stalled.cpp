@@ -7,7 +7,7 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "006-usb-stalled: a host that does not read disturbs no trigger and no sample; exposures outlive "
+    "006-usb-stalled: a host that does not read disturbs no trigger and no sample, exposures outlive "
     "samples") {
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera);

@@ -5,7 +5,7 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "024-vn100: set up by text, read as binary, stamped by its sync output; at a baud rate that carries it") {
+    "024-vn100: set up by text, read as binary, stamped by its sync output, at a baud rate that carries it") {
     const double rate_hz = GENERATE(100.0, 400.0, 800.0);
     Scenario world;
     world.add_vn100(rate_hz, true);
@@ -41,7 +41,7 @@ TEST_CASE("024-vn100-still-streaming: a part that still talks as fast as it was 
     CHECK(world.inbox().samples[1].size() > before + 1500);
 }
 
-TEST_CASE("024-vn100-faults: damaged packets are counted and missing by number; a mute part is found again") {
+TEST_CASE("024-vn100-faults: damaged packets are counted and missing by number, a mute part is found again") {
     Scenario world;
     devices::Vn100Device& part = world.add_vn100(200, true);
     world.add_camera(0);

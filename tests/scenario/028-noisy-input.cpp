@@ -17,7 +17,7 @@ TEST_CASE("028-unconnected: edges at an input that nothing is configured for cos
 }
 
 TEST_CASE(
-    "028-noisy-input: an input that changes without end is not listened to for a while; all else goes on") {
+    "028-noisy-input: an input that changes without end is not listened to for a while, all else goes on") {
     Scenario world;
     for (unsigned camera = 0; camera < 3; ++camera) world.add_camera(camera);
     world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),

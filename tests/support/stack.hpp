@@ -24,9 +24,8 @@ struct StackSettings {
     std::string camera_extra;     ///< keys for each camera of the service
     std::uint32_t width = 320;
     std::uint32_t height = 240;
-    std::string
-        slave_extra{};   ///< keys for the cameras of the service after the first, which have no rate then
-    std::string link{};  ///< of the service to the board; empty: the rig's socket
+    std::string link{};         ///< of the service to the board; empty: the rig's socket
+    std::string slave_extra{};  ///< instead of a rate, for the cameras of the service after the first
 };
 
 class Stack {

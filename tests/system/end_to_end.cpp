@@ -261,7 +261,7 @@ TEST_CASE("end to end: packets that get lost are asked for again") {
     CHECK(judge(stack, 4).ok);
 }
 
-TEST_CASE("end to end: without a board the service says so and waits; it also stops then") {
+TEST_CASE("end to end: without a board the service says so and waits, it also stops then") {
     Stack stack({"lonely", 19, 1, 20, "", "", ""});
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
@@ -314,7 +314,7 @@ TEST_CASE("end to end: one service per instance") {
     CHECK_THAT(output, Catch::Contains("another versavisd serves this instance"));
 }
 
-TEST_CASE("end to end: a bad configuration ends with 78 and its place; a good one is said to be") {
+TEST_CASE("end to end: a bad configuration ends with 78 and its place, a good one is said to be") {
     Stack stack({"config", 21, 1, 20, "", "", "rate = 3\n"});
     std::string output;
     CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("bad.log"),

@@ -87,7 +87,7 @@ TEST_CASE("exposure_tracker: a word that left late corrects the trigger's time, 
 }
 
 TEST_CASE(
-    "exposure_tracker: an exposure that is overdue may last for any time; one that was given up is over") {
+    "exposure_tracker: an exposure that is overdue may last for any time, one that was given up is over") {
     Bench bench;
     CHECK(bench.tracker.busy_until(90 * ms) == 102 * ms);
     bench.tracker.edge(98 * ms, true);

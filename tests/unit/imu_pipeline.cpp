@@ -21,7 +21,7 @@ wire::ImuSample sample(std::uint32_t number, BoardTime at, std::uint16_t flags =
 
 }  // namespace
 
-TEST_CASE("imu_pipeline: nothing before the clock is known; numbers go on over 32 bits; losses are counted") {
+TEST_CASE("imu_pipeline: nothing before the clock is known, numbers go on over 32 bits, losses are counted") {
     test::Pipelines bench;
     ImuConfiguration configuration;
     configuration.model = imu::find_model("adis16448b");

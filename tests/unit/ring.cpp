@@ -114,7 +114,7 @@ TEST_CASE_METHOD(Fixture, "ring: items whose slot is gone count as lost") {
 
 TEST_CASE_METHOD(
     Fixture,
-    "ring: slots are handed out until none is left; the oldest goes first, abandoned ones before it") {
+    "ring: slots are handed out until none is left, the oldest goes first, abandoned ones before it") {
     Writer writer = frame_writer(3);
     const auto a = writer.acquire();
     const auto b = writer.acquire();
