@@ -353,15 +353,24 @@ Expected<> BoardLink::send(const T& message) {
     return stream_->write({frame.bytes, frame.size});
 }
 
-void BoardLink::start_cameras(std::uint8_t mask, bool pattern) {
+void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
     if (!accepting_) return;  // board_connected() starts what streams by then
     wire::Start message{};
     message.cameras = mask;
-    message.flags = pattern ? std::uint8_t{wire::start_pattern} : std::uint8_t{0};
+    if (how == pairing::Start::pattern) message.flags = wire::start_pattern;
+    if (how == pairing::Start::slow) message.flags = wire::start_slow;
     // A failed write shows in the link's own thread, too, which then begins anew.
     static_cast<void>(send(message));
 }
 
 void BoardLink::stop_cameras(std::uint8_t mask) { static_cast<void>(send(wire::Stop{mask, {}})); }
+
+void BoardLink::announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure) {
+    wire::ExpectedExposure message{};
+    message.camera = static_cast<std::uint8_t>(output);
+    message.trigger = trigger;
+    message.exposure_ns = exposure.ns;
+    static_cast<void>(send(message));
+}
 
 }  // namespace versavis::daemon

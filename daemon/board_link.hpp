@@ -16,6 +16,7 @@
 #include "byte_stream.hpp"
 #include "configuration.hpp"
 #include "versavis/clock/translator.hpp"
+#include "versavis/pairing/pairing.hpp"
 #include "versavis/wire/packet.hpp"
 
 namespace versavis::daemon {
@@ -64,8 +65,11 @@ class BoardLink {
     void stop();
 
     /// Starts or stops triggering the cameras of the mask, if the board is there. From any thread.
-    void start_cameras(std::uint8_t mask, bool pattern);
+    void start_cameras(std::uint8_t mask, pairing::Start how);
     void stop_cameras(std::uint8_t mask);
+
+    /// The camera at this output will expose for so long from this trigger on.
+    void announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure);
 
     BoardReport report() const;
     bool running() const { return accepting_; }

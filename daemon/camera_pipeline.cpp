@@ -9,6 +9,11 @@ namespace versavis::daemon {
 namespace {
 
 constexpr std::uint32_t descriptor_floor = 64;
+constexpr std::uint32_t evidence_items = 16384;
+constexpr std::uint32_t slots_for_readers = 2;
+constexpr Duration exposure_tolerance = microseconds(200);
+constexpr int exposure_tolerance_part = 20;
+constexpr Duration exposure_settling = milliseconds(500);  // a new one takes a few frames to hold
 
 std::uint32_t power_of_two(std::uint32_t at_least) {
     std::uint32_t value = descriptor_floor;
@@ -21,7 +26,10 @@ Duration from_us(double us) { return {std::llround(us * 1e3)}; }
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
     limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
-    limits.pattern_duration = from_us((wire::start_pattern_length + 2) * 1e6 / configuration.rate_hz);
+    limits.period = from_us(1e6 / configuration.rate_hz);
+    limits.pattern_duration = limits.period * (wire::start_pattern_length + 2);
+    limits.frames_held = configuration.slots - configuration.buffers - slots_for_readers;
+    limits.camera_clock = configuration.camera_clock;
     return limits;
 }
 
@@ -38,12 +46,31 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       index_(index),
       translator_(translator),
       events_(events),
-      pairing_(limits_of(configuration), *this),
+      limits_(limits_of(configuration)),
+      pairing_(limits_, *this),
       start_patience_(seconds(2) + from_us(5e6 / configuration.rate_hz)),
       last_exposure_(from_us(configuration.exposure_us)) {}
 
-Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::uint64_t payload_size) {
+/// What pairing is told goes through here, so that the recording is complete.
+void CameraPipeline::tell(const pairing::Evidence& evidence) {
+    const clock::Stamp stamp = translator_.translate(host_now(), {});
+    if (evidence_) evidence_->publish(stamp.output, pack(pairing::to_metadata(evidence)));
+    pairing::tell(pairing_, evidence);
+}
+
+Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::uint64_t payload_size,
+                                   bool has_clock) {
     const std::lock_guard lock(mutex_);
+    if (triggered() && !evidence_) {
+        auto evidence = ring::Writer::create(
+            directory, {configuration_.name + evidence_suffix, ring::StreamKind::evidence, evidence_items});
+        if (!evidence) return tl::unexpected(evidence.error());
+        evidence_.emplace(std::move(*evidence));
+    }
+    tell(pairing::Reset{});
+    limits_.camera_clock = configuration_.camera_clock && has_clock;
+    pairing_.set_limits(limits_);
+    tell(limits_);
     if (ring_ && ring_->slot_size() >= payload_size) return {};
     ring::Shape shape;
     shape.name = configuration_.name;
@@ -51,7 +78,6 @@ Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::
     shape.slot_count = configuration_.slots;
     shape.slot_size = payload_size;
     shape.descriptor_count = power_of_two(2 * configuration_.slots);
-    pairing_.reset();
     auto ring = ring::Writer::create(directory, shape);
     if (!ring) return tl::unexpected(ring.error());
     ring_.emplace(std::move(*ring));
@@ -74,6 +100,7 @@ void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64
     if (reason == EventReason::none) return;
     ++report_.incomplete;
     unanswered_ = 0;  // it does answer
+    if (triggered()) tell(pairing::Shortfall{block_id, reason});
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
 }
 
@@ -83,7 +110,7 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     report_.last_frame = arrival.arrived;
     unanswered_ = 0;
     if (triggered())
-        pairing_.add(arrival);
+        tell(arrival);
     else
         publish_free_run(arrival);
 }
@@ -92,13 +119,15 @@ void CameraPipeline::add(const wire::Exposure& record) {
     const std::lock_guard lock(mutex_);
     ++report_.triggers;
     ++unanswered_;
+    newest_trigger_ = record.trigger;
     last_trigger_ = host_now();
     pairing::Exposure exposure = complete(record);
     const bool end_seen = record.end_ns != wire::no_time && own_strobe(record);
     const auto earliest = translator_.to_host(end_seen ? exposure.end : exposure.start);
     if (!earliest) return exposure_unpaired(exposure, EventReason::no_clock);
     exposure.earliest_on_host = earliest->time;
-    pairing_.add(exposure);
+    exposure.end_on_host = end_seen ? earliest->time : earliest->time + (exposure.end - exposure.start);
+    tell(exposure);
 }
 
 /// Fills in what the board did not see, and says so by the kind of the stamp.
@@ -136,20 +165,42 @@ Duration CameraPipeline::kind_sigma(const pairing::Exposure& exposure, Duration 
     return exposure.kind == StampKind::predicted_middle ? std::max(half, to_arrival) : half;
 }
 
+/// True when the exposure line shows something else than what the camera says that it exposes.
+bool CameraPipeline::contradicted(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
+    if (!configuration_.check_exposure || exposure.kind != StampKind::measured_middle) return false;
+    const bool settled =
+        exposure.earliest_on_host > camera_exposure_since_ + exposure_settling + limits_.period * 5;
+    const Duration told = settled ? camera_exposure_ : Duration{};
+    const Duration said = arrival.exposure.ns != 0 ? arrival.exposure : told;
+    report_.exposure = exposure.end - exposure.start;
+    report_.camera_exposure = said;
+    const Duration tolerance = std::max(exposure_tolerance, said / exposure_tolerance_part);
+    report_.exposure_contradicted = said.ns != 0 && absolute(said - report_.exposure) > tolerance;
+    return report_.exposure_contradicted;
+}
+
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
-    const BoardTime instant = middle(exposure.start, exposure.end);
-    auto stamp = translator_.translate(instant);
-    if (!stamp) return frame_unpaired(arrival, EventReason::no_clock);
-    const Duration kind = kind_sigma(exposure, arrival.arrived - stamp->host);
-    const double sigma = std::hypot(static_cast<double>(stamp->sigma_ns), static_cast<double>(kind.ns));
-    stamp->sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
+    if (contradicted(arrival, exposure))
+        return frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
+    const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
+    if (!stamp) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
+    publish_paired(arrival, exposure, *stamp, 0);
+}
+
+void CameraPipeline::publish_paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
+                                    const clock::Stamp& stamp, std::uint32_t flags) {
+    const Duration kind = kind_sigma(exposure, arrival.arrived - stamp.host);
+    const double sigma = std::hypot(static_cast<double>(stamp.sigma_ns), static_cast<double>(kind.ns));
+    clock::Stamp widened = stamp;
+    widened.sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
+    if ((flags & flag_suspect) != 0) widened.sigma_ns = sigma_unknown;
     FrameMetadata metadata{};
     metadata.trigger = exposure.trigger;
     metadata.tick = static_cast<std::uint32_t>(exposure.tick);
-    metadata.board_time = instant;
+    metadata.board_time = middle(exposure.start, exposure.end);
     if (exposure.kind == StampKind::measured_middle) metadata.exposure = exposure.end - exposure.start;
-    metadata.flags = static_cast<std::uint32_t>(exposure.kind);
-    publish(arrival, *stamp, metadata);
+    metadata.flags = static_cast<std::uint32_t>(exposure.kind) | flags;
+    publish(arrival, widened, metadata);
 }
 
 void CameraPipeline::publish_free_run(const pairing::Arrival& arrival) {
@@ -167,7 +218,7 @@ void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp
     metadata.sigma_ns = triggered() ? stamp.sigma_ns : sigma_unknown;
     metadata.width = arrival.width;
     metadata.height = arrival.height;
-    metadata.stride = arrival.height == 0 ? 0 : arrival.size / arrival.height;
+    metadata.stride = arrival.stride;
     metadata.pixel_format = arrival.pixel_format;
     metadata.epoch = stamp.epoch;
     ++report_.published;
@@ -175,10 +226,26 @@ void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp
     ring_->publish(arrival.slot, arrival.size, time, pack(metadata));
 }
 
-void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason) {
-    ring_->abandon(arrival.slot);
+void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
+                                    const pairing::Exposure* guess) {
     ++report_.frames_without_trigger;
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(arrival.block_id));
+    if (configuration_.on_unproved == OnUnproved::withhold || reason == EventReason::out_of_order)
+        return ring_->abandon(arrival.slot);
+    publish_suspect(arrival, guess);
+}
+
+/// As well stamped as can be guessed: by the exposure that it may be of, else by its arrival.
+void CameraPipeline::publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess) {
+    ++report_.suspect;
+    const auto stamp =
+        guess != nullptr ? translator_.translate(middle(guess->start, guess->end)) : std::nullopt;
+    if (stamp) return publish_paired(arrival, *guess, *stamp, flag_suspect);
+    FrameMetadata metadata{};
+    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival) | flag_suspect;
+    clock::Stamp arrived = translator_.translate(arrival.arrived, {});
+    arrived.sigma_ns = sigma_unknown;
+    publish(arrival, arrived, metadata);
 }
 
 void CameraPipeline::exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) {
@@ -208,22 +275,47 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
-    pairing_.reset();
+    tell(pairing::Reset{});
     unanswered_ = 0;
 }
 
-bool CameraPipeline::advance(HostTime now) {
+std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
     const std::lock_guard lock(mutex_);
     if (ring_) ring_->heartbeat(now);
-    if (!triggered()) return false;
-    pairing_.advance(now);
-    return pairing_.wants_pattern(now) || now - last_trigger_ > start_patience_;
+    if (!triggered()) return std::nullopt;
+    if (evidence_) evidence_->heartbeat(now);
+    if (pairing_.due(now)) tell(pairing::Advance{now});
+    if (now - last_trigger_ > start_patience_) return pairing_.first_start();
+    return pairing_.wanted_start(now);
 }
 
-void CameraPipeline::start_requested(HostTime now) {
+pairing::Start CameraPipeline::first_start() {
     const std::lock_guard lock(mutex_);
-    pairing_.pattern_requested(now);
+    return pairing_.first_start();
+}
+
+void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
+    const std::lock_guard lock(mutex_);
+    tell(pairing::StartRequest{start, now});
     last_trigger_ = now;
+}
+
+void CameraPipeline::starved(std::uint64_t frames) {
+    const std::lock_guard lock(mutex_);
+    report_.no_buffer += frames;
+    for (std::uint64_t i = 0; i < frames && triggered(); ++i)
+        tell(pairing::Shortfall{0, EventReason::no_buffer});
+}
+
+void CameraPipeline::set_camera_exposure(Duration exposure) {
+    const std::lock_guard lock(mutex_);
+    camera_exposure_ = exposure;
+    camera_exposure_since_ = host_now();
+}
+
+std::uint64_t CameraPipeline::newest_trigger() {
+    const std::lock_guard lock(mutex_);
+    return newest_trigger_;
 }
 
 std::uint64_t CameraPipeline::unanswered_triggers() {

@@ -18,7 +18,8 @@ namespace {
 
 constexpr double longest_us = 1e7;
 constexpr double longest_shift_us = 4e6;  // 32 bits of nanoseconds on the wire
-constexpr unsigned spare_slots = 8;  // frames that wait for proof, and the newest that readers still want
+constexpr unsigned spare_slots = 8;      // frames that wait for proof, and the newest that readers still want
+constexpr double longest_wait_s = 0.12;  // of frames behind one that lost packets
 
 bool valid_name(const std::string& name) {
     const auto allowed = [](char c) {
@@ -34,6 +35,9 @@ class Names {
         if (!valid_name(name))
             reader.fail("name", fmt::format("'{}' is no name", name),
                         "use up to 31 letters, digits, '_' and '-'");
+        if (name.size() >= evidence_suffix.size() &&
+            name.compare(name.size() - evidence_suffix.size(), std::string::npos, evidence_suffix) == 0)
+            reader.fail("name", fmt::format("names that end in '{}' are taken", evidence_suffix));
         if (!taken_.insert(name).second) reader.fail("name", fmt::format("the name '{}' is taken", name));
     }
 
@@ -96,8 +100,26 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     reader.choose<Strobe>(
         "strobe", camera.strobe,
         {{"active_high", Strobe::active_high}, {"active_low", Strobe::active_low}, {"none", Strobe::none}});
+    reader.read("preset", camera.preset);
     reader.read("trigger_line", camera.trigger_line);
     reader.read("strobe_line", camera.strobe_line);
+    reader.choose<bool>("exposure", camera.exposure_by_pulse, {{"timed", false}, {"pulse", true}});
+}
+
+void read_auto_exposure(TomlFile& file, TableReader& reader, CameraConfiguration& camera) {
+    AutoExposureConfiguration& control = camera.auto_exposure;
+    control.max_us = camera.max_exposure_us;
+    const toml::table* table = reader.table("auto_exposure");
+    if (table == nullptr) return;
+    TableReader keys(file, *table);
+    control.enabled = true;
+    keys.read("target", control.target, 0.01, 0.99);
+    keys.read("percentile", control.percentile, 0, 100);
+    keys.read("min_us", control.min_us, 1, longest_us);
+    keys.read("max_us", control.max_us, control.min_us, camera.max_exposure_us);
+    keys.read("largest_step", control.largest_step, 1.01, 10);
+    keys.read("delay_frames", control.delay_frames, 0, 10);
+    keys.finish();
 }
 
 CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
@@ -106,12 +128,23 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     reader.read("device", camera.device);
     read_trigger(reader, camera);
     reader.read("buffers", camera.buffers, 2, 64);
-    camera.slots = std::max(camera.slots, camera.buffers + spare_slots);
+    camera.slots = std::min(
+        camera.buffers + spare_slots + static_cast<unsigned>(std::ceil(camera.rate_hz * longest_wait_s)),
+        1024U);
     reader.read("slots", camera.slots, camera.buffers + spare_slots, 1024);
     reader.read("packet_size", camera.packet_size, 576, 16000);
     reader.choose<ReceiveMode>("receive", camera.receive,
                                {{"socket", ReceiveMode::socket}, {"packet", ReceiveMode::packet}});
     reader.read("latest_arrival_ms", camera.latest_arrival_ms, 1, 60000);
+    reader.choose<OnUnproved>("on_unproved", camera.on_unproved,
+                              {{"withhold", OnUnproved::withhold}, {"flag", OnUnproved::flag}});
+    reader.read("camera_clock", camera.camera_clock);
+    reader.read("chunks", camera.chunks);
+    reader.read("ptp", camera.ptp);
+    reader.read("max_temperature_c", camera.max_temperature_c, 0, 200);
+    reader.read("link_mbps", camera.link_mbps, 0, 1e6);
+    read_auto_exposure(file, reader, camera);
+    reader.read("check_exposure", camera.check_exposure);
     if (const toml::table* features = reader.table("features")) read_features(file, *features, camera);
     if (camera.device.empty())
         reader.fail("device", "a camera needs a 'device'",
@@ -266,6 +299,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
     top.read("instance", configuration.instance);
     if (!valid_name(configuration.instance))
         top.fail("instance", "'instance' must be a name of letters and digits");
+    top.read("preset_directory", configuration.preset_directory);
     top.choose<LogLevel>("log_level", configuration.log_level,
                          {{"error", LogLevel::error},
                           {"warning", LogLevel::warning},

@@ -16,6 +16,9 @@
 
 namespace versavis::daemon {
 
+/// The ring of what the pairing of a camera was told is named after the camera.
+inline const std::string evidence_suffix = "-evidence";
+
 struct BoardConfiguration {
     std::string link = "usb";  ///< "usb" or "unix:PATH"
     std::string serial;        ///< empty: any
@@ -32,6 +35,17 @@ struct ClockConfiguration {
 enum class TriggerSource { board, free_run };
 enum class Strobe { active_high, active_low, none };
 enum class ReceiveMode { socket, packet };
+enum class OnUnproved { withhold, flag };
+
+struct AutoExposureConfiguration {
+    bool enabled = false;
+    double target = 0.4;    ///< brightness, 0 black to 1 saturated
+    double percentile = 0;  ///< of the pixels whose brightness counts; 0: the mean of all
+    double min_us = 50;
+    double max_us = 0;          ///< 0: max_exposure_us
+    double largest_step = 1.5;  ///< factor from one exposure to the next
+    unsigned delay_frames = 1;  ///< frames between setting an exposure and the first that has it
+};
 
 struct CameraConfiguration {
     std::string name;
@@ -48,13 +62,24 @@ struct CameraConfiguration {
     double pulse_us = 100;
     bool trigger_inverted = false;
     Strobe strobe = Strobe::active_high;
-    std::string trigger_line = "Line0";
-    std::string strobe_line = "Line1";
-    unsigned slots = 16;
+    std::string preset = "auto";
+    std::string trigger_line;  ///< empty: as in the preset
+    std::string strobe_line;   ///< empty: as in the preset
+    bool exposure_by_pulse =
+        false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
+    bool chunks = false;
+    bool ptp = false;
+    AutoExposureConfiguration auto_exposure;
+    double max_temperature_c = 75;
+    double link_mbps = 0;  ///< of the network link; 0: as the interface says
+    unsigned slots = 17;
     unsigned buffers = 6;
     unsigned packet_size = 0;  ///< 0: the largest that passes
     ReceiveMode receive = ReceiveMode::socket;
     double latest_arrival_ms = 500;
+    OnUnproved on_unproved = OnUnproved::withhold;
+    bool camera_clock = true;    ///< its time stamps are evidence; false: they are worthless
+    bool check_exposure = true;  ///< the camera's exposure time against the measured one
     std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
 };
 
@@ -89,6 +114,7 @@ struct PortConfiguration {
 struct Configuration {
     std::string instance = "default";
     LogLevel log_level = LogLevel::info;
+    std::string preset_directory;  ///< empty: that of the installation
     BoardConfiguration board;
     ClockConfiguration clock;
     std::vector<CameraConfiguration> cameras;

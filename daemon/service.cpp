@@ -77,6 +77,11 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       started_(host_now()) {}
 
 Expected<> Service::make_parts() {
+    surroundings_.ring_directory = directory_.path();
+    const std::filesystem::path own_presets = configuration_.preset_directory;
+    auto presets = load_presets(own_presets.empty() ? default_preset_directory() : own_presets);
+    if (!presets) return tl::unexpected(presets.error());
+    surroundings_.presets = std::move(*presets);
     auto event_ring =
         ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
     if (!event_ring) return tl::unexpected(event_ring.error());
@@ -103,14 +108,17 @@ void Service::add_camera(const CameraConfiguration& configuration) {
     Camera::Hooks hooks;
     hooks.streaming = [this, pipeline, index, name = configuration.name] {
         events_->add({EventKind::camera_connected, EventReason::none, index, name});
-        pipeline->start_requested(host_now());
-        if (pipeline->triggered()) board_->start_cameras(pipeline->board_mask(), true);
+        if (pipeline->triggered()) start(*pipeline, pipeline->first_start());
     };
     hooks.lost = [this, pipeline, index, name = configuration.name] {
         if (pipeline->triggered()) board_->stop_cameras(pipeline->board_mask());
         events_->add({EventKind::camera_lost, EventReason::none, index, name});
     };
-    unit.camera = std::make_unique<Camera>(configuration, directory_.path(), *pipeline, std::move(hooks));
+    hooks.exposure = [this, pipeline, configuration](Duration exposure) {
+        const std::uint64_t from = pipeline->newest_trigger() + 1 + configuration.auto_exposure.delay_frames;
+        if (pipeline->triggered()) board_->announce_exposure(configuration.output, from, exposure);
+    };
+    unit.camera = std::make_unique<Camera>(configuration, surroundings_, *pipeline, std::move(hooks));
     cameras_.push_back(std::move(unit));
 }
 
@@ -121,7 +129,10 @@ void Service::start() {
     // Before the cameras make their rings: readers of streams that are no longer configured learn that they
     // are gone.
     std::vector<std::string> configured;
-    for (const CameraUnit& unit : cameras_) configured.push_back(unit.configuration.name);
+    for (const CameraUnit& unit : cameras_) {
+        configured.push_back(unit.configuration.name);
+        configured.push_back(unit.configuration.name + evidence_suffix);
+    }
     directory_.remove_strangers(configured);
     if (board_needed) board_->start();
     for (CameraUnit& unit : cameras_) unit.camera->start();
@@ -133,16 +144,13 @@ Service::~Service() {
     if (board_) board_->stop();
 }
 
-/// How long a camera may go without a frame; how fast one runs freely is not known here.
-Duration Service::frame_patience(const CameraUnit& unit) {
-    if (!unit.pipeline->triggered()) return seconds(5);
-    return seconds(1) + Duration{static_cast<std::int64_t>(5e9 / unit.configuration.rate_hz)};
+void Service::start(CameraPipeline& pipeline, pairing::Start how) {
+    pipeline.start_requested(how, host_now());
+    board_->start_cameras(pipeline.board_mask(), how);
 }
 
-/// Triggers a camera from its start pattern on.
-void Service::start_camera(CameraUnit& unit) {
-    unit.pipeline->start_requested(host_now());
-    board_->start_cameras(unit.pipeline->board_mask(), true);
+void Service::start_camera(CameraUnit& unit, pairing::Start how) {
+    start(*unit.pipeline, how);
     // Lost meanwhile: its own stop may have overtaken this start.
     if (!unit.camera->streaming()) board_->stop_cameras(unit.pipeline->board_mask());
 }
@@ -165,7 +173,7 @@ void Service::board_connected() {
     for (CameraUnit& unit : cameras_) {
         if (!unit.pipeline->triggered()) continue;
         unit.pipeline->reset();
-        if (unit.camera->streaming()) start_camera(unit);
+        if (unit.camera->streaming()) start_camera(unit, unit.pipeline->first_start());
     }
 }
 
@@ -206,8 +214,8 @@ void Service::board_event(const wire::Event& event) {
 void Service::tick() {
     const HostTime now = host_now();
     for (CameraUnit& unit : cameras_) {
-        const bool wants_start = unit.pipeline->advance(now);
-        if (wants_start && unit.camera->streaming() && board_->running()) start_camera(unit);
+        const auto how = unit.pipeline->advance(now);
+        if (how && unit.camera->streaming() && board_->running()) start_camera(unit, *how);
     }
     for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);

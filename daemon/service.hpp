@@ -51,8 +51,8 @@ class Service final : private BoardListener {
     void publish_status(HostTime now);
     std::vector<StreamStatus> stream_status(HostTime now);
     CameraUnit* camera_at(unsigned output);
-    void start_camera(CameraUnit& unit);
-    static Duration frame_patience(const CameraUnit& unit);
+    void start(CameraPipeline& pipeline, pairing::Start how);
+    void start_camera(CameraUnit& unit, pairing::Start how);
 
     void board_restarted() override;
     void board_connected() override;
@@ -67,6 +67,7 @@ class Service final : private BoardListener {
     ring::Writer status_ring_;
     std::unique_ptr<EventJournal> events_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
+    CameraSurroundings surroundings_;
     std::vector<CameraUnit> cameras_;
     std::unique_ptr<BoardLink> board_;
     HostTime started_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "status.hpp"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
@@ -18,8 +19,8 @@ constexpr Duration imu_patience = seconds(3);
 bool delivers(const CameraStatus& camera) {
     if (camera.camera.state != CameraState::streaming) return false;
     if (camera.stalled) return false;
-    return !camera.triggered ||
-           (camera.pipeline.pairing == pairing::State::locked && camera.pipeline.measured);
+    return !camera.triggered || (camera.pipeline.pairing == pairing::State::locked &&
+                                 camera.pipeline.measured && !camera.pipeline.exposure_contradicted);
 }
 
 std::string hint(const CameraStatus& status) {
@@ -29,6 +30,12 @@ std::string hint(const CameraStatus& status) {
     if (!status.pipeline.measured)
         return "exposures are not measured: check the exposure line, 'strobe', 'latency_us' and "
                "'max_exposure_us'";
+    if (status.pipeline.exposure_contradicted)
+        return fmt::format(
+            "the exposure line shows {} us, but the camera exposes {} us: check 'strobe_line' and its "
+            "LineSource, or "
+            "set check_exposure = false",
+            status.pipeline.exposure.ns / 1000, status.pipeline.camera_exposure.ns / 1000);
     return status.stalled ? "triggers are sent but no frames come: check trigger cable and network" : "";
 }
 
@@ -111,6 +118,13 @@ json camera_json(const CameraStatus& status) {
             {"hint", hint(status)},
             {"trigger", triggered ? "board" : "free"},
             {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
+            {"vendor", camera.vendor},
+            {"preset", camera.preset},
+            {"temperature_c", camera.temperature_c},
+            {"needed_mbps", camera.bandwidth.needed_mbps},
+            {"link_needed_mbps", camera.bandwidth.link_needed_mbps},
+            {"link_mbps", camera.bandwidth.link_mbps},
+            {"packet_delay_ns", camera.bandwidth.packet_delay.ns},
             {"model", camera.model},
             {"serial", camera.serial},
             {"packet_size", camera.packet_size},
@@ -122,6 +136,10 @@ json camera_json(const CameraStatus& status) {
             {"triggers", pipeline.triggers},
             {"triggers_without_frame", pipeline.triggers_without_frame},
             {"exposures_unmeasured", pipeline.unmeasured},
+            {"frames_suspect", pipeline.suspect},
+            {"frames_without_buffer", pipeline.no_buffer},
+            {"exposure_ns", pipeline.exposure.ns},
+            {"camera_exposure_ns", pipeline.camera_exposure.ns},
             {"locks", pipeline.locks},
             {"slips", pipeline.slips},
             {"last_frame_ns", pipeline.last_frame.ns}};

@@ -20,6 +20,7 @@ const char* kind_name(ring::StreamKind kind) {
         case ring::StreamKind::imu: return "imu";
         case ring::StreamKind::events: return "events";
         case ring::StreamKind::status: return "status";
+        case ring::StreamKind::evidence: return "evidence";
     }
     return "unknown";
 }

@@ -7,8 +7,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <fstream>
+#include <iostream>
 
 #include "list.hpp"
+#include "pair_replay.hpp"
 #include "snapshot.hpp"
 #include "status_document.hpp"
 #include "status_view.hpp"
@@ -46,6 +49,20 @@ int watch_status(const std::string& instance, bool json) {
     return code;
 }
 
+int replay_pairing(const std::string& recording, const std::string& decisions, bool json) {
+    std::ifstream file;
+    std::ofstream out;
+    if (recording != "-") file.open(recording);
+    if (!file) return fail({recording, "cannot be read", ""});
+    if (!decisions.empty()) out.open(decisions);
+    if (!out) return fail({decisions, "cannot be written", ""});
+    const auto summary =
+        client::replay_pairing(recording == "-" ? std::cin : file, decisions.empty() ? nullptr : &out);
+    if (!summary) return fail(summary.error());
+    fmt::print("{}", client::to_text(*summary, json));
+    return EX_OK;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -73,6 +90,17 @@ int main(int argc, char** argv) {
     tail_command->add_option("stream", tail.stream, "Name of the stream")->required();
     tail_command->add_option("-n,--count", tail.count, "Stop after that many items");
     tail_command->add_flag("--json", json, "One JSON object per line");
+    tail_command->add_flag("--oldest", tail.oldest, "Begin with the oldest item that is still there");
+
+    auto* pair = app.add_subcommand("pair", "Pairing of frames and exposures");
+    pair->require_subcommand(1);
+    std::string recording;
+    std::string decisions;
+    auto* replay = pair->add_subcommand(
+        "replay", "Pair again from a recording, made by: versavis tail CAMERA-evidence --oldest --json");
+    replay->add_option("recording", recording, "File to read; - for standard input")->required();
+    replay->add_option("-o,--output", decisions, "File for the decisions, one JSON object per line");
+    replay->add_flag("--json", json, "The summary as a JSON object");
 
     std::string stream;
     std::string output;
@@ -103,6 +131,7 @@ int main(int argc, char** argv) {
         const auto done = client::tail(tail);
         return done ? EX_OK : fail(done.error());
     }
+    if (*replay) return replay_pairing(recording, decisions, json);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
     if (!written) return fail(written.error());

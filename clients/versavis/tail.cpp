@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "evidence_json.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::client {
@@ -71,6 +72,13 @@ json describe(const Received<EventMetadata>& item) {
     return line;
 }
 
+json describe(const Received<pairing::EvidenceMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const auto evidence = pairing::from_metadata(item.data);
+    line.update(evidence ? to_json(*evidence) : json{{"evidence", "unknown"}});
+    return line;
+}
+
 /// The document itself, so that a script sees what the status command sees.
 json describe(const StatusStream& stream, const Received<ring::Metadata>& item) {
     std::string text(item.payload_size, '\0');
@@ -103,7 +111,8 @@ const char* remark(Found found) {
 
 template <class S>
 Expected<> print_stream(const TailSettings& settings) {
-    auto stream = S::open(settings.stream, settings.instance);
+    auto stream = S::open(settings.stream, settings.instance,
+                          settings.oldest ? ring::Reader::From::oldest : ring::Reader::From::newest);
     if (!stream) return tl::unexpected(stream.error());
     Found last = Found::item;
     for (std::uint64_t printed = 0; (settings.count == 0 || printed < settings.count) && !settings.stop();) {
@@ -132,6 +141,7 @@ Expected<> tail(const TailSettings& settings) {
         case ring::StreamKind::imu: return print_stream<ImuStream>(settings);
         case ring::StreamKind::events: return print_stream<EventStream>(settings);
         case ring::StreamKind::status: return print_stream<StatusStream>(settings);
+        case ring::StreamKind::evidence: return print_stream<EvidenceStream>(settings);
     }
     return failure(settings.stream, "is of a kind that this program does not know");
 }

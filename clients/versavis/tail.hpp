@@ -15,6 +15,7 @@ struct TailSettings {
     std::string stream;
     std::uint64_t count = 0;  ///< items to print; 0: until stopped
     bool json = false;
+    bool oldest = false;  ///< begin with the oldest item that the ring still holds
     std::function<bool()> stop;
 };
 

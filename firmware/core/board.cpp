@@ -289,7 +289,8 @@ void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
         CameraChannel& camera = cameras_[i].is_slave() ? cameras_[cameras_[i].master()] : cameras_[i];
         if (cameras_[i].is_slave()) slaves_ = static_cast<std::uint8_t>(slaves_ | 1U << i);
         // The gaps of a slave are its master's.
-        if (&camera == &cameras_[i] || (camera.running() && (flags & wire::start_pattern) != 0))
+        const bool other_gaps = flags != 0 || camera.slow();
+        if (&camera == &cameras_[i] || (camera.running() && other_gaps))
             camera.start(hal_.clock.now(), flags);
     }
     switch_slaves();

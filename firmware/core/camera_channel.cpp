@@ -9,7 +9,6 @@ constexpr Nanoseconds start_delay = 5'000'000;  // from the command to the first
 constexpr Nanoseconds start_timeout_floor = 2'000'000;
 constexpr Nanoseconds start_timeout_limit = 50'000'000;
 constexpr Nanoseconds latest_trigger = 1'000'000;
-constexpr std::uint64_t slow_interval_uhz = 1'000'000;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
@@ -66,11 +65,10 @@ Nanoseconds CameraChannel::trigger_time() const {
 bool CameraChannel::wanted(std::uint64_t tick) const {
     const std::uint64_t since_start = tick - first_tick_;
     if ((start_flags_ & wire::start_slow) != 0) {
-        const std::uint64_t ticks = (configuration_.rate_uhz + slow_interval_uhz - 1) / slow_interval_uhz;
-        return since_start % ticks == 0;
+        return since_start % wire::slow_start_ticks(configuration_.rate_uhz, camera_) == 0;
     }
     if ((start_flags_ & wire::start_pattern) == 0 || since_start >= wire::start_pattern_length) return true;
-    return (wire::start_pattern_bits >> since_start & 1U) != 0;
+    return (wire::start_pattern_bits[camera_] >> since_start & 1U) != 0;
 }
 
 void CameraChannel::decide(Nanoseconds now) {

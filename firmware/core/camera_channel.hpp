@@ -27,6 +27,7 @@ class CameraChannel {
     /// Pulses that were decided are still sent, and recorded.
     void stop() { running_ = false; }
     bool running() const { return running_; }
+    bool slow() const { return running_ && (start_flags_ & wire::start_slow) != 0; }
     bool is_slave() const { return enabled() && has(wire::camera_slave); }
     /// True: no exposure is waited for.
     bool idle() const { return tracker_.empty(); }

@@ -54,6 +54,10 @@ const char* to_string(EventReason reason) {
         case EventReason::camera_busy: return "camera_busy";
         case EventReason::too_late: return "too_late";
         case EventReason::queue_full: return "queue_full";
+        case EventReason::out_of_order: return "out_of_order";
+        case EventReason::no_buffer: return "no_buffer";
+        case EventReason::camera_silent: return "camera_silent";
+        case EventReason::wrong_exposure: return "wrong_exposure";
     }
     return "unknown";
 }

@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -23,6 +25,7 @@ constexpr std::uint8_t acknowledge_wanted = 0x01;
 constexpr std::size_t discovery_size = 0xF8;
 constexpr std::size_t most_memory = 512;
 constexpr int poll_ms = 20;
+constexpr std::uint32_t fire_bit = 1U << 31U;
 
 enum Command : std::uint16_t {
     discovery = 0x0002,
@@ -114,7 +117,7 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       truth_(truth),
       clock_(zero, settings.clock),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
-                  settings.exposure_us, settings.exposure_swing > 0}),
+                  settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c}),
       wall_(settings.width, settings.height, scenario.seed),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
@@ -212,7 +215,10 @@ std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command, std::span<co
             put_half(out, static_cast<std::uint16_t>(body.size() - 4));
             break;
         case packet_resend:
-            if (body.size() >= 12)
+            if (body.size() >= 20)
+                transmitter_.resend(std::uint64_t{word(body, 12)} << 32U | word(body, 16), word(body, 4),
+                                    word(body, 8));
+            else if (body.size() >= 12)
                 transmitter_.resend(half(body, 2), word(body, 4) & 0xFFFFFFU, word(body, 8) & 0xFFFFFFU);
             break;
         default: status = not_implemented;
@@ -235,14 +241,16 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
     } else if (!in_control(from)) {
         return access_denied;
     }
+    const bool fire_test_packet =
+        address == reg_fire_test_packet || (address == reg_stream_packet_size && (value & fire_bit) != 0);
     if (address == reg_stream_packet_size)
         value = std::clamp<std::uint32_t>(value & 0xFFFFU, 256, 16000) & ~3U;
     if (!registers_.write(address, value)) return invalid_address;
     switch (address) {
         case reg_stream_port:
         case reg_stream_packet_size:
+        case reg_stream_packet_delay:
         case reg_stream_address: configure_stream(); break;
-        case reg_fire_test_packet: transmitter_.send_test_packet(); break;
         case reg_acquisition_start: start_acquisition(); break;
         case reg_acquisition_stop: stop_acquisition(); break;
         case reg_trigger_software:
@@ -250,6 +258,7 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
             break;
         default: break;
     }
+    if (fire_test_packet) transmitter_.send_test_packet();
     return success;
 }
 
@@ -259,6 +268,7 @@ void GigeCamera::configure_stream() {
     settings.destination.sin_port = htons(static_cast<std::uint16_t>(registers_.value(reg_stream_port)));
     settings.destination.sin_addr.s_addr = htonl(registers_.value(reg_stream_address));
     settings.packet_size = registers_.value(reg_stream_packet_size);
+    settings.packet_delay_ns = registers_.value(reg_stream_packet_delay);  // a tick is a nanosecond
     transmitter_.configure(settings);
     registers_.write(reg_stream_source_port, std::uint32_t{transmitter_.source_port()});
 }
@@ -337,6 +347,41 @@ const Fault* GigeCamera::active_fault(FaultKind kind) const {
     return nullptr;
 }
 
+void GigeCamera::next_block_id() {
+    ++block_id_;
+    if (!settings_.extended_ids && block_id_ > 0xFFFF) block_id_ = 1;
+}
+
+Missing GigeCamera::missing_part() const {
+    if (active_fault(FaultKind::drop_leader) != nullptr) return Missing::leader;
+    if (active_fault(FaultKind::drop_last) != nullptr) return Missing::end;
+    if (active_fault(FaultKind::half_frame) != nullptr) return Missing::second_half;
+    return Missing::nothing;
+}
+
+/// The scene is as bright as it was exposed long.
+void GigeCamera::light_up(StreamFrame& frame, Duration exposure) const {
+    const double gain = settings_.light * static_cast<double>(exposure.ns) * 1e-6;
+    std::array<std::uint8_t, 256> table{};
+    for (std::size_t i = 0; i < table.size(); ++i)
+        table[i] = static_cast<std::uint8_t>(std::min(255.0, static_cast<double>(i) * gain));
+    auto lit = std::make_shared<std::vector<std::uint8_t>>(frame.pixels.begin(), frame.pixels.end());
+    for (std::uint8_t& value : *lit) value = table[value];
+    frame.pixels = *lit;
+    frame.owned_pixels = std::move(lit);
+}
+
+/// Each chunk is followed by its id and length; the image's lies at its end.
+std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure) const {
+    std::vector<std::uint8_t> out;
+    put_word(out, chunk_id_image);
+    put_word(out, settings_.width * settings_.height);
+    put_word(out, std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
+    put_word(out, chunk_id_exposure);
+    put_word(out, sizeof(float));
+    return out;
+}
+
 /// Faults that take the whole camera away begin with their exposure.
 void GigeCamera::apply_outages() {
     const Fault* mute = active_fault(FaultKind::camera_mute);
@@ -359,15 +404,23 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         ++exposures_;
         if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) != board_resets_.end())
             reset_board_();
-        if (active_fault(FaultKind::ignore_trigger) != nullptr) return std::nullopt;
+        if (active_fault(FaultKind::ignore_trigger) != nullptr) {
+            if (settings_.ids_count_ignored) next_block_id();
+            return std::nullopt;
+        }
         apply_outages();
-        block_id_ = static_cast<std::uint16_t>(block_id_ == 0xFFFF ? 1 : block_id_ + 1);
+        if (active_fault(FaultKind::restart_ids) != nullptr) block_id_ = 0;
+        if (active_fault(FaultKind::repeat_id) == nullptr) next_block_id();
+        if (const Fault* jump = active_fault(FaultKind::jump_clock))
+            clock_step_ns_ += std::llround(jump->seconds * 1e9);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
         truth.end = truth.start + exposure_at(trigger);
         busy_until_ = truth.end;
         frame.block_id = block_id_;
         frame.serial = exposures_;
         if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;
+        frame.missing = missing_part();
+        frame.after_next = active_fault(FaultKind::swap_frames) != nullptr;
     }
     truth.camera = settings_.name;
     truth.board_life = pulse != nullptr ? pulse->board_life : 0;
@@ -378,11 +431,15 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         truth_.add(truth);
         return Interval{truth.start, truth.end};
     }
-    frame.camera_time_ns = static_cast<std::uint64_t>(clock_.device_ns(truth.start));
+    frame.extended_id = settings_.extended_ids;
+    frame.camera_time_ns = static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
     frame.width = settings_.width;
     frame.height = settings_.height;
     frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));
+    if (settings_.light > 0) light_up(frame, truth.end - truth.start);
+    if (registers_.value(reg_chunk_mode) != 0) frame.chunks = chunks(truth.end - truth.start);
     frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};
+    frame.leader_due = settings_.early_leader ? truth.start : frame.due;
     frame.done = [this, truth](bool sent) mutable {
         truth.sent = sent;
         truth_.add(truth);

@@ -70,6 +70,10 @@ class GigeCamera {
     std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
     Duration exposure_at(HostTime at) const;
     const Fault* active_fault(FaultKind kind) const;
+    void next_block_id();
+    Missing missing_part() const;
+    void light_up(StreamFrame& frame, Duration exposure) const;
+    std::vector<std::uint8_t> chunks(Duration exposure) const;
     void apply_outages();
 
     CameraScenario settings_;
@@ -84,7 +88,8 @@ class GigeCamera {
 
     std::mutex mutex_;  ///< guards what follows, down to reset_board_
     bool acquiring_ = false;
-    std::uint16_t block_id_ = 0;
+    std::uint64_t block_id_ = 0;
+    std::int64_t clock_step_ns_ = 0;
     std::uint64_t exposures_ = 0;
     HostTime busy_until_;
     HostTime free_run_next_;

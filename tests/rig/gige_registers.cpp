@@ -54,6 +54,7 @@ void GigeRegisters::reset() {
     set(reg_acquisition_mode, 2);
     set(reg_frame_rate, std::bit_cast<std::uint32_t>(20.0F));
     set(reg_exposure_time, std::bit_cast<std::uint32_t>(static_cast<float>(identity_.exposure_us)));
+    set(reg_temperature, std::bit_cast<std::uint32_t>(static_cast<float>(identity_.temperature_c)));
     set(reg_exposure_auto, identity_.exposure_auto ? 2 : 0);
 }
 
@@ -77,6 +78,8 @@ bool GigeRegisters::write(std::uint32_t address, std::uint32_t value) {
     const std::lock_guard lock(mutex_);
     if (address < reg_user_name || address >= reg_xml) return false;  // constant, or not there
     set(static_cast<Register>(address), value);
+    if (address == reg_chunk_mode)
+        set(reg_payload_size, identity_.width * identity_.height + (value != 0 ? chunk_bytes : 0));
     return true;
 }
 

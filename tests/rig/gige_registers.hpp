@@ -64,11 +64,20 @@ enum Register : std::uint32_t {
     reg_tl_params_locked = 0x10054,
     reg_offset = 0x10058,
     reg_fire_test_packet = 0x1005C,
+    reg_chunk_mode = 0x10060,
+    reg_chunk_selector = 0x10064,
+    reg_chunk_enable = 0x10068,
+    reg_temperature = 0x1006C,
 
     reg_xml = 0x20000,
 };
 
 inline constexpr std::uint32_t gige_default_heartbeat_ms = 3000;
+
+/// Chunk data: the image, then the exposure time as a float, each followed by its id and length.
+inline constexpr std::uint32_t chunk_id_image = 1;
+inline constexpr std::uint32_t chunk_id_exposure = 0x1001;
+inline constexpr std::uint32_t chunk_bytes = 8 + 4 + 8;
 
 /// Thread-safe.
 class GigeRegisters {
@@ -81,6 +90,7 @@ class GigeRegisters {
         std::uint32_t height;
         double exposure_us;
         bool exposure_auto;
+        double temperature_c = 45;
     };
     explicit GigeRegisters(const Identity& identity);
 

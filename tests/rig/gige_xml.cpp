@@ -58,6 +58,22 @@ class XmlWriter {
             name, std::uint32_t{address}, length);
     }
 
+    void boolean(const std::string& name, Register address) {
+        list(name);
+        nodes_ += fmt::format("<Boolean Name=\"{0}\"><pValue>{0}Register</pValue></Boolean>\n", name);
+        int_register(name, address, true);
+    }
+
+    void chunk_real(const std::string& name, std::uint32_t id) {
+        list(name);
+        nodes_ += fmt::format(
+            "<Float Name=\"{0}\"><pValue>{0}Register</pValue></Float>\n<FloatReg "
+            "Name=\"{0}Register\"><Address>0</Address><Length>4</Length><AccessMode>RO</AccessMode>"
+            "<pPort>{0}Port</pPort><Endianess>BigEndian</Endianess></FloatReg>\n<Port "
+            "Name=\"{0}Port\"><ChunkID>{1:x}</ChunkID></Port>\n",
+            name, id);
+    }
+
     std::string document() const {
         return fmt::format(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
@@ -120,16 +136,22 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.enumeration("TriggerActivation", reg_trigger_activation, {{"RisingEdge", 0}, {"FallingEdge", 1}});
     xml.enumeration("TriggerOverlap", reg_trigger_overlap, {{"Off", 0}, {"ReadOut", 1}});
     xml.command("TriggerSoftware", reg_trigger_software);
-    xml.enumeration("ExposureMode", reg_exposure_mode, {{"Timed", 0}});
+    xml.enumeration("ExposureMode", reg_exposure_mode, {{"Timed", 0}, {"TriggerWidth", 1}});
     xml.real("ExposureTime", reg_exposure_time, "us", 10, 1e7);
     xml.enumeration("ExposureAuto", reg_exposure_auto, {{"Off", 0}, {"Continuous", 2}});
     xml.real("Gain", reg_gain, "dB", 0, 48);
     xml.enumeration("LineSelector", reg_line_selector, {{"Line0", 0}, {"Line1", 1}});
     xml.enumeration("LineMode", reg_line_mode, {{"Input", 0}, {"Output", 1}});
     xml.enumeration("LineSource", reg_line_source, {{"Off", 0}, {"ExposureActive", 1}});
+    xml.boolean("ChunkModeActive", reg_chunk_mode);
+    xml.enumeration("ChunkSelector", reg_chunk_selector, {{"ExposureTime", 0}});
+    xml.boolean("ChunkEnable", reg_chunk_enable);
+    xml.chunk_real("ChunkExposureTime", chunk_id_exposure);
+    xml.real("DeviceTemperature", reg_temperature, "C", -100, 200);
     xml.integer("TLParamsLocked", reg_tl_params_locked, "<Min>0</Min><Max>1</Max>");
     xml.integer("GevSCPSPacketSize", reg_stream_packet_size, "<Min>256</Min><Max>16000</Max>");
     xml.command("GevSCPSFireTestPacket", reg_fire_test_packet);
+    xml.integer("GevSCPD", reg_stream_packet_delay, "<Min>0</Min><Max>4294967295</Max>");
     xml.integer("GevTimestampTickFrequency", reg_tick_low, "", false);
     return xml.document();
 }

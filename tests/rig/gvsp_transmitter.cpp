@@ -19,12 +19,15 @@ namespace {
 constexpr std::size_t most_waiting = 8;
 constexpr std::size_t most_resendable = 4;
 constexpr std::uint32_t ip_udp_header = 28;
-constexpr std::uint32_t gvsp_header = 8;
+constexpr std::uint32_t extended_id_flag = 0x80;
+constexpr std::uint16_t payload_image = 0x0001;
+constexpr std::uint16_t payload_image_with_chunks = 0x4001;
 constexpr std::size_t batch = 16;
 
 enum PacketFormat : std::uint8_t { leader = 1, trailer = 2, payload = 3 };
 
-using PacketHeader = std::array<std::uint8_t, gvsp_header>;
+/// Eight bytes, or twenty with an extended block id.
+using PacketHeader = std::vector<std::uint8_t>;
 
 template <class T>
 void put(std::vector<std::uint8_t>& out, T value) {
@@ -33,21 +36,26 @@ void put(std::vector<std::uint8_t>& out, T value) {
             static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> static_cast<unsigned>(shift)));
 }
 
-PacketHeader packet_header(std::uint16_t block_id, PacketFormat format, std::uint32_t packet_id) {
-    return {0,
-            0,
-            static_cast<std::uint8_t>(block_id >> 8U),
-            static_cast<std::uint8_t>(block_id),
-            format,
-            static_cast<std::uint8_t>(packet_id >> 16U),
-            static_cast<std::uint8_t>(packet_id >> 8U),
-            static_cast<std::uint8_t>(packet_id)};
+std::uint32_t header_size(const StreamFrame& frame) { return frame.extended_id ? 20 : 8; }
+
+PacketHeader packet_header(const StreamFrame& frame, PacketFormat format, std::uint32_t packet_id) {
+    PacketHeader out;
+    put(out, std::uint16_t{0});  // status
+    put(out, static_cast<std::uint16_t>(frame.extended_id ? 0 : frame.block_id));
+    if (!frame.extended_id) {
+        put(out, std::uint32_t{format} << 24U | packet_id);
+        return out;
+    }
+    put(out, (extended_id_flag | std::uint32_t{format}) << 24U);
+    put(out, frame.block_id);
+    put(out, packet_id);
+    return out;
 }
 
 std::vector<std::uint8_t> leader_body(const StreamFrame& frame) {
     std::vector<std::uint8_t> out;
     put(out, std::uint16_t{0});
-    put(out, std::uint16_t{1});  // image
+    put(out, frame.chunks.empty() ? payload_image : payload_image_with_chunks);
     put(out, frame.camera_time_ns);
     put(out, std::uint32_t{0x01080001});
     put(out, frame.width);
@@ -62,6 +70,25 @@ std::vector<std::uint8_t> trailer_body(const StreamFrame& frame) {
     put(out, std::uint32_t{1});
     put(out, frame.height);
     return out;
+}
+
+std::size_t data_bytes(const StreamFrame& frame) {
+    const std::size_t all = frame.pixels.size() + frame.chunks.size();
+    return frame.missing == Missing::second_half ? all / 2 : all;
+}
+
+/// Pixels first, then chunks.
+std::uint8_t data_byte(const StreamFrame& frame, std::size_t at) {
+    return at < frame.pixels.size() ? frame.pixels[at] : frame.chunks[at - frame.pixels.size()];
+}
+
+std::uint32_t data_per_packet(const StreamFrame& frame, const StreamSettings& settings) {
+    return settings.packet_size - ip_udp_header - header_size(frame);
+}
+
+std::uint32_t data_packets(const StreamFrame& frame, const StreamSettings& settings) {
+    const std::uint32_t size = data_per_packet(frame, settings);
+    return static_cast<std::uint32_t>((data_bytes(frame) + size - 1) / size);
 }
 
 std::chrono::nanoseconds until(HostTime time) { return std::chrono::nanoseconds((time - host_now()).ns); }
@@ -109,7 +136,13 @@ void GvspTransmitter::send(StreamFrame frame) {
     {
         const std::lock_guard lock(mutex_);
         if (queue_.size() < most_waiting) {
-            queue_.push_back(std::move(frame));
+            const bool overtakes = !queue_.empty() && queue_.back().after_next;
+            if (overtakes) {
+                queue_.back().after_next = false;
+                queue_.back().due = std::max(queue_.back().due, frame.due);
+                queue_.back().leader_due = queue_.back().due;
+            }
+            queue_.insert(overtakes ? queue_.end() - 1 : queue_.end(), std::move(frame));
             wake_.notify_all();
             return;
         }
@@ -140,18 +173,19 @@ bool GvspTransmitter::muted() const {
 void GvspTransmitter::run() {
     std::unique_lock lock(mutex_);
     while (!stop_) {
-        if (queue_.empty()) {
+        if (queue_.empty() || queue_.front().after_next) {
             wake_.wait(lock);
             continue;
         }
-        if (const auto left = until(queue_.front().due); left.count() > 0) {
+        if (const auto left = until(queue_.front().leader_due); left.count() > 0) {
             wake_.wait_for(lock, left);
             continue;
         }
         const StreamFrame frame = queue_.front();
         queue_.pop_front();
         const StreamSettings settings = settings_;
-        sent_.push_back(frame);
+        // What is to be missing is missing when it is asked for again, too.
+        if (frame.missing == Missing::nothing) sent_.push_back(frame);
         if (sent_.size() > most_resendable) sent_.pop_front();
         lock.unlock();
         transmit(frame, settings);
@@ -161,25 +195,45 @@ void GvspTransmitter::run() {
 
 void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& settings) {
     const bool possible = settings.destination.sin_port != 0 && !muted();
-    frame.done(possible);
+    frame.done(possible && frame.missing == Missing::nothing);
     if (!possible) return;
-    const std::uint32_t data_size = settings.packet_size - ip_udp_header - gvsp_header;
-    const auto packets = static_cast<std::uint32_t>((frame.pixels.size() + data_size - 1) / data_size) + 2;
-    const double ns_per_packet = link_mbps_ > 0 ? settings.packet_size * 8e3 / link_mbps_ : 0;
+    if (frame.missing != Missing::leader) send_packets(frame, settings, 0, 0, true);
+    if (const auto left = until(frame.due); left.count() > 0) std::this_thread::sleep_for(left);
+    std::uint32_t end = data_packets(frame, settings) + 2;
+    if (frame.missing == Missing::end) end = std::max(end, 3U) - 2;  // the last data and the trailer
+    const double link_ns = link_mbps_ > 0 ? settings.packet_size * 8e3 / link_mbps_ : 0;
+    const double ns_per_packet = link_ns + static_cast<double>(settings.packet_delay_ns);
     const HostTime begin = host_now();
-    for (std::uint32_t first = 0; first < packets; first += batch) {
-        const HostTime due = begin + Duration{static_cast<std::int64_t>(first * ns_per_packet)};
+    for (std::uint32_t first = 1; first < end; first += batch) {
+        const HostTime due = begin + Duration{static_cast<std::int64_t>((first - 1) * ns_per_packet)};
         if (const auto left = until(due); left.count() > 0) std::this_thread::sleep_for(left);
-        send_packets(frame, settings, first, std::min<std::uint32_t>(first + batch, packets) - 1, true);
+        send_packets(frame, settings, first, std::min<std::uint32_t>(first + batch, end) - 1, true);
     }
+}
+
+/// One packet that is made up, not taken from the pixels as they are. Empty: it is.
+std::vector<std::uint8_t> GvspTransmitter::special_body(const StreamFrame& frame,
+                                                        const StreamSettings& settings, std::uint32_t id) {
+    if (id == 0) return leader_body(frame);
+    if (id == data_packets(frame, settings) + 1) return trailer_body(frame);
+    const std::size_t size = data_per_packet(frame, settings);
+    const std::size_t begin = (id - 1) * size;
+    const std::size_t end = std::min(begin + size, data_bytes(frame));
+    if (id != 1 && end <= frame.pixels.size()) return {};
+    std::vector<std::uint8_t> body(end - begin);
+    for (std::size_t at = begin; at < end; ++at) body[at - begin] = data_byte(frame, at);
+    const FrameMark mark{FrameMark::expected_magic, frame.serial};
+    if (id == 1) std::memcpy(body.data(), &mark, std::min(sizeof mark, body.size()));
+    return body;
 }
 
 void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSettings& settings,
                                    std::uint32_t first, std::uint32_t last, bool lossy) {
-    const std::uint32_t data_size = settings.packet_size - ip_udp_header - gvsp_header;
-    const auto data_packets = static_cast<std::uint32_t>((frame.pixels.size() + data_size - 1) / data_size);
-    last = std::min(last, data_packets + 1);
+    const std::size_t size = data_per_packet(frame, settings);
+    const std::uint32_t trailer_id = data_packets(frame, settings) + 1;
+    last = std::min(last, trailer_id);
     std::array<PacketHeader, batch> headers;
+    std::array<std::vector<std::uint8_t>, batch> special;
     std::array<std::array<iovec, 2>, batch> parts{};
     std::array<mmsghdr, batch> messages{};
     sockaddr_in destination = settings.destination;
@@ -187,35 +241,13 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
     for (std::uint32_t id = first; id <= last && count < batch; ++id) {
         if (lossy && packet_loss_ > 0 && std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_)
             continue;
-        std::span<const std::uint8_t> body;
-        std::vector<std::uint8_t> made;
-        PacketFormat format = payload;
-        if (id == 0) {
-            format = leader;
-            made = leader_body(frame);
-        } else if (id == data_packets + 1) {
-            format = trailer;
-            made = trailer_body(frame);
-        } else {
-            const std::size_t at = std::size_t{id - 1} * data_size;
-            body = frame.pixels.subspan(at, std::min<std::size_t>(data_size, frame.pixels.size() - at));
-            if (id == 1) {
-                made.assign(body.begin(), body.end());
-                const FrameMark mark{FrameMark::expected_magic, frame.serial};
-                std::memcpy(made.data(), &mark, sizeof mark);
-            }
-        }
-        headers[count] = packet_header(frame.block_id, format, id);
-        parts[count][0] = {headers[count].data(), gvsp_header};
-        if (!made.empty()) {
-            const iovec single[2] = {{headers[count].data(), gvsp_header}, {made.data(), made.size()}};
-            const msghdr message{
-                &destination, sizeof destination, const_cast<iovec*>(single), 2, nullptr, 0, 0};
-            if (count > 0) ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
-            ::sendmsg(socket_, &message, 0);
-            count = 0;
-            continue;
-        }
+        const PacketFormat format = id == 0 ? leader : id == trailer_id ? trailer : payload;
+        headers[count] = packet_header(frame, format, id);
+        special[count] = special_body(frame, settings, id);
+        std::span<const std::uint8_t> body = special[count];
+        if (body.empty())
+            body = frame.pixels.subspan((id - 1) * size, std::min(size, data_bytes(frame) - (id - 1) * size));
+        parts[count][0] = {headers[count].data(), headers[count].size()};
         parts[count][1] = {const_cast<std::uint8_t*>(body.data()), body.size()};
         messages[count].msg_hdr = {&destination, sizeof destination, parts[count].data(), 2, nullptr, 0, 0};
         ++count;
@@ -223,7 +255,7 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
     if (count > 0) ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
 }
 
-void GvspTransmitter::resend(std::uint16_t block_id, std::uint32_t first, std::uint32_t last) {
+void GvspTransmitter::resend(std::uint64_t block_id, std::uint32_t first, std::uint32_t last) {
     StreamFrame frame;
     StreamSettings settings;
     {

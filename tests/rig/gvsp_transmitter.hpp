@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <random>
 #include <span>
@@ -19,20 +20,30 @@
 
 namespace versavis::rig {
 
+/// What of a frame never leaves.
+enum class Missing { nothing, leader, end, second_half };
+
 struct StreamFrame {
-    std::uint16_t block_id = 0;
+    std::uint64_t block_id = 0;
+    bool extended_id = false;  ///< 64 bits, else 16
+    Missing missing = Missing::nothing;
+    bool after_next = false;  ///< it leaves after the frame that comes then
     std::uint64_t camera_time_ns = 0;
     std::uint64_t serial = 0;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
-    std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter
-    HostTime due;                          ///< when the first packet leaves
+    std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter, or be owned
+    std::shared_ptr<const std::vector<std::uint8_t>> owned_pixels;
+    std::vector<std::uint8_t> chunks;  ///< what follows the pixels; empty: no chunk data
+    HostTime leader_due;               ///< when the leader leaves
+    HostTime due;                      ///< when the first packet after it leaves
     std::function<void(bool sent)> done;
 };
 
 struct StreamSettings {
     sockaddr_in destination{};
     std::uint32_t packet_size = 1500;  ///< IP and UDP headers included
+    std::int64_t packet_delay_ns = 0;  ///< pause between packets
 };
 
 /// Thread-safe.
@@ -50,7 +61,7 @@ class GvspTransmitter {
     void send(StreamFrame frame);
 
     /// Packets `first` to `last` of a frame that was sent a short while ago.
-    void resend(std::uint16_t block_id, std::uint32_t first, std::uint32_t last);
+    void resend(std::uint64_t block_id, std::uint32_t first, std::uint32_t last);
 
     /// One packet of the full size, for the host to see what passes.
     void send_test_packet();
@@ -66,6 +77,8 @@ class GvspTransmitter {
     void transmit(const StreamFrame& frame, const StreamSettings& settings);
     void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first,
                       std::uint32_t last, bool lossy);
+    static std::vector<std::uint8_t> special_body(const StreamFrame& frame, const StreamSettings& settings,
+                                                  std::uint32_t id);
     bool muted() const;
 
     int socket_;

@@ -96,6 +96,7 @@ class Recorder {
         if (item.found != Found::item) return;
         FrameMark mark{};
         if (item.payload_size >= sizeof mark) std::memcpy(&mark, item.payload, sizeof mark);
+        if ((item.data.flags & flag_suspect) != 0) return;  // it says itself that it may be wrong
         if (!stream.intact(item))
             ++recording.missed;
         else

@@ -31,6 +31,11 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("readout_us", camera.readout_us, 0, 1e6);
     reader.read("link_mbps", camera.link_mbps, 0, 1e5);
     reader.read("packet_loss", camera.packet_loss, 0, 1);
+    reader.read("extended_ids", camera.extended_ids);
+    reader.read("ids_count_ignored", camera.ids_count_ignored);
+    reader.read("early_leader", camera.early_leader);
+    reader.read("light", camera.light, 0, 1000);
+    reader.read("temperature_c", camera.temperature_c, -40, 150);
     read_clock(reader, camera.clock);
     if (camera.name.empty()) reader.fail("name", "a camera needs a 'name'");
     if (camera.address.empty()) reader.fail("address", "a camera needs an 'address', such as 127.0.0.2");
@@ -41,6 +46,13 @@ Fault read_fault(TableReader& reader) {
     Fault fault;
     reader.choose<FaultKind>("kind", fault.kind,
                              {{"drop_frame", FaultKind::drop_frame},
+                              {"drop_leader", FaultKind::drop_leader},
+                              {"drop_last", FaultKind::drop_last},
+                              {"half_frame", FaultKind::half_frame},
+                              {"swap_frames", FaultKind::swap_frames},
+                              {"repeat_id", FaultKind::repeat_id},
+                              {"restart_ids", FaultKind::restart_ids},
+                              {"jump_clock", FaultKind::jump_clock},
                               {"ignore_trigger", FaultKind::ignore_trigger},
                               {"camera_mute", FaultKind::camera_mute},
                               {"camera_reboot", FaultKind::camera_reboot},
@@ -48,7 +60,7 @@ Fault read_fault(TableReader& reader) {
     reader.read("camera", fault.camera);
     reader.read("at_exposure", fault.at_exposure, 1, INT64_MAX);
     reader.read("count", fault.count, 1, INT64_MAX);
-    reader.read("seconds", fault.seconds, 0.001, 1e6);
+    reader.read("seconds", fault.seconds, -1e6, 1e6);
     return fault;
 }
 

@@ -27,14 +27,26 @@ struct CameraScenario {
     double exposure_swing = 0;    ///< auto exposure follows a brightness that varies by this fraction ...
     double exposure_swing_s = 7;  ///< ... with this period
     double trigger_latency_us = 20;
-    double readout_us = 2000;  ///< end of exposure to first packet
-    double link_mbps = 1000;   ///< packets leave at this pace; 0: as fast as they can
-    double packet_loss = 0;    ///< fraction
+    double readout_us = 2000;        ///< end of exposure to first packet
+    double link_mbps = 1000;         ///< packets leave at this pace; 0: as fast as they can
+    double packet_loss = 0;          ///< fraction
+    bool extended_ids = false;       ///< block ids of 64 bits
+    bool ids_count_ignored = false;  ///< a trigger that is ignored takes a block id, too
+    bool early_leader = false;       ///< a frame's leader leaves when its exposure begins
+    double light = 0;                ///< brightness of the image per millisecond of exposure; 0: as painted
+    double temperature_c = 45;
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 
 enum class FaultKind {
     drop_frame,      ///< the exposure happens, no packet leaves
+    drop_leader,     ///< the frame's first packet never leaves, not even when it is asked for again ...
+    drop_last,       ///< ... nor its last ones
+    half_frame,      ///< the frame ends in its middle, as if it were whole
+    swap_frames,     ///< the frame leaves after the next one
+    repeat_id,       ///< the frame has the number of the one before
+    restart_ids,     ///< numbers begin anew
+    jump_clock,      ///< the camera's clock steps by `seconds`, from this frame on
     ignore_trigger,  ///< the camera does not expose
     camera_mute,     ///< no answer and no packet for `seconds`
     camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
@@ -47,7 +59,7 @@ struct Fault {
     std::uint64_t at_exposure =
         0;                    ///< happens with this exposure of the camera, counted since the rig's start
     std::uint64_t count = 1;  ///< that many exposures in a row
-    double seconds = 1;
+    double seconds = 1;       ///< negative for a clock that steps back
 };
 
 struct Scenario {

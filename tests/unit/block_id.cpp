@@ -24,4 +24,5 @@ TEST_CASE("block_id: long ids stay as they are") {
     BlockIdUnwrapper ids;
     for (const std::uint64_t id : {65534ULL, 65535ULL, 65536ULL, 65537ULL, 1ULL << 40U})
         CHECK(ids.unwrap(id) == id);
+    CHECK(ids.unwrap(1) == 1);  // begun anew, not wrapped
 }

@@ -26,7 +26,7 @@ class Bench : public test::Pipelines {
     explicit Bench(const CameraConfiguration& configuration)
         : pipeline(configuration, 0, translator, events),
           period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {
-        REQUIRE(pipeline.prepare(directory.path(), frame_size));
+        REQUIRE(pipeline.prepare(directory.path(), frame_size, true));
         exchange(begin);
     }
 
@@ -52,6 +52,7 @@ class Bench : public test::Pipelines {
         arrival.arrived = at + milliseconds(15);
         arrival.width = 64;
         arrival.height = 48;
+        arrival.stride = 64;
         arrival.size = frame_size;
         pipeline.add(arrival);
     }
@@ -119,7 +120,7 @@ TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") 
 
 TEST_CASE("camera_pipeline: slow cameras are given the time of their pattern before they are started again") {
     Bench bench(camera(0.4));
-    bench.pipeline.start_requested(host_now());
+    bench.pipeline.start_requested(pairing::Start::pattern, host_now());
     bench.trigger(4);
     // The pattern's longest gap is three periods of 2.5 s.
     CHECK_FALSE(bench.pipeline.advance(host_now() + milliseconds(7600)));

@@ -21,7 +21,7 @@ enum class StampKind : std::uint32_t {
 
 enum ItemFlag : std::uint32_t {
     stamp_kind_mask = 0x3,         ///< StampKind
-    flag_suspect = 1U << 2U,       ///< reserved: the pairing could not be proved; such frames are withheld
+    flag_suspect = 1U << 2U,       ///< the pairing is not proved: trigger and stamp are a guess
     flag_holdover = 1U << 3U,      ///< the clocks were without contact: sigma grows
     flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
@@ -105,6 +105,10 @@ enum class EventReason : std::uint32_t {
     camera_busy = 11,      ///< it was, or would have been, still exposing
     too_late = 12,         ///< the instant had gone by before the board came to it
     queue_full = 13,       ///< too many pulses waited on the board
+    out_of_order = 14,     ///< this frame, or a newer one, was published before
+    no_buffer = 15,        ///< the frame had no slot to go to: readers or the service were too slow
+    camera_silent = 16,    ///< nothing at all came from the camera
+    wrong_exposure = 17,   ///< the exposure line shows another exposure than the camera tells
 };
 
 struct EventMetadata {

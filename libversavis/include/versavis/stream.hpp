@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "versavis/metadata.hpp"
+#include "versavis/pairing/recording.hpp"
 #include "versavis/ring/path.hpp"
 #include "versavis/ring/reader.hpp"
 
@@ -66,6 +67,7 @@ class Stream {
 using FrameStream = Stream<FrameMetadata, ring::StreamKind::frames>;
 using ImuStream = Stream<ImuMetadata, ring::StreamKind::imu>;
 using EventStream = Stream<EventMetadata, ring::StreamKind::events>;
+using EvidenceStream = Stream<pairing::EvidenceMetadata, ring::StreamKind::evidence>;
 using StatusStream = Stream<ring::Metadata, ring::StreamKind::status>;  ///< the payload is the document
 
 }  // namespace versavis

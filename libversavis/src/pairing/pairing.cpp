@@ -2,17 +2,24 @@
 #include "versavis/pairing/pairing.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 
 namespace versavis::pairing {
 
 namespace {
 
-constexpr double drift_gain_per_s = 0.2;
-constexpr double largest_drift_gain = 0.05;
-constexpr double largest_drift = 500e-6;
-constexpr double difference_gain = 0.25;
+constexpr std::size_t frames_in_search = 12;
+constexpr int frames_to_relock = 3;
+constexpr int frames_to_give_up = 5;
+// Lateness passes. Without a camera's clock nothing else can tell a late frame from a missed trigger.
+constexpr Duration shortest_check = milliseconds(100);
+constexpr Duration shortest_check_by_arrival = milliseconds(300);
+constexpr std::uint64_t ids_back = 16;
+constexpr int patterns_before_slow = 2;
+constexpr Duration slow_duration = seconds(6);
+constexpr Duration search_patience = seconds(10);
+constexpr std::int64_t step_tolerance_ns = 30'000;
+constexpr std::int64_t step_tolerance_part = 2'000;  // 500 ppm
 
 }  // namespace
 
@@ -25,313 +32,412 @@ const char* to_string(State state) {
     return "unknown";
 }
 
-std::int64_t Pairing::frame_time_ns(const Arrival& arrival) const {
-    return camera_clock_ ? arrival.camera_time.ns : arrival.arrived.ns;
+Pairing::Pairing(const Limits& limits, Outcome& outcome)
+    : limits_(limits),
+      outcome_(outcome),
+      timeline_(limits.camera_clock ? Timeline::camera : Timeline::arrival),
+      exposures_(limits.period) {}
+
+std::int64_t Pairing::frame_ns(const Arrival& arrival) const {
+    return timeline_ == Timeline::camera ? arrival.camera_time.ns : arrival.arrived.ns;
 }
 
-bool Pairing::arrival_possible(const Arrival& arrival, const Exposure& exposure) const {
-    const Duration after_end = arrival.arrived - exposure.earliest_on_host;
-    return after_end >= limits_.earliest_arrival && after_end <= limits_.latest_arrival;
-}
-
-/// How many faults it takes that ids step by `id_step` between these triggers. Cameras count either every
-/// trigger or only those that they took: both counts are right. A trigger without record may have been taken
-/// or not.
-unsigned Pairing::step_faults(std::uint64_t id_step, const Record& from, const Record& to) {
-    if (to.exposure.trigger <= from.exposure.trigger) return faults_to_refute;
-    const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
-    if (id_step == 0 || id_step > sent) return faults_to_refute;
-    const std::uint64_t unrecorded = sent - std::min(sent, to.recorded - from.recorded);
-    const std::uint64_t silent = to.silent - from.silent - (to.exposure.exposed ? 0 : 1);
-    const std::uint64_t taken = sent - std::min(sent - 1, unrecorded + silent);
-    return taken > id_step ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute))
-                           : 0;
-}
-
-/// Index of the first exposure that starts after `start`.
-std::size_t Pairing::first_after(BoardTime start) const {
-    const auto later = [](BoardTime time, const Record& record) { return time < record.exposure.start; };
-    return static_cast<std::size_t>(std::upper_bound(exposures_.begin(), exposures_.end(), start, later) -
-                                    exposures_.begin());
-}
-
-/// The exposure that starts within the tolerance of `start`; null when there is none.
-const Pairing::Record* Pairing::near(BoardTime start) const {
-    const std::size_t after = first_after(start);
-    for (const std::size_t i : {after - 1, after})
-        if (i < exposures_.size() && absolute(exposures_[i].exposure.start - start).ns <= tolerance_ns())
-            return &exposures_[i];
-    return nullptr;
-}
-
-/// True when an exposure whose record never came may have started about then.
-bool Pairing::record_lost_near(BoardTime start) const {
-    const std::size_t after = first_after(start);
-    if (after == exposures_.size()) return false;
-    if (after > 0) return exposures_[after].exposure.trigger > exposures_[after - 1].exposure.trigger + 1;
-    return last_ && exposures_[after].exposure.trigger > last_->record.exposure.trigger + 1;
+std::int64_t Pairing::expected_instant_ns(const Arrival& arrival) const {
+    const Relation& relation = timeline_ == Timeline::camera ? clock_ : latency_;
+    return relation.expected_instant_ns(frame_ns(arrival));
 }
 
 void Pairing::add(const Exposure& exposure) {
-    if (!exposures_.empty()) {
-        const Exposure& before = exposures_.back().exposure;
-        // Records come in order; one that does not is of another life of the board, and belongs to no frame
-        // here.
-        if (exposure.trigger <= before.trigger || exposure.start <= before.start)
-            return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
-        smallest_gap_ns_ = std::min(smallest_gap_ns_, (exposure.start - before.start).ns);
-    }
-    ++recorded_;
-    if (!exposure.exposed) ++silent_;
-    exposures_.push_back({exposure, false, recorded_, silent_});
-    if (exposures_.size() > exposures_kept)
-        drop_oldest_exposure(state_ == State::searching ? EventReason::unproved : EventReason::frame_missing);
+    if (!exposures_.add(exposure)) return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
+    if (exposures_.size() > exposures_kept) drop_oldest_exposure(EventReason::frame_missing);
     process();
 }
 
 void Pairing::add(const Arrival& arrival) {
+    last_arrival_ = arrival.arrived;
+    ++frames_since_start_;
     if (state_ == State::searching) {
-        ++fruitless_;
-        const bool has_clock = arrival.camera_time.ns != 0;
-        while (has_clock != camera_clock_ && !arrivals_.empty()) drop_front(EventReason::unproved);
-        camera_clock_ = has_clock;
-        if (arrivals_.size() == std::max(limits_.frames_held, frames_for_proof))
-            drop_front(EventReason::unproved);
-    } else if (arrivals_.size() == limits_.frames_held) {
-        drop_front(EventReason::exposure_missing);
+        const bool clock = limits_.camera_clock && arrival.camera_time.ns != 0;
+        const Timeline timeline = clock ? Timeline::camera : Timeline::arrival;
+        while (timeline != timeline_ && !arrivals_.empty()) drop_front(EventReason::unproved);
+        timeline_ = timeline;
     }
+    if (arrivals_.size() >= limits_.frames_held) expire_front();
     arrivals_.push_back(arrival);
     process();
 }
 
+void Pairing::add(const Shortfall& shortfall) { note(shortfall); }
+
+void Pairing::note(const Shortfall& shortfall) {
+    shortfalls_.push_back(shortfall);
+    if (shortfalls_.size() > shortfalls_kept) shortfalls_.pop_front();
+}
+
 void Pairing::process() {
     if (state_ == State::searching) search();
-    while (state_ != State::searching && !arrivals_.empty() && match_front()) {
+    while (state_ != State::searching && !arrivals_.empty() &&
+           (state_ == State::locked ? decide_locked() : decide_checking())) {
     }
 }
 
-/// What must have gone wrong if the frames' clock differs from the board's by `difference_ns`. None: it
-/// cannot be.
-std::optional<Pairing::Alignment> Pairing::align(std::int64_t difference_ns) const {
-    Alignment alignment;
-    const Record* last = nullptr;
-    std::uint64_t last_id = 0;
-    for (const Arrival& arrival : arrivals_) {
-        const BoardTime start{frame_time_ns(arrival) - difference_ns};
-        const Record* record = near(start);
-        if (record == nullptr) {
-            if (!record_lost_near(start)) return std::nullopt;  // no pulse was sent then
-            alignment.unknown = true;
-            continue;
-        }
-        if (record->used || !record->exposure.exposed || !arrival_possible(arrival, record->exposure))
-            return std::nullopt;
-        if (last != nullptr) alignment.faults += step_faults(arrival.block_id - last_id, *last, *record);
-        last = record;
-        last_id = arrival.block_id;
-        alignment.triggers.push_back(record->exposure.trigger);
-    }
-    return alignment;
+/// An exposure whose record is still on its way could explain the frame, too.
+bool Pairing::records_complete(const Arrival& arrival) const {
+    if (exposures_.empty()) return false;
+    const Duration until = exposures_.back().exposure.earliest_on_host - arrival.arrived;
+    return until.ns > -exposures_.smallest_gap_ns() / 4 * 3;
 }
 
-/// Differences of the clocks that bring some frame and some exposure together.
-std::vector<std::int64_t> Pairing::candidate_differences() const {
-    std::vector<std::int64_t> differences;
-    for (const Arrival& arrival : arrivals_)
-        for (const Record& record : exposures_)
-            if (arrival_possible(arrival, record.exposure))
-                differences.push_back(frame_time_ns(arrival) - record.exposure.start.ns);
-    std::sort(differences.begin(), differences.end());
-    const auto same = [this](std::int64_t a, std::int64_t b) { return b - a < tolerance_ns() / 2; };
-    differences.erase(std::unique(differences.begin(), differences.end(), same), differences.end());
-    return differences;
-}
-
-/// Locks when one alignment needs no fault to explain it, and each other one at least two.
+/// The oldest frames may be of another life of camera or board: they need no place in the alignment.
 void Pairing::search() {
-    if (arrivals_.size() < frames_for_proof || exposures_.size() < frames_for_proof) return;
-    // An exposure whose record is still on its way could explain the frames, too.
-    const HostTime records_complete =
-        exposures_.back().exposure.earliest_on_host + Duration{smallest_gap_ns_ / 4 * 3};
-    if (arrivals_.back().arrived > records_complete) return;
-    std::optional<Alignment> found;
-    for (const std::int64_t difference : candidate_differences()) {
-        auto alignment = align(difference);
-        if (!alignment || alignment->faults >= faults_to_refute) continue;
-        if (alignment->faults > 0 || alignment->unknown || found) return;
-        found = std::move(alignment);
+    const std::size_t enough = frames_for_proof(start_ == Start::slow ? Timeline::arrival : timeline_);
+    if (arrivals_.size() < enough || !records_complete(arrivals_.back())) return;
+    const std::size_t oldest = arrivals_.size() - std::min(arrivals_.size(), frames_in_search);
+    for (std::size_t first = oldest; first + enough <= arrivals_.size(); ++first) {
+        const std::vector<Arrival> frames(arrivals_.begin() + static_cast<std::ptrdiff_t>(first),
+                                          arrivals_.end());
+        const auto triggers = find_alignment(frames);
+        if (triggers.empty()) continue;
+        for (std::size_t i = 0; i < first; ++i) drop_front(EventReason::unproved);
+        return accept(triggers);
     }
-    if (found && irregular(found->triggers.front(), found->triggers.back()))
-        accept_alignment(found->triggers);
 }
 
-/// Regular triggers prove nothing: the true exposures may be those whose records are missing at either end.
-bool Pairing::irregular(std::uint64_t first, std::uint64_t last) const {
-    std::int64_t shortest = INT64_MAX;
-    std::int64_t longest = 0;
-    for (std::size_t i = 1; i < exposures_.size(); ++i) {
-        const Exposure& before = exposures_[i - 1].exposure;
-        const Exposure& after = exposures_[i].exposure;
-        if (before.trigger < first || after.trigger > last || after.trigger != before.trigger + 1) continue;
-        shortest = std::min(shortest, (after.start - before.start).ns);
-        longest = std::max(longest, (after.start - before.start).ns);
-    }
-    return longest > shortest + 2 * tolerance_ns();
+std::vector<std::uint64_t> Pairing::find_alignment(const std::vector<Arrival>& frames) const {
+    auto found = align(frames, exposures_, timeline_, limits_);
+    // Slow triggers are regular, but so far apart that arrivals alone prove it.
+    if (found.empty() && start_ == Start::slow) found = align(frames, exposures_, Timeline::arrival, limits_);
+    return found;
 }
 
-void Pairing::accept_alignment(const std::vector<std::uint64_t>& triggers) {
+void Pairing::accept(const std::vector<std::uint64_t>& triggers) {
+    const std::uint64_t first =
+        *std::find_if(triggers.begin(), triggers.end(), [](auto t) { return t != 0; });
+    forget_exposures_before(first);
     state_ = State::locked;
-    drift_ = 0;
-    last_.reset();
+    clock_ = Relation(true);
+    latency_ = Relation(false);
     proved_.reset();
-    forget_exposures_before(triggers.front(), EventReason::unproved);
+    fruitless_starts_ = 0;
     outcome_.locked(exposures_.front().exposure);
-    for (const std::uint64_t trigger : triggers) pair_front(trigger);
+    for (const std::uint64_t trigger : triggers)
+        if (trigger != 0)
+            pair_front(trigger);
+        else
+            drop_front(EventReason::unproved);
+}
+
+/// False while the record of the exposure at `instant_ns` may come: unless the frame would have arrived
+/// before it was exposed.
+bool Pairing::may_still_be_recorded(const Arrival& arrival, std::int64_t instant_ns) const {
+    const Record& newest = exposures_.back();
+    if (instant_ns - newest.instant_ns(timeline_) <= loose_ns()) return false;
+    if (timeline_ == Timeline::arrival) return true;
+    const HostTime on_host = newest.exposure.earliest_on_host + Duration{instant_ns - newest.exposure.end.ns};
+    return arrival.arrived - on_host >= limits_.earliest_arrival;
+}
+
+/// This frame, or a newer one, was published before: ids and time agree on that.
+bool Pairing::out_of_order(const Arrival& arrival) const {
+    const std::uint64_t newest = proved_->arrival.block_id;
+    if (arrival.block_id > newest || arrival.block_id + ids_back < newest) return false;
+    if (timeline_ == Timeline::arrival) return true;
+    const std::int64_t behind = proved_->record.instant_ns(timeline_) - expected_instant_ns(arrival);
+    return behind >= -loose_ns() && behind <= limits_.latest_arrival.ns;
+}
+
+bool Pairing::ids_agree(const Arrival& arrival, const Record& record) const {
+    return step_faults(arrival.block_id - proved_->arrival.block_id, proved_->record, record) == 0;
+}
+
+bool Pairing::verified(const Arrival& arrival, const Record& record) const {
+    return !record.used && record.exposure.exposed && arrival_possible(limits_, arrival, record.exposure) &&
+           ids_agree(arrival, record) && !length_contradicts(arrival, record.exposure) &&
+           (timeline_ == Timeline::camera || ids_exact(arrival, record));
+}
+
+/// Were a trigger left out of the count, a frame of the exposure before would do as well, only late.
+bool Pairing::ids_exact(const Arrival& arrival, const Record& record) const {
+    return arrival.block_id - proved_->arrival.block_id ==
+           record.exposure.trigger - proved_->record.exposure.trigger;
 }
 
 /// Decides the oldest waiting frame. False when it must wait for its exposure's record.
-bool Pairing::match_front() {
+bool Pairing::decide_locked() {
     const Arrival arrival = arrivals_.front();
-    const BoardTime start = expected_start(arrival);
     if (exposures_.empty()) return false;
-    const Exposure& newest = exposures_.back().exposure;
-    if ((start - newest.start).ns > tolerance_ns()) {
-        const HostTime on_host = newest.earliest_on_host + (start - newest.end);
-        if (arrival.arrived - on_host >= limits_.earliest_arrival) return false;
-        search_anew(arrival);  // it would have arrived before it was exposed
-        return true;
-    }
-    const Record* record = near(start);
-    if (record != nullptr && !record->exposure.exposed) {
-        drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none: one of them
-                                                   // is wrong
-    } else if (record != nullptr && !record->used && arrival_possible(arrival, record->exposure)) {
-        decide_front(*record);
-    } else if (record == nullptr && record_lost_near(start)) {
+    const std::int64_t instant = expected_instant_ns(arrival);
+    if (may_still_be_recorded(arrival, instant)) return false;
+    const Record* record = exposures_.near(timeline_, instant, loose_ns());
+    if (out_of_order(arrival)) {
+        drop_front(EventReason::out_of_order);
+    } else if (record == nullptr &&
+               exposures_.lost_near(timeline_, instant, proved_->record.exposure.trigger)) {
         drop_front(EventReason::exposure_missing);
+    } else if (record != nullptr && !record->exposure.exposed) {
+        drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none
+    } else if (record != nullptr && verified(arrival, *record) && !early(arrival, *record)) {
+        waits_for_witness_ = needs_witness(arrival, *record) && !has_witness();
+        if (waits_for_witness_) return false;
+        pair_front(record->exposure.trigger);
     } else {
-        search_anew(arrival);
+        slip(arrival);
     }
     return true;
 }
 
-/// What was known of the camera's clock, or of its ids, is void.
-void Pairing::search_anew(const Arrival& arrival) {
-    if (state_ == State::locked) slip(arrival);
-    state_ = State::searching;
-    fruitless_ = pattern_patience;
-    drop_front(EventReason::mismatch);
+/// Against when a frame of this exposure usually arrives.
+std::int64_t Pairing::lateness_ns(const Arrival& arrival, const Record& record) const {
+    return latency_.expected_instant_ns(arrival.arrived.ns) - record.exposure.end_on_host.ns;
 }
 
-/// The front frame is of this exposure by time; publish it only if the ids say the same. They are counted
-/// from the newest frame that was published: counted from the one before, a clock that stepped by a period
-/// agrees with itself.
-void Pairing::decide_front(const Record& record) {
-    const Arrival arrival = arrivals_.front();
-    const bool agrees = step_faults(arrival.block_id - proved_->block_id, proved_->record, record) == 0;
-    if (state_ == State::locked && agrees) return pair_front(record.exposure.trigger);
-    if (state_ == State::locked) slip(arrival);
-    agreeing_ = agrees ? agreeing_ + 1 : 0;
-    disagreeing_ = agrees ? 0 : disagreeing_ + 1;
-    if (disagreeing_ >= frames_to_relock) return search_anew(arrival);
-    if (agreeing_ >= frames_to_relock) {
-        state_ = State::locked;
-        outcome_.locked(record.exposure);
-        return pair_front(record.exposure.trigger);
-    }
-    track(arrival, record);
-    drop_front(EventReason::unproved);
+/// A frame may be late, but not early.
+bool Pairing::early(const Arrival& arrival, const Record& record) const {
+    return 3 * lateness_ns(arrival, record) < -2 * exposures_.smallest_gap_ns();
 }
 
-BoardTime Pairing::expected_start(const Arrival& arrival) const {
-    const BoardTime undrifted{frame_time_ns(arrival) - last_->difference_ns};
-    return undrifted - Duration{std::llround(
-                           drift_ * static_cast<double>((undrifted - last_->record.exposure.start).ns))};
+bool Pairing::late(const Arrival& arrival, const Record& record) const {
+    return 3 * lateness_ns(arrival, record) > 2 * exposures_.smallest_gap_ns();
 }
 
-/// Once the pattern is over and every exposure of it is too old for a frame to come.
-bool Pairing::wants_pattern(HostTime now) const {
-    return state_ == State::searching && fruitless_ >= pattern_patience && now > next_pattern_;
+/// Where ids leave a choice, because a trigger may have been ignored, a camera clock that steps back by as
+/// many periods lets both agree on a wrong exposure. Only the arrival, which seems late, speaks against it.
+bool Pairing::needs_witness(const Arrival& arrival, const Record& record) const {
+    const bool all_taken = record.exposure.kind != StampKind::trigger_edge &&
+                           record.exposure.trigger > proved_->record.exposure.trigger &&
+                           perhaps_not_taken(proved_->record, record) == 0;
+    return timeline_ == Timeline::camera && !all_taken && late(arrival, record);
 }
 
-void Pairing::pattern_requested(HostTime now) {
-    next_pattern_ = now + limits_.pattern_duration + limits_.latest_arrival;
-    fruitless_ = 0;
+/// A later frame for which all three kinds of evidence agree: then the two did not step before it either.
+bool Pairing::has_witness() const {
+    return std::any_of(arrivals_.begin() + 1, arrivals_.end(), [this](const Arrival& later) {
+        const Record* record = by_clock(later, loose_ns());
+        return record != nullptr && verified(later, *record) &&
+               3 * std::abs(lateness_ns(later, *record)) < exposures_.smallest_gap_ns();
+    });
 }
 
 void Pairing::slip(const Arrival& arrival) {
     state_ = State::checking;
-    agreeing_ = disagreeing_ = 0;
+    suspicions_ = {};
+    undecided_ = 0;
+    slipped_ = arrival.arrived;
     outcome_.slipped(arrival);
 }
 
-/// Follows the difference of the two clocks and its rate.
-void Pairing::track(const Arrival& arrival, const Record& record) {
-    const Exposure& exposure = record.exposure;
-    const std::int64_t difference = frame_time_ns(arrival) - exposure.start.ns;
-    if (!last_) {
-        last_ = Pair{difference, arrival.block_id, record};
-        return;
+const Record* Pairing::by_clock(const Arrival& arrival, std::int64_t tolerance_ns) const {
+    if (timeline_ != Timeline::camera || arrival.camera_time.ns == 0) return nullptr;
+    return exposures_.near(Timeline::camera, clock_.expected_instant_ns(arrival.camera_time.ns),
+                           tolerance_ns);
+}
+
+/// None as well when frames come too irregularly to tell.
+const Record* Pairing::by_latency(const Arrival& arrival) const {
+    const std::int64_t gap = exposures_.smallest_gap_ns();
+    if (3 * latency_.deviation_ns() > gap / 2) return nullptr;
+    return exposures_.near(Timeline::arrival, latency_.expected_instant_ns(arrival.arrived.ns), gap / 3);
+}
+
+/// The only exposure that ids and arrival allow.
+const Record* Pairing::by_ids(const Arrival& arrival) const {
+    const Record* found = nullptr;
+    for (std::size_t i = 0; i < exposures_.size(); ++i) {
+        const Record& record = exposures_[i];
+        if (!verified(arrival, record)) continue;
+        if (found != nullptr) return nullptr;
+        found = &record;
     }
-    const auto elapsed = static_cast<double>((exposure.start - last_->record.exposure.start).ns);
-    const double surprise = static_cast<double>(difference - last_->difference_ns) - drift_ * elapsed;
-    if (elapsed > 0 && camera_clock_) {
-        const double gain = std::min(drift_gain_per_s * elapsed * 1e-9, largest_drift_gain);
-        drift_ = std::clamp(drift_ + gain * surprise / elapsed, -largest_drift, largest_drift);
+    return found;
+}
+
+/// Which kind of evidence stepped, if the others agree on frame after frame?
+bool Pairing::decide_checking() {
+    const Arrival arrival = arrivals_.front();
+    if (!records_complete(arrival)) return false;
+    if (out_of_order(arrival)) {
+        drop_front(EventReason::out_of_order);
+        return true;
     }
-    const double smoothed = drift_ * elapsed + difference_gain * surprise;
-    last_ = Pair{last_->difference_ns + std::llround(smoothed), arrival.block_id, record};
+    const Record* late = by_latency(arrival);
+    const Record* likely = timeline_ == Timeline::camera ? by_clock(arrival, loose_ns()) : late;
+    if (likely != nullptr && likely == late && verified(arrival, *likely)) {
+        relock(*likely);  // all agree: nothing stepped after all
+        return true;
+    }
+    const Record* clocked =
+        by_clock(arrival, std::min(loose_ns(), clock_.tolerance_ns(expected_instant_ns(arrival))));
+    if (clocked != late || (clocked != nullptr && (clocked->used || !clocked->exposure.exposed)))
+        clocked = nullptr;
+    const Record* counted = timeline_ == Timeline::camera ? by_ids(arrival) : nullptr;
+    if (counted != late) counted = nullptr;
+    if (!suspect(Stepped::ids, arrival, clocked) && !suspect(Stepped::clock, arrival, counted))
+        give_up_front();
+    return true;
+}
+
+/// True when it is certain by now: then the frame was published.
+bool Pairing::suspect(Stepped kind, const Arrival& arrival, const Record* record) {
+    Suspicion& suspicion = suspicions_[static_cast<std::size_t>(kind)];
+    if (record == nullptr) {
+        suspicion.frames = 0;
+        return false;
+    }
+    const Pair now{arrival, *record};
+    suspicion.frames =
+        suspicion.frames > 0 && consistent(kind, suspicion.last, now) ? suspicion.frames + 1 : 1;
+    suspicion.last = now;
+    if (suspicion.frames < frames_to_relock) return false;
+    if (kind == Stepped::clock) clock_.move(arrival.camera_time.ns, record->exposure.start.ns);
+    relock(*record);
+    return true;
+}
+
+void Pairing::relock(const Record& record) {
+    state_ = State::locked;
+    outcome_.locked(record.exposure);
+    pair_front(record.exposure.trigger);
+}
+
+/// What stepped must be steady since.
+bool Pairing::consistent(Stepped kind, const Pair& before, const Pair& now) {
+    if (step_faults(now.arrival.block_id - before.arrival.block_id, before.record, now.record) != 0)
+        return false;
+    if (kind != Stepped::clock) return true;
+    const std::int64_t elapsed = (now.record.exposure.start - before.record.exposure.start).ns;
+    const std::int64_t step = (now.arrival.camera_time - before.arrival.camera_time).ns;
+    return std::abs(step - elapsed) <= step_tolerance_ns + elapsed / step_tolerance_part;
+}
+
+void Pairing::give_up_front() {
+    const Duration since = arrivals_.front().arrived - slipped_;
+    const Duration shortest = timeline_ == Timeline::camera ? shortest_check : shortest_check_by_arrival;
+    if (++undecided_ < frames_to_give_up || since < shortest) return drop_front(EventReason::unproved);
+    drop_front(EventReason::mismatch);
+    state_ = State::searching;
+    frames_since_start_ = static_cast<int>(frames_for_proof(timeline_));
+}
+
+std::optional<Start> Pairing::wanted_start(HostTime now) const {
+    if (state_ == State::locked && start_ == Start::slow) return Start::steady;
+    if (state_ != State::searching) return std::nullopt;
+    const bool futile = timeline_ == Timeline::arrival && start_ == Start::pattern;
+    if (!futile && now <= start_ends_) return std::nullopt;
+    if (frames_since_start_ < static_cast<int>(frames_for_proof(timeline_))) return std::nullopt;
+    const bool slow = timeline_ == Timeline::arrival ||
+                      fruitless_starts_ % (patterns_before_slow + 1) == patterns_before_slow;
+    return slow ? Start::slow : Start::pattern;
+}
+
+void Pairing::start_requested(Start start, HostTime now) {
+    start_ = start;
+    if (start == Start::steady) return;
+    ++fruitless_starts_;
+    frames_since_start_ = 0;
+    start_ends_ =
+        now + (start == Start::slow ? slow_duration : limits_.pattern_duration) + limits_.latest_arrival;
 }
 
 void Pairing::pair_front(std::uint64_t trigger) {
     const Arrival arrival = arrivals_.front();
     arrivals_.pop_front();
-    forget_exposures_before(trigger, EventReason::frame_missing);
-    Record& record = exposures_.front();
+    forget_exposures_before(trigger);
+    Record& record = *exposures_.find(trigger);
     record.used = true;
-    track(arrival, record);
-    proved_ = last_;
+    if (arrival.camera_time.ns != 0) clock_.track(arrival.camera_time.ns, record.exposure.start.ns);
+    if (!latency_.known() || !late(arrival, record))
+        latency_.track(arrival.arrived.ns, record.exposure.end_on_host.ns);
+    proved_ = Pair{arrival, record};
     outcome_.paired(arrival, record.exposure);
+}
+
+/// It has waited too long.
+void Pairing::expire_front() {
+    if (state_ == State::locked && waits_for_witness_) {  // frames stay late
+        slip(arrivals_.front());
+        waits_for_witness_ = false;
+    }
+    drop_front(state_ == State::locked ? EventReason::exposure_missing : EventReason::unproved);
 }
 
 void Pairing::drop_front(EventReason reason) {
     const Arrival arrival = arrivals_.front();
     arrivals_.pop_front();
-    outcome_.frame_unpaired(arrival, reason);
+    if (reason != EventReason::out_of_order) note({arrival.block_id, reason});
+    const Record* guess = nullptr;
+    if (proved_ && state_ != State::searching)
+        guess = exposures_.near(timeline_, expected_instant_ns(arrival), loose_ns());
+    outcome_.frame_unpaired(arrival, reason, guess == nullptr ? nullptr : &guess->exposure);
 }
 
 /// Frames come in order: what precedes a paired trigger gets no frame any more.
-void Pairing::forget_exposures_before(std::uint64_t trigger, EventReason reason) {
-    while (!exposures_.empty() && exposures_.front().exposure.trigger < trigger) drop_oldest_exposure(reason);
+void Pairing::forget_exposures_before(std::uint64_t trigger) {
+    while (!exposures_.empty() && exposures_.front().exposure.trigger < trigger)
+        drop_oldest_exposure(EventReason::frame_missing);
 }
 
 void Pairing::drop_oldest_exposure(EventReason reason) {
-    const Record record = exposures_.front();
-    exposures_.pop_front();
+    const Record record = exposures_.pop_front();
     if (record.used) return;
-    outcome_.exposure_unpaired(record.exposure,
-                               record.exposure.exposed ? reason : EventReason::trigger_ignored);
+    outcome_.exposure_unpaired(record.exposure, explanation(record, reason));
 }
 
-void Pairing::advance(HostTime now) {
-    while (!arrivals_.empty() && state_ != State::searching &&
-           now - arrivals_.front().arrived > limits_.exposure_wait)
-        drop_front(EventReason::exposure_missing);
-    // A search needs the exposures of several frames, however slow the camera.
+/// Why a trigger has no frame: what is known of the frame whose number it should have.
+EventReason Pairing::explanation(const Record& record, EventReason otherwise) {
+    if (!record.exposure.exposed) return EventReason::trigger_ignored;
+    if (otherwise == EventReason::reset) return otherwise;
+    if (!proved_ || state_ == State::searching) return EventReason::unproved;
+    const std::uint64_t sent = record.exposure.trigger - proved_->record.exposure.trigger;
+    const std::uint64_t silent = record.silent - proved_->record.silent;
+    const std::uint64_t last = proved_->arrival.block_id + sent;
+    const auto known = std::find_if(shortfalls_.begin(), shortfalls_.end(), [&](const Shortfall& shortfall) {
+        return shortfall.block_id == 0 || (shortfall.block_id <= last && shortfall.block_id + silent >= last);
+    });
+    if (known == shortfalls_.end()) return otherwise;
+    const EventReason reason = known->reason;
+    shortfalls_.erase(known);
+    return reason;
+}
+
+bool Pairing::arrival_expired(HostTime now) const {
+    const Duration patience =
+        state_ == State::searching ? search_patience + limits_.period * 10 : limits_.exposure_wait;
+    return !arrivals_.empty() && now - arrivals_.front().arrived > patience;
+}
+
+/// A search needs the exposures of several frames, however slow the camera.
+bool Pairing::exposure_expired(HostTime now) const {
     const std::size_t keep = state_ == State::searching ? exposures_kept / 4 : 0;
-    while (exposures_.size() > keep && now - exposures_.front().exposure.earliest_on_host >
-                                           limits_.latest_arrival + limits_.exposure_wait)
-        drop_oldest_exposure(state_ == State::searching ? EventReason::unproved : EventReason::frame_missing);
+    return exposures_.size() > keep && now - exposures_.front().exposure.earliest_on_host >
+                                           limits_.latest_arrival + limits_.exposure_wait;
+}
+
+bool Pairing::due(HostTime now) const { return arrival_expired(now) || exposure_expired(now); }
+
+void Pairing::advance(HostTime now) {
+    while (arrival_expired(now)) expire_front();
+    const bool silent = now - last_arrival_ > limits_.latest_arrival + limits_.exposure_wait;
+    while (exposure_expired(now))
+        drop_oldest_exposure(silent ? EventReason::camera_silent : EventReason::frame_missing);
+}
+
+void Pairing::set_limits(const Limits& limits) {
+    limits_ = limits;
+    timeline_ = limits.camera_clock ? Timeline::camera : Timeline::arrival;
+    exposures_ = ExposureLog(limits.period);
 }
 
 void Pairing::reset() {
     while (!arrivals_.empty()) drop_front(EventReason::reset);
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     state_ = State::searching;
-    last_.reset();
+    exposures_ = ExposureLog(limits_.period);
+    shortfalls_.clear();
     proved_.reset();
-    fruitless_ = 0;
-    smallest_gap_ns_ = INT64_MAX;
+    start_.reset();
+    fruitless_starts_ = 0;
+    frames_since_start_ = 0;
+    start_ends_ = {};
 }
 
 }  // namespace versavis::pairing

@@ -2,157 +2,162 @@
 // Finds for each frame of one camera the exposure that made it, and proves it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
 #include <vector>
 
-#include "versavis/metadata.hpp"
-#include "versavis/time.hpp"
+#include "versavis/pairing/alignment.hpp"
+#include "versavis/pairing/relation.hpp"
 
 namespace versavis::pairing {
-
-/// One trigger of the camera, as the board recorded it.
-struct Exposure {
-    std::uint64_t trigger = 0;  ///< consecutive: one per pulse
-    std::uint64_t tick = 0;
-    BoardTime start;  ///< start of the exposure, predicted when it was not measured
-    BoardTime end;
-    HostTime earliest_on_host;  ///< its end, or its start when the end was not seen: no frame of it can
-                                ///< arrive earlier
-    StampKind kind = StampKind::measured_middle;
-    bool exposed = true;  ///< false: the exposure line is wired and stayed silent
-};
-
-/// One complete frame.
-struct Arrival {
-    std::uint32_t slot = 0;  ///< where its pixels lie; handed back in the outcome
-    std::uint64_t block_id = 0;
-    CameraTime camera_time;  ///< 0: the camera has no usable clock
-    HostTime arrived;
-    std::uint32_t width = 0;
-    std::uint32_t height = 0;
-    std::uint32_t pixel_format = 0;
-    std::uint32_t size = 0;  ///< bytes
-};
 
 /// What pairing decides. Each arrival and each exposure comes back exactly once.
 class Outcome {
  public:
     virtual ~Outcome() = default;
     virtual void paired(const Arrival& arrival, const Exposure& exposure) = 0;
-    virtual void frame_unpaired(const Arrival& arrival, EventReason reason) = 0;
+
+    /// `guess`: the exposure that it may be of, unproved; null when there is none.
+    virtual void frame_unpaired(const Arrival& arrival, EventReason reason, const Exposure* guess) = 0;
     virtual void exposure_unpaired(const Exposure& exposure, EventReason reason) = 0;
     virtual void locked(const Exposure& first) = 0;
     virtual void slipped(const Arrival& at) = 0;
 };
 
-struct Limits {
-    Duration earliest_arrival =
-        milliseconds(-5);  ///< after the end of exposure; negative: error of translation
-    Duration latest_arrival = milliseconds(500);  ///< after the end of exposure
-    Duration exposure_wait = milliseconds(250);   ///< how long a frame waits for its exposure's record
-    Duration pattern_duration = seconds(1);       ///< how long the board's start pattern takes
-    std::size_t frames_held = 6;                  ///< most frames that wait for proof
-};
-
 enum class State {
     searching,  ///< no relation is known: the gaps between frames are held against those between exposures
-    checking,   ///< a slip was found: frames are matched by camera time, but withheld until all evidence
-                ///< agrees again
+    checking,   ///< a slip was found: frames are unproved until all evidence, or all but one kind, agrees
+                ///< again
     locked,     ///< each frame is verified against ids and times before it is published
 };
 const char* to_string(State state);
 
-/// Method. A frame belongs to the exposure whose start differs from the frame's camera time by the tracked
-/// difference of the two clocks; the step of block ids must agree with the number of exposures since the last
-/// pair, and the arrival must lie in its window. The difference of the clocks is found from an irregular
-/// sequence of gaps: it is the alignment of the last frames with the exposures that needs no fault to explain
-/// it, if every other needs two. Not thread-safe. Times only enter through the arguments.
+/// How the board should trigger the camera.
+enum class Start : std::uint32_t {
+    pattern = 1,  ///< irregular gaps at the working rate, then all
+    slow = 2,     ///< one pulse a second, until another start is asked for
+    steady = 3,   ///< all
+};
+
+/// Method. Three kinds of evidence count triggers, each in its own way: the camera's clock, followed against
+/// the board's; block ids, from the newest published frame; and the time from the end of the exposure to the
+/// arrival, whose usual value is learned and which has hard limits. A frame is published when clock and ids
+/// name the same exposure and the arrival is possible. When they contradict each other, nothing is published
+/// until one kind is found to have stepped, because the two others agree on several frames in a row; that one
+/// is then counted from there. When no two agree, the relation is searched anew, from triggers with irregular
+/// gaps (alignment.hpp). Cameras without a clock are paired by ids and arrival, and found by slow triggers.
+/// Not thread-safe. Times only enter through the arguments: the same calls lead to the same decisions.
 class Pairing {
  public:
-    Pairing(const Limits& limits, Outcome& outcome) : limits_(limits), outcome_(outcome) {}
+    Pairing(const Limits& limits, Outcome& outcome);
 
     void add(const Exposure& exposure);
     void add(const Arrival& arrival);
+    void add(const Shortfall& shortfall);
 
     /// Gives up what has waited too long.
     void advance(HostTime now);
+
+    /// True when advance() would change anything.
+    bool due(HostTime now) const;
+
+    /// For a new stream of the camera; between reset() and the first evidence.
+    void set_limits(const Limits& limits);
 
     /// Gives back everything and searches anew: camera or board began a new life.
     void reset();
 
     State state() const { return state_; }
 
-    /// True when regular triggers cannot lead to a lock: the board should repeat its start pattern.
-    bool wants_pattern(HostTime now) const;
-    void pattern_requested(HostTime now);
+    /// What the board should do for this camera now; none: go on. Say start_requested() when it was told so.
+    std::optional<Start> wanted_start(HostTime now) const;
+    void start_requested(Start start, HostTime now);
+
+    /// How the first start should be, before anything is known.
+    Start first_start() const { return timeline_ == Timeline::arrival ? Start::slow : Start::pattern; }
 
  private:
-    static constexpr int pattern_patience = 8;
-    static constexpr std::size_t frames_for_proof = 4;
-    static constexpr unsigned faults_to_refute = 2;
-    static constexpr int frames_to_relock = 3;
     static constexpr std::size_t exposures_kept = 128;
+    static constexpr std::size_t shortfalls_kept = 32;
 
-    struct Record {
-        Exposure exposure;
-        bool used = false;
-        std::uint64_t recorded = 0;  ///< records until this one, itself included
-        std::uint64_t silent = 0;    ///< those of them without an exposure
-    };
-    struct Alignment {
-        std::vector<std::uint64_t> triggers;  ///< of the waiting frames
-        unsigned faults = 0;                  ///< ignored triggers that nobody saw, which it takes
-        bool unknown = false;  ///< a frame falls where a record was lost: neither proved nor refuted
-    };
-    struct Pair {                    ///< the newest accepted match
-        std::int64_t difference_ns;  ///< camera time - board time
-        std::uint64_t block_id;
+    /// What may have stepped at a slip, so that the other kinds of evidence still agree.
+    enum class Stepped : std::size_t { ids, clock };
+
+    struct Pair {
+        Arrival arrival;
         Record record;
     };
+    struct Suspicion {  ///< of one kind of evidence
+        int frames = 0;
+        Pair last;
+    };
 
-    std::int64_t frame_time_ns(const Arrival& arrival) const;
-    /// Twice this is half the way between neighbouring exposures.
-    std::int64_t tolerance_ns() const { return smallest_gap_ns_ / 4; }
-    bool arrival_possible(const Arrival& arrival, const Exposure& exposure) const;
-    static unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to);
-    std::size_t first_after(BoardTime start) const;
-    const Record* near(BoardTime start) const;
-    bool record_lost_near(BoardTime start) const;
-    std::optional<Alignment> align(std::int64_t difference_ns) const;
-    std::vector<std::int64_t> candidate_differences() const;
-    void search();
-    void accept_alignment(const std::vector<std::uint64_t>& triggers);
+    std::int64_t frame_ns(const Arrival& arrival) const;
+    std::int64_t expected_instant_ns(const Arrival& arrival) const;
+    std::int64_t loose_ns() const {
+        return exposures_.smallest_gap_ns() / (timeline_ == Timeline::camera ? 4 : 3);
+    }
+
     void process();
-    bool match_front();
-    void decide_front(const Record& record);
-    bool irregular(std::uint64_t first, std::uint64_t last) const;
-    void search_anew(const Arrival& arrival);
-    BoardTime expected_start(const Arrival& arrival) const;
-    void track(const Arrival& arrival, const Record& record);
+    bool records_complete(const Arrival& arrival) const;
+    void search();
+    std::vector<std::uint64_t> find_alignment(const std::vector<Arrival>& frames) const;
+    void accept(const std::vector<std::uint64_t>& triggers);
+
+    bool decide_locked();
+    bool may_still_be_recorded(const Arrival& arrival, std::int64_t instant_ns) const;
+    bool out_of_order(const Arrival& arrival) const;
+    bool verified(const Arrival& arrival, const Record& record) const;
+    bool ids_agree(const Arrival& arrival, const Record& record) const;
+    bool ids_exact(const Arrival& arrival, const Record& record) const;
+    std::int64_t lateness_ns(const Arrival& arrival, const Record& record) const;
+    bool late(const Arrival& arrival, const Record& record) const;
+    bool early(const Arrival& arrival, const Record& record) const;
+    bool needs_witness(const Arrival& arrival, const Record& record) const;
+    bool has_witness() const;
+    const Record* by_clock(const Arrival& arrival, std::int64_t tolerance_ns) const;
+    const Record* by_latency(const Arrival& arrival) const;
+    const Record* by_ids(const Arrival& arrival) const;
+
     void slip(const Arrival& arrival);
+    bool decide_checking();
+    bool suspect(Stepped kind, const Arrival& arrival, const Record* record);
+    void relock(const Record& record);
+    static bool consistent(Stepped kind, const Pair& before, const Pair& now);
+    void give_up_front();
+
     void pair_front(std::uint64_t trigger);
+    void expire_front();
     void drop_front(EventReason reason);
-    void forget_exposures_before(std::uint64_t trigger, EventReason reason);
+    void forget_exposures_before(std::uint64_t trigger);
     void drop_oldest_exposure(EventReason reason);
+    bool arrival_expired(HostTime now) const;
+    bool exposure_expired(HostTime now) const;
+    EventReason explanation(const Record& record, EventReason otherwise);
+    void note(const Shortfall& shortfall);
 
     Limits limits_;
     Outcome& outcome_;
     State state_ = State::searching;
-    std::deque<Record> exposures_;
+    Timeline timeline_ = Timeline::camera;
+    ExposureLog exposures_;
     std::deque<Arrival> arrivals_;  ///< not decided yet
-    std::optional<Pair> last_;
-    std::optional<Pair> proved_;  ///< the newest that was published
-    std::uint64_t recorded_ = 0;
-    std::uint64_t silent_ = 0;
-    int disagreeing_ = 0;
-    std::int64_t smallest_gap_ns_ = INT64_MAX;
-    double drift_ = 0;  ///< camera clock against board clock, relative
-    bool camera_clock_ = true;
-    int fruitless_ = 0;      ///< frames that came during the search
-    HostTime next_pattern_;  ///< two patterns within one arrival window could be taken for each other
-    int agreeing_ = 0;
+    std::deque<Shortfall> shortfalls_;
+    Relation clock_{true};                   ///< camera time against the start of the exposure
+    Relation latency_{false};                ///< arrival against its end on the host
+    std::optional<Pair> proved_;             ///< the newest that was published
+    std::array<Suspicion, 2> suspicions_{};  ///< by Stepped
+    bool waits_for_witness_ = false;
+    int undecided_ = 0;  ///< frames since the slip
+    HostTime slipped_;
+
+    std::optional<Start> start_;  ///< asked for
+    int fruitless_starts_ = 0;
+    int frames_since_start_ = 0;
+    HostTime last_arrival_;
+    HostTime start_ends_;  ///< two patterns within one arrival window could be taken for each other
 };
 
 }  // namespace versavis::pairing

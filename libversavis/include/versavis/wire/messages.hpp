@@ -223,11 +223,17 @@ struct Reboot {
 };
 inline constexpr std::uint32_t reboot_magic = 0x544F4F42U;
 
-/// The start pattern: grid points 0..19 after start that get a pulse, bit 0 first; afterwards all do. Its
-/// gaps are 1 2 1 3 2 2 3 3 1 1: no two neighbouring gaps stand in it twice, so that three frames name their
-/// triggers.
-inline constexpr std::uint32_t start_pattern_bits = 0b1110'0100'1010'1001'1011;
+/// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first; afterwards all
+/// do. Four neighbouring gaps that are not all equal stand nowhere else in any of them, so that five frames
+/// name their triggers, and show it when the cables of two cameras are swapped. A slave has its master's.
+inline constexpr std::uint32_t start_pattern_bits[camera_count] = {0xE4A9B, 0xA3A73, 0xE2765, 0xE1AE3};
 inline constexpr unsigned start_pattern_length = 20;
+
+/// Slow start: every so many grid points get a pulse. Each camera has an interval of its own, of 1 s at
+/// least.
+constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera) {
+    return (rate_uhz * (4 + camera) + 3'999'999) / 4'000'000;
+}
 
 static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);

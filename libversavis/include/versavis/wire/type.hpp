@@ -10,7 +10,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire structs are c
 namespace versavis::wire {
 
 inline constexpr std::uint8_t protocol_major = 2;
-inline constexpr std::uint8_t protocol_minor = 0;
+inline constexpr std::uint8_t protocol_minor = 1;
 inline constexpr std::size_t camera_count = 4;
 
 /// Time fields of value `no_time` say that the instant was not observed.

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The fault matrix against the goals: `campaign` runs the same with more of everything.
+#include <catch2/catch.hpp>
+
+#include "campaign.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+constexpr double needless_goal = 1e-3;
+
+double needless(const Totals& totals) {
+    return static_cast<double>(totals.withheld_needlessly) / static_cast<double>(totals.frames);
+}
+
+}  // namespace
+
+TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") {
+    Totals with_clock;
+    for (const Row& row : run_matrix(4)) {
+        INFO(to_string(row.kind) << ", clock " << to_string(row.clock));
+        const Totals& totals = row.totals;
+        CHECK(totals.wrong == 0);
+        if (row.kind == FaultKind::cameras_swapped) {
+            CHECK(totals.published == 0);
+            continue;
+        }
+        CHECK(totals.published > totals.frames / 4);
+        if (row.clock == CameraClock::absent) {
+            CHECK(quantile(totals.first_published, 1) < seconds(4));
+            continue;
+        }
+        CHECK(totals.not_locked == 0);
+        CHECK(quantile(totals.first_published, 1) < milliseconds(600));
+        CHECK(quantile(totals.recoveries, 0.95) < seconds(1));
+        with_clock.frames += totals.frames;
+        with_clock.withheld_needlessly += totals.withheld_needlessly;
+    }
+    CHECK(needless(with_clock) < needless_goal);
+}
+
+TEST_CASE("matrix: faults at random, close together at times") {
+    for (const CameraClock clock : {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
+        const Totals totals = run_random(2000, 1, clock);
+        INFO("clock " << to_string(clock));
+        CHECK(totals.wrong == 0);
+        if (clock != CameraClock::absent) CHECK(needless(totals) < needless_goal);
+    }
+}

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/pairing/pairing.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "world.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+using pairing::State;
+
+namespace {
+
+WorldSettings world(std::uint64_t seed = 1) {
+    WorldSettings settings;
+    settings.seed = seed;
+    settings.late_frames = 0;
+    settings.pulses = 200;
+    return settings;
+}
+
+WorldSettings with(FaultKind kind, std::uint64_t at = 80) {
+    WorldSettings settings = world();
+    settings.faults[at] = kind;
+    return settings;
+}
+
+/// What every world must show whatever fails in it.
+Verdict run(const WorldSettings& settings) {
+    const Verdict verdict = run_world(settings);
+    CHECK(verdict.wrong == 0);
+    CHECK(verdict.final_state == State::locked);
+    return verdict;
+}
+
+}  // namespace
+
+TEST_CASE("pairing: a clean start publishes every frame, the first ones within half a second at 20 Hz") {
+    WorldSettings settings = world();
+    settings.rate_hz = GENERATE(5.0, 20.0, 155.0);
+    settings.clock = GENERATE(CameraClock::good, CameraClock::drifting);
+    settings.first_id = GENERATE(1U, 4711U);
+    const Verdict verdict = run(settings);
+    CHECK(verdict.published == verdict.frames);
+    CHECK(verdict.locks == 1);
+    CHECK(verdict.starts == 0);
+    CHECK(static_cast<double>(verdict.first_published.ns) * 1e-9 * settings.rate_hz < 10);
+}
+
+TEST_CASE("pairing: a camera without a clock is started slowly, then paired by ids and arrival") {
+    WorldSettings settings = world();
+    settings.clock = CameraClock::absent;
+    settings.clock_known_absent = GENERATE(true, false);
+    const Verdict verdict = run(settings);
+    // It is found out from the first frames, which are lost then.
+    CHECK(verdict.withheld <= (settings.clock_known_absent ? 0U : 20U));
+    CHECK(verdict.slips == 0);
+    CHECK(verdict.first_published < seconds(settings.clock_known_absent ? 3 : 6));
+}
+
+TEST_CASE("pairing: lost frames leave their triggers unpaired, with the reason, and shift nothing") {
+    Verdict verdict = run(with(FaultKind::frame_lost));
+    CHECK(verdict.exposure_reasons[EventReason::frame_missing] == 1);
+    for (const FaultKind kind : {FaultKind::last_packet_lost, FaultKind::leader_lost}) {
+        verdict = run(with(kind));
+        CHECK(verdict.exposure_reasons[EventReason::frame_incomplete] == 1);
+        CHECK(verdict.withheld == 0);
+        CHECK(verdict.slips == 0);
+    }
+}
+
+TEST_CASE("pairing: an ignored trigger is known from the silent exposure line") {
+    WorldSettings settings = with(FaultKind::trigger_ignored);
+    settings.faults[1] = settings.faults[81] = FaultKind::trigger_ignored;
+    settings.ids_count_ignored = GENERATE(false, true);
+    Verdict verdict = run(settings);
+    CHECK(verdict.slips == 0);
+    CHECK(verdict.withheld == 0);
+    CHECK(verdict.exposure_reasons[EventReason::trigger_ignored] == 3);
+}
+
+TEST_CASE("pairing: without an exposure line an ignored trigger is a slip, found at once and repaired") {
+    WorldSettings settings = with(FaultKind::trigger_ignored);
+    settings.strobe = false;
+    const Verdict verdict = run(settings);
+    CHECK(verdict.slips == 1);
+    CHECK(verdict.withheld == 2);
+    CHECK(verdict.starts == 0);
+}
+
+TEST_CASE("pairing: a lost exposure record costs its frame only") {
+    Verdict verdict = run(with(FaultKind::record_lost));
+    CHECK(verdict.slips == 0);
+    CHECK(verdict.frame_reasons[EventReason::exposure_missing] == 1);
+    CHECK(verdict.published == verdict.frames - 1);
+}
+
+TEST_CASE("pairing: a late exposure record is waited for") {
+    CHECK(run(with(FaultKind::record_late)).withheld == 0);
+}
+
+TEST_CASE("pairing: waiting for exposure records is bounded, and goes on when they come again") {
+    Verdict verdict = run(with(FaultKind::usb_stall));
+    CHECK(verdict.frame_reasons[EventReason::exposure_missing] > 20);
+    CHECK(verdict.withheld <= 42);  // two seconds
+    CHECK(verdict.slips == 0);
+}
+
+TEST_CASE("pairing: a frame that comes after a newer one, or twice, is left out and is no slip") {
+    Verdict verdict = run(with(FaultKind::frames_reordered));
+    CHECK(verdict.frame_reasons[EventReason::out_of_order] == 1);
+    CHECK(verdict.withheld == 1);
+    CHECK(verdict.slips == 0);
+}
+
+TEST_CASE("pairing: ids that begin anew are a slip that clock and arrival repair within five frames") {
+    const Verdict verdict = run(with(GENERATE(FaultKind::id_restart, FaultKind::duplicate_id)));
+    CHECK(verdict.slips == 1);
+    CHECK(verdict.withheld <= 5);
+    CHECK(verdict.starts == 0);
+}
+
+TEST_CASE("pairing: a camera clock that jumps, even by whole periods, is found, not followed") {
+    WorldSettings settings = with(FaultKind::clock_jump);
+    settings.seed = GENERATE(range(1, 30));
+    settings.faults[120] = FaultKind::clock_jump;
+    settings.readout = GENERATE(microseconds(2500), milliseconds(60));  // below and above the period
+    const Verdict verdict = run(settings);
+    CHECK(verdict.withheld <= 10);
+    CHECK(verdict.starts == 0);
+}
+
+TEST_CASE("pairing: frames from before the start are never published") {
+    const Verdict verdict = run(with(FaultKind::stale_frame));
+    CHECK(verdict.recoveries.size() == 1);
+    CHECK(verdict.recoveries.front() < seconds(1));
+}
+
+TEST_CASE("pairing: swapped cameras are never proved") {
+    WorldSettings settings = with(FaultKind::cameras_swapped);
+    settings.pulses = 1000;
+    settings.clock = GENERATE(CameraClock::good, CameraClock::absent);
+    const Verdict verdict = run_world(settings);
+    CHECK(verdict.published == 0);
+    CHECK(verdict.final_state == State::searching);
+    CHECK(verdict.starts > 3);  // it goes on trying
+}
+
+TEST_CASE("pairing: the same world has the same verdict") {
+    WorldSettings settings = with(FaultKind::clock_jump);
+    settings.late_frames = 0.05;
+    const Verdict first = run_world(settings);
+    const Verdict second = run_world(settings);
+    CHECK(first.published == second.published);
+    CHECK(first.frame_reasons == second.frame_reasons);
+}

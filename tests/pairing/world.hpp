@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Camera, trigger board and USB link in virtual time, all that can fail of them, and the judge of what
+// pairing makes of it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <queue>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "versavis/pairing/block_id.hpp"
+#include "versavis/pairing/pairing.hpp"
+
+namespace versavis::test {
+
+enum class FaultKind {
+    trigger_ignored,
+    frame_lost,
+    last_packet_lost,
+    leader_lost,
+    frames_reordered,
+    duplicate_id,
+    id_wrap,
+    id_restart,
+    clock_jump,
+    camera_reboot,
+    board_reset,
+    record_lost,
+    record_late,
+    usb_stall,
+    stale_frame,
+    cameras_swapped,
+};
+inline constexpr std::size_t fault_kinds = 16;
+const char* to_string(FaultKind kind);
+
+enum class CameraClock { good, drifting, absent };
+const char* to_string(CameraClock clock);
+
+struct WorldSettings {
+    std::uint64_t seed = 1;
+    double rate_hz = 20;
+    CameraClock clock = CameraClock::good;
+    bool clock_known_absent = true;  ///< the service was told, or found out from the camera
+    bool wide_ids = false;           ///< 64 bits, else 16
+    std::uint64_t first_id = 1;
+    bool strobe = true;              ///< the exposure line is wired
+    bool ids_count_ignored = false;  ///< the camera numbers triggers that it ignores
+    bool chunks = false;             ///< frames carry their exposure time, which varies
+    Duration readout = microseconds(2500);
+    Duration jitter = microseconds(1500);  ///< of the arrival, either way
+    double late_frames = 0.005;  ///< share of frames that the host is slow to take, by 40 ms at most
+    std::map<std::uint64_t, FaultKind> faults;  ///< by the number of the pulse at which they happen
+    std::uint64_t pulses = 300;
+};
+
+struct Verdict {
+    std::uint64_t frames = 0;  ///< that arrived whole
+    std::uint64_t published = 0;
+    std::uint64_t wrong = 0;
+    std::uint64_t withheld = 0;             ///< ... although it was whole
+    std::uint64_t withheld_needlessly = 0;  ///< ... more than five frames after the last fault had ended
+    std::uint64_t suspects_wrong = 0;       ///< guesses that are not the true exposure
+    std::uint64_t locks = 0;
+    std::uint64_t slips = 0;
+    std::uint64_t starts = 0;  ///< after the first
+    std::map<EventReason, std::uint64_t> frame_reasons;
+    std::map<EventReason, std::uint64_t> exposure_reasons;
+    Duration first_published;          ///< since the start was asked for
+    std::vector<Duration> recoveries;  ///< from the end of an outage to the first published frame
+    std::uint64_t longest_relock = 0;  ///< frames from a slip to the next published one
+    pairing::State final_state = pairing::State::searching;
+};
+
+/// Runs one world. The same settings lead to the same verdict.
+Verdict run_world(const WorldSettings& settings);
+
+}  // namespace versavis::test
