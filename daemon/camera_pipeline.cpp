@@ -71,6 +71,7 @@ Expected<> CameraPipeline::prepare(const std::filesystem::path& directory, std::
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     pairing_.set_limits(limits_);
     tell(limits_);
+    report_.last_proof = host_now();
     if (ring_ && ring_->slot_size() >= payload_size) return {};
     ring::Shape shape;
     shape.name = configuration_.name;
@@ -184,6 +185,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
         return frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
     const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
     if (!stamp) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
+    report_.last_proof = arrival.arrived;
     publish_paired(arrival, exposure, *stamp, 0);
 }
 

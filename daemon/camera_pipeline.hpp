@@ -30,6 +30,7 @@ struct PipelineReport {
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
     HostTime last_frame;
+    HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
     Duration exposure;                   ///< measured, of the newest trigger; 0: unknown
     Duration camera_exposure;            ///< by the camera's account; 0: unknown
     bool exposure_contradicted = false;  ///< the two differ

@@ -255,8 +255,10 @@ void Service::publish_status(HostTime now) {
         const Duration patience =
             seconds(1) + Duration{static_cast<std::int64_t>(3e9 / unit.configuration.rate_hz)};
         const bool stalled = unit.pipeline->triggered() && now - report.last_frame > patience;
-        status.cameras.push_back(
-            {unit.configuration.name, unit.pipeline->triggered(), stalled, unit.camera->report(), report});
+        const bool unproved =
+            unit.pipeline->triggered() && !stalled && now - report.last_proof > patience + seconds(5);
+        status.cameras.push_back({unit.configuration.name, unit.pipeline->triggered(), stalled, unproved,
+                                  unit.camera->report(), report});
     }
     for (auto& imu : imus_) status.imus.push_back(imu->report());
     status.streams = stream_status(now);

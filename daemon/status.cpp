@@ -36,6 +36,9 @@ std::string hint(const CameraStatus& status) {
             "LineSource, or "
             "set check_exposure = false",
             status.pipeline.exposure.ns / 1000, status.pipeline.camera_exposure.ns / 1000);
+    if (status.unproved)
+        return "the frames follow no trigger of this output: check that the trigger cable is on it, and "
+               "TriggerSource";
     return status.stalled ? "triggers are sent but no frames come: check trigger cable and network" : "";
 }
 
@@ -111,7 +114,7 @@ json clock_json(const clock::ClockReport& clock) {
 }
 
 json camera_json(const CameraStatus& status) {
-    const auto& [name, triggered, stalled, camera, pipeline] = status;
+    const auto& [name, triggered, stalled, unproved, camera, pipeline] = status;
     return {{"name", name},
             {"state", to_string(camera.state)},
             {"since_ns", camera.since.ns},

@@ -16,7 +16,8 @@ namespace versavis::daemon {
 struct CameraStatus {
     std::string name;
     bool triggered = true;
-    bool stalled = false;  ///< no frame for longer than its rate explains
+    bool stalled = false;   ///< no frame for longer than its rate explains
+    bool unproved = false;  ///< frames come, but for long none could be proved
     CameraReport camera;
     PipelineReport pipeline;
 };

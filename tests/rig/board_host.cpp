@@ -37,7 +37,7 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
 Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                                                        const std::string& socket_path, HostTime zero,
                                                        const Motion& motion, GroundTruth& truth,
-                                                       std::vector<GigeCamera*> cameras) {
+                                                       std::vector<TriggeredCamera*> cameras) {
     sockaddr_un self{};
     self.sun_family = AF_UNIX;
     if (socket_path.size() >= sizeof self.sun_path)
@@ -56,7 +56,7 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
 }
 
 BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
-                     GroundTruth& truth, std::vector<GigeCamera*> cameras, int listener)
+                     GroundTruth& truth, std::vector<TriggeredCamera*> cameras, int listener)
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
@@ -116,7 +116,7 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
     const std::uint32_t changed = pins ^ pins_;
     pins_ = pins;
     const HostTime instant = clock_->host(at);
-    for (GigeCamera* camera : cameras_) {
+    for (TriggeredCamera* camera : cameras_) {
         const unsigned output = camera->settings().output;
         if ((changed >> output & 1U) == 0) continue;
         const bool level = (pins >> output & 1U) != 0;

@@ -9,8 +9,11 @@
 #include <vector>
 
 #include "adis_device.hpp"
-#include "gige_camera.hpp"
+#include "ground_truth.hpp"
 #include "native_board.hpp"
+#include "scene.hpp"
+#include "skewed_clock.hpp"
+#include "triggered_camera.hpp"
 
 namespace versavis::rig {
 
@@ -20,7 +23,7 @@ class BoardHost {
     static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
                                                        const std::string& socket_path, HostTime zero,
                                                        const Motion& motion, GroundTruth& truth,
-                                                       std::vector<GigeCamera*> cameras);
+                                                       std::vector<TriggeredCamera*> cameras);
     ~BoardHost();
     BoardHost(const BoardHost&) = delete;
     BoardHost& operator=(const BoardHost&) = delete;
@@ -30,7 +33,7 @@ class BoardHost {
 
  private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
-              GroundTruth& truth, std::vector<GigeCamera*> cameras, int listener);
+              GroundTruth& truth, std::vector<TriggeredCamera*> cameras, int listener);
 
     void run();
     void boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero);
@@ -51,7 +54,7 @@ class BoardHost {
     std::string socket_path_;
     devices::AdisDevice imu_;
     GroundTruth& truth_;
-    std::vector<GigeCamera*> cameras_;
+    std::vector<TriggeredCamera*> cameras_;
     int listener_;
     int host_ = -1;
 

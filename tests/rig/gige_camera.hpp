@@ -17,36 +17,26 @@
 #include "scenario.hpp"
 #include "scene.hpp"
 #include "skewed_clock.hpp"
+#include "triggered_camera.hpp"
 
 namespace versavis::rig {
 
-/// Where a trigger pulse came from.
-struct TriggerPulse {
-    std::uint64_t board_life = 0;
-    std::uint64_t trigger = 0;
-    HostTime at;
-};
-
-class GigeCamera {
+class GigeCamera final : public TriggeredCamera {
  public:
-    using Interval = std::pair<HostTime, HostTime>;
-
     /// Binds the control port. Error: the address is not there or taken.
     static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario,
                                                         const CameraScenario& settings, HostTime zero,
                                                         const Motion& motion, GroundTruth& truth);
-    ~GigeCamera();
+    ~GigeCamera() override;
     GigeCamera(const GigeCamera&) = delete;
     GigeCamera& operator=(const GigeCamera&) = delete;
 
-    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it
-    /// exposes.
-    std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse);
+    std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) override;
 
     /// Calls `reset` with each of these exposures, counted since the rig's start.
     void reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset);
 
-    const CameraScenario& settings() const { return settings_; }
+    const CameraScenario& settings() const override { return settings_; }
 
  private:
     GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,

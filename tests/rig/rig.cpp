@@ -29,7 +29,8 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
         wired.push_back(camera->get());
         rig->cameras_.push_back(std::move(*camera));
     }
-    auto board = BoardHost::create(scenario, socket_path, zero, rig->motion_, *rig->truth_, wired);
+    auto board = BoardHost::create(scenario, socket_path, zero, rig->motion_, *rig->truth_,
+                                   {wired.begin(), wired.end()});
     if (!board) return tl::unexpected(board.error());
     rig->board_ = std::move(*board);
     for (GigeCamera* camera : wired)

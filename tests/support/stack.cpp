@@ -13,19 +13,25 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
     const std::string link = settings.link.empty() ? "unix:" + socket_path() : settings.link;
     std::string configuration =
         fmt::format("instance = \"{}\"\n[board]\nlink = \"{}\"\n", settings.name, link);
+    const auto at = [](const std::vector<std::string>& texts, unsigned i) {
+        return i < texts.size() ? texts[i] : std::string();
+    };
+    const auto address = [&](unsigned i) { return fmt::format("127.0.{}.{}", settings.subnet, i + 2); };
     for (unsigned i = 0; i < settings.cameras; ++i) {
-        const std::string address = fmt::format("127.0.{}.{}", settings.subnet, i + 2);
         scenario += fmt::format(
             "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = {2}\nheight = "
-            "{3}\n{4}\n",
-            i, address, settings.width, settings.height, settings.camera_scenario);
+            "{3}\n{4}\n{5}\n",
+            i, address(i), settings.width, settings.height, settings.camera_scenario,
+            at(settings.scenarios, i));
         const bool slave = i > 0 && !settings.slave_extra.empty();
+        const unsigned real = settings.swapped ? settings.cameras - 1 - i : i;
         configuration += fmt::format(
             "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nlatency_us = 20\npacket_size = "
             "9000\n"
-            "{2}\n{3}\n",
-            i, address, slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
-            settings.camera_extra);
+            "{2}\n{3}\n{4}\n",
+            i, settings.device.empty() ? address(real) : settings.device,
+            slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
+            settings.camera_extra, at(settings.extras, i));
     }
     configuration += "[[imu]]\nname = \"imu0\"\n";
     scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "process.hpp"
 #include "scenario.hpp"
@@ -26,6 +27,10 @@ struct StackSettings {
     std::uint32_t height = 240;
     std::string link{};         ///< of the service to the board; empty: the rig's socket
     std::string slave_extra{};  ///< instead of a rate, for the cameras of the service after the first
+    std::string device{};       ///< of every camera, as the service is told; empty: its address
+    bool swapped = false;       ///< the service takes each camera for another
+    std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
+    std::vector<std::string> extras{};     ///< more keys of the service, by camera
 };
 
 class Stack {

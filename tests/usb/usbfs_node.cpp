@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "usbfs_node.hpp"
 
+#include <linux/usb/ch9.h>
 #include <sys/ioctl.h>  // the _IOR family that the USBDEVFS_ constants use
 
 #include <algorithm>
@@ -16,7 +17,6 @@ using Client = UsbfsNode::Client;
 using DataPtr = GObjectPtr<UMockdevIoctlData>;
 using Task = std::function<void()>;
 
-constexpr int speed_full = 2;  // USB_SPEED_FULL of linux/usb/ch9.h
 constexpr std::size_t setup_size = 8;
 
 // Runs the task once on the thread of the context; dropping the result cancels it.
@@ -33,8 +33,10 @@ GSourcePtr schedule(GMainContext* context, std::chrono::milliseconds delay, Task
     return source;
 }
 
-unsigned interface_of(std::uint8_t endpoint) {
-    return endpoint == UsbFunction::interrupt_in_endpoint ? 0 : 1;
+Bytes string_descriptor(const std::string& ascii) {
+    Bytes result{static_cast<std::uint8_t>(2 + 2 * ascii.size()), 3};
+    for (char c : ascii) result.insert(result.end(), {static_cast<std::uint8_t>(c), 0});
+    return result;
 }
 
 void complete(Client* client, int result) {
@@ -68,27 +70,101 @@ std::span<std::uint8_t> UsbfsNode::Urb::payload() const {
     return {buffer->data, static_cast<std::size_t>(buffer->data_len)};
 }
 
+int UsbFunction::control(std::span<const std::uint8_t> /*setup*/, std::span<const std::uint8_t> /*out*/,
+                         Bytes& /*reply*/) {
+    return -EPIPE;
+}
+
+UsbfsNode::UsbfsNode(std::shared_ptr<UsbFunction> function, std::chrono::milliseconds idle_hold)
+    : function_{std::move(function)}, idle_hold_{idle_hold} {
+    parse_configuration();
+    function_->node_ = this;
+}
+
+void UsbfsNode::parse_configuration() {
+    constexpr std::uint8_t interface_type = 4;
+    constexpr std::uint8_t endpoint_type = 5;
+    const Bytes& text = function_->description().configuration;
+    interface_count_ = text.at(4);
+    unsigned interface = 0;
+    for (std::size_t at = 0; at < text.size(); at += text.at(at)) {
+        const std::uint8_t type = text.at(at + 1);
+        if (type == interface_type) interface = text.at(at + 2);
+        if (type != endpoint_type) continue;
+        Pipe& pipe = pipes_[text.at(at + 2)];
+        pipe.interface = interface;
+        pipe.packet_size = static_cast<std::size_t>(text.at(at + 4) | text.at(at + 5) << 8);
+    }
+}
+
 void UsbfsNode::attach(std::string path) {
-    const std::lock_guard lock{mutex_};
-    path_ = std::move(path);
+    {
+        const std::lock_guard lock{mutex_};
+        path_ = std::move(path);
+    }
+    function_->plugged(true);
 }
 
 void UsbfsNode::detach() {
+    function_->plugged(false);
     {
         const std::lock_guard lock{mutex_};
         path_.clear();
-        to_host_.clear();
+        for (auto& [address, pipe] : pipes_) {
+            pipe.transfers.clear();
+            pipe.halted = false;
+        }
     }
     post_pump();
 }
 
-void UsbfsNode::send(std::span<const std::byte> bytes) {
+void UsbfsNode::send(std::uint8_t endpoint, Bytes bytes) {
     {
         const std::lock_guard lock{mutex_};
-        if (path_.empty()) return;
-        for (std::byte byte : bytes) to_host_.push_back(std::to_integer<std::uint8_t>(byte));
+        Pipe& pipe = pipes_.at(endpoint);
+        if (path_.empty() || pipe.halted) return;
+        pipe.transfers.push_back({std::move(bytes), 0});
     }
     post_pump();
+}
+
+std::size_t UsbfsNode::queued(std::uint8_t endpoint) const {
+    const std::lock_guard lock{mutex_};
+    std::size_t sum = 0;
+    for (const Transfer& transfer : pipes_.at(endpoint).transfers)
+        sum += transfer.bytes.size() - transfer.sent;
+    return sum;
+}
+
+void UsbfsNode::flush(std::uint8_t endpoint) {
+    const std::lock_guard lock{mutex_};
+    pipes_.at(endpoint).transfers.clear();
+}
+
+void UsbfsNode::halt(std::uint8_t endpoint) {
+    {
+        const std::lock_guard lock{mutex_};
+        Pipe& pipe = pipes_.at(endpoint);
+        pipe.halted = true;
+        pipe.transfers.clear();
+    }
+    post_pump();
+}
+
+bool UsbfsNode::halted(std::uint8_t endpoint) const {
+    const std::lock_guard lock{mutex_};
+    return pipes_.at(endpoint).halted;
+}
+
+int UsbfsNode::clear_halt(std::uint8_t endpoint) {
+    {
+        const std::lock_guard lock{mutex_};
+        const auto pipe = pipes_.find(endpoint);
+        if (pipe == pipes_.end()) return -ENOENT;
+        pipe->second.halted = false;
+    }
+    function_->halt_cleared(endpoint);
+    return 0;
 }
 
 // The testbed's context is private; this is the first chance to learn it, and
@@ -130,16 +206,16 @@ void UsbfsNode::forget(Client* client) {
 int UsbfsNode::execute(Client* client, unsigned long request) {
     switch (request) {
         case USBDEVFS_GET_CAPABILITIES: return capabilities(client);
-        case USBDEVFS_GET_SPEED: return speed_full;
+        case USBDEVFS_GET_SPEED: return speed();
         case USBDEVFS_CLAIMINTERFACE:
         case USBDEVFS_DISCONNECT_CLAIM:  // the interface number is its first member
-            return claim(client, read_argument<unsigned>(client, UsbFunction::interface_count));
+            return claim(client, read_argument<unsigned>(client, interface_count_));
         case USBDEVFS_RELEASEINTERFACE:
-            return release(client, read_argument<unsigned>(client, UsbFunction::interface_count));
+            return release(client, read_argument<unsigned>(client, interface_count_));
         case USBDEVFS_SETCONFIGURATION: return read_argument<unsigned>(client, 0) == 1 ? 0 : -EINVAL;
         case USBDEVFS_SETINTERFACE:
             return read_argument(client, usbdevfs_setinterface{}).altsetting == 0 ? 0 : -EINVAL;
-        case USBDEVFS_CLEAR_HALT:
+        case USBDEVFS_CLEAR_HALT: return clear_halt(static_cast<std::uint8_t>(read_argument(client, 0U)));
         case USBDEVFS_RESET: return 0;
         case USBDEVFS_GETDRIVER:
         case USBDEVFS_IOCTL: return -ENODATA;  // no kernel driver is ever bound
@@ -160,8 +236,13 @@ int UsbfsNode::capabilities(Client* client) {
     return 0;
 }
 
+int UsbfsNode::speed() const {  // enum usb_device_speed of linux/usb/ch9.h
+    const unsigned mbit = function_->description().speed_mbit;
+    return mbit >= 5000 ? 5 : mbit >= 480 ? 3 : 2;
+}
+
 int UsbfsNode::claim(Client* client, unsigned interface) {
-    if (interface >= UsbFunction::interface_count) return -ENOENT;
+    if (interface >= interface_count_) return -ENOENT;
     const auto [claim, added] = claims_.try_emplace(interface, client);
     return claim->second == client ? 0 : -EBUSY;
 }
@@ -194,17 +275,17 @@ int UsbfsNode::start(Urb urb) {
         return 0;
     }
     const std::uint8_t endpoint = fields.endpoint;
-    if (endpoint != UsbFunction::bulk_out_endpoint && endpoint != UsbFunction::bulk_in_endpoint &&
-        endpoint != UsbFunction::interrupt_in_endpoint) {
-        return -ENOENT;
-    }
+    const auto pipe = pipes_.find(endpoint);
+    if (pipe == pipes_.end()) return -ENOENT;
     // Like the kernel, take an interface the caller forgot to claim.
-    const int claimed = claim(urb.client, interface_of(endpoint));
+    const int claimed = claim(urb.client, pipe->second.interface);
     if (claimed < 0) return claimed;
-    if (endpoint == UsbFunction::bulk_out_endpoint) {
-        receive(urb);
+    if ((endpoint & USB_DIR_IN) == 0) {
+        urb.fields().actual_length = urb.fields().buffer_length;
+        function_->receive(endpoint, urb.payload());
         finish(std::move(urb), 0);
     } else {
+        urb.fields().actual_length = 0;
         pending_.push_back(std::move(urb));
         post_pump();
     }
@@ -229,7 +310,7 @@ void UsbfsNode::control(Urb& urb) {
     const bool to_host = (setup[0] & 0x80) != 0;
     std::vector<std::uint8_t> reply;
     const auto out = to_host ? std::span<std::uint8_t>{} : data;
-    const int status = function_->control(setup, out, reply);
+    const int status = answer_control(setup, out, reply);
     std::size_t length = to_host ? std::min(reply.size(), data.size()) : data.size();
     if (status < 0) length = 0;
     if (to_host) std::copy_n(reply.begin(), length, data.begin());
@@ -237,9 +318,38 @@ void UsbfsNode::control(Urb& urb) {
     finish(std::move(urb), status);
 }
 
-void UsbfsNode::receive(Urb& urb) {
-    urb.fields().actual_length = urb.fields().buffer_length;
-    if (urb.buffer) function_->receive(std::as_bytes(urb.payload()));
+int UsbfsNode::answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
+                              Bytes& reply) {
+    constexpr int get_descriptor = 0x8006;
+    constexpr int clear_endpoint_feature = 0x0201;
+    constexpr int set_endpoint_feature = 0x0203;
+    const auto endpoint = setup[4];
+    const bool endpoint_halt = setup[2] == 0 && setup[3] == 0 && pipes_.contains(endpoint);
+    switch (setup[0] << 8 | setup[1]) {
+        case get_descriptor: return descriptor(setup[3], setup[2], reply);
+        case set_endpoint_feature:
+            if (!endpoint_halt) return -EPIPE;
+            halt(endpoint);
+            return 0;
+        case clear_endpoint_feature: return endpoint_halt ? clear_halt(endpoint) : -EPIPE;
+        default: return function_->control(setup, out, reply);
+    }
+}
+
+int UsbfsNode::descriptor(unsigned type, unsigned index, Bytes& reply) const {
+    const UsbDescription& description = function_->description();
+    if (type == 1) {
+        reply = description.device;
+    } else if (type == 2 && index == 0) {
+        reply = description.configuration;
+    } else if (type == 3 && index == 0) {
+        reply = {4, 3, 0x09, 0x04};  // US English
+    } else if (type == 3 && index <= description.strings.size()) {
+        reply = string_descriptor(description.strings[index - 1]);
+    } else {
+        return -EPIPE;
+    }
+    return 0;
 }
 
 void UsbfsNode::finish(Urb urb, int status) {
@@ -303,7 +413,7 @@ void UsbfsNode::pump() {
         pump_posted_ = false;
     }
     shut_down_stale_urbs();
-    fill_bulk_in();
+    fill_in_urbs();
     for (auto held = held_.begin(); held != held_.end();) {
         const auto next = std::next(held);
         if (answer_reap(held->first)) held_.erase(held);
@@ -323,21 +433,52 @@ void UsbfsNode::shut_down_stale_urbs() {
     pending_ = std::move(kept);
 }
 
-void UsbfsNode::fill_bulk_in() {
+void UsbfsNode::fill_in_urbs() {
     const std::lock_guard lock{mutex_};
-    for (auto urb = pending_.begin(); urb != pending_.end() && !to_host_.empty();) {
-        if (urb->fields().endpoint != UsbFunction::bulk_in_endpoint) {
-            ++urb;
+    std::deque<Urb> kept;
+    std::set<std::uint8_t> waiting;  // endpoints whose first urb is not full: later ones must wait
+    for (Urb& urb : std::exchange(pending_, {})) {
+        const std::uint8_t endpoint = urb.fields().endpoint;
+        Pipe& pipe = pipes_.at(endpoint);
+        if (pipe.halted) {
+            finish(std::move(urb), -EPIPE);
             continue;
         }
-        const std::size_t length = std::min(urb->payload().size(), to_host_.size());
-        const auto end = to_host_.begin() + static_cast<std::ptrdiff_t>(length);
-        std::copy(to_host_.begin(), end, urb->payload().begin());
-        to_host_.erase(to_host_.begin(), end);
-        urb->fields().actual_length = static_cast<int>(length);
-        finish(std::move(*urb), 0);
-        urb = pending_.erase(urb);
+        const Progress progress = waiting.contains(endpoint) ? Progress::waiting : fill(urb, pipe);
+        if (progress == Progress::waiting) {
+            waiting.insert(endpoint);
+            kept.push_back(std::move(urb));
+        } else {
+            finish(std::move(urb), progress == Progress::overflow ? -EOVERFLOW : 0);
+        }
     }
+    pending_ = std::move(kept);
+}
+
+// Packet by packet as on the wire: an urb ends when it is full or a short packet arrives. A packet that does
+// not fit is an overflow; the rest of its transfer is lost.
+UsbfsNode::Progress UsbfsNode::fill(const Urb& urb, Pipe& pipe) {
+    const std::span<std::uint8_t> payload = urb.payload();
+    while (!pipe.transfers.empty()) {
+        Transfer& transfer = pipe.transfers.front();
+        const auto filled = static_cast<std::size_t>(urb.fields().actual_length);
+        const std::size_t room = payload.size() - filled;
+        const std::size_t left = transfer.bytes.size() - transfer.sent;
+        const bool fits = left <= room;
+        const std::size_t length = fits ? left : room / pipe.packet_size * pipe.packet_size;
+        std::copy_n(transfer.bytes.begin() + static_cast<std::ptrdiff_t>(transfer.sent), length,
+                    payload.begin() + static_cast<std::ptrdiff_t>(filled));
+        transfer.sent += length;
+        urb.fields().actual_length += static_cast<int>(length);
+        if (!fits && length < room) {
+            pipe.transfers.pop_front();
+            return Progress::overflow;
+        }
+        if (!fits) return Progress::finished;
+        pipe.transfers.pop_front();
+        if (left == 0 || left % pipe.packet_size != 0 || length == room) return Progress::finished;
+    }
+    return Progress::waiting;
 }
 
 }  // namespace versavis::test

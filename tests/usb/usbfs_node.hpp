@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The kernel's side of a usbfs node, played by the simulator: it answers the ioctls of linux/usbdevice_fs.h.
+// The kernel's side of a usbfs node, played by the simulator: it answers the ioctls of linux/usbdevice_fs.h
+// for any device that its descriptors describe.
 #pragma once
 
 #include <linux/usbdevice_fs.h>
@@ -16,6 +17,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace versavis::test {
@@ -35,33 +37,62 @@ struct GSourceDestroy {
 };
 using GSourcePtr = std::unique_ptr<GSource, GSourceDestroy>;
 
-/// What the device itself does; called on the testbed's GLib thread only.
-class UsbFunction {
- public:
-    static constexpr unsigned interface_count = 2;
-    static constexpr std::uint8_t interrupt_in_endpoint = 0x81;  // interface 0
-    static constexpr std::uint8_t bulk_out_endpoint = 0x02;      // interface 1
-    static constexpr std::uint8_t bulk_in_endpoint = 0x82;       // interface 1
+using Bytes = std::vector<std::uint8_t>;
 
-    virtual ~UsbFunction() = default;
-    /// Answers a control request: 0, or -EPIPE for a stall.
-    virtual int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
-                        std::vector<std::uint8_t>& reply) = 0;
-    virtual void receive(std::span<const std::byte> bytes) = 0;
+/// All that a host learns about a device before it talks to it.
+struct UsbDescription {
+    Bytes device;
+    Bytes configuration;
+    std::vector<std::string> strings;  ///< ASCII; the first has index 1
+    unsigned speed_mbit = 12;
 };
 
-/// The members from mutex_ to to_host_ are shared; everything about urbs is
+class UsbfsNode;
+
+/// What the device itself does; its virtual functions are called on the testbed's GLib thread only.
+class UsbFunction {
+ public:
+    virtual ~UsbFunction() = default;
+    /// Must not change while the device exists.
+    virtual const UsbDescription& description() const = 0;
+    /// Answers a class or vendor request: 0, or -EPIPE for a stall. Standard requests never come here.
+    virtual int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out, Bytes& reply);
+    /// One transfer of the host to a bulk OUT endpoint. Must not block; may send.
+    virtual void receive(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) = 0;
+    /// The host has cleared a halt of this endpoint.
+    virtual void halt_cleared(std::uint8_t /*endpoint*/) {}
+    /// The device was plugged in or pulled out; called on the thread that did it.
+    virtual void plugged(bool /*in*/) {}
+
+ protected:
+    /// From any thread, while the node lives.
+    UsbfsNode* node() const { return node_; }
+
+ private:
+    friend class UsbfsNode;
+    UsbfsNode* node_ = nullptr;
+};
+
+/// The members from mutex_ to pipes_ are shared; everything about urbs is
 /// touched on the testbed's GLib thread only.
 class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
  public:
     using Client = UMockdevIoctlClient;
 
-    UsbfsNode(std::shared_ptr<UsbFunction> function, std::chrono::milliseconds idle_hold)
-        : function_{std::move(function)}, idle_hold_{idle_hold} {}
+    UsbfsNode(std::shared_ptr<UsbFunction> function, std::chrono::milliseconds idle_hold);
 
     void attach(std::string path);
     void detach();
-    void send(std::span<const std::byte> bytes);
+
+    /// Queues one transfer of the device to an IN endpoint. Its last packet is short, and so ends the host's
+    /// urb, unless its size is a multiple of the packet size; an empty one is a packet of length zero.
+    void send(std::uint8_t endpoint, Bytes bytes);
+    /// Bytes that the host has not fetched.
+    std::size_t queued(std::uint8_t endpoint) const;
+    void flush(std::uint8_t endpoint);
+    /// The endpoint answers STALL, and what it had queued is gone, until the host clears the halt.
+    void halt(std::uint8_t endpoint);
+    bool halted(std::uint8_t endpoint) const;
 
     /// The handler's signals, on the testbed's GLib thread.
     void on_connected(Client* client);
@@ -80,18 +111,33 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
         GObjectPtr<Client> client;
         GSourcePtr timeout;  // null for a reap that may wait for ever
     };
+    struct Transfer {
+        Bytes bytes;
+        std::size_t sent = 0;
+    };
+    struct Pipe {
+        unsigned interface = 0;
+        std::size_t packet_size = 64;
+        bool halted = false;
+        std::deque<Transfer> transfers;  // of an IN endpoint
+    };
+    enum class Progress { waiting, finished, overflow };
 
+    void parse_configuration();
     bool is_current(Client* client);
     void forget(Client* client);
     int execute(Client* client, unsigned long request);
     int capabilities(Client* client);
+    int speed() const;
     int claim(Client* client, unsigned interface);
     int release(Client* client, unsigned interface);
     int submit(Client* client);
     int start(Urb urb);
     int discard(Client* client);
+    int clear_halt(std::uint8_t endpoint);
     void control(Urb& urb);
-    void receive(Urb& urb);
+    int answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out, Bytes& reply);
+    int descriptor(unsigned type, unsigned index, Bytes& reply) const;
     void finish(Urb urb, int status);
     void reap(Client* client, bool wait);
     bool answer_reap(Client* client);
@@ -100,16 +146,18 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     void post_pump();
     void pump();
     void shut_down_stale_urbs();
-    void fill_bulk_in();
+    void fill_in_urbs();
+    static Progress fill(const Urb& urb, Pipe& pipe);
 
     const std::shared_ptr<UsbFunction> function_;
     const std::chrono::milliseconds idle_hold_;
+    unsigned interface_count_ = 0;
 
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::string path_;  // empty while detached
     GMainContext* context_ = nullptr;
     bool pump_posted_ = false;
-    std::deque<std::uint8_t> to_host_;
+    std::map<std::uint8_t, Pipe> pipes_;  // by endpoint address; its keys never change
 
     std::deque<Urb> pending_;
     std::deque<Urb> done_;

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the board's wires see of a camera, whatever bus its frames take.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "scenario.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::rig {
+
+/// Where a trigger pulse came from.
+struct TriggerPulse {
+    std::uint64_t board_life = 0;
+    std::uint64_t trigger = 0;
+    HostTime at;
+};
+
+class TriggeredCamera {
+ public:
+    using Interval = std::pair<HostTime, HostTime>;
+
+    virtual ~TriggeredCamera() = default;
+    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it
+    /// exposes.
+    virtual std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) = 0;
+    virtual const CameraScenario& settings() const = 0;
+};
+
+}  // namespace versavis::rig

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What cameras do wrong, live through Aravis: each stamp that is published still belongs to its frame.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <set>
+
+#include "../support/stack.hpp"
+#include "judge.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+
+rig::Verdict judge(const Stack& stack, double seconds) {
+    rig::JudgeSettings settings;
+    settings.instance = stack.instance();
+    settings.truth_path = stack.truth_path();
+    settings.seconds = seconds;
+    auto verdict = rig::judge(stack.scenario(), settings);
+    if (!verdict) FAIL(verdict.error().message());
+    INFO(rig::to_table(*verdict));
+    for (const auto& [name, stream] : verdict->streams) CHECK(stream.wrong_pairs == 0);
+    return *verdict;
+}
+
+std::string fault(const std::string& camera, const std::string& kind, int at, const std::string& more = "") {
+    return "[[fault]]\nkind = \"" + kind + "\"\ncamera = \"" + camera +
+           "\"\nat_exposure = " + std::to_string(at) + "\n" + more + "\n";
+}
+
+using Pairs = std::set<std::pair<std::uint64_t, std::uint64_t>>;
+
+/// Triggers and block ids in lines of JSON, of those with this `decision` if it is not empty.
+Pairs pairs(std::istream& lines, const std::string& decision) {
+    Pairs found;
+    for (std::string text; std::getline(lines, text);) {
+        const auto line = nlohmann::json::parse(text, nullptr, false);
+        if (line.is_discarded() || line.value("decision", "") != decision) continue;
+        found.emplace(line["trigger"], line["block_id"]);
+    }
+    return found;
+}
+
+/// Reasons of all events about `camera` that are still in the ring.
+std::set<EventReason> reasons(const Stack& stack, const std::string& camera) {
+    std::set<EventReason> reasons;
+    auto stream = EventStream::open("events", stack.instance(), ring::Reader::From::oldest);
+    REQUIRE(stream);
+    for (auto item = stream->next(); item.found == Found::item; item = stream->next())
+        if (camera == item.data.source_name) reasons.insert(item.data.reason);
+    return reasons;
+}
+
+}  // namespace
+
+TEST_CASE("cameras: frames that are lost, cut, late, repeated or misnumbered, with all kinds of ids") {
+    StackSettings settings{"badcams", 50, 3, 20, "exposure_us = 3000", "", ""};
+    settings.scenarios = {"", "extended_ids = true\nexposure_swing = 0.5",
+                          "ids_count_ignored = true\nearly_leader = true"};
+    settings.extras = {"", "chunks = true", ""};
+    settings.faults = fault("cam0", "drop_leader", 50) + fault("cam0", "drop_last", 70) +
+                      fault("cam0", "swap_frames", 90) + fault("cam0", "repeat_id", 110) +
+                      fault("cam0", "half_frame", 130) + fault("cam0", "ignore_trigger", 150) +
+                      fault("cam1", "restart_ids", 130) + fault("cam1", "jump_clock", 50, "seconds = 0.05") +
+                      fault("cam1", "jump_clock", 80, "seconds = -0.123") + fault("cam1", "drop_frame", 110) +
+                      fault("cam2", "ignore_trigger", 50, "count = 2") + fault("cam2", "drop_frame", 80) +
+                      fault("cam2", "jump_clock", 110, "seconds = 100") + fault("cam2", "drop_last", 140);
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto verdict = judge(stack, 8);
+    const auto status = stack.wait_for_status(healthy);
+    for (const auto& camera : status["cameras"]) {
+        INFO(camera.dump(1));
+        // Aravis takes ids that begin anew for late ones until they are a hundred behind.
+        CHECK(camera["connections"] == 1);
+        CHECK(camera["frames_without_trigger"].get<int>() < 25);
+        CHECK(camera["slips"].get<int>() <= 4);
+    }
+    CHECK(reasons(stack, "cam0").count(EventReason::frame_incomplete) == 1);
+    CHECK(reasons(stack, "cam0").count(EventReason::wrong_size) == 1);
+    CHECK(reasons(stack, "cam0").count(EventReason::trigger_ignored) == 1);
+    CHECK(reasons(stack, "cam1").count(EventReason::frame_missing) == 1);
+    CHECK(reasons(stack, "cam2").count(EventReason::trigger_ignored) == 1);
+}
+
+TEST_CASE("cameras: swapped trigger cables are never published, and said") {
+    StackSettings settings{"swapped", 51, 2, 20, "", "", ""};
+    settings.swapped = true;
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find("trigger cable") != std::string::npos;
+    });
+    for (const auto& camera : status["cameras"]) {
+        CHECK(camera["state"] == "streaming");
+        CHECK(camera["frames_received"].get<int>() > 40);
+        CHECK(camera["frames_published"] == 0);
+        CHECK(camera["pairing"] == "searching");
+    }
+    CHECK(status["health"] == "degraded");
+}
+
+TEST_CASE("cameras: frames that are not proved are published as suspect where that is wanted") {
+    StackSettings settings{
+        "suspect", 52, 1, 20, "", fault("cam0", "restart_ids", 120), "on_unproved = \"flag\""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    judge(stack, 6);
+    const auto status = stack.wait_for_status(healthy);
+    const auto& camera = status["cameras"][0];
+    CHECK(camera["frames_suspect"].get<int>() >= 1);
+    CHECK(camera["frames_suspect"].get<int>() <= 5);
+    CHECK(camera["frames_published"] == camera["frames_received"]);
+}
+
+TEST_CASE("cameras: one without a usable clock is started slowly and then paired at its rate") {
+    Stack stack({"noclock", 53, 1, 20, "", "", "camera_clock = false"});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(0.5));
+}
+
+TEST_CASE("cameras: the service exposes by the brightness it sees, and the board knows before") {
+    StackSettings settings{"auto", 54, 1, 20, "exposure_us = 500\nlight = 0.4", "", ""};
+    settings.camera_extra = "[camera.auto_exposure]\ntarget = 0.4\nmax_us = 20000\n";
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        const auto exposure = s["cameras"][0]["exposure_ns"].template get<std::int64_t>();
+        const auto told = s["cameras"][0]["camera_exposure_ns"].template get<std::int64_t>();
+        return exposure > 1'500'000 && told != 0 && std::abs(exposure - told) < 50'000;
+    });
+    CHECK(status["cameras"][0]["frames_without_trigger"] == 0);
+    CHECK(judge(stack, 2).ok);
+}
+
+TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs again") {
+    StackSettings settings{
+        "replay", 55, 1, 20, "", fault("cam0", "restart_ids", 120) + fault("cam0", "drop_last", 130), ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    wait_for_stream<FrameStream>("cam0", stack.instance());
+    Process live({program("versavis"), "--instance", stack.instance(), "tail", "cam0", "--oldest", "--json"},
+                 stack.log_path("live.jsonl"));
+    judge(stack, 6);
+    stack.wait_for_status(healthy);
+    std::string recording;
+    CHECK(stack.tool({"tail", "cam0-evidence", "--oldest", "-n", "290", "--json"}, &recording) == 0);
+    const std::string path = stack.log_path("evidence.jsonl");
+    std::ofstream(path) << recording;
+    std::string output;
+    CHECK(stack.tool({"pair", "replay", path, "--json", "-o", stack.log_path("decisions.jsonl")}, &output) ==
+          0);
+    const auto summary = nlohmann::json::parse(output);
+    CHECK(summary["slips"] == 1);
+    CHECK(summary["locks"] == 2);
+    CHECK(summary["paired"].get<int>() > 120);
+    live.terminate();
+    std::ifstream decisions(stack.log_path("decisions.jsonl"));
+    const Pairs replayed = pairs(decisions, "paired");
+    std::ifstream frames(stack.log_path("live.jsonl"));
+    const Pairs published = pairs(frames, "");
+    CHECK(replayed.size() == summary["paired"]);
+    CHECK(std::includes(published.begin(), published.end(), replayed.begin(), replayed.end()));
+
+    std::ofstream(path) << "no json\n";
+    CHECK(stack.tool({"pair", "replay", path}, &output) == 69);
+    CHECK_THAT(output, Catch::Contains("line 1"));
+    CHECK(stack.tool({"pair", "replay", "/nowhere"}, &output) == 69);
+}
+
+TEST_CASE("cameras: a share of the link is planned for each, and too many are said") {
+    StackSettings settings{"link", 56, 2, 20, "", "", "link_mbps = 100"};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return healthy(s) && s["cameras"][0]["packet_delay_ns"] > 0 && s["cameras"][1]["packet_delay_ns"] > 0;
+    });
+    const double needed = status["cameras"][0]["needed_mbps"];
+    CHECK(needed == Approx(320 * 240 * 8 * 20 * 1e-6).epsilon(0.03));
+    CHECK(status["cameras"][1]["link_needed_mbps"] == Approx(2 * needed));
+    CHECK(judge(stack, 2).ok);
+}
+
+TEST_CASE("cameras: what a camera lacks, and who else has it, is its state") {
+    StackSettings settings{"states", 57, 3, 20, "temperature_c = 90", "", ""};
+    settings.extras = {"[camera.features]\nPixelFormat = \"Mono12\"\n", "trigger_line = \"Line7\"",
+                       "preset = \"dalsa\""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        for (const auto& camera : s["cameras"])
+            if (camera["state"] != "misconfigured") return false;
+        return true;
+    });
+    CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
+               Catch::Contains("PixelFormat") && Catch::Contains("allowed: Mono8"));
+    CHECK_THAT(status["cameras"][1]["hint"].get<std::string>(),
+               Catch::Contains("TriggerSource") && Catch::Contains("Line0, Software"));
+    CHECK_THAT(status["cameras"][2]["hint"].get<std::string>(), Catch::Contains("preset dalsa"));
+}
+
+TEST_CASE("cameras: an address in no network of this host is unreachable") {
+    StackSettings settings{"nowhere", 59, 1, 20, "", "", ""};
+    settings.device = "203.0.113.9";
+    Stack stack(settings);
+    stack.start_service();
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
+    CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
+               Catch::Contains("in no network of this host"));
+}
+
+TEST_CASE("cameras: a hot one is said") {
+    StackSettings settings{"hot", 58, 1, 20, "temperature_c = 90", "", ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {  // it delivers all the same
+        return healthy(s) &&
+               s["cameras"][0]["hint"].template get<std::string>().find("90 degrees") != std::string::npos;
+    });
+    CHECK(status["cameras"][0]["state"] == "streaming");
+}

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Board and USB3 Vision camera on one simulated bus: the unmodified service, through the real libusb and
+// Aravis. Run under umockdev-wrapper.
+#include <umockdev.h>
+
+#include <catch2/catch.hpp>
+#include <thread>
+
+#include "../support/stack.hpp"
+#include "board_host.hpp"
+#include "judge.hpp"
+#include "rig_u3v_camera.hpp"
+#include "usb_bridge.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+
+/// The testbed must live in the process that runs under the wrapper: board and camera do, too, here.
+class UsbRig {
+ public:
+    explicit UsbRig(const Stack& stack)
+        : testbed_(umockdev_testbed_new()),
+          zero_(host_now()),
+          motion_(zero_),
+          truth_(std::move(*rig::GroundTruth::create(stack.truth_path()))),
+          camera(testbed_.get(), "1-2", stack.scenario().cameras[0], zero_, motion_, *truth_,
+                 stack.scenario().seed),
+          board_(std::move(*rig::BoardHost::create(stack.scenario(), stack.socket_path(), zero_, motion_,
+                                                   *truth_, {&camera}))),
+          bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
+
+ private:
+    GObjectPtr<UMockdevTestbed> testbed_;
+    HostTime zero_;
+    rig::Motion motion_;
+    std::unique_ptr<rig::GroundTruth> truth_;
+
+ public:
+    RigU3vCamera camera;
+
+ private:
+    std::unique_ptr<rig::BoardHost> board_;
+    UsbBridge bridge_;
+};
+
+void judge(const Stack& stack) {
+    rig::JudgeSettings settings;
+    settings.instance = stack.instance();
+    settings.truth_path = stack.truth_path();
+    settings.seconds = 3;
+    const auto verdict = rig::judge(stack.scenario(), settings);
+    REQUIRE(verdict);
+    INFO(rig::to_table(*verdict));
+    CHECK(verdict->streams.at("cam0").wrong_pairs == 0);
+    CHECK(verdict->streams.at("cam0").items > 40);
+}
+
+}  // namespace
+
+TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes back") {
+    StackSettings settings{"u3v", 32, 1, 20, "", "", "", 320, 240, "usb"};
+    settings.device = "RIGCAM-cam0";  // its serial number
+    Stack stack(settings);
+    {
+        UsbRig rig(stack);
+        stack.start_service();
+        auto status = stack.wait_for_status(healthy);
+        CHECK(status["cameras"][0]["serial"] == "RIGCAM-cam0");
+        CHECK(status["cameras"][0]["packet_size"] == 0);
+        judge(stack);
+
+        rig.camera.camera().stall_data();
+        stack.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "silent"; });
+        status = stack.wait_for_status(healthy);
+        CHECK(status["cameras"][0]["connections"] == 2);
+        judge(stack);
+
+        rig.camera.device().unplug();
+        status = stack.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "absent"; });
+        CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(), Catch::Contains("no such camera"));
+        rig.camera.device().plug();
+        status = stack.wait_for_status(healthy);
+        CHECK(status["cameras"][0]["connections"] == 3);
+        judge(stack);
+        CHECK(stack.service().terminate() == 0);
+    }
+}
