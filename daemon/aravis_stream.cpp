@@ -13,13 +13,13 @@ namespace versavis::daemon {
 namespace {
 
 constexpr int receive_buffer = 32 << 20;
-constexpr unsigned shortest_retention_us = 500'000;
-constexpr double arrival_margin_us = 200'000;
+constexpr unsigned shortest_retention_us = 100'000;
+constexpr double readout_us = 50'000;
 
 /// A frame is kept open until its trailer may have come, even where the leader leaves when the exposure
-/// begins.
+/// begins. No longer: complete frames wait behind one that lost packets.
 unsigned frame_retention_us(const CameraConfiguration& configuration) {
-    const double longest = configuration.max_exposure_us + arrival_margin_us;
+    const double longest = configuration.max_exposure_us + readout_us;
     return std::max(shortest_retention_us, static_cast<unsigned>(std::lround(longest)));
 }
 

@@ -75,18 +75,14 @@ std::optional<double> brightness(const Image& image, double percentile) {
     return *at;
 }
 
-AutoExposure::AutoExposure(const AutoExposureConfiguration& settings, Duration first)
-    : settings_(settings),
-      exposure_(std::clamp(first, Duration{std::llround(settings.min_us * 1e3)},
-                           Duration{std::llround(settings.max_us * 1e3)})) {}
-
 std::optional<Duration> AutoExposure::update(double brightness) {
     const double error = settings_.target / std::max(brightness, darkest);
-    if (std::abs(std::log(error)) < dead_zone) return std::nullopt;
+    const double exposure_us = static_cast<double>(exposure_.ns) * 1e-3;
     const double factor =
         std::clamp(std::pow(error, part_of_the_way), 1 / settings_.largest_step, settings_.largest_step);
+    const bool right = std::abs(std::log(error)) < dead_zone;
     const double wanted_us =
-        std::clamp(static_cast<double>(exposure_.ns) * 1e-3 * factor, settings_.min_us, settings_.max_us);
+        std::clamp(right ? exposure_us : exposure_us * factor, settings_.min_us, settings_.max_us);
     const Duration wanted{std::llround(wanted_us * 1e3)};
     if (wanted == exposure_) return std::nullopt;
     exposure_ = wanted;

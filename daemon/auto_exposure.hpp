@@ -29,7 +29,9 @@ std::optional<double> brightness(const Image& image, double percentile);
 /// of the way in the logarithm, by a bounded factor, and small errors are left alone.
 class AutoExposure {
  public:
-    AutoExposure(const AutoExposureConfiguration& settings, Duration first);
+    /// `first`: what the camera exposes now, be it within the limits or not.
+    AutoExposure(const AutoExposureConfiguration& settings, Duration first)
+        : settings_(settings), exposure_(first) {}
 
     /// The exposure to set from now on; none: leave it.
     std::optional<Duration> update(double brightness);

@@ -24,6 +24,7 @@ double packets_per_frame(const BandwidthNeed& need) {
 }  // namespace
 
 double needed_mbps(const BandwidthNeed& need) {
+    if (need.packet_size <= gvsp_overhead) return 0;
     const double packets = packets_per_frame(need);
     const double bytes = static_cast<double>(need.frame_size) +
                          (packets + leader_and_trailer) * (gvsp_overhead + ethernet_overhead);

@@ -91,7 +91,7 @@ void Camera::run() {
 /// From opening the camera to its loss. A value: it was asked to stop.
 CameraResult<> Camera::session() {
     std::atomic<bool> control_lost{false};  // outlives the camera, whose heartbeat thread sets it
-    auto camera = open_camera(configuration_.device);
+    auto camera = open_camera(configuration_.device, [this] { return !pause({}); });
     if (!camera) return tl::unexpected(camera.error());
     if (!pause({})) return {};
     ArvDevice* device = arv_camera_get_device(camera->get());
@@ -125,7 +125,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
         return failed(done.error());
     ArvDevice* device = arv_camera_get_device(camera);
     const Duration exposure = fixed_exposure(device, setup);
-    pipeline_.set_camera_exposure(exposure);
+    pipeline_.set_camera_exposure(exposure, host_now());
     if (configuration_.auto_exposure.enabled) {
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
@@ -157,7 +157,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
 /// Cameras on one link are told how long to pause between packets.
 void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
     ArvDevice* device = arv_camera_get_device(camera);
-    packet_delay_ = {};
+    packet_delay_ = Duration{-1};  // what it was left with is unknown
     if (!ARV_IS_GV_DEVICE(device)) return;
     const guint packet_size = arv_camera_gv_get_packet_size(camera, nullptr);
     const Object<GInetAddress> own(G_INET_ADDRESS(g_object_ref(g_inet_socket_address_get_address(
@@ -207,8 +207,9 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream, const std:
 
 /// What changes slowly: temperature, and the share of the link as other cameras come and go.
 void Camera::look_after(ArvCamera* camera) {
+    const bool network = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
     const BandwidthShare share = surroundings_.bandwidth.share(configuration_.name);
-    if (share.packet_delay != packet_delay_) {
+    if (network && share.packet_delay != packet_delay_) {
         arv_camera_gv_set_packet_delay(camera, share.packet_delay.ns, nullptr);
         packet_delay_ = share.packet_delay;
     }
@@ -237,11 +238,14 @@ void Camera::control_exposure(ArvDevice* device) {
     const auto wanted = seen ? exposure_->update(*seen) : std::nullopt;
     if (!wanted) return;
     hooks_.exposure(*wanted);
-    pipeline_.set_camera_exposure(*wanted);
+    pipeline_.set_camera_exposure(*wanted, host_now());
     GlibError error;
     arv_device_set_float_feature_value(device, exposure_feature_.c_str(),
                                        static_cast<double>(wanted->ns) * 1e-3, error.out());
-    if (error.set()) log(LogLevel::warning, configuration_.name, "exposure cannot be set: {}", error.text());
+    if (error.set()) {
+        log(LogLevel::warning, configuration_.name, "exposure cannot be set: {}", error.text());
+        pipeline_.set_camera_exposure({}, host_now());
+    }
     const double period_ns = 1e9 / configuration_.rate_hz;
     exposure_holds_ =
         host_now() + Duration{std::llround(period_ns * (configuration_.auto_exposure.delay_frames + 2.0))};

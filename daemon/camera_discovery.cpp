@@ -90,9 +90,11 @@ const char* to_string(CameraState state) {
     return "unknown";
 }
 
-CameraResult<Object<ArvCamera>> open_camera(const std::string& device) {
+CameraResult<Object<ArvCamera>> open_camera(const std::string& device,
+                                            const std::function<bool()>& cancelled) {
     static std::mutex mutex;
     const std::lock_guard lock(mutex);
+    if (cancelled()) return problem(CameraState::absent, {device, "is not looked for any more", ""});
     std::optional<Listed> listed;
     if (!parse_address(device)) {
         // USB is listed at once; the network takes a second, and knows a camera's own name without being

@@ -2,6 +2,7 @@
 // Finds a camera by address, MAC, serial number or name, opens it and takes control; says why it cannot.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "camera_state.hpp"
@@ -11,6 +12,8 @@ namespace versavis::daemon {
 
 /// Blocks for seconds when the camera is not there. Opens one camera at a time: what Aravis knows of devices
 /// is shared by all threads.
-CameraResult<Object<ArvCamera>> open_camera(const std::string& device);
+/// `cancelled` is asked when its turn has come.
+CameraResult<Object<ArvCamera>> open_camera(const std::string& device,
+                                            const std::function<bool()>& cancelled);
 
 }  // namespace versavis::daemon

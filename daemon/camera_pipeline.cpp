@@ -309,10 +309,10 @@ void CameraPipeline::starved(std::uint64_t frames) {
         tell(pairing::Shortfall{0, EventReason::no_buffer});
 }
 
-void CameraPipeline::set_camera_exposure(Duration exposure) {
+void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     const std::lock_guard lock(mutex_);
     camera_exposure_ = exposure;
-    camera_exposure_since_ = host_now();
+    camera_exposure_since_ = since;
 }
 
 std::uint64_t CameraPipeline::newest_trigger() {

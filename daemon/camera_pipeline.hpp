@@ -53,8 +53,8 @@ class CameraPipeline final : private pairing::Outcome {
     /// Frames that found no slot to go to.
     void starved(std::uint64_t frames);
 
-    /// What the camera says that it exposes from now on; 0: it changes by itself.
-    void set_camera_exposure(Duration exposure);
+    /// What the camera says that it exposes from now on, about; 0: it changes by itself.
+    void set_camera_exposure(Duration exposure, HostTime since);
 
     /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
     void add(const pairing::Arrival& arrival);

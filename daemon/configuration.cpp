@@ -122,8 +122,22 @@ void read_auto_exposure(TomlFile& file, TableReader& reader, CameraConfiguration
     keys.finish();
 }
 
-CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
+/// A slave begins with the rate of its master, by which its other keys are checked.
+CameraConfiguration inherited(const toml::table& root, const toml::table& table) {
     CameraConfiguration camera;
+    const auto master = table["master"].value<std::string>();
+    const toml::array* all = root["camera"].as_array();
+    if (!master || all == nullptr) return camera;
+    for (const toml::node& node : *all) {
+        const toml::table* other = node.as_table();
+        if (other == nullptr || (*other)["name"].value_or(std::string()) != *master) continue;
+        camera.rate_hz = std::clamp((*other)["rate_hz"].value_or(camera.rate_hz), 0.1, 1000.0);
+        camera.max_exposure_us = std::max((*other)["max_exposure_us"].value_or(0.0), 0.0);
+    }
+    return camera;
+}
+
+CameraConfiguration read_camera(TomlFile& file, TableReader& reader, CameraConfiguration camera) {
     reader.read("name", camera.name);
     reader.read("device", camera.device);
     read_trigger(reader, camera);
@@ -139,6 +153,9 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     reader.choose<OnUnproved>("on_unproved", camera.on_unproved,
                               {{"withhold", OnUnproved::withhold}, {"flag", OnUnproved::flag}});
     reader.read("camera_clock", camera.camera_clock);
+    if (!camera.camera_clock && camera.latest_arrival_ms > 900)
+        reader.fail("latest_arrival_ms", "without 'camera_clock', 'latest_arrival_ms' must be 900 at most",
+                    "its slow start has a pulse a second");
     reader.read("chunks", camera.chunks);
     reader.read("ptp", camera.ptp);
     reader.read("max_temperature_c", camera.max_temperature_c, 0, 200);
@@ -317,7 +334,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
     }
     for (const toml::table* table : top.tables("camera")) {
         TableReader reader(file, *table);
-        configuration.cameras.push_back(read_camera(file, reader));
+        configuration.cameras.push_back(read_camera(file, reader, inherited(*root, *table)));
         names.check(reader, configuration.cameras.back().name);
         reader.finish();
     }

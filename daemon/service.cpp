@@ -110,8 +110,12 @@ void Service::add_camera(const CameraConfiguration& configuration) {
         events_->add({EventKind::camera_connected, EventReason::none, index, name});
         if (pipeline->triggered()) start(*pipeline, pipeline->first_start());
     };
-    hooks.lost = [this, pipeline, index, name = configuration.name] {
+    hooks.lost = [this, pipeline, index, name = configuration.name, master_name = configuration.master] {
         if (pipeline->triggered()) board_->stop_cameras(pipeline->board_mask());
+        // A slave's start may have slowed its master down.
+        const CameraUnit* master = find_camera(master_name);
+        if (master != nullptr && master->camera->streaming())
+            board_->start_cameras(master->pipeline->board_mask(), pairing::Start::steady);
         events_->add({EventKind::camera_lost, EventReason::none, index, name});
     };
     hooks.exposure = [this, pipeline, configuration](Duration exposure) {
@@ -153,6 +157,12 @@ void Service::start_camera(CameraUnit& unit, pairing::Start how) {
     start(*unit.pipeline, how);
     // Lost meanwhile: its own stop may have overtaken this start.
     if (!unit.camera->streaming()) board_->stop_cameras(unit.pipeline->board_mask());
+}
+
+const Service::CameraUnit* Service::find_camera(const std::string& name) const {
+    for (const CameraUnit& unit : cameras_)
+        if (unit.configuration.name == name) return &unit;
+    return nullptr;
 }
 
 Service::CameraUnit* Service::camera_at(unsigned output) {

@@ -50,6 +50,7 @@ class Service final : private BoardListener {
     void add_camera(const CameraConfiguration& configuration);
     void publish_status(HostTime now);
     std::vector<StreamStatus> stream_status(HostTime now);
+    const CameraUnit* find_camera(const std::string& name) const;
     CameraUnit* camera_at(unsigned output);
     void start(CameraPipeline& pipeline, pairing::Start how);
     void start_camera(CameraUnit& unit, pairing::Start how);

@@ -16,12 +16,16 @@ namespace {
 
 using versavis::bench::Metric;
 
-const std::map<std::string, std::function<std::vector<Metric>()>> benches{
-    {"ring", versavis::bench::bench_ring},
-    {"end_to_end", versavis::bench::bench_end_to_end},
-    {"firmware", versavis::bench::bench_firmware}};
+using Benches = std::map<std::string, std::function<std::vector<Metric>()>>;
 
-nlohmann::json run(const std::string& only) {
+Benches all_benches(const double& seconds) {
+    return {{"ring", versavis::bench::bench_ring},
+            {"cameras", [&] { return versavis::bench::bench_cameras(seconds); }},
+            {"end_to_end", versavis::bench::bench_end_to_end},
+            {"firmware", versavis::bench::bench_firmware}};
+}
+
+nlohmann::json run(const Benches& benches, const std::string& only) {
     nlohmann::json document = nlohmann::json::object();
     for (const auto& [name, bench] : benches) {
         if (!only.empty() && only != name) continue;
@@ -42,12 +46,17 @@ int main(int argc, char** argv) {
     CLI::App app{"Benchmarks of VersaVIS"};
     std::string only;
     std::string json_path;
-    app.add_option("name", only, "ring, end_to_end or firmware; without it, all")
-        ->check(CLI::IsMember({"ring", "end_to_end", "firmware"}));
+    double seconds = 30;
+    const Benches benches = all_benches(seconds);
+    app.add_option("name", only, "ring, cameras, end_to_end or firmware; without it, all")
+        ->check(CLI::IsMember({"ring", "cameras", "end_to_end", "firmware"}));
+    app.add_option("--seconds", seconds, "How long three cameras run")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     app.add_option("--json", json_path, "File for the results");
     try {
         app.parse(argc, argv);
-        const nlohmann::json document = run(only);
+        const nlohmann::json document = run(benches, only);
         if (json_path.empty()) return EX_OK;
         std::ofstream file(json_path);
         file << document.dump(2) << '\n';

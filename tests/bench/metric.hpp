@@ -22,6 +22,9 @@ std::vector<Metric> bench_ring();
 /// The service against Aravis's own test program on the same stream, and its stamps against the rig's truth.
 std::vector<Metric> bench_end_to_end();
 
+/// Three cameras and a fast IMU for `seconds`, and how soon a frame can be read, against a bare callback.
+std::vector<Metric> bench_cameras(double seconds);
+
 /// Instructions and memory of the firmware's core.
 std::vector<Metric> bench_firmware();
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace versavis::test {
 
@@ -55,7 +56,8 @@ void Totals::add(const WorldSettings& settings, const Verdict& verdict) {
     withheld += verdict.withheld;
     withheld_needlessly += verdict.withheld_needlessly;
     slips += verdict.slips;
-    if (verdict.final_state != pairing::State::locked) ++not_locked;
+    const Duration ten_periods{std::llround(1e10 / settings.rate_hz)};
+    if (verdict.unproved_at_end > seconds(1) + ten_periods) ++not_locked;
     if (verdict.wrong != 0) wrong_seeds.push_back(settings.seed);
     if (settings.rate_hz != 20) return;
     if (verdict.published != 0 && settings.late_frames == 0)

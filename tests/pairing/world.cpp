@@ -23,7 +23,9 @@ constexpr Duration command_delay = milliseconds(2);
 constexpr Duration missing_packets_timeout = milliseconds(110);
 constexpr double board_drift = 20e-6;
 constexpr double camera_drift = 100e-6;
+constexpr int frames_in_camera = 3;
 constexpr std::uint64_t frames_of_grace = 5;
+constexpr std::uint64_t frames_of_pattern = 20;
 
 class World final : private pairing::Outcome {
  public:
@@ -52,6 +54,7 @@ class World final : private pairing::Outcome {
             event.happen();
         }
         verdict_.final_state = pairing_.state();
+        verdict_.unproved_at_end = last_arrival_ - last_published_;
         judge_withheld();
         return verdict_;
     }
@@ -150,7 +153,9 @@ class World final : private pairing::Outcome {
         fault_ = fault == settings_.faults.end() ? std::nullopt : std::optional(fault->second);
         if (fault_) disturb(*fault_);
         if (!board_alive_) return;
-        const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored;
+        const bool crowded =
+            link_busy_ - now_ > frame_on_link() * (frames_in_camera - 1) && settings_.link_load > 0;
+        const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored && !crowded;
         const bool lost = fault_ == FaultKind::record_lost;
         const Truth truth{life_, trigger_, pulses_, !lost};
         const HostTime start = now_ + microseconds(20);
@@ -162,7 +167,8 @@ class World final : private pairing::Outcome {
         exposure.end_on_host = start + exposure_ + between(-microseconds(30), microseconds(30));
         exposure.earliest_on_host = exposure.end_on_host;
         if (!settings_.strobe) exposure.kind = StampKind::trigger_edge;
-        exposure.exposed = takes || !settings_.strobe || swapped_;
+        exposure.exposed =
+            takes || !settings_.strobe || swapped_ || (crowded && settings_.drops_after_exposure);
         if (!lost) send_record(exposure);
         if (!swapped_) expose(start, truth, takes);
         // It follows the light.
@@ -197,6 +203,7 @@ class World final : private pairing::Outcome {
         }
         const HostTime end = start + exposure_;
         HostTime arrives = end + settings_.readout + between(-settings_.jitter, settings_.jitter);
+        if (settings_.link_load > 0) arrives = link_busy_ = std::max(link_busy_, end) + frame_on_link();
         if (chance(settings_.late_frames)) arrives = arrives + between({}, milliseconds(40));
         if (fault_ == FaultKind::frame_lost) return;
         if (fault_ == FaultKind::last_packet_lost || fault_ == FaultKind::leader_lost) {
@@ -223,11 +230,15 @@ class World final : private pairing::Outcome {
         at(arrives, [this, frame, id, power = camera_power_]() mutable {
             if (power != camera_power_) return;  // it was off when it should have sent this
             frame.block_id = unwrap(id);
-            frame.arrived = now_;
+            frame.arrived = last_arrival_ = now_;
             if (truths_[frame.slot].trigger != 0) ++verdict_.frames;
             ++frames_since_slip_;
             pairing_.add(frame);
         });
+    }
+
+    Duration frame_on_link() const {
+        return {std::llround(static_cast<double>(period_.ns) * settings_.link_load)};
     }
 
     std::uint64_t unwrap(std::uint64_t id) {
@@ -256,7 +267,13 @@ class World final : private pairing::Outcome {
         grace_.push_back({pulses_ - std::min(pulses_, in_flight), pulses_ + frames_of_grace});
         switch (kind) {
             case FaultKind::id_restart: next_id_ = 1; break;
-            case FaultKind::clock_jump: camera_offset_ += clock_step().ns; break;
+            case FaultKind::clock_jump: {
+                const Duration step = clock_step();
+                camera_offset_ += step.ns;
+                // Only the pattern can tell that it is the clock: the others could have stepped together.
+                if (step.ns % period_.ns == 0) grace_.back().second += frames_of_pattern;
+                break;
+            }
             case FaultKind::camera_reboot: reboot_camera(); break;
             case FaultKind::board_reset: reset_board(); break;
             case FaultKind::usb_stall:
@@ -325,6 +342,7 @@ class World final : private pairing::Outcome {
     // --- what pairing decides
     void paired(const Arrival& arrival, const Exposure& exposure) override {
         const Truth& truth = truths_[arrival.slot];
+        last_published_ = now_;
         if (verdict_.published++ == 0) verdict_.first_published = now_ - started_;
         if (truth.trigger != exposure.trigger || truth.life != exposure.tick >> 32U) ++verdict_.wrong;
         if (recovering_since_) verdict_.recoveries.push_back(now_ - *recovering_since_);
@@ -393,8 +411,11 @@ class World final : private pairing::Outcome {
     std::uint64_t next_id_;
     std::int64_t camera_offset_ = 5'000'000'000'000;
     HostTime frames_free_;
+    HostTime link_busy_;
 
     HostTime started_;
+    HostTime last_arrival_;
+    HostTime last_published_ = begin;
     std::optional<HostTime> recovering_since_;
     bool slipped_ = false;
     std::uint64_t frames_since_slip_ = 0;

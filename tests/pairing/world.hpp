@@ -52,6 +52,9 @@ struct WorldSettings {
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames = 0.005;  ///< share of frames that the host is slow to take, by 40 ms at most
+    double link_load = 0;  ///< time that a frame takes on the link, in periods; above 1 frames queue in the
+                           ///< camera, and triggers are lost when three wait
+    bool drops_after_exposure = false;          ///< ... not ignored, but exposed and then dropped
     std::map<std::uint64_t, FaultKind> faults;  ///< by the number of the pulse at which they happen
     std::uint64_t pulses = 300;
 };
@@ -72,6 +75,7 @@ struct Verdict {
     std::vector<Duration> recoveries;  ///< from the end of an outage to the first published frame
     std::uint64_t longest_relock = 0;  ///< frames from a slip to the next published one
     pairing::State final_state = pairing::State::searching;
+    Duration unproved_at_end;  ///< frames came for so long after the last that was published
 };
 
 /// Runs one world. The same settings lead to the same verdict.

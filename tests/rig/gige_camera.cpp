@@ -444,6 +444,9 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         truth.sent = sent;
         truth_.add(truth);
     };
+    frame.sent = [this, serial = truth.serial](HostTime at) {
+        truth_.add(TrueDeparture{settings_.name, serial, at});
+    };
     transmitter_.send(std::move(frame));
     return Interval{truth.start, truth.end};
 }

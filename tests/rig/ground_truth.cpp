@@ -27,6 +27,11 @@ void GroundTruth::add(const TrueExposure& e) {
         e.camera, e.board_life, e.trigger, e.serial, e.block_id, e.start.ns, e.end.ns, e.sent));
 }
 
+void GroundTruth::add(const TrueDeparture& d) {
+    write(fmt::format(R"({{"type":"departure","camera":"{}","serial":{},"at_ns":{}}})", d.camera, d.serial,
+                      d.at.ns));
+}
+
 void GroundTruth::add(const TrueImuSample& s) {
     write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})", s.imu,
                       s.board_life, s.number, s.at.ns));

@@ -32,6 +32,13 @@ struct TrueExposure {
     bool sent = false;
 };
 
+/// The last packet of a frame left the camera.
+struct TrueDeparture {
+    std::string camera;
+    std::uint64_t serial = 0;
+    HostTime at;
+};
+
 struct TrueImuSample {
     std::string imu;
     std::uint64_t board_life = 0;
@@ -47,6 +54,7 @@ class GroundTruth {
 
     void add(const TrueTrigger& trigger);
     void add(const TrueExposure& exposure);
+    void add(const TrueDeparture& departure);
     void add(const TrueImuSample& sample);
 
  private:

@@ -199,8 +199,8 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
     if (!possible) return;
     if (frame.missing != Missing::leader) send_packets(frame, settings, 0, 0, true);
     if (const auto left = until(frame.due); left.count() > 0) std::this_thread::sleep_for(left);
-    std::uint32_t end = data_packets(frame, settings) + 2;
-    if (frame.missing == Missing::end) end = std::max(end, 3U) - 2;  // the last data and the trailer
+    std::uint32_t end = data_packets(frame, settings) + 1;  // the trailer
+    if (frame.missing == Missing::end) --end;
     const double link_ns = link_mbps_ > 0 ? settings.packet_size * 8e3 / link_mbps_ : 0;
     const double ns_per_packet = link_ns + static_cast<double>(settings.packet_delay_ns);
     const HostTime begin = host_now();
@@ -209,6 +209,9 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
         if (const auto left = until(due); left.count() > 0) std::this_thread::sleep_for(left);
         send_packets(frame, settings, first, std::min<std::uint32_t>(first + batch, end) - 1, true);
     }
+    const HostTime last = host_now();
+    if (frame.missing != Missing::end) send_packets(frame, settings, end, end, true);
+    frame.sent(last);
 }
 
 /// One packet that is made up, not taken from the pixels as they are. Empty: it is.

@@ -38,6 +38,7 @@ struct StreamFrame {
     HostTime leader_due;               ///< when the leader leaves
     HostTime due;                      ///< when the first packet after it leaves
     std::function<void(bool sent)> done;
+    std::function<void(HostTime at)> sent;  ///< its last packet leaves
 };
 
 struct StreamSettings {

@@ -33,7 +33,7 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
             slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
             settings.camera_extra, at(settings.extras, i));
     }
-    configuration += "[[imu]]\nname = \"imu0\"\n";
+    configuration += "[[imu]]\nname = \"imu0\"\n" + settings.imu_extra;
     scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);
     configuration_path_ = directory_.write("versavis.toml", configuration);
     auto loaded = rig::load_scenario(scenario_path_);

@@ -31,6 +31,7 @@ struct StackSettings {
     bool swapped = false;       ///< the service takes each camera for another
     std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
+    std::string imu_extra{};               ///< more keys of the IMU
 };
 
 class Stack {

@@ -118,6 +118,31 @@ TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") 
     CHECK(bench.pipeline.report().published == std::size(pattern) - 1);
 }
 
+TEST_CASE(
+    "camera_pipeline: an exposure line that shows another exposure than the camera tells proves nothing") {
+    auto configuration = camera(20);
+    configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);
+    configuration.check_exposure = GENERATE(true, false);
+    Bench bench(configuration);
+    auto reader = bench.reader("cam0");
+    bench.pipeline.set_camera_exposure(milliseconds(30), bench.begin - seconds(10));
+    const bool believed = !configuration.check_exposure;
+    const bool flagged = configuration.on_unproved == OnUnproved::flag;
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick);
+        bench.frame(tick);
+    }
+    const auto report = bench.pipeline.report();
+    CHECK(report.exposure_contradicted == !believed);
+    CHECK(report.published == (believed || flagged ? std::size(pattern) : 0));
+    CHECK(report.suspect == (!believed && flagged ? std::size(pattern) : 0));
+    if (report.suspect == 0) return;
+    const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+    CHECK((frame.flags & flag_suspect) != 0);
+    CHECK(frame.sigma_ns == sigma_unknown);
+    CHECK(frame.trigger == 1);
+}
+
 TEST_CASE("camera_pipeline: slow cameras are given the time of their pattern before they are started again") {
     Bench bench(camera(0.4));
     bench.pipeline.start_requested(pairing::Start::pattern, host_now());

@@ -16,6 +16,8 @@ constexpr Duration shortest_check = milliseconds(100);
 constexpr Duration shortest_check_by_arrival = milliseconds(300);
 constexpr std::uint64_t ids_back = 16;
 constexpr int patterns_before_slow = 2;
+constexpr int starts_in_a_row = 3;
+constexpr int longest_patience = 10;
 constexpr Duration slow_duration = seconds(6);
 constexpr Duration search_patience = seconds(10);
 constexpr std::int64_t step_tolerance_ns = 30'000;
@@ -118,6 +120,7 @@ void Pairing::accept(const std::vector<std::uint64_t>& triggers) {
     clock_ = Relation(true);
     latency_ = Relation(false);
     proved_.reset();
+    shortest_delay_ns_ = INT64_MAX;
     fruitless_starts_ = 0;
     outcome_.locked(exposures_.front().exposure);
     for (const std::uint64_t trigger : triggers)
@@ -176,7 +179,8 @@ bool Pairing::decide_locked() {
         drop_front(EventReason::exposure_missing);
     } else if (record != nullptr && !record->exposure.exposed) {
         drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none
-    } else if (record != nullptr && verified(arrival, *record) && !early(arrival, *record)) {
+    } else if (record != nullptr && verified(arrival, *record) && !early(arrival, *record) &&
+               (timeline_ == Timeline::camera || latency_trusted())) {
         waits_for_witness_ = needs_witness(arrival, *record) && !has_witness();
         if (waits_for_witness_) return false;
         pair_front(record->exposure.trigger);
@@ -191,9 +195,23 @@ std::int64_t Pairing::lateness_ns(const Arrival& arrival, const Record& record) 
     return latency_.expected_instant_ns(arrival.arrived.ns) - record.exposure.end_on_host.ns;
 }
 
-/// A frame may be late, but not early.
+/// A frame may be late, but not earlier than the quickest ever was.
 bool Pairing::early(const Arrival& arrival, const Record& record) const {
-    return 3 * lateness_ns(arrival, record) < -2 * exposures_.smallest_gap_ns();
+    const std::int64_t delay = (arrival.arrived - record.exposure.end_on_host).ns;
+    return 3 * (delay - shortest_delay_ns_) < -2 * exposures_.smallest_gap_ns();
+}
+
+/// Frames that come later and later wait for each other somewhere. When one of them is dropped, the others
+/// come earlier by a period, and seem to be of the trigger before, as they do by their ids if those do not
+/// count the dropped one.
+bool Pairing::latency_trusted() const {
+    const std::int64_t gap = exposures_.smallest_gap_ns();
+    return 6 * latency_.deviation_ns() <= gap &&
+           4 * (latency_.difference_ns() - shortest_delay_ns_) < 3 * gap;
+}
+
+bool Pairing::punctual(const Arrival& arrival, const Record& record) const {
+    return 3 * std::abs(lateness_ns(arrival, record)) < exposures_.smallest_gap_ns();
 }
 
 bool Pairing::late(const Arrival& arrival, const Record& record) const {
@@ -206,15 +224,14 @@ bool Pairing::needs_witness(const Arrival& arrival, const Record& record) const 
     const bool all_taken = record.exposure.kind != StampKind::trigger_edge &&
                            record.exposure.trigger > proved_->record.exposure.trigger &&
                            perhaps_not_taken(proved_->record, record) == 0;
-    return timeline_ == Timeline::camera && !all_taken && late(arrival, record);
+    return timeline_ == Timeline::camera && !all_taken && (late(arrival, record) || !latency_trusted());
 }
 
 /// A later frame for which all three kinds of evidence agree: then the two did not step before it either.
 bool Pairing::has_witness() const {
     return std::any_of(arrivals_.begin() + 1, arrivals_.end(), [this](const Arrival& later) {
         const Record* record = by_clock(later, loose_ns());
-        return record != nullptr && verified(later, *record) &&
-               3 * std::abs(lateness_ns(later, *record)) < exposures_.smallest_gap_ns();
+        return record != nullptr && latency_trusted() && verified(later, *record) && punctual(later, *record);
     });
 }
 
@@ -222,6 +239,7 @@ void Pairing::slip(const Arrival& arrival) {
     state_ = State::checking;
     suspicions_ = {};
     undecided_ = 0;
+    waits_for_witness_ = false;
     slipped_ = arrival.arrived;
     outcome_.slipped(arrival);
 }
@@ -234,9 +252,9 @@ const Record* Pairing::by_clock(const Arrival& arrival, std::int64_t tolerance_n
 
 /// None as well when frames come too irregularly to tell.
 const Record* Pairing::by_latency(const Arrival& arrival) const {
-    const std::int64_t gap = exposures_.smallest_gap_ns();
-    if (3 * latency_.deviation_ns() > gap / 2) return nullptr;
-    return exposures_.near(Timeline::arrival, latency_.expected_instant_ns(arrival.arrived.ns), gap / 3);
+    if (!latency_trusted()) return nullptr;
+    return exposures_.near(Timeline::arrival, latency_.expected_instant_ns(arrival.arrived.ns),
+                           exposures_.smallest_gap_ns() / 3);
 }
 
 /// The only exposure that ids and arrival allow.
@@ -267,11 +285,13 @@ bool Pairing::decide_checking() {
     }
     const Record* clocked =
         by_clock(arrival, std::min(loose_ns(), clock_.tolerance_ns(expected_instant_ns(arrival))));
-    if (clocked != late || (clocked != nullptr && (clocked->used || !clocked->exposure.exposed)))
-        clocked = nullptr;
-    const Record* counted = timeline_ == Timeline::camera ? by_ids(arrival) : nullptr;
-    if (counted != late) counted = nullptr;
-    if (!suspect(Stepped::ids, arrival, clocked) && !suspect(Stepped::clock, arrival, counted))
+    const bool free = clocked != nullptr && !clocked->used && clocked->exposure.exposed;
+    // A clock that steps does not hit another exposure to some microseconds. When it fits so well, it is ids
+    // and arrivals that have stepped together.
+    const bool may_have_stepped = timeline_ == Timeline::camera && clocked == nullptr;
+    const Record* counted = may_have_stepped ? by_ids(arrival) : nullptr;
+    if (!suspect(Stepped::ids, arrival, free && clocked == late ? clocked : nullptr) &&
+        !suspect(Stepped::clock, arrival, counted == late ? counted : nullptr))
         give_up_front();
     return true;
 }
@@ -334,8 +354,10 @@ void Pairing::start_requested(Start start, HostTime now) {
     if (start == Start::steady) return;
     ++fruitless_starts_;
     frames_since_start_ = 0;
-    start_ends_ =
-        now + (start == Start::slow ? slow_duration : limits_.pattern_duration) + limits_.latest_arrival;
+    // A start costs triggers: what does not help is asked for less and less often.
+    const int patience = std::clamp(fruitless_starts_ - starts_in_a_row, 1, longest_patience);
+    const Duration duration = start == Start::slow ? slow_duration : limits_.pattern_duration;
+    start_ends_ = now + (duration + limits_.latest_arrival) * patience;
 }
 
 void Pairing::pair_front(std::uint64_t trigger) {
@@ -345,7 +367,8 @@ void Pairing::pair_front(std::uint64_t trigger) {
     Record& record = *exposures_.find(trigger);
     record.used = true;
     if (arrival.camera_time.ns != 0) clock_.track(arrival.camera_time.ns, record.exposure.start.ns);
-    if (!latency_.known() || !late(arrival, record))
+    shortest_delay_ns_ = std::min(shortest_delay_ns_, (arrival.arrived - record.exposure.end_on_host).ns);
+    if (!latency_.known() || punctual(arrival, record))
         latency_.track(arrival.arrived.ns, record.exposure.end_on_host.ns);
     proved_ = Pair{arrival, record};
     outcome_.paired(arrival, record.exposure);
@@ -434,6 +457,7 @@ void Pairing::reset() {
     exposures_ = ExposureLog(limits_.period);
     shortfalls_.clear();
     proved_.reset();
+    waits_for_witness_ = false;
     start_.reset();
     fruitless_starts_ = 0;
     frames_since_start_ = 0;

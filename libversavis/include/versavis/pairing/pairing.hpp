@@ -113,6 +113,8 @@ class Pairing {
     bool ids_agree(const Arrival& arrival, const Record& record) const;
     bool ids_exact(const Arrival& arrival, const Record& record) const;
     std::int64_t lateness_ns(const Arrival& arrival, const Record& record) const;
+    bool latency_trusted() const;
+    bool punctual(const Arrival& arrival, const Record& record) const;
     bool late(const Arrival& arrival, const Record& record) const;
     bool early(const Arrival& arrival, const Record& record) const;
     bool needs_witness(const Arrival& arrival, const Record& record) const;
@@ -146,6 +148,7 @@ class Pairing {
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::deque<Shortfall> shortfalls_;
     Relation clock_{true};                   ///< camera time against the start of the exposure
+    std::int64_t shortest_delay_ns_ = 0;     ///< from the end of an exposure to its frame, since the lock
     Relation latency_{false};                ///< arrival against its end on the host
     std::optional<Pair> proved_;             ///< the newest that was published
     std::array<Suspicion, 2> suspicions_{};  ///< by Stepped

@@ -26,6 +26,9 @@ class Relation {
     /// How far a frame may lie off where it is expected, by what was seen so far.
     std::int64_t tolerance_ns(std::int64_t instant_ns) const;
 
+    /// Frame time less instant, of the newest pair.
+    std::int64_t difference_ns() const { return difference_ns_; }
+
     /// Mean distance from where frames were expected.
     std::int64_t deviation_ns() const { return deviation_ns_; }
 

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <arv.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "../support/stack.hpp"
+#include "cpu_time.hpp"
+#include "judge.hpp"
+#include "metric.hpp"
+#include "scene.hpp"
+#include "versavis/stream.hpp"
+
+namespace versavis::bench {
+
+namespace {
+
+constexpr Duration latency_time = seconds(10);
+
+using Arrivals = std::map<std::uint64_t, HostTime>;  ///< by the serial in the pixels
+
+bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+
+std::uint64_t serial_of(const void* pixels) {
+    rig::FrameMark mark{};
+    std::memcpy(&mark, pixels, sizeof mark);
+    return mark.magic == rig::FrameMark::expected_magic ? mark.serial : 0;
+}
+
+struct Bare {
+    ArvStream* stream = nullptr;
+    Arrivals arrivals;
+};
+
+void on_frame(void* user, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
+    if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
+    const HostTime now = host_now();
+    auto& bare = *static_cast<Bare*>(user);
+    ArvBuffer* buffer = arv_stream_try_pop_buffer(bare.stream);
+    if (buffer == nullptr) return;
+    if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) {
+        std::size_t size = 0;
+        bare.arrivals[serial_of(arv_buffer_get_data(buffer, &size))] = now;
+    }
+    arv_stream_push_buffer(bare.stream, buffer);
+}
+
+/// Frames of a camera that runs freely, in the callback of Aravis's stream thread.
+Arrivals bare_callback(const std::string& address) {
+    Bare bare;
+    ArvCamera* camera = arv_camera_new(address.c_str(), nullptr);
+    if (camera == nullptr) throw std::runtime_error("no camera at " + address);
+    arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+    arv_camera_gv_set_packet_size(camera, 9000, nullptr);
+    bare.stream = arv_camera_create_stream(camera, on_frame, &bare, nullptr);
+    g_object_set(bare.stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+                 32 << 20, nullptr);
+    for (int i = 0; i < 6; ++i)
+        arv_stream_push_buffer(bare.stream, arv_buffer_new_allocate(arv_camera_get_payload(camera, nullptr)));
+    arv_camera_start_acquisition(camera, nullptr);
+    const timespec time{latency_time.ns / 1'000'000'000, 0};
+    nanosleep(&time, nullptr);
+    arv_camera_stop_acquisition(camera, nullptr);
+    g_object_unref(bare.stream);
+    g_object_unref(camera);
+    return bare.arrivals;
+}
+
+/// Frames of the service, when a reader that waits for them has them.
+Arrivals by_reader(test::Stack& stack) {
+    Arrivals arrivals;
+    auto stream = test::wait_for_stream<FrameStream>("cam0", stack.instance());
+    const HostTime end = host_now() + latency_time;
+    while (host_now() < end) {
+        const auto item = stream.wait(seconds(1));
+        if (item.found == Found::item) arrivals[serial_of(item.payload)] = host_now();
+    }
+    return arrivals;
+}
+
+double median_us(const Arrivals& arrivals, const Arrivals& departures) {
+    std::vector<double> latencies;
+    for (const auto& [serial, at] : arrivals)
+        if (const auto left = departures.find(serial); left != departures.end())
+            latencies.push_back(static_cast<double>((at - left->second).ns) * 1e-3);
+    if (latencies.size() < 50) throw std::runtime_error("too few frames for a latency");
+    std::nth_element(latencies.begin(), latencies.begin() + static_cast<std::ptrdiff_t>(latencies.size() / 2),
+                     latencies.end());
+    return latencies[latencies.size() / 2];
+}
+
+Arrivals departures(const std::string& truth_path) {
+    Arrivals departures;
+    std::ifstream file(truth_path);
+    for (std::string line; std::getline(file, line);) {
+        const auto record = nlohmann::json::parse(line, nullptr, false);
+        if (!record.is_discarded() && record["type"] == "departure")
+            departures[record["serial"]] = HostTime{record["at_ns"]};
+    }
+    return departures;
+}
+
+std::vector<Metric> latency() {
+    test::Stack stack({"benchlat", 41, 1, 20, "", "", "", 1920, 1200});
+    stack.start_rig();
+    const Arrivals bare = bare_callback(stack.scenario().cameras[0].address);
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    const Arrivals read = by_reader(stack);
+    const Arrivals left = departures(stack.truth_path());
+    const double bare_us = median_us(bare, left);
+    const double read_us = median_us(read, left);
+    return {{"bare_callback_latency_p50", bare_us, "us", 1e9},
+            {"frame_latency_p50", read_us, "us", 1e9},
+            {"frame_latency_to_bare_callback", read_us / bare_us, "ratio", 1.5}};
+}
+
+std::vector<Metric> three_cameras(double seconds) {
+    test::StackSettings settings{"benchcam", 42, 3, 20, "", "", "", 1920, 1200};
+    settings.imu_extra = "rate_hz = 800\n";
+    test::Stack stack(settings);
+    stack.start_rig();
+    const double aravis = aravis_cpu_per_gb(stack, std::min(seconds, 20.0));
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    const double before = cpu_seconds(stack.service().pid());
+    const HostTime begin = host_now();
+    rig::JudgeSettings judging;
+    judging.instance = stack.instance();
+    judging.truth_path = stack.truth_path();
+    judging.seconds = seconds;
+    const auto verdict = rig::judge(stack.scenario(), judging);
+    if (!verdict) throw std::runtime_error(verdict.error().message());
+    const double elapsed = static_cast<double>((host_now() - begin).ns) * 1e-9;
+    const double cpu = cpu_seconds(stack.service().pid()) - before;
+    double wrong = 0;
+    double lost = 0;
+    double rate = 0;
+    for (const auto& [name, stream] : verdict->streams) {
+        wrong += static_cast<double>(stream.wrong_pairs);
+        lost += static_cast<double>(stream.lost);
+        if (name != stack.scenario().imu) rate += stream.rate_hz;
+    }
+    return {
+        {"three_cameras_wrong", wrong, "items", 0},
+        {"three_cameras_lost", lost, "items", 0},
+        {"three_cameras_cpu_to_arv_camera_test", cpu / (rate * elapsed * frame_gb) / aravis, "ratio", 1.1}};
+}
+
+}  // namespace
+
+std::vector<Metric> bench_cameras(double seconds) {
+    std::vector<Metric> metrics = latency();
+    for (Metric& metric : three_cameras(seconds)) metrics.push_back(std::move(metric));
+    return metrics;
+}
+
+}  // namespace versavis::bench

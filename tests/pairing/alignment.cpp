@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/pairing/alignment.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::pairing;
+
+namespace {
+
+/// Exposures of 2 ms at these ticks of 50 ms, and the frames of some of them.
+class Bench {
+ public:
+    explicit Bench(const std::vector<int>& ticks) : exposures(Limits{}.period) {
+        std::uint64_t trigger = 0;
+        for (const int tick : ticks) {
+            Exposure exposure;
+            exposure.trigger = ++trigger;
+            exposure.start = BoardTime{1'000'000'000 + tick * 50'000'000LL};
+            exposure.end = exposure.start + milliseconds(2);
+            exposure.end_on_host = exposure.earliest_on_host = HostTime{exposure.end.ns};
+            exposures.add(exposure);
+        }
+    }
+
+    /// The frame of the exposure with this number.
+    void frame(std::uint64_t trigger, Duration late = milliseconds(3)) {
+        const Exposure& exposure = exposures.find(trigger)->exposure;
+        Arrival arrival;
+        arrival.block_id = 100 + trigger;
+        arrival.camera_time = CameraTime{exposure.start.ns + 9'000'000'000};
+        arrival.arrived = exposure.end_on_host + late;
+        frames.push_back(arrival);
+    }
+
+    std::vector<std::uint64_t> align(Timeline timeline = Timeline::camera) const {
+        return pairing::align(frames, exposures, timeline, Limits{});
+    }
+
+    ExposureLog exposures;
+    std::vector<Arrival> frames;
+};
+
+using Triggers = std::vector<std::uint64_t>;
+
+}  // namespace
+
+TEST_CASE("alignment: irregular gaps name the triggers; regular ones and too few frames name nothing") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {1, 2, 3, 4}) bench.frame(trigger);
+    CHECK(bench.align().empty());
+    bench.frame(5);
+    CHECK(bench.align() == Triggers{1, 2, 3, 4, 5});
+    Bench regular({0, 1, 2, 3, 4, 5, 6, 7});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6}) regular.frame(trigger);
+    CHECK(regular.align().empty());
+}
+
+TEST_CASE("alignment: a late frame is left out of the proof") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6})
+        bench.frame(trigger, milliseconds(trigger == 3 ? 40 : 3));
+    CHECK(bench.align() == Triggers{1, 2, 0, 4, 5, 6});
+}
+
+TEST_CASE("alignment: ids, exposure lengths and silent lines refute") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5}) bench.frame(trigger);
+    SECTION("a step of ids that is too long") { bench.frames[3].block_id += 5; }
+    SECTION("ids that begin anew") { bench.frames[2].block_id = 1; }
+    SECTION("an exposure of another length") { bench.frames[2].exposure = milliseconds(3); }
+    SECTION("a camera that did not expose") { bench.exposures.find(3)->exposure.exposed = false; }
+    CHECK(bench.align().empty());
+}
+
+TEST_CASE("alignment: by arrival alone triggers must be further apart than frames may be late") {
+    Bench near({0, 1, 3, 4, 7, 9, 11});
+    Bench far({0, 20, 40, 60});
+    for (const std::uint64_t trigger : {1, 2, 3, 4}) {
+        near.frame(trigger);
+        far.frame(trigger);
+    }
+    CHECK(near.align(Timeline::arrival).empty());
+    CHECK(far.align(Timeline::arrival) == Triggers{1, 2, 3, 4});
+    CHECK(far.align(Timeline::camera).empty());
+}
+
+TEST_CASE("alignment: a missing record leaves it open") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {2, 3, 4, 5, 6}) bench.frame(trigger);
+    Bench holed({0});
+    for (std::size_t i = 1; i < bench.exposures.size(); ++i)
+        if (i != 3) holed.exposures.add(bench.exposures[i].exposure);
+    holed.frames = bench.frames;
+    CHECK(holed.align().empty());
+}

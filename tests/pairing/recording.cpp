@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/pairing/recording.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::pairing;
+
+namespace {
+
+template <class Item>
+Item there_and_back(const Item& item) {
+    const auto evidence = from_metadata(to_metadata(item));
+    REQUIRE(evidence);
+    REQUIRE(std::holds_alternative<Item>(*evidence));
+    return std::get<Item>(*evidence);
+}
+
+}  // namespace
+
+TEST_CASE("recording: evidence comes back from an item of the ring as it was") {
+    Exposure exposure;
+    exposure.trigger = 7;
+    exposure.start = BoardTime{1'000};
+    exposure.end_on_host = HostTime{2'000};
+    exposure.kind = StampKind::trigger_edge;
+    exposure.exposed = false;
+    const Exposure same = there_and_back(exposure);
+    CHECK(same.trigger == 7);
+    CHECK(same.start == exposure.start);
+    CHECK(same.end_on_host == exposure.end_on_host);
+    CHECK(same.kind == StampKind::trigger_edge);
+    CHECK_FALSE(same.exposed);
+
+    Arrival arrival;
+    arrival.block_id = 65'536;
+    arrival.camera_time = CameraTime{99};
+    arrival.size = 12;
+    CHECK(there_and_back(arrival).block_id == 65'536);
+    CHECK(there_and_back(arrival).camera_time.ns == 99);
+    CHECK(there_and_back(arrival).size == 12);
+
+    Limits limits;
+    limits.period = milliseconds(7);
+    limits.camera_clock = false;
+    CHECK(there_and_back(limits).period == milliseconds(7));
+    CHECK_FALSE(there_and_back(limits).camera_clock);
+    CHECK(there_and_back(Shortfall{5, EventReason::no_buffer}).reason == EventReason::no_buffer);
+    CHECK(there_and_back(StartRequest{Start::slow, HostTime{4}}).start == Start::slow);
+    there_and_back(Reset{});
+}
+
+TEST_CASE("recording: layout by the document, and kinds that nobody knows") {
+    Exposure exposure;
+    exposure.trigger = 0x1122334455667788;
+    const EvidenceMetadata metadata = to_metadata(exposure);
+    CHECK(metadata.kind == 2);
+    CHECK(metadata.words[0] == 0x1122334455667788);
+    CHECK(to_metadata(Reset{}).kind == 6);
+    EvidenceMetadata unknown = metadata;
+    unknown.kind = GENERATE(0U, 8U, 0xFFFFFFFFU);
+    CHECK_FALSE(from_metadata(unknown));
+}
