@@ -35,7 +35,7 @@ TEST_CASE("bandwidth_plan: headers count") {
     CHECK(needed_mbps(need(20)) == Approx((1920 * 1200 + 260 * 74) * 8 * 20 * 1e-6));
 }
 
-TEST_CASE("bandwidth_plan: a camera alone does not pause; sharers keep to their parts, and come and go") {
+TEST_CASE("bandwidth_plan: a camera alone does not pause, sharers keep to their parts, and come and go") {
     BandwidthPlan plan;
     plan.join("cam0", need(20));
     CHECK(plan.share("cam0").packet_delay.ns == 0);
@@ -68,7 +68,7 @@ TEST_CASE("bandwidth_plan: too much is said, an unknown link plans nothing") {
     CHECK(plan.share("cam2").fits());
 }
 
-TEST_CASE("bandwidth_plan: interfaces are found by their address; loopback has no speed") {
+TEST_CASE("bandwidth_plan: interfaces are found by their address, loopback has no speed") {
     CHECK(interface_of(inet_addr("127.0.0.1")) == "lo");
     CHECK(interface_of(inet_addr("203.0.113.9")).empty());
     CHECK(link_speed_mbps("lo") == 0);
