@@ -24,12 +24,8 @@ std::vector<Metric> bench_end_to_end() {
     stack.wait_for_status([](const auto& status) { return status["health"] == "ok"; });
     const pid_t pid = stack.service().pid();
     const double before = cpu_seconds(pid);
-    rig::JudgeSettings settings;
-    settings.instance = stack.instance();
-    settings.truth_path = stack.truth_path();
-    settings.seconds = seconds_each;
     const HostTime begin = host_now();
-    const auto verdict = rig::judge(stack.scenario(), settings);
+    const auto verdict = rig::judge(stack.scenario(), stack.judging(seconds_each));
     const double elapsed = static_cast<double>((host_now() - begin).ns) * 1e-9;
     const double cpu = cpu_seconds(pid) - before;
     if (!verdict) throw std::runtime_error(verdict.error().message());

@@ -151,6 +151,18 @@ TEST_CASE(
     CHECK(verdict.published > 0);
 }
 
+TEST_CASE("pairing: ids and clock that both step while no record comes are no dead end") {
+    WorldSettings settings = world();
+    settings.seed = GENERATE(range(1, 30));
+    settings.rate_hz = GENERATE(20.0, 155.0);
+    settings.faults = {{80, FaultKind::usb_stall},
+                       {81, FaultKind::record_lost},
+                       {90, FaultKind::id_restart},
+                       {100, FaultKind::clock_jump}};
+    settings.pulses = 900;
+    CHECK(run(settings).unproved_at_end < seconds(1));
+}
+
 TEST_CASE("pairing: swapped cameras are never proved") {
     WorldSettings settings = with(FaultKind::cameras_swapped);
     settings.pulses = 1000;

@@ -63,6 +63,14 @@ void Stack::start_service() {
         throw std::runtime_error("service: " + service_->output());
 }
 
+rig::JudgeSettings Stack::judging(double seconds) const {
+    rig::JudgeSettings settings;
+    settings.instance = instance();
+    settings.truth_path = truth_path();
+    settings.seconds = seconds;
+    return settings;
+}
+
 void Stack::kill_service() {
     service_->signal(SIGKILL);
     service_->wait(seconds(10));

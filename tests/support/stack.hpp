@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "judge.hpp"
 #include "process.hpp"
 #include "scenario.hpp"
 #include "temporary_directory.hpp"
@@ -34,6 +35,9 @@ struct StackSettings {
     std::string imu_extra{};               ///< more keys of the IMU
 };
 
+/// All that is configured delivers proved data.
+inline bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
+
 class Stack {
  public:
     explicit Stack(const StackSettings& settings);
@@ -54,6 +58,9 @@ class Stack {
     std::string socket_path() const { return (directory_.path() / "board").string(); }
     std::string log_path(const std::string& name) const { return (directory_.path() / name).string(); }
     const std::string& instance() const { return settings_.name; }
+
+    /// For rig::judge(), on what this rig does and this service publishes.
+    rig::JudgeSettings judging(double seconds) const;
 
     /// The newest status document that meets the condition; throws when none does in time.
     nlohmann::json wait_for_status(const std::function<bool(const nlohmann::json&)>& condition,

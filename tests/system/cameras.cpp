@@ -13,14 +13,8 @@ using namespace versavis::test;
 
 namespace {
 
-bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
-
 rig::Verdict judge(const Stack& stack, double seconds) {
-    rig::JudgeSettings settings;
-    settings.instance = stack.instance();
-    settings.truth_path = stack.truth_path();
-    settings.seconds = seconds;
-    auto verdict = rig::judge(stack.scenario(), settings);
+    auto verdict = rig::judge(stack.scenario(), stack.judging(seconds));
     if (!verdict) FAIL(verdict.error().message());
     INFO(rig::to_table(*verdict));
     for (const auto& [name, stream] : verdict->streams) CHECK(stream.wrong_pairs == 0);
@@ -210,6 +204,22 @@ TEST_CASE("cameras: what a camera lacks, and who else has it, is its state") {
     CHECK_THAT(status["cameras"][1]["hint"].get<std::string>(),
                Catch::Contains("TriggerSource") && Catch::Contains("Line0, Software"));
     CHECK_THAT(status["cameras"][2]["hint"].get<std::string>(), Catch::Contains("preset dalsa"));
+}
+
+TEST_CASE("cameras: one that another program controls is left alone, and taken when it is free") {
+    Stack first({"owner", 60, 1, 20, "", "", ""});
+    StackSettings settings{"second", 60, 1, 20, "", "", ""};
+    Stack second(settings);
+    first.start_rig();
+    first.start_service();
+    first.wait_for_status(healthy);
+    second.start_service();
+    const auto status =
+        second.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "busy"; });
+    CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(), Catch::Contains("another program"));
+    first.wait_for_status(healthy);
+    CHECK(first.service().terminate() == 0);
+    second.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "streaming"; });
 }
 
 TEST_CASE("cameras: an address in no network of this host is unreachable") {

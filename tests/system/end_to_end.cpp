@@ -16,14 +16,8 @@ using namespace versavis::test;
 
 namespace {
 
-bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
-
 rig::Verdict judge(const Stack& stack, double seconds) {
-    rig::JudgeSettings settings;
-    settings.instance = stack.instance();
-    settings.truth_path = stack.truth_path();
-    settings.seconds = seconds;
-    auto verdict = rig::judge(stack.scenario(), settings);
+    auto verdict = rig::judge(stack.scenario(), stack.judging(seconds));
     if (!verdict) FAIL(verdict.error().message());
     INFO(rig::to_table(*verdict));
     for (const auto& [name, stream] : verdict->streams) {

@@ -14,7 +14,6 @@ using namespace versavis::test;
 
 namespace {
 
-bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
 bool board_absent(const nlohmann::json& status) { return status["board"]["state"] == "absent"; }
 
 }  // namespace
@@ -29,11 +28,7 @@ TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes b
     CHECK(status["board"]["serial"] == "RIG0001");
     CHECK(bridge.line_state_set());
 
-    rig::JudgeSettings settings;
-    settings.instance = stack.instance();
-    settings.truth_path = stack.truth_path();
-    settings.seconds = 4;
-    const auto verdict = rig::judge(stack.scenario(), settings);
+    const auto verdict = rig::judge(stack.scenario(), stack.judging(4));
     REQUIRE(verdict);
     INFO(rig::to_table(*verdict));
     CHECK(verdict->ok);

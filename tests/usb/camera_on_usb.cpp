@@ -17,8 +17,6 @@ using namespace versavis::test;
 
 namespace {
 
-bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
-
 /// The testbed must live in the process that runs under the wrapper: board and camera do, too, here.
 class UsbRig {
  public:
@@ -48,11 +46,7 @@ class UsbRig {
 };
 
 void judge(const Stack& stack) {
-    rig::JudgeSettings settings;
-    settings.instance = stack.instance();
-    settings.truth_path = stack.truth_path();
-    settings.seconds = 3;
-    const auto verdict = rig::judge(stack.scenario(), settings);
+    const auto verdict = rig::judge(stack.scenario(), stack.judging(3));
     REQUIRE(verdict);
     INFO(rig::to_table(*verdict));
     CHECK(verdict->streams.at("cam0").wrong_pairs == 0);

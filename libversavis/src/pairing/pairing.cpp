@@ -122,6 +122,7 @@ void Pairing::accept(const std::vector<std::uint64_t>& triggers) {
     proved_.reset();
     shortest_delay_ns_ = INT64_MAX;
     fruitless_starts_ = 0;
+    start_ends_ = std::min(start_ends_, last_arrival_ + limits_.pattern_duration + limits_.latest_arrival);
     outcome_.locked(exposures_.front().exposure);
     for (const std::uint64_t trigger : triggers)
         if (trigger != 0)
@@ -174,7 +175,7 @@ bool Pairing::decide_locked() {
     const Record* record = exposures_.near(timeline_, instant, loose_ns());
     if (out_of_order(arrival)) {
         drop_front(EventReason::out_of_order);
-    } else if (record == nullptr &&
+    } else if (record == nullptr && instant > proved_->record.instant_ns(timeline_) &&
                exposures_.lost_near(timeline_, instant, proved_->record.exposure.trigger)) {
         drop_front(EventReason::exposure_missing);
     } else if (record != nullptr && !record->exposure.exposed) {
