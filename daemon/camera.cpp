@@ -16,7 +16,7 @@ namespace versavis::daemon {
 namespace {
 
 constexpr Duration first_retry = milliseconds(200);
-constexpr Duration longest_retry = seconds(2);
+constexpr Duration longest_retry = milliseconds(500);
 constexpr Duration step = milliseconds(20);
 constexpr Duration housekeeping_interval = seconds(3);
 constexpr std::uint64_t triggers_of_silence = 5;

@@ -11,8 +11,8 @@
 
 namespace versavis::daemon {
 
-const std::vector<std::string> preset_groups{"trigger",     "strobe", "free_run", "fixed_exposure",
-                                             "pulse_width", "chunks", "ptp"};
+const std::vector<std::string> preset_groups{"trigger",        "strobe",      "free_run", "fixed_exposure",
+                                             "exposure_limit", "pulse_width", "chunks",   "ptp"};
 
 namespace {
 

@@ -14,7 +14,7 @@ namespace versavis::daemon {
 /// Sets the first of the features that the camera has to the first of the values that it knows.
 struct PresetStep {
     std::vector<std::string> features;
-    std::vector<std::string> values;  ///< may hold {trigger_line}, {strobe_line} and {edge}
+    std::vector<std::string> values;  ///< may hold {trigger_line}, {strobe_line}, {edge}, {max_exposure_us}
     bool optional = false;            ///< a camera may lack or refuse it
 };
 
@@ -29,7 +29,8 @@ struct CameraPreset {
 };
 
 /// trigger: by a line; strobe: the exposure on a line; free_run: without triggers; pulse_width: the trigger's
-/// length is the exposure's; chunks: exposure time with each frame; ptp; fixed_exposure: no auto exposure.
+/// length is the exposure's; chunks: exposure time with each frame; ptp; fixed_exposure: no auto exposure;
+/// exposure_limit: the longest that the camera's own auto exposure takes.
 extern const std::vector<std::string> preset_groups;
 
 /// Where the presets are that belong to this program.

@@ -34,6 +34,7 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
         groups.emplace_back("free_run");
         return groups;
     }
+    if (!configuration.auto_exposure.enabled) groups.emplace_back("exposure_limit");
     groups.emplace_back("trigger");
     if (configuration.exposure_by_pulse) groups.emplace_back("pulse_width");
     if (configuration.strobe != Strobe::none) groups.emplace_back("strobe");
@@ -48,11 +49,13 @@ Expected<std::vector<PresetAction>> plan_all(const CameraPreset& preset,
     const std::map<std::string, std::string> variables{
         {"trigger_line", line(configuration.trigger_line, preset.trigger_line)},
         {"strobe_line", line(configuration.strobe_line, preset.strobe_line)},
+        {"max_exposure_us", fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))},
         {"edge", configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}};
     std::vector<PresetAction> actions;
     for (const std::string& group : wanted_groups(configuration)) {
         const auto steps = preset.groups.find(group);
-        if (steps == preset.groups.end())
+        const bool asked_for = group == "chunks" || group == "ptp" || group == "pulse_width";
+        if (steps == preset.groups.end() && asked_for)
             return failure(fmt::format("preset {}", preset.name),
                            fmt::format("cameras of its kind have no '{}'", group),
                            "remove the key that asks for it, or set the features by name");

@@ -335,6 +335,7 @@ Duration GigeCamera::exposure_at(HostTime at) const {
         const double seconds = static_cast<double>((at - zero_).ns) * 1e-9;
         const double phase = 2 * 3.14159265358979 * seconds / settings_.exposure_swing_s;
         exposure_us *= 1 + settings_.exposure_swing * std::sin(phase);
+        exposure_us = std::min(exposure_us, static_cast<double>(registers_.real(reg_exposure_limit)));
     }
     return Duration{std::llround(exposure_us * 1e3)};
 }

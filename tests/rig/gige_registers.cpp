@@ -55,6 +55,7 @@ void GigeRegisters::reset() {
     set(reg_frame_rate, std::bit_cast<std::uint32_t>(20.0F));
     set(reg_exposure_time, std::bit_cast<std::uint32_t>(static_cast<float>(identity_.exposure_us)));
     set(reg_temperature, std::bit_cast<std::uint32_t>(static_cast<float>(identity_.temperature_c)));
+    set(reg_exposure_limit, std::bit_cast<std::uint32_t>(1e7F));
     set(reg_exposure_auto, identity_.exposure_auto ? 2 : 0);
 }
 

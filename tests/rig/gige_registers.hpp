@@ -68,6 +68,7 @@ enum Register : std::uint32_t {
     reg_chunk_selector = 0x10064,
     reg_chunk_enable = 0x10068,
     reg_temperature = 0x1006C,
+    reg_exposure_limit = 0x10070,
 
     reg_xml = 0x20000,
 };

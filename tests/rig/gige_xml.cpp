@@ -139,6 +139,7 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.enumeration("ExposureMode", reg_exposure_mode, {{"Timed", 0}, {"TriggerWidth", 1}});
     xml.real("ExposureTime", reg_exposure_time, "us", 10, 1e7);
     xml.enumeration("ExposureAuto", reg_exposure_auto, {{"Off", 0}, {"Continuous", 2}});
+    xml.real("AutoExposureExposureTimeUpperLimit", reg_exposure_limit, "us", 10, 1e7);
     xml.real("Gain", reg_gain, "dB", 0, 48);
     xml.enumeration("LineSelector", reg_line_selector, {{"Line0", 0}, {"Line1", 1}});
     xml.enumeration("LineMode", reg_line_mode, {{"Input", 0}, {"Output", 1}});

@@ -49,6 +49,7 @@ const Book blackfly_s({{"TriggerSelector", {"AcquisitionStart", "FrameStart", "F
                        {"TriggerOverlap", {"Off", "ReadOut", "PreviousFrame"}},
                        {"TriggerDelay", {}},
                        {"ExposureMode", {"Timed", "TriggerWidth"}},
+                       {"AutoExposureExposureTimeUpperLimit", {}},
                        {"AcquisitionFrameRateEnable", {}},
                        {"LineSelector", {"Line0", "Line1", "Line2", "Line3"}},
                        {"LineMode", {"Input", "Output"}},
@@ -100,6 +101,8 @@ TEST_CASE("camera_preset: steps become what this camera has") {
     CHECK(value_of(*actions, "TriggerSelector") == "FrameStart");
     CHECK(value_of(*actions, "AcquisitionFrameRateEnable") == "false");
     CHECK(value_of(*plan(*flir, "strobe", variables, blackfly_s), "LineSource") == "ExposureActive");
+    CHECK(value_of(*plan(*flir, "exposure_limit", {{"max_exposure_us", "45000"}}, blackfly_s),
+                   "AutoExposureExposureTimeUpperLimit") == "45000");
     CHECK(value_of(*plan(*flir, "pulse_width", variables, blackfly_s), "ExposureMode") == "TriggerWidth");
 
     const auto allied = choose_preset(all(), "allied-vision-gige", "", "");
