@@ -50,9 +50,7 @@ std::string allowed(ArvDevice* device, ArvGcNode* node, const std::string& name)
 
 /// Throws what the conversions of the text throw.
 void write(ArvDevice* device, ArvGcNode* node, const char* name, const std::string& value, GError** error) {
-    if (ARV_IS_GC_ENUMERATION(node))
-        arv_device_set_string_feature_value(device, name, value.c_str(), error);
-    else if (ARV_IS_GC_BOOLEAN(node))
+    if (ARV_IS_GC_BOOLEAN(node))
         arv_device_set_boolean_feature_value(device, name, to_boolean(value) ? TRUE : FALSE, error);
     else if (ARV_IS_GC_FLOAT(node))
         arv_device_set_float_feature_value(device, name, to_real(value), error);
@@ -60,7 +58,7 @@ void write(ArvDevice* device, ArvGcNode* node, const char* name, const std::stri
         arv_device_set_integer_feature_value(device, name, to_integer(value), error);
     else if (ARV_IS_GC_COMMAND(node))
         arv_device_execute_command(device, name, error);
-    else
+    else  // texts and enumerations
         arv_device_set_string_feature_value(device, name, value.c_str(), error);
 }
 

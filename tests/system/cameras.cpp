@@ -89,7 +89,8 @@ TEST_CASE("cameras: swapped trigger cables are never published, and said") {
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {
-        return s["cameras"][0]["hint"].template get<std::string>().find("follow no trigger") != std::string::npos;
+        return s["cameras"][0]["hint"].template get<std::string>().find("follow no trigger") !=
+               std::string::npos;
     });
     for (const auto& camera : status["cameras"]) {
         CHECK(camera["state"] == "streaming");
