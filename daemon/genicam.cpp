@@ -50,11 +50,12 @@ std::string allowed(ArvDevice* device, ArvGcNode* node, const std::string& name)
 
 /// Throws what the conversions of the text throw.
 void write(ArvDevice* device, ArvGcNode* node, const char* name, const std::string& value, GError** error) {
+    const bool counts = ARV_IS_GC_INTEGER(node) && !ARV_IS_GC_ENUMERATION(node);  // an enumeration is both
     if (ARV_IS_GC_BOOLEAN(node))
         arv_device_set_boolean_feature_value(device, name, to_boolean(value) ? TRUE : FALSE, error);
     else if (ARV_IS_GC_FLOAT(node))
         arv_device_set_float_feature_value(device, name, to_real(value), error);
-    else if (ARV_IS_GC_INTEGER(node))
+    else if (counts)
         arv_device_set_integer_feature_value(device, name, to_integer(value), error);
     else if (ARV_IS_GC_COMMAND(node))
         arv_device_execute_command(device, name, error);
