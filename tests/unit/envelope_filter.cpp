@@ -109,18 +109,73 @@ TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {
 
 TEST_CASE("envelope_filter: an exchange that took no time is not believed") {
     EnvelopeFilter filter;
-    filter.add({{1000}, {500}, {2500}, {1500}});
+    filter.add(Exchange{{1000}, {500}, {2500}, {1500}});
     CHECK_FALSE(filter.initialised());
 }
 
-TEST_CASE("envelope_filter: a slow link locks, too, with a sigma that owns up to its asymmetry") {
+TEST_CASE("envelope_filter: a slow link locks, too, with a bound that owns up to its asymmetry") {
     EnvelopeFilter filter;
     constexpr Duration one_way = milliseconds(1);
     for (HostTime t{0}; t.ns < 30'000'000'000; t = t + milliseconds(100)) {
         const BoardTime received{t.ns + one_way.ns};
-        filter.add({t, received, received, t + one_way * 2 + nanoseconds(t.ns / 1'000'000 % 7 * 10'000)});
+        filter.add(
+            Exchange{t, received, received, t + one_way * 2 + nanoseconds(t.ns / 1'000'000 % 7 * 10'000)});
     }
     const auto now = filter.translate(filter.last_contact());
     CHECK(now.state == ClockState::locked);
-    CHECK(now.sigma >= microseconds(300));
+    CHECK(now.bound >= one_way);
+    CHECK(now.sigma >= microseconds(30));
+}
+
+TEST_CASE("envelope_filter: whoever begins an exchange, it says the same") {
+    EnvelopeFilter host_began;
+    EnvelopeFilter board_began;
+    Link link(20, 6);
+    for (HostTime t{1'000'000'000}; t.ns < 20'000'000'000; t = t + milliseconds(100)) {
+        const Exchange exchange = link.exchange(t);
+        host_began.add(exchange);
+        // The board asks just before, and the host answers at once.
+        const HostTime asked = t - link.delay();
+        board_began.add(Exchange{t, exchange.received, link.board(asked), t});
+    }
+    for (EnvelopeFilter* filter : {&host_began, &board_began})
+        CHECK(std::abs(error_ns(*filter, link, HostTime{20'000'000'000})) < 20e3);
+}
+
+TEST_CASE("envelope_filter: one-way messages alone say nothing, with exchanges they say more") {
+    EnvelopeFilter alone;
+    alone.add(OneWay{{1'000'000}, {2'000'000}});
+    CHECK_FALSE(alone.initialised());
+
+    EnvelopeFilter exchanges;
+    EnvelopeFilter both;
+    Link link(20, 7);
+    for (HostTime t{1'000'000'000}; t.ns < 60'000'000'000; t = t + milliseconds(5)) {
+        both.add(OneWay{link.board(t), t + link.delay()});
+        if (t.ns % 1'000'000'000 != 0) continue;
+        const Exchange exchange = link.exchange(t);
+        exchanges.add(exchange);
+        both.add(exchange);
+    }
+    const BoardTime now = link.board(HostTime{60'000'000'000});
+    CHECK(both.translate(now).sigma < exchanges.translate(now).sigma);
+    CHECK(both.skew_sigma_ppm() < exchanges.skew_sigma_ppm());
+    CHECK(both.one_way_messages() == 11'800);
+}
+
+TEST_CASE("envelope_filter: absurd stamps are left out") {
+    EnvelopeFilter filter;
+    constexpr std::int64_t extremes[] = {INT64_MIN, INT64_MIN / 2, -1, 0, 1, INT64_MAX / 2, INT64_MAX};
+    for (const std::int64_t a : extremes)
+        for (const std::int64_t b : extremes)
+            for (const std::int64_t c : extremes)
+                for (const std::int64_t d : extremes) {
+                    filter.add(Exchange{{a}, {b}, {c}, {d}});
+                    filter.add(OneWay{{b}, {c}});
+                    static_cast<void>(filter.translate({d}));
+                }
+    Link link(0, 8);
+    for (HostTime t{1'000'000'000}; t.ns < 10'000'000'000; t = t + milliseconds(100))
+        filter.add(link.exchange(t));
+    CHECK(std::abs(error_ns(filter, link, HostTime{10'000'000'000})) < 100e3);
 }

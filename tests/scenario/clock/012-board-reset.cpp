@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The board is reset: its clock begins anew.
+#include <catch2/catch.hpp>
+
+#include "score.hpp"
+#include "versavis/clock/envelope_filter.hpp"
+
+using namespace versavis;
+using namespace versavis::clock_world;
+
+TEST_CASE("clock 012: a board that is reset is known again after one exchange, with its skew") {
+    const bool told = GENERATE(true, false);
+    Settings settings;
+    settings.length = seconds(130);
+    settings.board_begin = seconds(1000);
+    settings.board_reset = TrueTime{seconds(100).ns};
+    for (settings.seed = 1; settings.seed <= 10; ++settings.seed) {
+        const World world(settings);
+        Observer<clock::EnvelopeFilter> observer(world);
+        const double skew = observer.at(*settings.board_reset - milliseconds(1)).skew_ppm();
+        if (told) {
+            observer.at(*settings.board_reset).board_restarted();
+            CHECK(observer.estimate(*settings.board_reset).state == clock::ClockState::reset);
+        }
+        TrueTime first = *settings.board_reset;
+        for (const Delivery& delivery : world.deliveries())
+            if (delivery.at > first) {
+                first = delivery.at;
+                break;
+            }
+        CHECK(absolute(observer.error(first)) < milliseconds(1));
+        CHECK(observer.at(first).skew_ppm() == Approx(skew).margin(0.5));
+        CHECK(observer.at(first).restarts() == (told ? 0 : 1));
+        CHECK(absolute(observer.error({seconds(129).ns})) < microseconds(40));
+    }
+}
