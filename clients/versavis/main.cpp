@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "clock.hpp"
 #include "list.hpp"
 #include "pair_replay.hpp"
 #include "snapshot.hpp"
@@ -102,6 +103,8 @@ int main(int argc, char** argv) {
     replay->add_option("-o,--output", decisions, "File for the decisions, one JSON object per line");
     replay->add_flag("--json", json, "The summary as a JSON object");
 
+    client::ClockCommands clock(app);
+
     std::string stream;
     std::string output;
     double timeout_s = 5;
@@ -132,6 +135,7 @@ int main(int argc, char** argv) {
         return done ? EX_OK : fail(done.error());
     }
     if (*replay) return replay_pairing(recording, decisions, json);
+    if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
     if (!written) return fail(written.error());

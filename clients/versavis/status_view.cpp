@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
 namespace versavis::client {
 
 namespace {
@@ -41,7 +46,80 @@ std::string camera_line(const json& camera) {
         count(camera, "slips"), hint(camera));
 }
 
+struct ClockFact {
+    std::string_view key;
+    std::string_view name;
+    std::string_view meaning;
+};
+
+constexpr std::array clock_facts{
+    ClockFact{"state", "state", ""},
+    ClockFact{"output", "stamps are of", "clock of the published stamps"},
+    ClockFact{"sigma_ns", "sigma", "one standard deviation of a stamp made now"},
+    ClockFact{"bound_ns", "bound", "the link's asymmetry cannot make a larger error"},
+    ClockFact{"residual_ns", "residual", "last correction measured"},
+    ClockFact{"round_trip_ns", "round trip", "the last one"},
+    ClockFact{"smallest_round_trip_ns", "smallest round trip", "of the last ten minutes"},
+    ClockFact{"skew_ppm", "skew", "host clock against board clock"},
+    ClockFact{"skew_sigma_ppm", "sigma of the skew", ""},
+    ClockFact{"exchanges", "exchanges", "used since the board's boot"},
+    ClockFact{"restarts", "restarts", "estimate begun anew, because measurements contradicted it"},
+    ClockFact{"epoch", "epoch", "stamps of different epochs do not compare"},
+    ClockFact{"output_minus_host_ns", "output minus host", "output clock against CLOCK_MONOTONIC_RAW"},
+    ClockFact{"output_steps", "output steps", "steps of the output clock that were seen"},
+};
+
+bool ends_with(std::string_view key, std::string_view end) {
+    return key.size() > end.size() && key.substr(key.size() - end.size()) == end;
+}
+
+/// The unit is the end of the key's name.
+std::string with_unit(std::string_view key, const json& value) {
+    if (value.is_string()) return value.get<std::string>();
+    if (!value.is_number()) return value.dump();
+    const auto number = value.get<double>();
+    if (ends_with(key, "_ns") && std::abs(number) < 1e9) return fmt::format("{:.1f} us", number * 1e-3);
+    if (ends_with(key, "_ns")) return fmt::format("{:.6f} s", number * 1e-9);
+    if (ends_with(key, "_ppm")) return fmt::format("{:.4f} ppm", number);
+    if (ends_with(key, "_ppb")) return fmt::format("{} ppb", value.dump());
+    if (ends_with(key, "_s")) return fmt::format("{:.1f} s", number);
+    return value.dump();
+}
+
+std::string fact_line(std::string_view name, const std::string& value, std::string_view meaning) {
+    const std::string line = fmt::format("{:<20} {:<22} {}", name, value, meaning);
+    return line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+}
+
+/// Facts that are not in the table, those of nested objects as parent.child.
+std::string other_facts(const json& object, const std::string& parent) {
+    std::string out;
+    for (const auto& [key, value] : object.items()) {
+        const auto known = [&key = key](const ClockFact& fact) { return fact.key == key; };
+        if (parent.empty() && std::any_of(clock_facts.begin(), clock_facts.end(), known)) continue;
+        const std::string name = parent + key;
+        out +=
+            value.is_object() ? other_facts(value, name + ".") : fact_line(name, with_unit(key, value), "");
+    }
+    return out;
+}
+
 }  // namespace
+
+std::string clock_text(const json& status) {
+    const json clock = status.value("clock", json::object());
+    std::string out;
+    for (const ClockFact& fact : clock_facts)
+        if (clock.contains(fact.key))
+            out += fact_line(fact.name, with_unit(fact.key, clock[std::string(fact.key)]), fact.meaning);
+    out += other_facts(clock, "");
+    const json board = status.value("board", json::object());
+    if (board.contains("pps")) out += fact_line("PPS at the board", with_unit("pps", board["pps"]), "");
+    if (board.value("pps", "") == "good" && board.contains("pps_error_ppb"))
+        out += fact_line("board against PPS", with_unit("pps_error_ppb", board["pps_error_ppb"]),
+                         "positive: the board's clock runs fast");
+    return out;
+}
 
 std::string status_text(const json& status) {
     const double up_s = (status.value("host_time_ns", 0.0) - status.value("started_ns", 0.0)) * 1e-9;
