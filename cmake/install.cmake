@@ -8,5 +8,5 @@ install(FILES systemd/versavisd.service DESTINATION lib/systemd/system)
 install(FILES systemd/60-versavis.rules DESTINATION lib/udev/rules.d)
 install(FILES systemd/versavis.sysusers DESTINATION lib/sysusers.d RENAME versavis.conf)
 install(FILES systemd/versavis.tmpfiles DESTINATION lib/tmpfiles.d RENAME versavis.conf)
-install(FILES README.md docs/configuration.md docs/shm-layout.md docs/status.md docs/cameras.md docs/wire-protocol.md docs/rig.md
+install(FILES README.md docs/configuration.md docs/shm-layout.md docs/status.md docs/cameras.md docs/clock.md docs/wire-protocol.md docs/rig.md
     DESTINATION ${CMAKE_INSTALL_DOCDIR})
