@@ -16,11 +16,11 @@ using Catch::Contains;
 
 namespace {
 
-/// Exchanges every 0.1 s with a board that runs 50 ppm slow; each delay is the longer, the later in a cycle.
-ClockRecording recording(std::int64_t count) {
+/// Exchanges with a board that runs 50 ppm slow; each delay is the longer, the later in a cycle.
+ClockRecording recording(std::int64_t count, Duration interval = milliseconds(100)) {
     ClockRecording all;
     for (std::int64_t i = 0; i < count; ++i) {
-        const std::int64_t t = i * 100'000'000;
+        const std::int64_t t = i * interval.ns;
         const std::int64_t there = 100'000 + i % 7 * 10'000;
         const std::int64_t back = 100'000 + i % 5 * 10'000;
         const auto board = [](std::int64_t host) { return BoardTime{host - host / 20'000}; };
@@ -53,16 +53,16 @@ std::string texts(const boost::property_tree::ptree& tree) {
 }  // namespace
 
 TEST_CASE("clock_plot: history has a point per exchange, with what it measured and changed") {
-    const auto points = history(300, EstimatorKind::ekf_fair);
-    REQUIRE(points.size() == 300);
+    const auto points = clock_history(recording(600, seconds(1)), *make_estimator(EstimatorKind::ekf_fair));
+    REQUIRE(points.size() == 600);
     CHECK(points[0].time_s == 0);
     CHECK(points[0].residual_ns == 0);
-    CHECK(points[299].time_s == Approx(29.9).margin(0.01));
+    CHECK(points[599].time_s == Approx(599).margin(0.01));
     // Host minus board clock grows by 50 us a second.
-    CHECK(points[299].offset_ns - points[199].offset_ns == Approx(500e3).epsilon(0.15));
-    CHECK(points[299].skew_ppm == Approx(50).epsilon(0.2));
+    CHECK(points[599].offset_ns - points[499].offset_ns == Approx(5e6).epsilon(0.05));
+    CHECK(points[599].skew_ppm == Approx(50).epsilon(0.05));
     // The published gain is the ratio of the two.
-    CHECK(points[299].innovation_ns == Approx(0.0515 * points[299].residual_ns).epsilon(0.03));
+    CHECK(points[599].innovation_ns == Approx(0.0515 * points[599].residual_ns).margin(2));
 }
 
 TEST_CASE("clock_plot: corrections by one-way messages count for the next exchange") {
