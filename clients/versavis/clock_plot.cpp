@@ -61,7 +61,7 @@ Unit unit_of_time(double seconds) {
 std::string with_unit(double value, Unit axis) {
     if (axis.name == std::string_view("ppm")) return fmt::format("{:.3g} ppm", value);
     const double ns = value * axis.ns;
-    const Unit unit = unit_for({0, ns});
+    const Unit unit = ns >= 1e9 ? Unit{"s", 1e9} : ns >= 1e6 ? Unit{"ms", 1e6} : Unit{"us", 1e3};
     return fmt::format("{:.3g} {}", ns / unit.ns, unit.name);
 }
 
@@ -201,6 +201,11 @@ class Column {
     svg::Span x_;
 };
 
+std::string start_title(const Points& start) {
+    const double length = start.back().time_s - start.front().time_s;
+    return fmt::format("after the start: the first {:.{}f} s", length, length < 9.5 ? 1 : 0);
+}
+
 /// Index of the first point of the convergence.
 std::size_t end_of_start(const Points& history) {
     const double first = history.front().time_s;
@@ -256,7 +261,8 @@ std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTex
     const Points begin(history.begin(), history.begin() + static_cast<std::ptrdiff_t>(split));
     Points rest(history.begin() + static_cast<std::ptrdiff_t>(split), history.end());
     if (rest.empty()) rest = begin;
-    const Line line = fitted(rest);
+    const auto half = rest.begin() + static_cast<std::ptrdiff_t>(rest.size() / 2);
+    const Line line = fitted(Points(half, rest.end()));  // an estimator may take long to converge
     std::string out = fmt::format(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" "
         "height=\"{1}\" viewBox=\"0 0 {0} {1}\" font-family=\"sans-serif\">\n"
@@ -269,9 +275,7 @@ std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTex
                               texts.estimator, history.size(), history.back().time_s - history.front().time_s,
                               std::round(line.slope * 10) * 1e-4 + 0.0),
                   Anchor::middle, 12, "#666");
-    out += Column(begin, column_left[0], line,
-                  fmt::format("after the start: the first {:.3g} s", std::max(begin.back().time_s, 0.0)))
-               .drawn();
+    out += Column(begin, column_left[0], line, start_title(begin)).drawn();
     out += Column(std::move(rest), column_left[1], line, "in convergence").drawn();
     return out + "</svg>\n";
 }

@@ -70,9 +70,10 @@ Span span_of(std::vector<double> values, double cut) {
     if (values.size() < many) cut = 0;
     const double low = quantile(values, cut);
     const double high = quantile(values, 1 - cut);
-    // An exact constant still needs a scale that a double resolves at its size.
-    const double least = std::max(1e-9, std::max(std::abs(low), std::abs(high)) * 1e-9);
-    const double room = std::max(0.08 * (high - low), least);
+    const double size = std::max(std::abs(low), std::abs(high));
+    // A constant, too, needs a scale: one with short labels.
+    const double room = std::max(0.08 * (high - low), high - low <= 1e-6 * size ? 0.01 * size : 0.0);
+    if (room == 0) return {-1, 1};
     return {low - room, high + room};
 }
 
