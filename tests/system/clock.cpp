@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "process.hpp"
-#include "temporary_directory.hpp"
+#include "../support/process.hpp"
+#include "../support/temporary_directory.hpp"
 #include "versavis/time.hpp"
 
 using namespace versavis;
