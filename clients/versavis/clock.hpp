@@ -2,14 +2,11 @@
 // The command `versavis clock`: state of the board's clock, and its estimation again from recordings.
 #pragma once
 
+#include <CLI/App.hpp>
 #include <string>
 
 #include "clock_plot.hpp"
 #include "clock_replay.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace versavis::client {
 

@@ -112,7 +112,7 @@ class Reader {
         if (fields_.size() != width_) return wrong_width();
         for (std::size_t i = 0; i < names_.size(); ++i) {
             if (positions_[i] == absent) continue;
-            const auto done = take_field(i, fields_[positions_[i]]);
+            auto done = take_field(i, fields_[positions_[i]]);
             if (!done) return done;
         }
         ++table_.rows;
