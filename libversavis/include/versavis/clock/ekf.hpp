@@ -24,7 +24,7 @@ struct EkfStart {
     static EkfStart fair() { return {0, 0, 1e-5, 1e-15}; }
 };
 
-/// Source: T. Tschopp et al., "VersaVIS: An Open Versatile Multi-Camera Visual-Inertial Sensor Suite",
+/// Source: F. Tschopp et al., "VersaVIS: An Open Versatile Multi-Camera Visual-Inertial Sensor Suite",
 /// Sensors 2020, 20(5), 1439, and the values of github.com/ethz-asl/rosserial at 9136b35, file node_handle.h,
 /// which github.com/ethz-asl/versavis refers to. State: offset and skew; process noise (1e-5, 8e-10) per
 /// exchange, whatever time has passed; measurement noise 5e-3, however long the round trip took; an exchange
