@@ -62,6 +62,7 @@ void read_clock(TableReader& reader, ClockConfiguration& clock) {
                                    {{"realtime", OutputClockKind::realtime},
                                     {"tai", OutputClockKind::tai},
                                     {"monotonic_raw", OutputClockKind::monotonic_raw}});
+    reader.read("force_tai", clock.force_tai);
     reader.read("exchange_rate_hz", clock.exchange_rate_hz, 1, 100);
 }
 

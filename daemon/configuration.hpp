@@ -29,6 +29,7 @@ struct BoardConfiguration {
 
 struct ClockConfiguration {
     clock::OutputClockKind output = clock::OutputClockKind::realtime;
+    bool force_tai = false;  ///< take CLOCK_TAI although the kernel does not know its offset
     double exchange_rate_hz = 10;
 };
 

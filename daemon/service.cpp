@@ -55,7 +55,7 @@ bool of_imu(wire::EventKind kind) {
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
-    auto output = clock::OutputClock::create(configuration.clock.output);
+    auto output = clock::OutputClock::create(configuration.clock.output, configuration.clock.force_tai);
     if (!output) return tl::unexpected(output.error());
     auto directory = ring::OwnedDirectory::claim(instance_directory(configuration.instance));
     if (!directory) return tl::unexpected(directory.error());
@@ -63,7 +63,7 @@ Expected<std::unique_ptr<Service>> Service::create(const Configuration& configur
     auto status_ring = ring::Writer::create(directory->path(), shape);
     if (!status_ring) return tl::unexpected(status_ring.error());
     std::unique_ptr<Service> service(
-        new Service(configuration, std::move(*directory), *output, std::move(*status_ring)));
+        new Service(configuration, std::move(*directory), std::move(*output), std::move(*status_ring)));
     if (auto made = service->make_parts(); !made) return tl::unexpected(made.error());
     return service;
 }
@@ -72,7 +72,7 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
                  clock::OutputClock output, ring::Writer status_ring)
     : configuration_(configuration),
       directory_(std::move(directory)),
-      translator_(output),
+      translator_(std::move(output)),
       status_ring_(std::move(status_ring)),
       started_(host_now()) {}
 

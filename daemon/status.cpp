@@ -110,7 +110,12 @@ json clock_json(const clock::ClockReport& clock) {
             {"restarts", clock.restarts},
             {"epoch", clock.epoch},
             {"output_minus_host_ns", clock.output_minus_host.ns},
-            {"output_steps", clock.output_steps}};
+            {"output_steps", clock.output_steps},
+            {"host_suspends", clock.host_suspends},
+            {"host_synchronised", clock.kernel.synchronised},
+            {"host_max_error_ns", clock.kernel.max_error.ns},
+            {"tai_offset_s", clock.kernel.tai_offset_s},
+            {"tai_valid", clock.kernel.tai_offset_s != 0}};
 }
 
 json camera_json(const CameraStatus& status) {

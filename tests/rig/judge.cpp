@@ -46,7 +46,7 @@ struct Recording {
 class Recorder {
  public:
     Recorder(const Scenario& scenario, const std::string& instance, clock::OutputClock clock)
-        : instance_(instance), clock_(clock) {
+        : instance_(instance), clock_(std::move(clock)) {
         for (const CameraScenario& camera : scenario.cameras) frames_[camera.name];
         imu_name_ = scenario.imu;
     }
@@ -263,7 +263,7 @@ Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
             for (const auto kind :
                  {OutputClockKind::realtime, OutputClockKind::tai, OutputClockKind::monotonic_raw})
                 if (status["clock"]["output"] == clock::to_string(kind))
-                    return clock::OutputClock::create(kind);
+                    return clock::OutputClock::create(kind, true);
         }
         const bool stopped = settings.stop_requested && settings.stop_requested();
         if (stopped || host_now() > deadline)
@@ -317,7 +317,7 @@ void complain(Verdict& verdict) {
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings) {
     auto clock = output_clock(settings);
     if (!clock) return tl::unexpected(clock.error());
-    Recorder recorder(scenario, settings.instance, *clock);
+    Recorder recorder(scenario, settings.instance, std::move(*clock));
     const auto interval = record(recorder, settings);
     if (!interval) return tl::unexpected(interval.error());
     auto truth = load_truth(settings.truth_path);

@@ -35,6 +35,15 @@ TEST_CASE("configuration: an empty file is a service without cameras") {
     CHECK(configuration->cameras.empty());
 }
 
+TEST_CASE("configuration: the output clock") {
+    CHECK(load("")->clock.output == clock::OutputClockKind::realtime);
+    CHECK_FALSE(load("")->clock.force_tai);
+    const auto configuration = load("[clock]\noutput = \"tai\"\nforce_tai = true\n");
+    REQUIRE(configuration);
+    CHECK(configuration->clock.output == clock::OutputClockKind::tai);
+    CHECK(configuration->clock.force_tai);
+}
+
 TEST_CASE("configuration: what the board is told") {
     const auto configuration = load(
         camera +

@@ -3,6 +3,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "simulated_clocks.hpp"
+
 using namespace versavis;
 using daemon::StampGuard;
 
@@ -16,6 +18,28 @@ clock::Stamp stamp(std::int64_t ns, std::uint32_t epoch,
     stamp.state = state;
     return stamp;
 }
+
+/// What one stream publishes of instants on the host clock.
+struct StreamOfStamps {
+    struct Published {
+        OutputTime time;
+        std::uint32_t epoch;
+        std::uint32_t flags;
+    };
+
+    Published publish(HostTime host) {
+        const clock::Stamp stamp = translator.translate(host, {});
+        std::uint32_t flags = 0;
+        const OutputTime time = guard.guard(stamp, flags);
+        return {time, stamp.epoch, flags};
+    }
+    HostTime now() const { return {clocks->value_ns(clock::SystemClock::monotonic_raw)}; }
+
+    std::shared_ptr<test::SimulatedClocks> clocks = std::make_shared<test::SimulatedClocks>();
+    clock::Translator translator{
+        *clock::OutputClock::create(clock::OutputClockKind::realtime, false, clocks)};
+    StampGuard guard;
+};
 
 }  // namespace
 
@@ -31,4 +55,55 @@ TEST_CASE("stamp_guard: stamps never go backwards within an epoch, and say when 
     CHECK(flags == 0);
     CHECK(guard.guard(stamp(60, 2, clock::ClockState::holdover), flags).ns == 60);
     CHECK(flags == flag_holdover);
+}
+
+TEST_CASE("stamp_guard: a clock that is set back begins a new epoch, with its own time at once") {
+    StreamOfStamps stream;
+    const auto before = stream.publish(stream.now());
+    stream.clocks->step(-GENERATE(seconds(1), milliseconds(1), microseconds(50)));
+    const auto after = stream.publish(stream.now());
+    CHECK(after.epoch == before.epoch + 1);
+    CHECK(after.time < before.time);
+    CHECK(after.flags == 0);
+    const auto next = stream.publish(stream.now() + milliseconds(1));
+    CHECK(next.epoch == after.epoch);
+    CHECK(next.time > after.time);
+}
+
+TEST_CASE("stamp_guard: a clock that is slewed back is held within its epoch") {
+    StreamOfStamps stream;
+    const HostTime instant = stream.now();
+    const auto before = stream.publish(instant);
+    stream.clocks->slew_ppb = -500'000;
+    stream.clocks->pass(milliseconds(100));  // 50 us are lost meanwhile
+    const auto held = stream.publish(instant + microseconds(20));
+    CHECK(held.epoch == before.epoch);
+    CHECK(held.time == before.time + nanoseconds(1));
+    CHECK(held.flags == flag_clamped);
+    const auto free = stream.publish(instant + microseconds(60));
+    CHECK(free.time > held.time);
+    CHECK(free.flags == 0);
+}
+
+TEST_CASE("stamp_guard: an estimate that goes back is held within its epoch") {
+    StreamOfStamps stream;
+    // The board's clock is the host's; the first exchange is lopsided by 2 ms.
+    const auto exchange = [&](std::int64_t at_ns, std::int64_t up_ns) {
+        stream.translator.add({{at_ns}, {at_ns + 10'000}, {at_ns + 10'000}, {at_ns + 20'000 + up_ns}});
+    };
+    const auto publish = [&](BoardTime board) {
+        const auto stamp = stream.translator.translate(board);
+        REQUIRE(stamp);
+        std::uint32_t flags = 0;
+        const OutputTime time = stream.guard.guard(*stamp, flags);
+        return StreamOfStamps::Published{time, stamp->epoch, flags};
+    };
+    const std::int64_t begin_ns = stream.now().ns;
+    exchange(begin_ns, 2'000'000);
+    const auto before = publish({begin_ns + 300'000'000});
+    for (int i = 1; i <= 20; ++i) exchange(begin_ns + i * 10'000'000, 0);
+    const auto held = publish({begin_ns + 300'100'000});
+    CHECK(held.epoch == before.epoch);
+    CHECK(held.time == before.time + nanoseconds(1));
+    CHECK(held.flags == flag_clamped);
 }

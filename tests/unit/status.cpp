@@ -71,6 +71,22 @@ TEST_CASE("status: healthy only if all that is configured delivers") {
     CHECK(health(status) == "degraded");
 }
 
+TEST_CASE("status: what the kernel says of its clock, and whether its TAI is worth the name") {
+    Status status = healthy();
+    auto clock = nlohmann::json::parse(to_json(status))["clock"];
+    CHECK(clock["host_synchronised"] == false);
+    CHECK(clock["tai_valid"] == false);
+    CHECK(clock["tai_offset_s"] == 0);
+    status.clock.kernel = {true, microseconds(5), 37};
+    status.clock.host_suspends = 2;
+    clock = nlohmann::json::parse(to_json(status))["clock"];
+    CHECK(clock["host_synchronised"] == true);
+    CHECK(clock["host_max_error_ns"] == 5'000);
+    CHECK(clock["tai_valid"] == true);
+    CHECK(clock["tai_offset_s"] == 37);
+    CHECK(clock["host_suspends"] == 2);
+}
+
 TEST_CASE("status: every key of the document is in its manual") {
     std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/status.md");
     REQUIRE(file);

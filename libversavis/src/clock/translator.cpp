@@ -2,6 +2,7 @@
 #include "versavis/clock/translator.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "versavis/metadata.hpp"
 
@@ -11,6 +12,13 @@ namespace {
 
 std::uint32_t saturated(Duration sigma) {
     return static_cast<std::uint32_t>(std::clamp<std::int64_t>(sigma.ns, 0, sigma_unknown - 1));
+}
+
+/// A wide reading of the output clock is part of the stamp's uncertainty: it is off by up to so much, evenly.
+Duration widened(Duration sigma, const OutputReading& output) {
+    const auto estimate = static_cast<double>(sigma.ns);
+    const auto reading = static_cast<double>(output.uncertainty.ns);
+    return {std::llround(std::sqrt(estimate * estimate + reading * reading / 3))};
 }
 
 }  // namespace
@@ -36,23 +44,40 @@ std::optional<Stamp> Translator::translate(BoardTime board) {
     const std::lock_guard lock(mutex_);
     if (!filter_.initialised()) return std::nullopt;
     const HostEstimate estimate = filter_.translate(board);
-    const OutputTime output{estimate.time.ns + output_.offset().ns};
-    return Stamp{output, estimate.time, saturated(estimate.sigma), epoch(), estimate.state};
+    const OutputReading output = output_.read();
+    return Stamp{{estimate.time.ns + output.minus_host.ns},
+                 estimate.time,
+                 saturated(widened(estimate.sigma, output)),
+                 epoch(output),
+                 estimate.state};
 }
 
 Stamp Translator::translate(HostTime host, Duration sigma) {
     const std::lock_guard lock(mutex_);
-    const OutputTime output{host.ns + output_.offset().ns};
-    return {output, host, saturated(sigma), epoch(), ClockState::locked};
+    const OutputReading output = output_.read();
+    return {{host.ns + output.minus_host.ns},
+            host,
+            saturated(widened(sigma, output)),
+            epoch(output),
+            ClockState::locked};
+}
+
+OutputRelation Translator::output_now() {
+    const std::lock_guard lock(mutex_);
+    const OutputReading output = output_.read();
+    return {output.at, output.minus_host, output.uncertainty, epoch(output)};
 }
 
 ClockReport Translator::report() {
     const std::lock_guard lock(mutex_);
     ClockReport report;
     report.output = output_.kind();
-    report.output_minus_host = output_.offset();
-    report.epoch = epoch();
-    report.output_steps = output_.steps();
+    const OutputReading output = output_.read();
+    report.output_minus_host = output.minus_host;
+    report.epoch = epoch(output);
+    report.output_steps = output.steps;
+    report.host_suspends = output_.suspends();
+    report.kernel = output_.kernel_state();
     if (!filter_.initialised()) return report;
     // The board's time now is unknown here; the newest exchange is at most one interval old.
     const HostEstimate newest = filter_.translate(filter_.last_contact());

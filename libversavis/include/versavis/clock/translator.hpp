@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "versavis/clock/envelope_filter.hpp"
 #include "versavis/clock/output_clock.hpp"
@@ -36,12 +37,22 @@ struct ClockReport {
     std::uint64_t restarts = 0;
     std::uint32_t epoch = 0;
     std::uint32_t output_steps = 0;
+    std::uint32_t host_suspends = 0;
+    KernelState kernel;
+};
+
+/// Output clock against host clock at one moment, and the epoch of stamps that are made by it.
+struct OutputRelation {
+    HostTime host;
+    Duration minus_host;
+    Duration uncertainty;
+    std::uint32_t epoch = 0;
 };
 
 /// Thread-safe.
 class Translator {
  public:
-    explicit Translator(OutputClock output) : output_(output) {}
+    explicit Translator(OutputClock output) : output_(std::move(output)) {}
 
     /// The board began a new life: what was known of its clock is void, and a new epoch begins.
     void board_restarted();
@@ -57,11 +68,14 @@ class Translator {
     /// Stamp of an instant that was seen on the host clock, not by the board.
     Stamp translate(HostTime host, Duration sigma);
 
+    OutputRelation output_now();
+
     ClockReport report();
 
  private:
-    std::uint32_t epoch() const {
-        return board_lives_ + output_.steps() + static_cast<std::uint32_t>(filter_.restarts());
+    /// Epoch of stamps that are made by `output`.
+    std::uint32_t epoch(const OutputReading& output) const {
+        return board_lives_ + output.steps + static_cast<std::uint32_t>(filter_.restarts());
     }
 
     mutable std::mutex mutex_;
