@@ -19,6 +19,9 @@ struct Metric {
 /// Publication and reading of rings, within this process.
 std::vector<Metric> bench_ring();
 
+/// Translation of host time to the output clock.
+std::vector<Metric> bench_output_clock();
+
 /// The service against Aravis's own test program on the same stream, and its stamps against the rig's truth.
 std::vector<Metric> bench_end_to_end();
 
