@@ -78,11 +78,12 @@ const char* to_string(BoardState state) {
 }
 
 BoardLink::BoardLink(OpenStream open, const wire::Configuration& configuration, double exchange_rate_hz,
-                     clock::Translator& translator, BoardListener& listener)
+                     clock::Translator& translator, ClockRecorder& recorder, BoardListener& listener)
     : open_(std::move(open)),
       configuration_(configuration),
       exchange_interval_{static_cast<std::int64_t>(1e9 / exchange_rate_hz)},
       translator_(translator),
+      recorder_(recorder),
       listener_(listener) {}
 
 BoardLink::~BoardLink() { stop(); }
@@ -268,6 +269,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         if (!same_life(packet.header, received)) {
             listener_.board_restarted();
             translator_.board_restarted();
+            recorder_.board_restarted(nonce_);
         }
         last_life_ = nonce_;
         return;
@@ -286,7 +288,10 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::Log line{};
     wire::Refusal refusal{};
     if (packet.read(exposure)) return listener_.exposure(exposure);
-    if (packet.read(sample)) return listener_.imu_sample(sample);
+    if (packet.read(sample)) {
+        recorder_.one_way({sample.time_ns}, received);
+        return listener_.imu_sample(sample);
+    }
     if (packet.read(event)) return listener_.board_event(event);
     if (packet.read(answer)) return take_answer(answer, received);
     if (packet.read(line))
@@ -340,7 +345,9 @@ void BoardLink::plan_next_request() {
 void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {
     if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout) return;
     request_open_ = false;
-    translator_.add({request_sent_, {answer.received_ns}, {answer.sent_ns}, received});
+    const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
+    recorder_.exchange(answer.id, exchange);
+    translator_.add(exchange);
     ++exchanges_;
 }
 

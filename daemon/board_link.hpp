@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "byte_stream.hpp"
+#include "clock_recorder.hpp"
 #include "configuration.hpp"
 #include "versavis/clock/translator.hpp"
 #include "versavis/pairing/pairing.hpp"
@@ -56,7 +57,7 @@ class BoardLink {
     using OpenStream = std::function<Expected<std::unique_ptr<ByteStream>>()>;
 
     BoardLink(OpenStream open, const wire::Configuration& configuration, double exchange_rate_hz,
-              clock::Translator& translator, BoardListener& listener);
+              clock::Translator& translator, ClockRecorder& recorder, BoardListener& listener);
     ~BoardLink();
     BoardLink(const BoardLink&) = delete;
     BoardLink& operator=(const BoardLink&) = delete;
@@ -98,6 +99,7 @@ class BoardLink {
     wire::Configuration configuration_;
     Duration exchange_interval_;
     clock::Translator& translator_;
+    ClockRecorder& recorder_;
     BoardListener& listener_;
 
     std::mutex send_mutex_;  ///< guards stream_ against senders, and the sequence

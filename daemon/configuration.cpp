@@ -42,7 +42,7 @@ class Names {
     }
 
  private:
-    std::set<std::string> taken_{"events", "status"};
+    std::set<std::string> taken_{"clock", "events", "status"};
 };
 
 void read_board(TableReader& reader, BoardConfiguration& board) {

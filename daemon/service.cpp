@@ -15,6 +15,7 @@ constexpr std::uint64_t status_size = 64 * 1024;
 constexpr std::uint32_t status_slots = 8;
 constexpr std::uint32_t imu_items = 16384;  // 16 s at 1 kHz
 constexpr std::uint32_t event_items = 4096;
+constexpr std::uint32_t clock_items = 65536;  // 8 MiB: a minute of an IMU at 1 kHz, 5 of one at 200 Hz
 
 EventKind event_kind(wire::EventKind kind) {
     switch (kind) {
@@ -86,6 +87,10 @@ Expected<> Service::make_parts() {
         ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
     if (!event_ring) return tl::unexpected(event_ring.error());
     events_ = std::make_unique<EventJournal>(std::move(*event_ring), translator_);
+    auto clock_ring =
+        ring::Writer::create(directory_.path(), {"clock", ring::StreamKind::clock, clock_items});
+    if (!clock_ring) return tl::unexpected(clock_ring.error());
+    clock_recorder_ = std::make_unique<ClockRecorder>(std::move(*clock_ring), translator_);
     for (const ImuConfiguration& imu : configuration_.imus) {
         auto ring = ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
         if (!ring) return tl::unexpected(ring.error());
@@ -93,9 +98,9 @@ Expected<> Service::make_parts() {
     }
     for (const CameraConfiguration& camera : configuration_.cameras) add_camera(camera);
     BoardListener& self = *this;
-    board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         board_configuration(configuration_),
-                                         configuration_.clock.exchange_rate_hz, translator_, self);
+    board_ = std::make_unique<BoardLink>(
+        [this] { return open_byte_stream(configuration_.board); }, board_configuration(configuration_),
+        configuration_.clock.exchange_rate_hz, translator_, *clock_recorder_, self);
     return {};
 }
 
@@ -229,6 +234,7 @@ void Service::tick() {
     }
     for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);
+    clock_recorder_->tick(now);
     status_ring_.heartbeat(now);
     if (now >= next_status_) publish_status(now);
 }
@@ -246,6 +252,7 @@ std::vector<StreamStatus> Service::stream_status(HostTime now) {
     for (CameraUnit& unit : cameras_) add(unit.configuration.name, "frames", unit.pipeline->items());
     for (auto& imu : imus_) add(imu->report().name, "imu", imu->report().published);
     add("events", "events", events_->items());
+    add("clock", "clock", clock_recorder_->items());
     add("status", "status", status_ring_.head());
     return streams;
 }

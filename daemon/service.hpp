@@ -9,6 +9,7 @@
 #include "board_link.hpp"
 #include "camera.hpp"
 #include "camera_pipeline.hpp"
+#include "clock_recorder.hpp"
 #include "configuration.hpp"
 #include "event_journal.hpp"
 #include "imu_pipeline.hpp"
@@ -67,6 +68,7 @@ class Service final : private BoardListener {
     clock::Translator translator_;
     ring::Writer status_ring_;
     std::unique_ptr<EventJournal> events_;
+    std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
     CameraSurroundings surroundings_;
     std::vector<CameraUnit> cameras_;

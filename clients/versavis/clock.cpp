@@ -48,10 +48,13 @@ void add_estimator(CLI::App& command, EstimatorKind& estimator, bool& fair_start
 
 }  // namespace
 
-ClockCommands::ClockCommands(CLI::App& app)
-    : clock_(app.add_subcommand("clock", "The board's clock: its state, and its estimation again")) {
+ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
+    : clock_(app.add_subcommand("clock",
+                                "The board's clock: state, recordings, and its estimation again")) {
     clock_->require_subcommand(1);
+    record_settings_.stop = std::move(stop);
     add_status();
+    add_record();
     add_replay();
     add_plot();
 }
@@ -61,6 +64,14 @@ void ClockCommands::add_status() {
                                      "State of the translation of the board's clock; exit code 0: locked, 1: "
                                      "not locked, 69: the service is not running");
     status_->add_flag("--json", json_, "The object `clock` of the status document (docs/status.md)");
+}
+
+void ClockCommands::add_record() {
+    record_ = clock_->add_subcommand("record", "Write the stamps that the clocks are compared by");
+    record_->add_option("--seconds", recording_s_, "How long; without it, until it is stopped")
+        ->check(CLI::PositiveNumber);
+    record_->add_option("--exchanges", record_settings_.exchanges, "CSV file for the exchanges")->required();
+    record_->add_option("--oneway", record_settings_.one_way, "CSV file for the board's other messages");
 }
 
 void ClockCommands::add_replay() {
@@ -94,7 +105,8 @@ bool ClockCommands::chosen() const { return clock_->parsed(); }
 
 int ClockCommands::run(const std::string& instance) {
     if (status_->parsed()) return show_status(instance);
-    // Nothing here looks for the program's stop flag: a signal ends it.
+    if (record_->parsed()) return record(instance);
+    // Nothing below looks for the program's stop flag: a signal ends it.
     for (const int number : {SIGINT, SIGTERM}) signal(number, SIG_DFL);
     if (fair_start_ && estimator_ == EstimatorKind::ekf) estimator_ = EstimatorKind::ekf_fair;
     return replay_->parsed() ? replay() : plot();
@@ -107,6 +119,12 @@ int ClockCommands::show_status(const std::string& instance) const {
     fmt::print("{}", json_ ? clock.dump() + "\n" : clock_text(*status));
     std::fflush(stdout);
     return clock.value("state", "") == "locked" ? EX_OK : EXIT_FAILURE;
+}
+
+int ClockCommands::record(const std::string& instance) {
+    record_settings_.instance = instance;
+    record_settings_.duration = {static_cast<std::int64_t>(recording_s_ * 1e9)};
+    return record_clock(record_settings_);
 }
 
 int ClockCommands::replay() {

@@ -21,6 +21,7 @@ const char* kind_name(ring::StreamKind kind) {
         case ring::StreamKind::events: return "events";
         case ring::StreamKind::status: return "status";
         case ring::StreamKind::evidence: return "evidence";
+        case ring::StreamKind::clock: return "clock";
     }
     return "unknown";
 }

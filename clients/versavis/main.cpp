@@ -103,7 +103,7 @@ int main(int argc, char** argv) {
     replay->add_option("-o,--output", decisions, "File for the decisions, one JSON object per line");
     replay->add_flag("--json", json, "The summary as a JSON object");
 
-    client::ClockCommands clock(app);
+    client::ClockCommands clock(app, [] { return stop_requested != 0; });
 
     std::string stream;
     std::string output;

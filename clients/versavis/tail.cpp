@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "clock_json.hpp"
 #include "evidence_json.hpp"
 #include "versavis/stream.hpp"
 
@@ -79,6 +80,13 @@ json describe(const Received<pairing::EvidenceMetadata>& item) {
     return line;
 }
 
+json describe(const Received<clock::ClockMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const auto told = clock::from_metadata(item.data);
+    line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
+    return line;
+}
+
 /// The document itself, so that a script sees what the status command sees.
 json describe(const StatusStream& stream, const Received<ring::Metadata>& item) {
     std::string text(item.payload_size, '\0');
@@ -142,6 +150,7 @@ Expected<> tail(const TailSettings& settings) {
         case ring::StreamKind::events: return print_stream<EventStream>(settings);
         case ring::StreamKind::status: return print_stream<StatusStream>(settings);
         case ring::StreamKind::evidence: return print_stream<EvidenceStream>(settings);
+        case ring::StreamKind::clock: return print_stream<ClockStream>(settings);
     }
     return failure(settings.stream, "is of a kind that this program does not know");
 }

@@ -123,6 +123,7 @@ TEST_CASE("configuration: errors name line, column and cure") {
                Catch::Contains("uses output 0, which is taken"));
     CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"), Catch::Contains("is no name"));
     CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"), Catch::Contains("is taken"));
+    CHECK_THAT(error_of("[[imu]]\nname = \"clock\"\n"), Catch::Contains("is taken"));
     CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("must be one of: adis16448b"));
     CHECK_THAT(error_of("[[imu]]\n[[imu]]\nname = \"b\"\n"), Catch::Contains("one SPI port"));
     CHECK_THAT(error_of("[[imu]]\nrate_hz = 2000\n"), Catch::Contains("from 1 to 1000"));

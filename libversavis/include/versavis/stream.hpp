@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reading a stream by its name: frames, IMU samples, events or the status document.
+// Reading a stream by its name: frames, IMU samples, events, the status document or what was told to pairing
+// and clock.
 #pragma once
 
 #include <string>
 #include <utility>
 
+#include "versavis/clock/recording.hpp"
 #include "versavis/metadata.hpp"
 #include "versavis/pairing/recording.hpp"
 #include "versavis/ring/path.hpp"
@@ -68,6 +70,7 @@ using FrameStream = Stream<FrameMetadata, ring::StreamKind::frames>;
 using ImuStream = Stream<ImuMetadata, ring::StreamKind::imu>;
 using EventStream = Stream<EventMetadata, ring::StreamKind::events>;
 using EvidenceStream = Stream<pairing::EvidenceMetadata, ring::StreamKind::evidence>;
+using ClockStream = Stream<clock::ClockMetadata, ring::StreamKind::clock>;
 using StatusStream = Stream<ring::Metadata, ring::StreamKind::status>;  ///< the payload is the document
 
 }  // namespace versavis

@@ -11,7 +11,7 @@ namespace versavis::ring {
 
 inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
 inline constexpr std::uint32_t abi_major = 1;
-inline constexpr std::uint32_t abi_minor = 1;
+inline constexpr std::uint32_t abi_minor = 2;
 inline constexpr std::size_t page_size = 4096;
 inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's generation
 inline constexpr std::size_t metadata_words = 12;
@@ -20,7 +20,14 @@ inline constexpr std::uint32_t no_slot = 0xFFFFFFFFU;  ///< the item lies in the
 
 using Metadata = std::array<std::uint64_t, metadata_words>;
 
-enum class StreamKind : std::uint32_t { frames = 1, imu = 2, events = 3, status = 4, evidence = 5 };
+enum class StreamKind : std::uint32_t {
+    frames = 1,
+    imu = 2,
+    events = 3,
+    status = 4,
+    evidence = 5,
+    clock = 6
+};
 
 enum class WriterState : std::uint32_t { live = 1, closed = 2, superseded = 3 };
 
