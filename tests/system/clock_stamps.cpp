@@ -174,3 +174,31 @@ TEST_CASE("clock stamps: recorded for some seconds, until it is stopped, and nev
     CHECK(first.nonce != second.nonce);
     CHECK(next_of<ExchangeTold>(all).nonce == second.nonce);
 }
+
+TEST_CASE("clock stamps: TAI that the kernel does not know is refused, or forced and said to be UTC") {
+    const std::int32_t kernel_offset_s = kernel_clocks()->kernel_state().tai_offset_s;
+    Stack stack({"tai", 68, 1, 20, "", "", ""});
+    std::ofstream file(stack.configuration_path(), std::ios::app);
+    file << "[clock]\noutput = \"tai\"\n" << std::flush;
+    if (kernel_offset_s == 0) {
+        std::string text;
+        CHECK(run({program("versavisd"), "--config", stack.configuration_path()},
+                  stack.log_path("refused.log"), &text) == 69);
+        CHECK_THAT(text, Catch::Contains("TAI") && Catch::Contains("force_tai = true"));
+    }
+    file << "force_tai = true\n" << std::flush;
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["clock"]["output"] == "tai");
+    CHECK(status["clock"]["tai_offset_s"] == kernel_offset_s);
+    CHECK(status["clock"]["tai_valid"] == (kernel_offset_s != 0));
+    CHECK(status["clock"]["host_max_error_ns"].is_number_integer());
+    CHECK(status["clock"]["output_steps"] == 0);
+    auto stream = wait_for_stream<FrameStream>("cam0", "tai");
+    auto frame = stream.wait(seconds(5));
+    while (frame.found != Found::item) frame = stream.wait(seconds(5));
+    auto clock = OutputClock::create(OutputClockKind::tai, true);
+    REQUIRE(clock);
+    CHECK(absolute(Duration{frame.time.ns - frame.data.host_time.ns} - clock->offset()) < milliseconds(1));
+}

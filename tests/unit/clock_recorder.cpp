@@ -89,7 +89,7 @@ TEST_CASE("clock_recorder: what it is told is in the ring, with the board's nonc
 
 TEST_CASE("clock_recorder: the output clock is told once a second, and at each step") {
     Recording recording;
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 30; ++i) {
         recording.tick();
         recording.clocks->pass(milliseconds(50));
     }
