@@ -88,7 +88,7 @@ std::string to_csv(const std::vector<ClockQuery>& queries, const ClockAnswers& a
     for (std::size_t i = 0; i < answers.size(); ++i) {
         const HostEstimate& answer = answers[i];
         if (answer.state == ClockState::init)
-            fmt::format_to(out, "{},,,init\n", queries[i].board.ns);
+            fmt::format_to(out, "{},0,{},init\n", queries[i].board.ns, INT64_MAX);
         else
             fmt::format_to(out, "{},{},{},{}\n", queries[i].board.ns, answer.time.ns, answer.sigma.ns,
                            to_string(answer.state));
@@ -132,9 +132,16 @@ ClockAnswers replayed_answers(const std::vector<TimedMessage>& messages,
     return answers;
 }
 
-Expected<ClockAnswers> smoothed_answers(const std::vector<TimedMessage>& /*messages*/,
-                                        const std::vector<ClockQuery>& /*queries*/) {
-    return failure("--smoothed", "this version has no smoother", "leave it out: each answer is then causal");
+ClockAnswers smoothed_answers(const std::vector<TimedMessage>& messages,
+                              const std::vector<ClockQuery>& queries) {
+    std::vector<Message> stamps;
+    stamps.reserve(messages.size());
+    for (const TimedMessage& timed : messages) stamps.push_back(timed.message);
+    const Smoother smoother(stamps);
+    ClockAnswers answers(queries.size());
+    for (std::size_t i = 0; i < queries.size(); ++i)
+        if (plausible(queries[i].board.ns)) answers[i] = smoother.translate(queries[i].board);
+    return answers;
 }
 
 Expected<ClockReplaySummary> replay_clock(const ClockReplaySettings& settings) {
@@ -147,15 +154,14 @@ Expected<ClockReplaySummary> replay_clock(const ClockReplaySettings& settings) {
     const auto queries = read_queries(settings.queries);
     if (!queries) return tl::unexpected(queries.error());
     const auto estimator = make_estimator(settings.estimator);
-    const Expected<ClockAnswers> answers = settings.smoothed
-                                               ? smoothed_answers(recording->messages, *queries)
-                                               : replayed_answers(recording->messages, *queries, *estimator);
-    if (!answers) return tl::unexpected(answers.error());
-    const auto written = write_whole_file(settings.out, to_csv(*queries, *answers));
+    const ClockAnswers answers = settings.smoothed
+                                     ? smoothed_answers(recording->messages, *queries)
+                                     : replayed_answers(recording->messages, *queries, *estimator);
+    const auto written = write_whole_file(settings.out, to_csv(*queries, answers));
     if (!written) return tl::unexpected(written.error());
-    const auto unanswered = std::count_if(answers->begin(), answers->end(),
+    const auto unanswered = std::count_if(answers.begin(), answers.end(),
                                           [](const auto& a) { return a.state == ClockState::init; });
-    return ClockReplaySummary{recording->messages.size(), recording->ignored, answers->size(),
+    return ClockReplaySummary{recording->messages.size(), recording->ignored, answers.size(),
                               static_cast<std::size_t>(unanswered)};
 }
 

@@ -10,6 +10,7 @@
 #include "versavis/clock/ekf.hpp"
 #include "versavis/clock/envelope_filter.hpp"
 #include "versavis/clock/messages.hpp"
+#include "versavis/clock/smoother.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {
@@ -59,8 +60,8 @@ ClockAnswers replayed_answers(const std::vector<TimedMessage>& messages,
                               const std::vector<ClockQuery>& queries, ClockEstimator& estimator);
 
 /// One answer per query from all messages, later ones included.
-Expected<ClockAnswers> smoothed_answers(const std::vector<TimedMessage>& messages,
-                                        const std::vector<ClockQuery>& queries);
+ClockAnswers smoothed_answers(const std::vector<TimedMessage>& messages,
+                              const std::vector<ClockQuery>& queries);
 
 struct ClockReplaySettings {
     std::string exchanges;
