@@ -15,6 +15,8 @@ constexpr Duration answer_timeout = milliseconds(1000);
 constexpr Duration silence_limit = seconds(3);  // the board reports its health every second
 constexpr Duration request_timeout = milliseconds(500);
 constexpr unsigned exchanges_to_start = 4;
+constexpr Duration follow_up_patience = milliseconds(50);  // of the first exchanges, which nothing else paces
+constexpr std::uint8_t first_minor_with_follow_up = 2;
 constexpr Duration longest_read = milliseconds(100);
 constexpr Duration largest_clock_surprise = milliseconds(500);
 
@@ -225,16 +227,20 @@ Expected<> BoardLink::configure() {
 
 /// A few exchanges in a row, so that the first frame can be stamped.
 Expected<> BoardLink::synchronise() {
-    exchanges_ = 0;
+    answers_ = 0;
     request_open_ = false;
-    while (exchanges_ < exchanges_to_start) {
-        const unsigned before = exchanges_;
+    exchange_.reset();
+    while (answers_ < exchanges_to_start) {
+        const unsigned before = answers_;
         if (auto sent = request_clock(); !sent) return sent;
-        if (auto done = read_until([&] { return exchanges_ > before; }, answer_timeout,
+        if (auto done = read_until([&] { return answers_ > before; }, answer_timeout,
                                    "does not answer clock requests");
             !done)
             return done;
+        // A link that cannot tell when the answer left is no failure.
+        static_cast<void>(read_until([&] { return !exchange_; }, follow_up_patience, "sends no follow-up"));
     }
+    hand_on_exchange();
     plan_next_request();
     return {};
 }
@@ -264,6 +270,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     last_packet_ = received;
     if (packet.read(hello_)) {
         greeted_ = true;
+        exchange_.reset();
         nonce_ = packet.header.nonce;
         next_sequence_ = packet.header.sequence + 1;
         if (!same_life(packet.header, received)) {
@@ -284,6 +291,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::ImuSample sample{};
     wire::Event event{};
     wire::ClockAnswer answer{};
+    wire::ClockFollowUp follow_up{};
     wire::Health health{};
     wire::Log line{};
     wire::Refusal refusal{};
@@ -294,6 +302,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     }
     if (packet.read(event)) return listener_.board_event(event);
     if (packet.read(answer)) return take_answer(answer, received);
+    if (packet.read(follow_up)) return take_follow_up(follow_up);
     if (packet.read(line))
         return log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
     if (packet.read(refusal)) {
@@ -326,6 +335,7 @@ void BoardLink::count_losses(const wire::Header& header) {
 }
 
 Expected<> BoardLink::request_clock() {
+    hand_on_exchange();
     request_open_ = true;
     wire::ClockRequest request{};
     request.id = ++request_id_;
@@ -345,10 +355,23 @@ void BoardLink::plan_next_request() {
 void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {
     if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout) return;
     request_open_ = false;
-    const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
-    recorder_.exchange(answer.id, exchange);
-    translator_.add(exchange);
-    ++exchanges_;
+    exchange_ = clock::Exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
+    ++answers_;
+    if (hello_.minor < first_minor_with_follow_up) hand_on_exchange();
+}
+
+/// One that says that the answer left before it was written is not believed.
+void BoardLink::take_follow_up(const wire::ClockFollowUp& follow_up) {
+    if (!exchange_ || follow_up.id != request_id_ || follow_up.sent_ns < exchange_->answered.ns) return;
+    exchange_->answered.ns = follow_up.sent_ns;
+    hand_on_exchange();
+}
+
+void BoardLink::hand_on_exchange() {
+    if (!exchange_) return;
+    recorder_.exchange(request_id_, *exchange_);
+    translator_.add(*exchange_);
+    exchange_.reset();
 }
 
 template <class T>

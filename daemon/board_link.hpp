@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
@@ -87,6 +88,8 @@ class BoardLink {
     void take(const wire::Packet& packet, HostTime received);
     bool same_life(const wire::Header& header, HostTime received) const;
     void take_answer(const wire::ClockAnswer& answer, HostTime received);
+    void take_follow_up(const wire::ClockFollowUp& follow_up);
+    void hand_on_exchange();
     void count_losses(const wire::Header& header);
     Expected<> request_clock();
     void plan_next_request();
@@ -122,7 +125,8 @@ class BoardLink {
     std::uint32_t request_id_ = 0;
     HostTime request_sent_;
     bool request_open_ = false;
-    unsigned exchanges_ = 0;
+    std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still be told
+    unsigned answers_ = 0;
     HostTime next_request_;
     HostTime last_packet_;
 

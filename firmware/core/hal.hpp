@@ -155,6 +155,11 @@ struct ByteLink {
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
     /// `received` is when the newest of the bytes entered the board.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
+    /// Asks when the newest byte that was written leaves: is acknowledged, or handed to what does not tell
+    /// more. The newest question alone is answered. A link that cannot tell never answers.
+    virtual void watch_departure() {}
+    /// True, once: the byte that was asked for left at `at`, not later than the host could have it.
+    virtual bool take_departure(Nanoseconds& /*at*/) { return false; }
 
  protected:
     ~ByteLink() = default;

@@ -3,10 +3,21 @@
 
 namespace versavis::firmware {
 
+namespace {
+
+/// 0, which says that it is unknown, when it is no age, or one that the field cannot hold.
+std::uint32_t age(Nanoseconds of, Nanoseconds now) {
+    const Nanoseconds passed = now - of;
+    return passed < 0 || passed > UINT32_MAX ? 0 : static_cast<std::uint32_t>(passed);
+}
+
+}  // namespace
+
 void Transmitter::begin() {
     hellos_.clear();
     refusals_.clear();
     answers_.clear();
+    follow_ups_.clear();
     clock_answers_.clear();
     exposures_.clear();
     events_.clear();
@@ -16,11 +27,12 @@ void Transmitter::begin() {
     frame_.bytes[0] = 0;  // ends the packet that was being written
     frame_.size = 1;
     written_ = 0;
+    answering_ = watching_ = false;
 }
 
 std::size_t Transmitter::waiting_packets() const {
-    return hellos_.size() + refusals_.size() + answers_.size() + clock_answers_.size() + exposures_.size() +
-           events_.size() + healths_.size() + samples_.size() + logs_.size();
+    return hellos_.size() + refusals_.size() + answers_.size() + follow_ups_.size() + clock_answers_.size() +
+           exposures_.size() + events_.size() + healths_.size() + samples_.size() + logs_.size();
 }
 
 template <class Queue>
@@ -33,22 +45,44 @@ bool Transmitter::stage_first_of(Queue& queue) {
 }
 
 bool Transmitter::stage() {
-    if (stage_first_of(hellos_)) return true;
-    if (!clock_answers_.empty()) clock_answers_.front().sent_ns = clock_.now();
+    stamp();
+    if (stage_first_of(hellos_) || stage_first_of(follow_ups_)) return true;
+    answering_ = !clock_answers_.empty();
+    if (answering_) answer_id_ = clock_answers_.front().id;
     return stage_first_of(clock_answers_) || stage_first_of(refusals_) || stage_first_of(answers_) ||
            stage_first_of(exposures_) || stage_first_of(events_) || stage_first_of(healths_) ||
            stage_first_of(samples_) || stage_first_of(logs_);
+}
+
+/// What is staged next carries the time of now.
+void Transmitter::stamp() {
+    const Nanoseconds now = clock_.now();
+    if (!clock_answers_.empty()) clock_answers_.front().sent_ns = now;
+    if (!samples_.empty()) samples_.front().departure_ns = age(samples_.front().time_ns, now);
+}
+
+void Transmitter::follow_up() {
+    Nanoseconds left = 0;
+    if (!watching_ || !link_.take_departure(left)) return;
+    watching_ = false;
+    follow_ups_.push(wire::ClockFollowUp{watched_id_, 0, left});
 }
 
 void Transmitter::pump() {
     const std::size_t waiting = waiting_packets();
     if (waiting > high_water_) high_water_ = waiting;
     for (std::size_t space = link_.free_space(); space > 0; space = link_.free_space()) {
+        follow_up();
         if (written_ == frame_.size && !stage()) return;
         const std::size_t left = frame_.size - written_;
         const std::size_t size = left < space ? left : space;
         link_.write(frame_.bytes + written_, size);
         written_ += size;
+        if (!answering_ || written_ < frame_.size) continue;
+        link_.watch_departure();
+        watched_id_ = answer_id_;
+        answering_ = false;
+        watching_ = true;
     }
 }
 

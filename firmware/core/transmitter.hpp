@@ -50,11 +50,12 @@ class Transmitter {
     void send(const wire::BoardHello& message) { hellos_.push(message); }
     void send(const wire::Refusal& message) { refusals_.push(message); }
     void send(const wire::ConfigurationAnswer& message) { answers_.push(message); }
-    /// Its time of sending is filled when it leaves.
+    /// Its time of sending is filled when it is handed to the link; when it truly left follows after it.
     void send(const wire::ClockAnswer& message) { clock_answers_.push(message); }
     void send(const wire::Exposure& message) { exposures_.push(message); }
     void send(const wire::Event& message) { events_.push(message); }
     void send(const wire::Health& message) { healths_.push(message); }
+    /// How old it is when it leaves is filled in then.
     void send(const wire::ImuSample& message) { samples_.push(message); }
     void send(const wire::Log& message) { logs_.push(message); }
 
@@ -70,6 +71,8 @@ class Transmitter {
 
  private:
     std::size_t waiting_packets() const;
+    void follow_up();
+    void stamp();
     bool stage();
     template <class Queue>
     bool stage_first_of(Queue& queue);
@@ -81,10 +84,15 @@ class Transmitter {
     std::size_t high_water_ = 0;
     wire::Frame frame_{};      ///< the packet that is being written
     std::size_t written_ = 0;  ///< of its bytes
+    bool answering_ = false;   ///< it is a clock answer
+    bool watching_ = false;    ///< the link was asked when an answer leaves
+    std::uint32_t answer_id_ = 0;
+    std::uint32_t watched_id_ = 0;
 
     MessageQueue<wire::BoardHello, 1> hellos_;
     MessageQueue<wire::Refusal, 48> refusals_;
     MessageQueue<wire::ConfigurationAnswer, 1> answers_;
+    MessageQueue<wire::ClockFollowUp, 1> follow_ups_;
     MessageQueue<wire::ClockAnswer, 8> clock_answers_;
     MessageQueue<wire::Exposure, 256> exposures_;
     MessageQueue<wire::Event, 128> events_;

@@ -129,8 +129,13 @@ void NativeBoard::drive_pins(Nanoseconds at) {
     if (surroundings_.outputs_changed) surroundings_.outputs_changed(at, pins);
 }
 
-void NativeBoard::consume(std::size_t size) {
+void NativeBoard::consume(std::size_t size, Nanoseconds at) {
     transmitted_.erase(transmitted_.begin(), transmitted_.begin() + static_cast<std::ptrdiff_t>(size));
+    consumed_ += size;
+    if (watched_ && consumed_ >= *watched_) {
+        departure_ = at;
+        watched_.reset();
+    }
     attention_ = attention_ || size > 0;
 }
 
@@ -203,6 +208,18 @@ std::size_t NativeBoard::free_space() {
 
 void NativeBoard::write(const std::uint8_t* data, std::size_t size) {
     transmitted_.insert(transmitted_.end(), data, data + size);
+    written_ += size;
+}
+
+void NativeBoard::watch_departure() {
+    watched_ = written_;
+    departure_.reset();
+}
+
+bool NativeBoard::take_departure(Nanoseconds& at) {
+    if (!departure_) return false;
+    at = *std::exchange(departure_, std::nullopt);
+    return true;
 }
 
 std::size_t NativeBoard::read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) {

@@ -77,7 +77,8 @@ class NativeBoard final : Clock64,
 
     /// Bytes for the host that were not consumed yet; at the capacity the core has to wait.
     std::span<const std::uint8_t> transmitted() const { return transmitted_; }
-    void consume(std::size_t size);
+    /// They left at `at`, or later.
+    void consume(std::size_t size, Nanoseconds at);
     void set_link_capacity(std::size_t bytes) { link_capacity_ = bytes; }
 
     /// What another SPI master reads from the second port in one selection.
@@ -118,6 +119,8 @@ class NativeBoard final : Clock64,
     std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
     void write(const std::uint8_t* data, std::size_t size) override;
     std::size_t free_space() override;
+    void watch_departure() override;
+    bool take_departure(Nanoseconds& at) override;
     void publish(const ImuImage& image) override;
     std::size_t load(std::uint8_t* data, std::size_t capacity) override;
     void store(const std::uint8_t* data, std::size_t size) override;
@@ -169,6 +172,10 @@ class NativeBoard final : Clock64,
     Nanoseconds received_at_ = 0;
     std::vector<std::uint8_t> transmitted_;
     std::size_t link_capacity_ = std::size_t{64} * 1024;
+    std::uint64_t written_ = 0;   ///< bytes for the host since boot
+    std::uint64_t consumed_ = 0;  ///< of them
+    std::optional<std::uint64_t> watched_;
+    std::optional<Nanoseconds> departure_;
     Board board_;
 };
 

@@ -101,7 +101,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             feed_as_packet(board, chunk, now);
         now += step_ns;
         board.run_until(now);
-        board.consume(board.transmitted().size());
+        board.consume(board.transmitted().size(), 0);
         rest = rest.subspan(1 + chunk.size());
     }
     board.run_until(now + 100 * step_ns);

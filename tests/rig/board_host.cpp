@@ -158,7 +158,7 @@ void BoardHost::drop_host() {
 void BoardHost::exchange_bytes() {
     accept_host();
     if (host_ < 0) {
-        board_->consume(board_->transmitted().size());
+        board_->consume(board_->transmitted().size(), board_now());
         return;
     }
     std::uint8_t buffer[4096];
@@ -170,8 +170,10 @@ void BoardHost::exchange_bytes() {
     }
     if (size == 0 || errno != EAGAIN) return drop_host();
     const auto out = board_->transmitted();
+    // The time before: the host may have the bytes before this process goes on.
+    const firmware::Nanoseconds leaving = board_now();
     const ssize_t sent = out.empty() ? 0 : ::send(host_, out.data(), out.size(), MSG_NOSIGNAL);
-    if (sent > 0) board_->consume(static_cast<std::size_t>(sent));
+    if (sent > 0) board_->consume(static_cast<std::size_t>(sent), leaving);
 }
 
 }  // namespace versavis::rig

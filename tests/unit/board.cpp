@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "adis_device.hpp"
 #include "world.hpp"
 
 using namespace versavis;
@@ -51,4 +52,36 @@ TEST_CASE("board: its health comes once a second") {
     world.run(10 * second);
     CHECK(world.inbox().healths.size() == 10);
     CHECK(world.inbox().lost == 0);
+}
+
+TEST_CASE("board: when a clock answer left is told after it, also when the host was slow to take it") {
+    World world;
+    world.connect();
+    for (const Nanoseconds stall : {Nanoseconds{0}, 300 * ms}) {
+        world.inbox() = {};
+        world.stall_host(stall);
+        world.send(wire::ClockRequest{77, 0});
+        const Nanoseconds asked = world.now();
+        world.run(stall + 10 * ms);
+        REQUIRE(world.inbox().clock_answers.size() == 1);
+        REQUIRE(world.inbox().follow_ups.size() == 1);
+        const wire::ClockFollowUp& told = world.inbox().follow_ups[0];
+        CHECK(told.id == 77);
+        CHECK(world.inbox().clock_answers[0].sent_ns - asked < ms);
+        CHECK(told.sent_ns >= asked + stall);
+        CHECK(told.sent_ns <= asked + stall + ms);
+    }
+}
+
+TEST_CASE("board: each sample says how old it was when it left") {
+    World world;
+    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+                  wire::ImuKind::adis16448b, 204.8, true);
+    REQUIRE(world.begin());
+    world.run(2 * second);
+    REQUIRE(world.inbox().samples[0].size() > 200);
+    for (const wire::ImuSample& sample : world.inbox().samples[0]) {
+        REQUIRE(sample.departure_ns > 0);
+        REQUIRE(sample.departure_ns < 2'000'000);  // read at once, and the link is free
+    }
 }

@@ -75,6 +75,7 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
           documented("clock-answer"));
+    CHECK(hex(encoded(ClockFollowUp{42, 0, 123469876}, 0xA1B2C3D4, 8)) == documented("clock-follow-up"));
     CHECK(hex(encoded(Start{0b0101, start_pattern, {}}, 0x11223344, 4)) == documented("start"));
     CHECK(hex(encoded(Event{EventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
           documented("event"));

@@ -2,6 +2,7 @@
 #include "transmitter.hpp"
 
 #include <catch2/catch.hpp>
+#include <utility>
 #include <vector>
 
 using namespace versavis;
@@ -12,6 +13,8 @@ namespace {
 struct Link final : ByteLink {
     std::size_t space = 0;
     std::vector<std::uint8_t> bytes;
+    std::size_t watched = 0;  ///< bytes that were written when it was asked
+    Nanoseconds left = 0;     ///< 0: it does not tell
     std::size_t free_space() override { return space; }
     void write(const std::uint8_t* data, std::size_t size) override {
         bytes.insert(bytes.end(), data, data + size);
@@ -19,6 +22,11 @@ struct Link final : ByteLink {
     }
     std::size_t read(std::uint8_t* /*data*/, std::size_t /*capacity*/, Nanoseconds& /*received*/) override {
         return 0;
+    }
+    void watch_departure() override { watched = bytes.size(); }
+    bool take_departure(Nanoseconds& at) override {
+        at = std::exchange(left, 0);
+        return at != 0;
     }
 };
 
@@ -38,6 +46,17 @@ struct Bench {
         wire::Decoder decoder;
         decoder.feed(link.bytes.data(), link.bytes.size(),
                      [&](const wire::Packet& packet) { out.push_back(packet.header); });
+        return out;
+    }
+
+    template <class T>
+    std::vector<T> received() {
+        std::vector<T> out;
+        wire::Decoder decoder;
+        decoder.feed(link.bytes.data(), link.bytes.size(), [&](const wire::Packet& packet) {
+            T message{};
+            if (packet.read(message)) out.push_back(message);
+        });
         return out;
     }
 };
@@ -122,4 +141,60 @@ TEST_CASE("transmitter: the time of sending is that at which the answer leaves")
                  [&](const wire::Packet& packet) { packet.read(answer); });
     CHECK(answer.received_ns == 500);
     CHECK(answer.sent_ns == 90'000);
+}
+
+TEST_CASE("transmitter: when an answer left follows as soon as the link tells, before all that waits") {
+    Bench bench;
+    bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
+    bench.link.space = 20;  // less than the answer
+    bench.transmitter.pump();
+    CHECK(bench.link.watched == 0);
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    REQUIRE(bench.received<wire::ClockAnswer>().size() == 1);
+    CHECK(bench.link.watched == bench.link.bytes.size());
+    CHECK(bench.received<wire::ClockFollowUp>().empty());
+    bench.transmitter.send(exposure(1));
+    bench.transmitter.send(wire::ClockAnswer{43, 0, 600, 0});
+    bench.link.left = 12'345;
+    bench.transmitter.pump();
+    const auto headers = bench.headers();
+    REQUIRE(headers.size() == 4);
+    CHECK(headers[1].type == wire::Type::clock_follow_up);
+    REQUIRE(bench.received<wire::ClockFollowUp>().size() == 1);
+    CHECK(bench.received<wire::ClockFollowUp>()[0].id == 42);
+    CHECK(bench.received<wire::ClockFollowUp>()[0].sent_ns == 12'345);
+}
+
+TEST_CASE("transmitter: a new connection hears nothing of the departures of the one before") {
+    Bench bench;
+    bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    bench.transmitter.begin();
+    bench.link.left = 12'345;
+    bench.transmitter.send(wire::BoardHello{});
+    bench.transmitter.pump();
+    CHECK(bench.received<wire::BoardHello>().size() == 1);
+    CHECK(bench.received<wire::ClockFollowUp>().empty());
+}
+
+TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody knows") {
+    Bench bench;
+    for (const Nanoseconds taken : {Nanoseconds{90'000}, Nanoseconds{40'000}, Nanoseconds{-5'000'000'000}}) {
+        wire::ImuSample sample{};
+        sample.time_ns = taken;
+        bench.transmitter.send(sample);
+    }
+    bench.clock.time = 100'000;
+    bench.link.space = 60;  // for the first, which is staged now
+    bench.transmitter.pump();
+    bench.clock.time = 190'000;
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    const auto samples = bench.received<wire::ImuSample>();
+    REQUIRE(samples.size() == 3);
+    CHECK(samples[0].departure_ns == 10'000);
+    CHECK(samples[1].departure_ns == 150'000);
+    CHECK(samples[2].departure_ns == 0);
 }

@@ -42,7 +42,8 @@ void HostModel::take(const wire::Packet& packet) {
         inbox.samples[sample.imu].push_back(sample);
     } else {
         keep(packet, inbox.events) || keep(packet, inbox.healths) || keep(packet, inbox.hellos) ||
-            keep(packet, inbox.answers) || keep(packet, inbox.refusals) || keep(packet, inbox.clock_answers);
+            keep(packet, inbox.answers) || keep(packet, inbox.refusals) ||
+            keep(packet, inbox.clock_answers) || keep(packet, inbox.follow_ups);
     }
 }
 

@@ -19,6 +19,7 @@ struct Inbox {
     std::vector<wire::ConfigurationAnswer> answers;
     std::vector<wire::Refusal> refusals;
     std::vector<wire::ClockAnswer> clock_answers;
+    std::vector<wire::ClockFollowUp> follow_ups;
     std::uint64_t packets = 0;
     std::uint64_t lost = 0;  ///< by sequence numbers
 

@@ -165,7 +165,7 @@ void World::read_link() {
     const auto bytes = board_->transmitted();
     const std::size_t size = std::min(bytes.size(), read_size_);
     host_.take(bytes.subspan(0, size));
-    board_->consume(size);
+    board_->consume(size, now_);
 }
 
 Nanoseconds World::next_event() const {

@@ -104,7 +104,7 @@ struct ImuSample {
     std::int16_t temperature;
     std::uint16_t pressure;
     std::uint16_t reserved;
-    std::uint32_t reserved2;
+    std::uint32_t departure_ns;  ///< from time_ns to when this packet began to leave the board; 0: unknown
 };
 
 enum class EventKind : std::uint8_t {
@@ -149,7 +149,15 @@ struct ClockAnswer {
     std::uint32_t id;
     std::uint32_t reserved;
     std::int64_t received_ns;  ///< the request, stamped where it entered the board
-    std::int64_t sent_ns;      ///< this answer, stamped as it left
+    std::int64_t sent_ns;      ///< this answer, stamped as it was handed to the link
+};
+
+/// After the answer, from boards whose link can tell: when it truly left.
+struct ClockFollowUp {
+    static constexpr Type type = Type::clock_follow_up;
+    std::uint32_t id;  ///< of the request
+    std::uint32_t reserved;
+    std::int64_t sent_ns;  ///< the last byte of the answer left
 };
 
 enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
@@ -237,8 +245,8 @@ constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera
 
 static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
-static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(Health) == 88 &&
-              sizeof(Log) == 96);
+static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(ClockFollowUp) == 16 &&
+              sizeof(Health) == 88 && sizeof(Log) == 96);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
               sizeof(Reboot) == 8);
 
@@ -250,6 +258,7 @@ constexpr std::size_t payload_size(Type type) {
         case Type::imu_sample: return sizeof(ImuSample);
         case Type::event: return sizeof(Event);
         case Type::clock_answer: return sizeof(ClockAnswer);
+        case Type::clock_follow_up: return sizeof(ClockFollowUp);
         case Type::health: return sizeof(Health);
         case Type::log: return sizeof(Log);
         case Type::configuration_answer: return sizeof(ConfigurationAnswer);

@@ -10,7 +10,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire structs are c
 namespace versavis::wire {
 
 inline constexpr std::uint8_t protocol_major = 2;
-inline constexpr std::uint8_t protocol_minor = 1;
+inline constexpr std::uint8_t protocol_minor = 2;
 inline constexpr std::size_t camera_count = 4;
 
 /// Time fields of value `no_time` say that the instant was not observed.
@@ -26,6 +26,7 @@ enum class Type : std::uint8_t {
     log = 0x07,
     configuration_answer = 0x08,
     refusal = 0x09,
+    clock_follow_up = 0x0A,
     host_hello = 0x81,
     configuration = 0x82,
     start = 0x83,

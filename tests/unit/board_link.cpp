@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The link against a board that is played: what it makes of answers, follow-ups and older boards.
+#include "board_link.hpp"
+
+#include <catch2/catch.hpp>
+#include <condition_variable>
+#include <deque>
+#include <future>
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+constexpr Duration on_the_way = milliseconds(100);  // an answer waits so long before it leaves the board
+
+/// Answers at once; time stands still on the way, but for what the stamps say.
+class PlayedBoard final : public ByteStream {
+ public:
+    PlayedBoard(std::uint8_t minor, bool follows_up) : minor_(minor), follows_up_(follows_up) {}
+
+    Expected<Chunk> read(Duration timeout) override {
+        std::unique_lock lock(mutex_);
+        const auto any = [this] { return !chunks_.empty(); };
+        if (!came_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), any)) return Chunk{host_now(), {}};
+        Chunk chunk = std::move(chunks_.front());
+        chunks_.pop_front();
+        return chunk;
+    }
+
+    Expected<> write(std::span<const std::uint8_t> bytes) override {
+        decoder_.feed(bytes.data(), bytes.size(), [this](const wire::Packet& packet) { answer(packet); });
+        return {};
+    }
+
+ private:
+    void answer(const wire::Packet& packet) {
+        wire::HostHello hello{};
+        wire::Configuration configuration{};
+        wire::ClockRequest request{};
+        const HostTime now = host_now();
+        if (packet.read(hello)) {
+            wire::BoardHello message{};
+            message.major = wire::protocol_major;
+            message.minor = minor_;
+            message.board_time_ns = now.ns;
+            send(message, now);
+        } else if (packet.read(configuration)) {
+            wire::ConfigurationAnswer message{};
+            message.id = configuration.id;
+            send(message, now);
+        } else if (packet.read(request)) {
+            send(wire::ClockAnswer{request.id, 0, now.ns, now.ns}, now + on_the_way);
+            const Duration until = on_the_way - microseconds(10);
+            if (follows_up_) send(wire::ClockFollowUp{request.id, 0, (now + until).ns}, now + on_the_way);
+        }
+    }
+
+    template <class T>
+    void send(const T& message, HostTime arrives) {
+        wire::Frame frame{};
+        wire::encode(message, 7, sequence_++, frame);
+        const std::lock_guard lock(mutex_);
+        chunks_.push_back({arrives, {frame.bytes, frame.bytes + frame.size}});
+        came_.notify_one();
+    }
+
+    std::uint8_t minor_;
+    bool follows_up_;
+    wire::Decoder decoder_;
+    std::uint32_t sequence_ = 0;
+    std::mutex mutex_;
+    std::condition_variable came_;
+    std::deque<Chunk> chunks_;
+};
+
+struct Listener final : BoardListener {
+    std::promise<void> connected;
+    void board_restarted() override {}
+    void board_connected() override { connected.set_value(); }
+    void board_lost() override {}
+    void exposure(const wire::Exposure& /*record*/) override {}
+    void imu_sample(const wire::ImuSample& /*sample*/) override {}
+    void board_event(const wire::Event& /*event*/) override {}
+};
+
+/// The clock as it stands when the cameras may be started.
+clock::ClockReport connect(std::uint8_t minor, bool follows_up) {
+    clock::Translator translator(*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw));
+    Listener listener;
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            return std::make_unique<PlayedBoard>(minor, follows_up);
+        },
+        {}, 1, translator, listener);
+    link.start();
+    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    return translator.report();
+}
+
+}  // namespace
+
+TEST_CASE("board_link: an exchange ends when the answer truly left, if the board tells") {
+    const clock::ClockReport clock = connect(2, true);
+    CHECK(clock.exchanges == 4);
+    CHECK(clock.round_trip < on_the_way / 2);
+}
+
+TEST_CASE("board_link: without a follow-up the answer's own stamp is used, whether one could come or not") {
+    for (const std::uint8_t minor : {std::uint8_t{1}, std::uint8_t{2}}) {
+        const clock::ClockReport clock = connect(minor, false);
+        CHECK(clock.exchanges == 4);
+        CHECK(clock.round_trip >= on_the_way);
+    }
+}
