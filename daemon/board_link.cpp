@@ -165,6 +165,7 @@ Expected<> BoardLink::serve() {
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;
     set_state(BoardState::running, "");
+    listener_.board_synchronised();
     connected_ = true;
     accepting_ = true;
     listener_.board_connected();
@@ -204,6 +205,7 @@ Expected<> BoardLink::handshake() {
     report_.serial = text(hello_.serial, sizeof hello_.serial);
     report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
     report_.nonce = nonce_;
+    report_.capabilities = hello_.capabilities;
     ++report_.connections;
     return {};
 }
@@ -394,6 +396,8 @@ void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
 }
 
 void BoardLink::stop_cameras(std::uint8_t mask) { static_cast<void>(send(wire::Stop{mask, {}})); }
+
+void BoardLink::align_grid(const wire::AlignGrid& message) { static_cast<void>(send(message)); }
 
 void BoardLink::announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure) {
     wire::ExpectedExposure message{};

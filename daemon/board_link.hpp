@@ -29,7 +29,8 @@ class BoardListener {
     virtual ~BoardListener() = default;
     virtual void
     board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
-    virtual void board_connected() = 0;  ///< configured, its clock known: cameras may be started
+    virtual void board_synchronised() {}  ///< its clock is known; no camera can be started yet
+    virtual void board_connected() = 0;   ///< configured, its clock known: cameras may be started
     virtual void board_lost() = 0;
     virtual void exposure(const wire::Exposure& record) = 0;
     virtual void imu_sample(const wire::ImuSample& sample) = 0;
@@ -46,6 +47,7 @@ struct BoardReport {
     std::string serial;
     std::string firmware;
     std::uint32_t nonce = 0;
+    std::uint32_t capabilities = 0;  ///< bits of wire::Capability
     std::uint64_t connections = 0;
     std::uint64_t packets = 0;
     std::uint64_t lost_packets = 0;
@@ -72,6 +74,9 @@ class BoardLink {
 
     /// The camera at this output will expose for so long from this trigger on.
     void announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure);
+
+    /// The board's grid shall lie there, if it has that capability. From any thread.
+    void align_grid(const wire::AlignGrid& message);
 
     BoardReport report() const;
     bool running() const { return accepting_; }

@@ -64,6 +64,8 @@ void read_clock(TableReader& reader, ClockConfiguration& clock) {
                                     {"monotonic_raw", OutputClockKind::monotonic_raw}});
     reader.read("force_tai", clock.force_tai);
     reader.read("exchange_rate_hz", clock.exchange_rate_hz, 1, 100);
+    reader.read("align", clock.align);
+    reader.read("max_slew_ppm", clock.max_slew_ppm, 0.1, 500);
 }
 
 void read_features(TomlFile& file, const toml::table& table, CameraConfiguration& camera) {

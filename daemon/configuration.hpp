@@ -31,6 +31,8 @@ struct ClockConfiguration {
     clock::OutputClockKind output = clock::OutputClockKind::realtime;
     bool force_tai = false;  ///< take CLOCK_TAI although the kernel does not know its offset
     double exchange_rate_hz = 10;
+    bool align = false;        ///< the board's grid lies on whole seconds of the output clock
+    double max_slew_ppm = 20;  ///< it is moved there no faster
 };
 
 enum class TriggerSource { board, free_run };

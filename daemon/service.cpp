@@ -53,6 +53,13 @@ bool of_imu(wire::EventKind kind) {
            kind == wire::EventKind::imu_silent;
 }
 
+/// What is asked of a board whose firmware is too old for it, and what to do; empty: nothing.
+std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
+    if (configuration.clock.align && (capabilities & wire::capability_host_grid) == 0)
+        return "its grid cannot be aligned by the host: update its firmware, or set align = false";
+    return "";
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -75,6 +82,7 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       directory_(std::move(directory)),
       translator_(std::move(output)),
       status_ring_(std::move(status_ring)),
+      alignment_(configuration.clock, board_configuration(configuration)),
       started_(host_now()) {}
 
 Expected<> Service::make_parts() {
@@ -183,6 +191,17 @@ void Service::board_restarted() {
         if (unit.pipeline->triggered()) unit.pipeline->reset();
 }
 
+/// Before any camera starts: then its first exposure lies on the grid already.
+void Service::board_synchronised() {
+    alignment_.begin();
+    align_grid(host_now());
+}
+
+void Service::align_grid(HostTime now) {
+    if (!alignment_.wanted() || (board_->report().capabilities & wire::capability_host_grid) == 0) return;
+    if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
+}
+
 void Service::board_connected() {
     events_->add({EventKind::board_connected, EventReason::none, 0, "board", board_->report().nonce});
     for (CameraUnit& unit : cameras_) {
@@ -195,7 +214,12 @@ void Service::board_connected() {
 void Service::board_lost() { events_->add({EventKind::board_lost, EventReason::none, 0, "board"}); }
 
 void Service::exposure(const wire::Exposure& record) {
-    if (CameraUnit* unit = camera_at(record.camera)) unit->pipeline->add(record);
+    CameraUnit* unit = camera_at(record.camera);
+    if (unit == nullptr) return;
+    unit->pipeline->add(record);
+    if (!alignment_.wanted() || (record.flags & wire::exposure_measured) == 0) return;
+    const auto stamp = translator_.translate(middle(BoardTime{record.start_ns}, BoardTime{record.end_ns}));
+    if (stamp) alignment_.exposure(record, stamp->output, host_now());
 }
 
 void Service::imu_sample(const wire::ImuSample& sample) {
@@ -232,6 +256,7 @@ void Service::tick() {
         const auto how = unit.pipeline->advance(now);
         if (how && unit.camera->streaming() && board_->running()) start_camera(unit, *how);
     }
+    if (board_->running()) align_grid(now);
     for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);
     clock_recorder_->tick(now);
@@ -266,6 +291,9 @@ void Service::publish_status(HostTime now) {
     status.board_needed = !imus_.empty();
     status.board = board_->report();
     status.clock = translator_.report();
+    status.grid = alignment_.report(now);
+    if (status.board.state == BoardState::running && status.board.hint.empty())
+        status.board.hint = missing_capability(configuration_, status.board.capabilities);
     for (CameraUnit& unit : cameras_) {
         status.board_needed = status.board_needed || unit.pipeline->triggered();
         const PipelineReport report = unit.pipeline->report();

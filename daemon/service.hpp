@@ -12,6 +12,7 @@
 #include "clock_recorder.hpp"
 #include "configuration.hpp"
 #include "event_journal.hpp"
+#include "grid_alignment.hpp"
 #include "imu_pipeline.hpp"
 #include "status.hpp"
 #include "versavis/ring/directory.hpp"
@@ -56,7 +57,10 @@ class Service final : private BoardListener {
     void start(CameraPipeline& pipeline, pairing::Start how);
     void start_camera(CameraUnit& unit, pairing::Start how);
 
+    void align_grid(HostTime now);
+
     void board_restarted() override;
+    void board_synchronised() override;
     void board_connected() override;
     void board_lost() override;
     void exposure(const wire::Exposure& record) override;
@@ -72,6 +76,7 @@ class Service final : private BoardListener {
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
     CameraSurroundings surroundings_;
     std::vector<CameraUnit> cameras_;
+    GridAlignment alignment_;
     std::unique_ptr<BoardLink> board_;
     HostTime started_;
     HostTime next_status_;

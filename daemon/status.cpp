@@ -96,7 +96,7 @@ json board_json(const BoardReport& board, bool needed) {
         {"pps_error_ppb", health.pps_error_ppb}};
 }
 
-json clock_json(const clock::ClockReport& clock) {
+json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
     return {{"state", clock::to_string(clock.state)},
             {"output", clock::to_string(clock.output)},
             {"sigma_ns", clock.sigma.ns},
@@ -115,7 +115,9 @@ json clock_json(const clock::ClockReport& clock) {
             {"host_synchronised", clock.kernel.synchronised},
             {"host_max_error_ns", clock.kernel.max_error.ns},
             {"tai_offset_s", clock.kernel.tai_offset_s},
-            {"tai_valid", clock.kernel.tai_offset_s != 0}};
+            {"tai_valid", clock.kernel.tai_offset_s != 0},
+            {"grid_aligned", grid.aligned},
+            {"grid_error_ns", grid.error.ns}};
 }
 
 json camera_json(const CameraStatus& status) {
@@ -189,7 +191,7 @@ std::string to_json(const Status& status) {
                         {"host_time_ns", status.now.ns},
                         {"health", health(status)},
                         {"board", board_json(status.board, status.board_needed)},
-                        {"clock", clock_json(status.clock)},
+                        {"clock", clock_json(status.clock, status.grid)},
                         {"cameras", cameras},
                         {"imus", imus},
                         {"streams", streams}};

@@ -8,6 +8,7 @@
 #include "board_link.hpp"
 #include "camera.hpp"
 #include "camera_pipeline.hpp"
+#include "grid_alignment.hpp"
 #include "imu_pipeline.hpp"
 #include "versavis/clock/translator.hpp"
 
@@ -36,6 +37,7 @@ struct Status {
     bool board_needed = true;
     BoardReport board;
     clock::ClockReport clock;
+    GridReport grid;
     std::vector<CameraStatus> cameras;
     std::vector<ImuReport> imus;
     std::vector<StreamStatus> streams;

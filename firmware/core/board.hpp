@@ -63,6 +63,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void start(const wire::Start& start);
     void start_cameras(std::uint8_t cameras, std::uint8_t flags);
     void stop(std::uint8_t cameras);
+    void align(const wire::AlignGrid& wanted);
     void switch_slaves();
     void edges_lost();
     bool any_running() const;

@@ -1,49 +1,94 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The one grid that all cameras share: its origin, and how it follows another board's sync pulses.
+// The one grid that all cameras share: its origin, and how it follows another board's sync pulses, or the
+// host's time.
 #pragma once
 
 #include "hal.hpp"
 
 namespace versavis::firmware {
 
-/// Grid time counts from the origin. By itself it passes as board time does; while sync pulses come, it
-/// passes as the board that sends them has it: between two pulses at the pace of the two before.
+/// Board time over grid time, straight through an anchor; without divisions, which take long on small
+/// processors. Exact to a nanosecond within some minutes of the anchor.
+class GridLine {
+ public:
+    GridLine() = default;
+    /// Board time passes by `pace_ppb` faster than grid time: at most 1900 ppm either way.
+    GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb);
+
+    Nanoseconds board() const { return board_; }
+    Nanoseconds grid() const { return grid_; }
+
+    Nanoseconds board_time(Nanoseconds grid_time) const {
+        const Nanoseconds since = grid_time - grid_;
+        return board_ + since + gained(since);
+    }
+
+    /// Not after the true one, and close before it: a place to begin a search with.
+    Nanoseconds grid_time(Nanoseconds board_time) const {
+        const Nanoseconds since = board_time - board_;
+        if (pace_ == 0) return grid_ + since;
+        const Nanoseconds margin =
+            ((since < 0 ? -since : since) >> 27) + 4;  // more than the cube of the pace
+        return grid_ + since - gained(since - gained(since)) - margin;
+    }
+
+ private:
+    /// since * pace_ / 2^40, rounded, in two halves that do not overflow.
+    Nanoseconds gained(Nanoseconds since) const {
+        if (pace_ == 0) return 0;
+        const Nanoseconds low = (since & 0xFFFFFFFF) * pace_;
+        const Nanoseconds high = (since >> 32) * pace_;
+        return (high + (low >> 32) + 128) >> 8;
+    }
+
+    Nanoseconds board_ = 0;
+    Nanoseconds grid_ = 0;
+    std::int64_t pace_ = 0;  ///< parts of 2^40
+};
+
+/// Grid time counts from the origin. By itself it passes as board time does. While sync pulses come, it
+/// passes as the board that sends them has it: between two pulses at the pace of the two before. Aligned, it
+/// passes as the host says, whose whole seconds are approached without a step.
 class GridClock {
  public:
     /// Grid time 0 is at `origin`; `sync_period` as the sender has it, 0: unknown, pulses are not followed.
     void begin(Nanoseconds origin, Nanoseconds sync_period) {
         *this = {};
-        origin_ = anchor_ = origin;
+        line_ = GridLine(origin, 0, 0);
         period_ = sync_period;
     }
 
     Nanoseconds board_time(Nanoseconds grid_time) const {
-        const Nanoseconds since = grid_time - anchor_grid_;
-        if (pace_ppb_ == 0) return anchor_ + since;  // divisions of 64 bits take long on small processors
-        const Nanoseconds whole = since / billion * pace_ppb_ + since % billion * pace_ppb_ / billion;
-        return anchor_ + since + whole;
+        return (grid_time < bend_ ? approach_ : line_).board_time(grid_time);
     }
 
     /// Not after the true one, and close before it: a place to begin a search with.
     Nanoseconds grid_time(Nanoseconds board_time) const {
-        const Nanoseconds since = board_time - anchor_;
-        if (pace_ppb_ == 0) return anchor_grid_ + since;
-        const Nanoseconds margin = (since < 0 ? -since : since) / 1'000'000 + 1;
-        return anchor_grid_ + since - since / billion * pace_ppb_ - since % billion * pace_ppb_ / billion -
-               margin;
+        const bool approaches = bend_ != no_bend && board_time < line_.board_time(bend_);
+        return (approaches ? approach_ : line_).grid_time(board_time);
     }
 
     /// False: the pulse is none of the sender's, and is not followed.
     bool sync_pulse(Nanoseconds at);
 
- private:
-    static constexpr Nanoseconds billion = 1'000'000'000;
+    /// A whole second of grid time belongs at `second`, and board time passes by `pace_ppb` faster from there
+    /// on. The nearest one goes there, from `now` on, by no more than `max_slew_ppb` of the time beyond the
+    /// pace. Sync pulses are no longer followed.
+    void align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb, Nanoseconds now);
 
-    Nanoseconds origin_ = 0;
+    /// The same at once.
+    void place(Nanoseconds second, std::int32_t pace_ppb);
+
+    /// How far place() would move the grid there.
+    Nanoseconds misplaced(Nanoseconds second) const;
+
+ private:
+    static constexpr Nanoseconds no_bend = INT64_MIN;
+
     Nanoseconds period_ = 0;
-    Nanoseconds anchor_ = 0;       ///< board time of the newest pulse
-    Nanoseconds anchor_grid_ = 0;  ///< its grid time
-    std::int64_t pace_ppb_ = 0;    ///< board time passes so much faster than grid time
+    GridLine line_;               ///< from the newest pulse, or towards the second that the host named
+    GridLine approach_;           ///< until line_ is reached
+    Nanoseconds bend_ = no_bend;  ///< grid time from which on line_ holds
     bool pace_known_ = false;
 };
 

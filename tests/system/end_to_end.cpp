@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <fstream>
 
 #include "../support/stack.hpp"
@@ -245,6 +246,32 @@ TEST_CASE("end to end: stamps in another output clock") {
     auto stream = wait_for_stream<FrameStream>("cam0", "raw");
     const auto frame = read_until(stream, is_item);
     CHECK(frame.time.ns == frame.data.host_time.ns);
+}
+
+TEST_CASE("end to end: frames of an aligned board lie at whole seconds of the output clock") {
+    StackSettings settings{"aligned", 71, 2, 20, "exposure_us = 3000", "", ""};
+    settings.extras = {"", "phase_us = 10000"};
+    Stack stack(settings);
+    {
+        std::ofstream file(stack.configuration_path(), std::ios::app);
+        file << "[clock]\nalign = true\nmax_slew_ppm = 200\n";
+    }
+    stack.start_rig();
+    stack.start_service();
+    const auto aligned = [](const auto& s) { return healthy(s) && s["clock"]["grid_aligned"] == true; };
+    stack.wait_for_status(aligned);
+    for (const unsigned camera : {0U, 1U}) {
+        auto stream = wait_for_stream<FrameStream>("cam" + std::to_string(camera), "aligned");
+        for (int i = 0; i < 60; ++i) {
+            const auto frame = read_until(stream, is_item);
+            const double past_ms = static_cast<double>(frame.time.ns % 1'000'000'000) * 1e-6 - camera * 10.0;
+            REQUIRE(std::abs(std::remainder(past_ms, 50.0)) < 0.2);
+        }
+    }
+    const auto status = stack.wait_for_status(aligned);
+    CHECK(std::abs(status["clock"]["grid_error_ns"].get<double>()) < 100'000);
+    CHECK(status["board"]["hint"] == "");
+    CHECK(judge(stack, 2).ok);
 }
 
 TEST_CASE("end to end: packets that get lost are asked for again") {

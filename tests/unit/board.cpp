@@ -85,3 +85,58 @@ TEST_CASE("board: each sample says how old it was when it left") {
         REQUIRE(sample.departure_ns < 2'000'000);  // read at once, and the link is free
     }
 }
+
+TEST_CASE("board: the host places the grid at once while no camera runs, and slews it when one does") {
+    World world;
+    world.add_camera(0);
+    world.gaps_allowed = true;
+    world.connect();
+    CHECK((world.inbox().hellos[0].capabilities & wire::capability_host_grid) != 0);
+    REQUIRE(world.configure());
+    const auto off = [&world](const wire::Exposure& record, Nanoseconds second_at) {
+        const Nanoseconds middle = record.start_ns + (record.end_ns - record.start_ns) / 2;
+        const Nanoseconds past = (middle - second_at + 100 * second) % (50 * ms);  // 20 Hz
+        return past > 25 * ms ? past - 50 * ms : past;
+    };
+    const Nanoseconds wanted = world.now() + 1'213 * ms;
+    world.send(wire::AlignGrid{wanted, 0, 1000});
+    world.start();
+    world.run(3 * second);
+    auto& records = world.inbox().exposures[0];
+    REQUIRE(records.size() > 40);
+    for (std::size_t i = 1; i < records.size(); ++i) REQUIRE(off(records[i], wanted) == 0);
+    // Moved by 1 ms at 1000 ppm: a second later it is there, and no interval was wrong by more than the slew.
+    const std::size_t slewed_from = records.size();
+    world.send(wire::AlignGrid{wanted + 7 * second + ms, 0, 1'000'000});
+    world.run(3 * second);
+    for (std::size_t i = slewed_from; i < records.size(); ++i)
+        REQUIRE(std::abs(records[i].start_ns - records[i - 1].start_ns - 50 * ms) <= 50 * us + 2);
+    CHECK(off(records.back(), wanted + ms) == 0);
+    // A new configuration begins the grid anew.
+    world.stop();
+    REQUIRE(world.configure());
+    world.start();
+    world.run(second);
+    CHECK(world.grid_error(records.back()) == 0);
+    CHECK(world.inbox().healths.back().ignored == 0);
+    world.finish();
+    CHECK(world.judge() == "");
+}
+
+TEST_CASE("board: an alignment out of range is ignored, counted and told") {
+    World world;
+    world.add_camera(0);
+    REQUIRE(world.begin());
+    world.run(second);
+    const Nanoseconds now = world.now();
+    const wire::AlignGrid junk[] = {
+        {now, 500'001, 1000}, {now, -500'001, 1000},         {now, INT32_MIN, 1000},     {now, 0, 0},
+        {now, 0, 1'000'001},  {now + 101 * second, 0, 1000}, {now - 101 * second, 0, 1}, {INT64_MIN, 0, 1000},
+        {INT64_MAX, 0, 1000}};
+    for (const wire::AlignGrid& message : junk) world.send(message);
+    world.run(2 * second);
+    for (const wire::Exposure& record : world.inbox().exposures[0])
+        if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
+    CHECK(world.inbox().healths.back().ignored == std::size(junk));
+    CHECK(world.inbox().logs.size() == std::size(junk));
+}

@@ -2,6 +2,7 @@
 // The link against a board that is played: what it makes of answers, follow-ups and older boards.
 #include "board_link.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <deque>
@@ -17,7 +18,8 @@ constexpr Duration on_the_way = milliseconds(100);  // an answer waits so long b
 /// Answers at once; time stands still on the way, but for what the stamps say.
 class PlayedBoard final : public ByteStream {
  public:
-    PlayedBoard(std::uint8_t minor, bool follows_up) : minor_(minor), follows_up_(follows_up) {}
+    PlayedBoard(std::uint8_t minor, bool follows_up, std::vector<wire::Type>* heard = nullptr)
+        : minor_(minor), follows_up_(follows_up), heard_(heard) {}
 
     Expected<Chunk> read(Duration timeout) override {
         std::unique_lock lock(mutex_);
@@ -39,10 +41,12 @@ class PlayedBoard final : public ByteStream {
         wire::Configuration configuration{};
         wire::ClockRequest request{};
         const HostTime now = host_now();
+        if (heard_ != nullptr) heard_->push_back(packet.header.type);
         if (packet.read(hello)) {
             wire::BoardHello message{};
             message.major = wire::protocol_major;
             message.minor = minor_;
+            message.capabilities = wire::capability_host_grid;
             message.board_time_ns = now.ns;
             send(message, now);
         } else if (packet.read(configuration)) {
@@ -67,6 +71,7 @@ class PlayedBoard final : public ByteStream {
 
     std::uint8_t minor_;
     bool follows_up_;
+    std::vector<wire::Type>* heard_;
     wire::Decoder decoder_;
     std::uint32_t sequence_ = 0;
     std::mutex mutex_;
@@ -76,7 +81,9 @@ class PlayedBoard final : public ByteStream {
 
 struct Listener final : BoardListener {
     std::promise<void> connected;
+    std::function<void()> synchronised = [] {};
     void board_restarted() override {}
+    void board_synchronised() override { synchronised(); }
     void board_connected() override { connected.set_value(); }
     void board_lost() override {}
     void exposure(const wire::Exposure& /*record*/) override {}
@@ -112,4 +119,25 @@ TEST_CASE("board_link: without a follow-up the answer's own stamp is used, wheth
         CHECK(clock.exchanges == 4);
         CHECK(clock.round_trip >= on_the_way);
     }
+}
+
+TEST_CASE("board_link: the grid is aligned before any camera can be started") {
+    clock::Translator translator(*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw));
+    Listener listener;
+    std::vector<wire::Type> heard;
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            return std::make_unique<PlayedBoard>(2, true, &heard);
+        },
+        {}, 1, translator, listener);
+    listener.synchronised = [&] {
+        link.start_cameras(1, pairing::Start::steady);  // too early
+        link.align_grid({1, 2, 3});
+    };
+    link.start();
+    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    CHECK((link.report().capabilities & wire::capability_host_grid) != 0);
+    link.stop();
+    CHECK(std::count(heard.begin(), heard.end(), wire::Type::align_grid) == 1);
+    CHECK(std::count(heard.begin(), heard.end(), wire::Type::start) == 0);
 }

@@ -20,6 +20,7 @@ struct Inbox {
     std::vector<wire::Refusal> refusals;
     std::vector<wire::ClockAnswer> clock_answers;
     std::vector<wire::ClockFollowUp> follow_ups;
+    std::vector<wire::Log> logs;
     std::uint64_t packets = 0;
     std::uint64_t lost = 0;  ///< by sequence numbers
 

@@ -21,6 +21,17 @@ struct Stamp {
     ClockState state = ClockState::init;
 };
 
+/// Where a whole second of the output clock lies on the board's.
+struct BoardSecond {
+    BoardTime board;
+    HostTime host;
+    OutputTime output;
+    double skew_ppm = 0;  ///< host clock against board clock
+    Duration sigma;
+    std::uint32_t epoch = 0;
+    ClockState state = ClockState::init;
+};
+
 /// What the status document says of the clock.
 struct ClockReport {
     ClockState state = ClockState::init;
@@ -61,6 +72,9 @@ class Translator {
 
     /// None before the first exchange.
     std::optional<Stamp> translate(BoardTime board);
+
+    /// The first whole second of the output clock after `now`. None before the first exchange.
+    std::optional<BoardSecond> next_second(HostTime now);
 
     /// Host time alone, without reading the output clock.
     std::optional<HostEstimate> to_host(BoardTime board) const;

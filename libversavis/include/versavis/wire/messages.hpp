@@ -39,6 +39,7 @@ enum Capability : std::uint32_t {
     capability_pulse_inputs = 1U << 5U,
     capability_sync = 1U << 6U,
     capability_imu_output = 1U << 7U,
+    capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
 };
 
 struct BoardHello {
@@ -185,7 +186,7 @@ struct Health {
     std::int32_t pps_error_ppb;      ///< board clock against PPS: positive runs fast
     PpsState pps_state;
     ResetCause reset_cause;
-    std::uint16_t reserved;
+    std::uint16_t ignored;  ///< messages of the host that were out of range, modulo 2^16
 };
 
 enum class LogLevel : std::uint8_t { error = 3, warning = 4, info = 6, debug = 7 };
@@ -231,6 +232,17 @@ struct Reboot {
 };
 inline constexpr std::uint32_t reboot_magic = 0x544F4F42U;
 
+/// The nearest whole second of the grid belongs at `board_ns`; from there on the grid keeps this pace.
+struct AlignGrid {
+    static constexpr Type type = Type::align_grid;
+    std::int64_t board_ns;       ///< at most 100 s from now
+    std::int32_t pace_ppb;       ///< board time passes so much faster than grid time: up to 500 ppm
+    std::uint32_t max_slew_ppb;  ///< the grid goes there by no more than so much beyond its pace: 1 to 10^6
+};
+inline constexpr std::int64_t align_reach_ns = 100'000'000'000;
+inline constexpr std::int32_t align_largest_pace_ppb = 500'000;
+inline constexpr std::uint32_t align_largest_slew_ppb = 1'000'000;
+
 /// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first; afterwards all
 /// do. Four neighbouring gaps that are not all equal stand nowhere else in any of them, so that five frames
 /// name their triggers, and show it when the cables of two cameras are swapped. A slave has its master's.
@@ -248,7 +260,7 @@ static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event)
 static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 && sizeof(ClockFollowUp) == 16 &&
               sizeof(Health) == 88 && sizeof(Log) == 96);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
-              sizeof(Reboot) == 8);
+              sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16);
 
 /// Size of the payload of `type`, or 0 when the type is unknown.
 constexpr std::size_t payload_size(Type type) {
@@ -270,6 +282,7 @@ constexpr std::size_t payload_size(Type type) {
         case Type::clock_request: return sizeof(ClockRequest);
         case Type::expected_exposure: return sizeof(ExpectedExposure);
         case Type::reboot: return sizeof(Reboot);
+        case Type::align_grid: return sizeof(AlignGrid);
     }
     return 0;
 }

@@ -34,6 +34,7 @@ enum class Type : std::uint8_t {
     clock_request = 0x85,
     expected_exposure = 0x86,
     reboot = 0x87,
+    align_grid = 0x88,
 };
 
 }  // namespace versavis::wire
