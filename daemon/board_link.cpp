@@ -43,7 +43,10 @@ std::pair<const char*, const char*> field_name(wire::ConfigurationField field) {
         case Field::inputs: return {"inputs", "bits"};
         case Field::test: return {"test", "source"};
         case Field::sync_rate: return {"sync_rate_hz", "micro-hertz"};
-        case Field::port_options: return {"imu_output", "bits; it needs an IMU on the SPI port"};
+        case Field::port_options:
+            return {"imu_output' or 'nmea",
+                    "bits; the one needs an IMU on the SPI port, the other none on the UART"};
+        case Field::nmea_baud: return {"nmea_baud", "baud"};
     }
     return {"an unknown field", "?"};
 }

@@ -214,6 +214,11 @@ void read_ports(TableReader& reader, PortConfiguration& ports) {
                 reader.fail(key, fmt::format("'{}' is no input", name),
                             fmt::format("use some of: {}", fmt::join(pulse_input_names, ", ")));
     reader.read("imu_output", ports.imu_output);
+    reader.read("nmea", ports.nmea);
+    reader.read("nmea_baud", ports.nmea_baud, 1200, 921600);
+    if (ports.nmea && std::find(ports.inputs.begin(), ports.inputs.end(), "pps") == ports.inputs.end())
+        reader.fail("nmea", "'nmea' names pulses of the PPS input, which is not listened to",
+                    "add \"pps\" to 'inputs'");
     reader.read("test", ports.test);
     reader.read("sync_rate_hz", ports.sync_rate_hz, 0, 10);
     reader.read("pulse_us", ports.pulse_us, 1, 1e4);
@@ -254,13 +259,15 @@ void check_masters(TableReader& top, Configuration& configuration) {
     }
 }
 
-void check_imus(TableReader& top, const std::vector<ImuConfiguration>& imus) {
+void check_imus(TableReader& top, const std::vector<ImuConfiguration>& imus, bool nmea) {
     std::set<unsigned> taken;
     for (const ImuConfiguration& imu : imus)
         if (imu.model != nullptr && !taken.insert(imu.port()).second)
             top.fail("imu",
                      fmt::format("the board has one {} port for IMUs", imu.port() == 0 ? "SPI" : "UART"),
                      "a vn100 is on the UART, all others on the SPI; remove one of the [[imu]] tables");
+    if (nmea && taken.count(1) != 0)
+        top.fail("ports", "'nmea' needs the UART, which the vn100 has", "remove one of them");
 }
 
 /// What `test` names, as the board has it; none: there is nothing of that name.
@@ -357,7 +364,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
         read_ports(reader, configuration.ports);
         reader.finish();
     }
-    check_imus(top, configuration.imus);
+    check_imus(top, configuration.imus, configuration.ports.nmea);
     check_outputs(top, configuration.cameras);
     check_masters(top, configuration);
     check_names(top, configuration);
@@ -393,6 +400,10 @@ wire::Configuration board_configuration(const Configuration& configuration) {
     out.ports.inputs = pulse_inputs(configuration.ports.inputs);
     out.ports.falling = pulse_inputs(configuration.ports.falling);
     if (configuration.ports.imu_output) out.ports.options |= wire::port_imu_output;
+    if (configuration.ports.nmea) {
+        out.ports.options |= wire::port_nmea;
+        out.ports.nmea_baud = configuration.ports.nmea_baud;
+    }
     out.ports.test = test_source(configuration).value_or(wire::test_none);
     out.ports.sync_rate_uhz = micro_hertz(configuration.ports.sync_rate_hz);
     out.ports.pulse_ns = short_ns(configuration.ports.pulse_us);

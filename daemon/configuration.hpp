@@ -109,6 +109,8 @@ struct PortConfiguration {
     std::vector<std::string> inputs;   ///< of pulse_input_names
     std::vector<std::string> falling;  ///< those whose falling edge counts
     bool imu_output = false;
+    bool nmea = false;  ///< a GNSS receiver at the UART names the PPS pulses
+    unsigned nmea_baud = 9600;
     std::string test;         ///< name of a camera or an IMU; empty: none
     double sync_rate_hz = 0;  ///< 0: none
     double pulse_us = 100;

@@ -31,6 +31,7 @@ EventKind event_kind(wire::EventKind kind) {
         case wire::EventKind::imu_ready: return EventKind::imu_ready;
         case wire::EventKind::imu_failed: return EventKind::imu_failed;
         case wire::EventKind::imu_silent: return EventKind::imu_silent;
+        case wire::EventKind::utc_label: return EventKind::utc_label;
     }
     return {};
 }
@@ -57,6 +58,8 @@ bool of_imu(wire::EventKind kind) {
 std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
     if (configuration.clock.align && (capabilities & wire::capability_host_grid) == 0)
         return "its grid cannot be aligned by the host: update its firmware, or set align = false";
+    if (configuration.ports.nmea && (capabilities & wire::capability_nmea) == 0)
+        return "it does not read NMEA: update its firmware, or set nmea = false";
     return "";
 }
 

@@ -19,7 +19,7 @@ constexpr Nanoseconds stray_interval = 100'000'000;
 constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
-    wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid;
+    wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid | wire::capability_nmea;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
@@ -59,6 +59,7 @@ void Board::poll() {
     poll_outputs(now);
     poll_configuration(now);
     poll_imus(now);
+    poll_nmea();
     poll_health(now);
     transmitter_.pump();
     polled_ = hal_.clock.now();
@@ -178,6 +179,7 @@ void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus sta
 void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     apply_imus(configuration, now);
     configuration_ = configuration;
+    apply_nmea();
     for (std::size_t port = 0; port < wire::imu_count; ++port) {
         wire::ImuConfiguration& imu = configuration_.imus[port];
         imu.rate_millihertz = port == 0                         ? SpiImu::true_rate(imu)

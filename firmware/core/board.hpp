@@ -8,6 +8,7 @@
 #include "illumination.hpp"
 #include "imu/spi_imu.hpp"
 #include "imu/vn100.hpp"
+#include "nmea_reader.hpp"
 #include "noise_guard.hpp"
 #include "output_queue.hpp"
 #include "pps_monitor.hpp"
@@ -47,6 +48,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void poll_outputs(Nanoseconds now);
     void poll_configuration(Nanoseconds now);
     void poll_imus(Nanoseconds now);
+    void poll_nmea();
     void poll_health(Nanoseconds now);
     void take_edge(const Edge& edge, Nanoseconds now);
     void take_exposure_edge(const Edge& edge, Nanoseconds now);
@@ -57,6 +59,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void apply(const wire::Configuration& configuration, Nanoseconds now);
     void apply_imus(const wire::Configuration& configuration, Nanoseconds now);
     void apply_routes();
+    void apply_nmea();
     void begin_trains(Nanoseconds now);
     void restore();
     void answer_configuration(std::uint32_t id, wire::ConfigurationStatus status);
@@ -85,6 +88,7 @@ class Board final : private ChannelReports, private RefusalSink {
     PulseTrain sync_;
     PulseTrain test_;
     PpsMonitor pps_;
+    NmeaReader nmea_;
     wire::Decoder decoder_;
     wire::Configuration configuration_{};  ///< in force
     wire::Configuration wanted_{};         ///< waits for the last pulses and exposures to end

@@ -8,6 +8,7 @@ namespace {
 
 constexpr Nanoseconds default_sync_period = 1'000'000'000;
 constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: more than two crystals differ
+constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
 }  // namespace
@@ -68,7 +69,10 @@ void Board::take_exposure_edge(const Edge& edge, Nanoseconds now) {
 void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     const std::uint32_t number = ++pulses_[input];
     switch (input) {
-        case wire::pulse_pps: pps_.pulse(at); return event(wire::EventKind::pps, 0, at, number, 0);
+        case wire::pulse_pps:
+            pps_.pulse(at);
+            nmea_.pulse(at);
+            return event(wire::EventKind::pps, 0, at, number, 0);
         case wire::pulse_aux0:
         case wire::pulse_aux1:
             return event(wire::EventKind::aux_pulse, static_cast<std::uint8_t>(input - wire::pulse_aux0), at,
@@ -92,6 +96,26 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     }
     start_cameras(on_sync_.cameras, on_sync_.flags);
     on_sync_ = {};
+}
+
+void Board::apply_nmea() {
+    if ((configuration_.ports.options & wire::port_nmea) == 0) return;
+    const std::uint32_t baud = configuration_.ports.nmea_baud;
+    nmea_.begin(baud == 0 ? default_nmea_baud : baud);
+    hal_.imu_uart.set_baud(baud == 0 ? default_nmea_baud : baud);
+}
+
+void Board::poll_nmea() {
+    if ((configuration_.ports.options & wire::port_nmea) == 0) return;
+    std::uint8_t bytes[32];
+    Nanoseconds received = 0;
+    UtcLabel label;
+    while (const std::size_t size = hal_.imu_uart.read(bytes, sizeof bytes, received))
+        for (std::size_t i = 0; i < size; ++i) {
+            const Nanoseconds at = received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
+            if (nmea_.take(bytes[i], at, label))
+                event(wire::EventKind::utc_label, 0, label.pulse, label.utc_s, 0);
+        }
 }
 
 }  // namespace versavis::firmware

@@ -137,6 +137,10 @@ void check_ports(const wire::Configuration& configuration, RefusalSink& sink) {
     }
     if ((ports.options & wire::port_imu_output) != 0 && configuration.imus[0].kind == wire::ImuKind::none)
         checker.range(Field::port_options, ports.options, 0, 0);
+    if ((ports.options & wire::port_nmea) == 0) return;
+    if (configuration.imus[1].kind != wire::ImuKind::none)  // it has the UART
+        checker.range(Field::port_options, ports.options, 0, wire::port_imu_output);
+    if (ports.nmea_baud != 0) checker.range(Field::nmea_baud, ports.nmea_baud, 1'200, 921'600);
 }
 
 }  // namespace

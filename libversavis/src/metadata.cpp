@@ -35,6 +35,7 @@ const char* to_string(EventKind kind) {
         case EventKind::imu_ready: return "imu_ready";
         case EventKind::imu_failed: return "imu_failed";
         case EventKind::imu_silent: return "imu_silent";
+        case EventKind::utc_label: return "utc_label";
     }
     return "unknown";
 }

@@ -140,3 +140,50 @@ TEST_CASE("board: an alignment out of range is ignored, counted and told") {
     CHECK(world.inbox().healths.back().ignored == std::size(junk));
     CHECK(world.inbox().logs.size() == std::size(junk));
 }
+
+TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
+    World world;
+    world.add_pulses(wire::pulse_pps, 300 * ms, 1e9);
+    world.configuration.ports.options = wire::port_nmea;
+    world.connect();
+    CHECK((world.inbox().hellos[0].capabilities & wire::capability_nmea) != 0);
+    REQUIRE(world.configure());
+    const std::string lines[] = {"$GPRMC,235959.00,A,4723.1,N,00832.4,E,0.02,31.6,311223,,,A*",
+                                 "$GPRMC,000000.00,A,4723.1,N,00832.4,E,0.02,31.6,010124,,,A*"};
+    std::vector<Nanoseconds> pulses;
+    for (std::string line : lines) {
+        unsigned sum = 0;
+        for (std::size_t i = 1; i + 1 < line.size(); ++i) sum ^= static_cast<unsigned char>(line[i]);
+        line += {"0123456789ABCDEF"[sum >> 4U], "0123456789ABCDEF"[sum & 15U], '\r', '\n'};
+        const std::size_t before = world.inbox().events_of(wire::EventKind::pps).size();
+        while (world.inbox().events_of(wire::EventKind::pps).size() == before) world.run(ms);
+        pulses.push_back(world.inbox().events_of(wire::EventKind::pps).back().time_ns);
+        // It begins 200 ms after the pulse, and is told of as a whole.
+        const auto lasts = static_cast<Nanoseconds>(line.size()) * 10 * second / 9600;
+        const std::vector<std::uint8_t> bytes(line.begin(), line.end());
+        world.board().uart_receive(bytes, pulses.back() + 200 * ms + lasts);
+        world.run(500 * ms);
+    }
+    const auto labels = world.inbox().events_of(wire::EventKind::utc_label);
+    REQUIRE(labels.size() == 2);
+    for (std::size_t i = 0; i < 2; ++i) {
+        CHECK(labels[i].time_ns == pulses[i]);
+        CHECK(labels[i].value == 1'704'067'199 + static_cast<std::int64_t>(i));
+    }
+}
+
+TEST_CASE("board: NMEA is refused where an IMU has the UART, or at a baud rate that nobody has") {
+    World world;
+    world.connect();
+    world.configuration.ports.options = wire::port_nmea;
+    world.configuration.ports.nmea_baud = 1'000;
+    CHECK_FALSE(world.configure());
+    REQUIRE(world.inbox().refusals.size() == 1);
+    CHECK(world.inbox().refusals[0].field == wire::ConfigurationField::nmea_baud);
+    world.configuration.ports.nmea_baud = 115'200;
+    CHECK(world.configure());
+    world.add_vn100(200, false);
+    CHECK_FALSE(world.configure());
+    REQUIRE(world.inbox().refusals.size() == 2);
+    CHECK(world.inbox().refusals[1].field == wire::ConfigurationField::port_options);
+}

@@ -92,6 +92,14 @@ TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is to
     CHECK(board.ports.pulse_ns == 20'000);
 }
 
+TEST_CASE("configuration: a GNSS receiver at the UART") {
+    const auto configuration = load("[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
+    REQUIRE(configuration);
+    const wire::Configuration board = board_configuration(*configuration);
+    CHECK(board.ports.options == wire::port_nmea);
+    CHECK(board.ports.nmea_baud == 38'400);
+}
+
 TEST_CASE("configuration: features are kept in text, in their own types") {
     const auto configuration =
         load(camera + "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
@@ -135,6 +143,10 @@ TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is no input"));
     CHECK_THAT(error_of("[ports]\ntest = \"nobody\"\n"), Catch::Contains("'test' names 'nobody'"));
     CHECK_THAT(error_of("[ports]\nsync_rate_hz = 0.01\n"), Catch::Contains("0.1 to 10"));
+    CHECK_THAT(error_of("[ports]\nnmea = true\n"), Catch::Contains("add \"pps\" to 'inputs'"));
+    CHECK_THAT(error_of("[[imu]]\nmodel = \"vn100\"\n[ports]\ninputs = [\"pps\"]\nnmea = true\n"),
+               Catch::Contains("needs the UART"));
+    CHECK_THAT(error_of("[clock]\nmax_slew_ppm = 0\n"), Catch::Contains("from 0.1 to 500"));
     CHECK_THAT(error_of("[board]\nlink = \"tty\"\n"), Catch::Contains("unix:/path"));
     CHECK_THAT(error_of("camera = 3\n"), Catch::Contains("array of tables"));
     CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(),

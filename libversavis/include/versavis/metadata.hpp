@@ -88,6 +88,7 @@ enum class EventKind : std::uint32_t {
     imu_ready = 18,             ///< value: identity of the part
     imu_failed = 19,            ///< the part is not what it should be; value: what it said
     imu_silent = 20,            ///< no data-ready edge, no end of a transfer or no bytes came
+    utc_label = 21,             ///< a PPS pulse, of this time, was named; value: UTC seconds since 1970
 };
 
 /// Why a trigger has no frame, or a frame no trigger.

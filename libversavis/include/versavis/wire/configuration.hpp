@@ -71,6 +71,7 @@ inline constexpr std::size_t pulse_input_count = 4;
 
 enum PortOption : std::uint8_t {
     port_imu_output = 1U << 0U,  ///< the second SPI port serves the samples of IMU 0
+    port_nmea = 1U << 1U,        ///< a GNSS receiver's NMEA sentences come at the UART, instead of an IMU
 };
 
 /// What the test output shows: a grid point of a camera, where the middle of its exposure should be, or the
@@ -84,7 +85,7 @@ struct PortConfiguration {
     std::uint8_t test;            ///< TestSource: test_camera0 + camera, or test_imu0 + port
     std::uint32_t sync_rate_uhz;  ///< pulses at the sync output, micro-hertz: 0 (none), 100'000 to 10'000'000
     std::uint32_t pulse_ns;       ///< width of pulses at sync and test outputs: 1'000 to 10'000'000
-    std::uint32_t reserved;
+    std::uint32_t nmea_baud;      ///< 1'200 to 921'600; 0: 9'600
 };
 
 enum ConfigurationFlag : std::uint32_t {
@@ -125,6 +126,7 @@ enum class ConfigurationField : std::uint8_t {
     test = 18,
     sync_rate = 19,
     port_options = 20,
+    nmea_baud = 21,
 };
 
 /// One field that the board does not take; one packet for each, before the answer.

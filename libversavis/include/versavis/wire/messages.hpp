@@ -40,6 +40,7 @@ enum Capability : std::uint32_t {
     capability_sync = 1U << 6U,
     capability_imu_output = 1U << 7U,
     capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
+    capability_nmea = 1U << 9U,       ///< NMEA sentences at the UART name the pulses of the PPS input
 };
 
 struct BoardHello {
@@ -121,6 +122,7 @@ enum class EventKind : std::uint8_t {
     imu_ready = 10,            ///< the part answers and is set up; value: what identifies it
     imu_failed = 11,           ///< the part is not what it should be; detail: step; value: what it said
     imu_silent = 12,           ///< no data-ready edge, no end of a transfer or no bytes came
+    utc_label = 13,            ///< a sentence named the PPS pulse of this time; value: UTC seconds since 1970
 };
 
 enum class SkipReason : std::uint16_t {
