@@ -12,8 +12,11 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <random>
 #include <system_error>
+
+#include "versavis/clock/output_clock.hpp"
 
 namespace versavis::rig {
 
@@ -30,6 +33,23 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
     felt.magnetic_gauss = {0.2, 0, 0.4};
     felt.temperature_c = 36;
     return felt;
+}
+
+constexpr Duration marked_ahead = milliseconds(500);
+constexpr Duration sentence_after = milliseconds(150);
+constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
+
+/// As a receiver in Zurich says it.
+std::string rmc(std::int64_t utc_s) {
+    const std::time_t seconds = utc_s;
+    std::tm utc{};
+    gmtime_r(&seconds, &utc);
+    const std::string body =
+        fmt::format("GPRMC,{:02}{:02}{:02}.00,A,4722.6,N,00832.9,E,0.0,0.0,{:02}{:02}{:02},,,A", utc.tm_hour,
+                    utc.tm_min, utc.tm_sec, utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
+    unsigned sum = 0;
+    for (const char c : body) sum ^= static_cast<unsigned char>(c);
+    return fmt::format("${}*{:02X}\r\n", body, sum);
 }
 
 }  // namespace
@@ -60,6 +80,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
+      gnss_(scenario.board.gnss),
       imu_name_(scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
@@ -87,6 +108,7 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     clock_ = std::make_unique<SkewedClock>(zero, clock);
     pins_ = 0;
     imu_samples_ = 0;
+    next_utc_s_ = 0;
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
     firmware::Surroundings surroundings;
     surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
@@ -132,11 +154,30 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
 void BoardHost::run() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
+        if (gnss_) hear_gnss();
         board_->run_until(board_now());
         exchange_bytes();
         const HostTime wake = clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
         wait(std::min(wake, host_now() + longest_wait));
     }
+}
+
+/// The pulse of each second, and its sentence.
+void BoardHost::hear_gnss() {
+    constexpr std::int64_t second_ns = 1'000'000'000;
+    const Duration offset = clock::OutputClock::create(clock::OutputClockKind::realtime)->offset();
+    const HostTime now = host_now();
+    if (next_utc_s_ == 0) next_utc_s_ = (now + offset + marked_ahead).ns / second_ns + 1;
+    const HostTime pulse = HostTime{next_utc_s_ * second_ns} - offset;
+    if (pulse - now > marked_ahead) return;
+    const auto input = static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_pps});
+    board_->schedule_edge({clock_->device_ns(pulse), input, true});
+    board_->schedule_edge({clock_->device_ns(pulse + milliseconds(100)), input, false});
+    const std::string text = rmc(next_utc_s_++);
+    const HostTime complete =
+        pulse + sentence_after + byte_at_9600_baud * static_cast<std::int64_t>(text.size());
+    board_->uart_receive({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
+                         clock_->device_ns(complete));
 }
 
 void BoardHost::wait(HostTime until) const {

@@ -40,6 +40,7 @@ class BoardHost {
     void restart();
     void wait(HostTime until) const;
     void exchange_bytes();
+    void hear_gnss();
     void accept_host();
     void drop_host();
     void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
@@ -50,6 +51,7 @@ class BoardHost {
     std::string serial_;
     std::uint64_t seed_;
     ClockErrors clock_errors_;
+    bool gnss_;
     std::string imu_name_;
     std::string socket_path_;
     devices::AdisDevice imu_;
@@ -64,6 +66,7 @@ class BoardHost {
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
+    std::int64_t next_utc_s_ = 0;  ///< that the receiver is to mark; 0: the next
     std::atomic<bool> reset_pending_{false};
     std::atomic<bool> stop_{false};
     std::thread thread_;

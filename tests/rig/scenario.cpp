@@ -77,6 +77,7 @@ Expected<Scenario> load_scenario(const std::string& path) {
     if (const toml::table* table = top.table("board")) {
         TableReader reader(file, *table);
         reader.read("serial", scenario.board.serial);
+        reader.read("gnss", scenario.board.gnss);
         read_clock(reader, scenario.board.clock);
         reader.finish();
     }

@@ -14,6 +14,7 @@ namespace versavis::rig {
 struct BoardScenario {
     std::string serial = "RIG0001";
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
+    bool gnss = false;  ///< a receiver's time pulse and sentences come, by CLOCK_REALTIME
 };
 
 struct CameraScenario {

@@ -274,6 +274,26 @@ TEST_CASE("end to end: frames of an aligned board lie at whole seconds of the ou
     CHECK(judge(stack, 2).ok);
 }
 
+TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie at those seconds") {
+    Stack stack({"gnss", 72, 1, 20, "", "[board]\ngnss = true\n", ""});
+    {
+        std::ofstream file(stack.configuration_path(), std::ios::app);
+        file << "[ports]\ninputs = [\"pps\"]\nnmea = true\n";
+    }
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    auto events = wait_for_stream<EventStream>("events", "gnss");
+    std::int64_t last = 0;
+    for (int i = 0; i < 4; ++i) {
+        const auto label = read_until(
+            events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::utc_label; });
+        if (i > 0) CHECK(label.data.value == last + 1);
+        last = label.data.value;
+        CHECK(absolute(label.time - OutputTime{last * 1'000'000'000}) < milliseconds(1));
+    }
+}
+
 TEST_CASE("end to end: packets that get lost are asked for again") {
     Stack stack({"loss", 18, 1, 20, "packet_loss = 0.02", "", ""});
     stack.start_rig();
