@@ -100,8 +100,11 @@ TEST_CASE("grid_clock: messages once a second from a true clock keep it there to
     std::uint64_t tick = 0;
     for (std::int64_t host_s = 1; host_s < 2000; ++host_s) {
         // The message comes some 0.3 s before the second that it names.
-        clock.align(board_time(host_s * second, ppb), static_cast<std::int32_t>(ppb), 500'000,
-                    board_time(host_s * second - 300'000'000 - host_s * 100'000, ppb));
+        const Nanoseconds now = board_time(host_s * second - 300'000'000 - host_s * 100'000, ppb);
+        const Nanoseconds meets = clock.grid_time(now);
+        const Nanoseconds met_before = clock.board_time(meets);
+        clock.align(board_time(host_s * second, ppb), static_cast<std::int32_t>(ppb), 500'000, now);
+        REQUIRE(clock.board_time(meets) == met_before);
         for (;
              clock.board_time(static_cast<Nanoseconds>(tick) * 50'000'000) < board_time(host_s * second, ppb);
              ++tick) {
