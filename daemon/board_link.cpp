@@ -301,10 +301,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::Log line{};
     wire::Refusal refusal{};
     if (packet.read(exposure)) return listener_.exposure(exposure);
-    if (packet.read(sample)) {
-        recorder_.one_way({sample.time_ns}, received);
-        return listener_.imu_sample(sample);
-    }
+    if (packet.read(sample)) return take_sample(sample, received);
     if (packet.read(event)) return listener_.board_event(event);
     if (packet.read(answer)) return take_answer(answer, received);
     if (packet.read(follow_up)) return take_follow_up(follow_up);
@@ -355,6 +352,16 @@ void BoardLink::plan_next_request() {
     next_request_ =
         host_now() +
         Duration{static_cast<std::int64_t>(dither(random_) * static_cast<double>(exchange_interval_.ns))};
+}
+
+/// Its departure tells of the clock, too; that of a board before 2.2 is unknown.
+void BoardLink::take_sample(const wire::ImuSample& sample, HostTime received) {
+    if (sample.departure_ns != 0) {
+        const clock::OneWay message{BoardTime{sample.time_ns} + Duration{sample.departure_ns}, received};
+        recorder_.one_way(message);
+        translator_.add(message);
+    }
+    listener_.imu_sample(sample);
 }
 
 void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {

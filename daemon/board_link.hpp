@@ -92,6 +92,7 @@ class BoardLink {
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
     bool same_life(const wire::Header& header, HostTime received) const;
+    void take_sample(const wire::ImuSample& sample, HostTime received);
     void take_answer(const wire::ClockAnswer& answer, HostTime received);
     void take_follow_up(const wire::ClockFollowUp& follow_up);
     void hand_on_exchange();

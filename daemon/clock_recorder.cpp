@@ -24,9 +24,9 @@ void ClockRecorder::exchange(std::uint32_t request, const clock::Exchange& excha
             exchange.arrived);
 }
 
-void ClockRecorder::one_way(BoardTime departed, HostTime arrived) {
+void ClockRecorder::one_way(const clock::OneWay& message) {
     const std::lock_guard lock(mutex_);
-    publish(clock::OneWayTold{nonce_, departed, arrived}, arrived);
+    publish(clock::OneWayTold{nonce_, message.sent, message.arrived}, message.arrived);
 }
 
 void ClockRecorder::tick(HostTime now) {

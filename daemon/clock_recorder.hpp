@@ -6,7 +6,7 @@
 #include <mutex>
 #include <optional>
 
-#include "versavis/clock/envelope_filter.hpp"
+#include "versavis/clock/messages.hpp"
 #include "versavis/clock/recording.hpp"
 #include "versavis/clock/translator.hpp"
 #include "versavis/ring/writer.hpp"
@@ -25,7 +25,7 @@ class ClockRecorder {
     void exchange(std::uint32_t request, const clock::Exchange& exchange);
 
     /// A message of the board that was not asked for.
-    void one_way(BoardTime departed, HostTime arrived);
+    void one_way(const clock::OneWay& message);
 
     /// Once a second the output clock is told, and heartbeats more often; call it every 50 ms or so.
     void tick(HostTime now);

@@ -14,7 +14,8 @@ class StampGuard {
  public:
     /// The stamp to publish: `stamp.output`, or just after the one before; then `flags` says so.
     OutputTime guard(const clock::Stamp& stamp, std::uint32_t& flags) {
-        if (stamp.state == clock::ClockState::holdover) flags |= flag_holdover;
+        using clock::ClockState;
+        if (stamp.state == ClockState::holdover || stamp.state == ClockState::step) flags |= flag_holdover;
         OutputTime time = stamp.output;
         if (last_ && epoch_ == stamp.epoch && time <= *last_) {
             time = *last_ + nanoseconds(1);

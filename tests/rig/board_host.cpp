@@ -206,6 +206,7 @@ void BoardHost::exchange_bytes() {
     ssize_t size = 0;
     while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0) {
         const firmware::Nanoseconds at = board_now();
+        board_->run_until(at);  // nothing answers before it was asked
         board_->receive({buffer, static_cast<std::size_t>(size)}, at);
         board_->run_until(at);
     }

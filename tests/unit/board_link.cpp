@@ -8,6 +8,8 @@
 #include <deque>
 #include <future>
 
+#include "../support/temporary_directory.hpp"
+
 using namespace versavis;
 using namespace versavis::daemon;
 
@@ -91,18 +93,25 @@ struct Listener final : BoardListener {
     void board_event(const wire::Event& /*event*/) override {}
 };
 
+struct Clock {
+    clock::Translator translator{*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
+    test::TemporaryDirectory directory{"/dev/shm"};
+    ClockRecorder recorder{*ring::Writer::create(directory.path(), {"clock", ring::StreamKind::clock, 64}),
+                           translator};
+};
+
 /// The clock as it stands when the cameras may be started.
 clock::ClockReport connect(std::uint8_t minor, bool follows_up) {
-    clock::Translator translator(*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw));
+    Clock clock;
     Listener listener;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
             return std::make_unique<PlayedBoard>(minor, follows_up);
         },
-        {}, 1, translator, listener);
+        {}, 1, clock.translator, clock.recorder, listener);
     link.start();
     REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) == std::future_status::ready);
-    return translator.report();
+    return clock.translator.report();
 }
 
 }  // namespace
@@ -122,14 +131,14 @@ TEST_CASE("board_link: without a follow-up the answer's own stamp is used, wheth
 }
 
 TEST_CASE("board_link: the grid is aligned before any camera can be started") {
-    clock::Translator translator(*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw));
+    Clock clock;
     Listener listener;
     std::vector<wire::Type> heard;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
             return std::make_unique<PlayedBoard>(2, true, &heard);
         },
-        {}, 1, translator, listener);
+        {}, 1, clock.translator, clock.recorder, listener);
     listener.synchronised = [&] {
         link.start_cameras(1, pairing::Start::steady);  // too early
         link.align_grid({1, 2, 3});

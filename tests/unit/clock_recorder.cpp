@@ -78,7 +78,7 @@ TEST_CASE("clock_recorder: what it is told is in the ring, with the board's nonc
     CHECK(exchange.answered == BoardTime{2'000});
     CHECK(exchange.arrived == arrived);
     CHECK(absolute(recording.time - (recording.output_now() - milliseconds(3))) < microseconds(1));
-    recording.recorder.one_way({3'000}, arrived);
+    recording.recorder.one_way({{3'000}, arrived});
     const auto one_way = recording.expect<OneWayTold>();
     CHECK(one_way.nonce == 77);
     CHECK(one_way.departed == BoardTime{3'000});
@@ -114,7 +114,7 @@ TEST_CASE("clock_recorder: a step is told before the first item that is stamped 
     recording.tick();
     recording.expect<OutputTold>();
     recording.clocks->step(-seconds(1));
-    recording.recorder.one_way({1}, recording.now());
+    recording.recorder.one_way({{1}, recording.now()});
     const auto stepped = recording.expect<OutputTold>();
     recording.expect<OneWayTold>();
     CHECK(stepped.epoch == 1);

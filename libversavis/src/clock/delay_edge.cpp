@@ -20,7 +20,7 @@ constexpr std::size_t newest = 8;  // slots
 
 // phi(u) / Phi(u) of the normal distribution, and log Phi(u), without underflow.
 double inverse_mills(double u) {
-    if (u < -6) return -u - 1 / u + 2 / (u * u * u);
+    if (u < -6) return -u - 1 / u + 2 / (u * u * u) - 10 / (u * u * u * u * u);
     return std::exp(-0.5 * u * u) * 0.3989422804014327 / (0.5 * std::erfc(-u * M_SQRT1_2));
 }
 double log_phi(double u) {

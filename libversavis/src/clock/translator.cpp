@@ -28,13 +28,18 @@ Duration widened(Duration sigma, const OutputReading& output) {
 
 void Translator::board_restarted() {
     const std::lock_guard lock(mutex_);
-    board_lives_ += 1 + static_cast<std::uint32_t>(filter_.restarts());
-    filter_ = EnvelopeFilter();
+    ++board_lives_;
+    filter_.board_restarted();
 }
 
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
     filter_.add(exchange);
+}
+
+void Translator::add(const OneWay& message) {
+    const std::lock_guard lock(mutex_);
+    filter_.add(message);
 }
 
 std::optional<HostEstimate> Translator::to_host(BoardTime board) const {
@@ -100,20 +105,25 @@ ClockReport Translator::report() {
     report.output_steps = output.steps;
     report.host_suspends = output_.suspends();
     report.kernel = output_.kernel_state();
+    report.state = filter_.translate({}).state;
     if (!filter_.initialised()) return report;
     // The board's time now is unknown here; the newest exchange is at most one interval old.
     const HostEstimate newest = filter_.translate(filter_.last_contact());
-    const Duration since_contact = host_now() - newest.time;
-    const HostEstimate now = filter_.translate(filter_.last_contact() + since_contact);
+    report.since_contact = output.at - newest.time;
+    const HostEstimate now = filter_.translate(filter_.last_contact() + report.since_contact);
     report.state = now.state;
     report.sigma = now.sigma;
     report.smallest_round_trip = filter_.smallest_round_trip();
-    report.bound = report.smallest_round_trip / 2;
+    report.bound = now.bound;
     report.residual = filter_.last_residual();
+    report.innovation = filter_.last_innovation();
     report.round_trip = filter_.last_round_trip();
     report.skew_ppm = filter_.skew_ppm();
     report.skew_sigma_ppm = filter_.skew_sigma_ppm();
     report.exchanges = filter_.exchanges();
+    report.one_way_messages = filter_.one_way_messages();
+    report.slots = filter_.slots();
+    report.surprises = filter_.surprises();
     report.restarts = filter_.restarts();
     return report;
 }

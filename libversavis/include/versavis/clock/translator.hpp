@@ -37,14 +37,19 @@ struct ClockReport {
     ClockState state = ClockState::init;
     OutputClockKind output = OutputClockKind::realtime;
     Duration sigma;
-    Duration bound;  ///< what the asymmetry of the link can make of an error at most
+    Duration bound;  ///< what the error cannot exceed, however unequal the link's directions are
     Duration residual;
+    Duration innovation;  ///< by which the newest slot moved the estimate
+    Duration since_contact;
     Duration round_trip;
     Duration smallest_round_trip;
     Duration output_minus_host;
     double skew_ppm = 0;
     double skew_sigma_ppm = 0;
     std::uint64_t exchanges = 0;
+    std::uint64_t one_way_messages = 0;
+    std::uint64_t slots = 0;
+    std::uint64_t surprises = 0;
     std::uint64_t restarts = 0;
     std::uint32_t epoch = 0;
     std::uint32_t output_steps = 0;
@@ -69,6 +74,7 @@ class Translator {
     void board_restarted();
 
     void add(const Exchange& exchange);
+    void add(const OneWay& message);
 
     /// None before the first exchange.
     std::optional<Stamp> translate(BoardTime board);
@@ -95,7 +101,7 @@ class Translator {
     mutable std::mutex mutex_;
     EnvelopeFilter filter_;
     OutputClock output_;
-    std::uint32_t board_lives_ = 0;  ///< and restarts of the filters of earlier ones
+    std::uint32_t board_lives_ = 0;
 };
 
 }  // namespace versavis::clock
