@@ -205,6 +205,7 @@ Expected<> BoardLink::handshake() {
         return failure("board", "incompatible protocol");
     }
     const std::lock_guard lock(report_mutex_);
+    report_.port = stream_->port();
     report_.serial = text(hello_.serial, sizeof hello_.serial);
     report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
     report_.nonce = nonce_;

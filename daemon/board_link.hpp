@@ -44,6 +44,7 @@ struct BoardReport {
     BoardState state = BoardState::absent;
     HostTime since;
     std::string hint;  ///< what to do about it
+    std::string port;  ///< where it is plugged in
     std::string serial;
     std::string firmware;
     std::uint32_t nonce = 0;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "configuration.hpp"
@@ -29,6 +30,9 @@ class ByteStream {
 
     /// Writes all or fails; waits for a slow board a bounded time.
     virtual Expected<> write(std::span<const std::uint8_t> bytes) = 0;
+
+    /// Names the place that the board is plugged in at, the same each time.
+    virtual std::string port() const = 0;
 };
 
 /// Opens the link of the configuration. Error: there is no such board, or it may not be opened.

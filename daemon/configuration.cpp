@@ -66,6 +66,12 @@ void read_clock(TableReader& reader, ClockConfiguration& clock) {
     reader.read("exchange_rate_hz", clock.exchange_rate_hz, 1, 100);
     reader.read("align", clock.align);
     reader.read("max_slew_ppm", clock.max_slew_ppm, 0.1, 500);
+    using clock::PpsLabels;
+    reader.choose<PpsLabels>("pps", clock.pps,
+                             {{"off", PpsLabels::off}, {"host", PpsLabels::host}, {"nmea", PpsLabels::nmea}});
+    if (clock.pps != PpsLabels::off && clock.output == OutputClockKind::monotonic_raw)
+        reader.fail("pps", "seconds of PPS are none of CLOCK_MONOTONIC_RAW",
+                    "choose output = \"realtime\" or \"tai\", or pps = \"off\"");
 }
 
 void read_features(TomlFile& file, const toml::table& table, CameraConfiguration& camera) {
@@ -226,6 +232,18 @@ void read_ports(TableReader& reader, PortConfiguration& ports) {
         reader.fail("sync_rate_hz", "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10");
 }
 
+void check_pps(TableReader& top, const Configuration& configuration) {
+    using clock::PpsLabels;
+    const std::vector<std::string>& inputs = configuration.ports.inputs;
+    const PpsLabels labels = configuration.clock.pps;
+    if (labels != PpsLabels::off && std::find(inputs.begin(), inputs.end(), "pps") == inputs.end())
+        top.fail("clock", "'pps' of [clock] needs the PPS input, which is not listened to",
+                 "add \"pps\" to 'inputs' of [ports]");
+    if (labels == PpsLabels::nmea && !configuration.ports.nmea)
+        top.fail("clock", "pps = \"nmea\" of [clock] needs a receiver at the board's UART",
+                 "set nmea = true in [ports], or pps = \"host\"");
+}
+
 void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cameras) {
     std::set<unsigned> taken;
     for (const CameraConfiguration& camera : cameras)
@@ -327,6 +345,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
     if (!valid_name(configuration.instance))
         top.fail("instance", "'instance' must be a name of letters and digits");
     top.read("preset_directory", configuration.preset_directory);
+    top.read("state_directory", configuration.state_directory);
     top.choose<LogLevel>("log_level", configuration.log_level,
                          {{"error", LogLevel::error},
                           {"warning", LogLevel::warning},
@@ -365,6 +384,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
         reader.finish();
     }
     check_imus(top, configuration.imus, configuration.ports.nmea);
+    check_pps(top, configuration);
     check_outputs(top, configuration.cameras);
     check_masters(top, configuration);
     check_names(top, configuration);

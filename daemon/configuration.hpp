@@ -9,6 +9,7 @@
 
 #include "log.hpp"
 #include "versavis/clock/output_clock.hpp"
+#include "versavis/clock/pps_reference.hpp"
 #include "versavis/error.hpp"
 #include "versavis/imu/imu_model.hpp"
 #include "versavis/time.hpp"
@@ -33,6 +34,7 @@ struct ClockConfiguration {
     double exchange_rate_hz = 10;
     bool align = false;        ///< the board's grid lies on whole seconds of the output clock
     double max_slew_ppm = 20;  ///< it is moved there no faster
+    clock::PpsLabels pps = clock::PpsLabels::off;
 };
 
 enum class TriggerSource { board, free_run };
@@ -119,7 +121,9 @@ struct PortConfiguration {
 struct Configuration {
     std::string instance = "default";
     LogLevel log_level = LogLevel::info;
-    std::string preset_directory;  ///< empty: that of the installation
+    std::string preset_directory;
+    std::string state_directory;  ///< what is measured once and used later; empty: systemd's  ///< empty:
+                                  ///< that of the installation
     BoardConfiguration board;
     ClockConfiguration clock;
     std::vector<CameraConfiguration> cameras;

@@ -83,8 +83,9 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
                  clock::OutputClock output, ring::Writer status_ring)
     : configuration_(configuration),
       directory_(std::move(directory)),
-      translator_(std::move(output)),
+      translator_(std::move(output), configuration.clock.pps),
       status_ring_(std::move(status_ring)),
+      asymmetries_(configuration.state_directory),
       alignment_(configuration.clock, board_configuration(configuration)),
       started_(host_now()) {}
 
@@ -196,6 +197,10 @@ void Service::board_restarted() {
 
 /// Before any camera starts: then its first exposure lies on the grid already.
 void Service::board_synchronised() {
+    const auto stored = asymmetries_.load(board_->report().port);
+    if (!stored) log(LogLevel::warning, "clock", "{}", stored.error().message());
+    translator_.use_asymmetry(stored.value_or(std::nullopt));
+    kept_asymmetry_ = translator_.report().asymmetry.offset;
     alignment_.begin();
     align_grid(host_now());
 }
@@ -203,6 +208,16 @@ void Service::board_synchronised() {
 void Service::align_grid(HostTime now) {
     if (!alignment_.wanted() || (board_->report().capabilities & wire::capability_host_grid) == 0) return;
     if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
+}
+
+/// What PPS measured outlives the service; it is written when it changed by more than it is worth.
+void Service::keep_asymmetry(const clock::ClockReport& clock, const std::string& port) {
+    if (clock.asymmetry_source != clock::AsymmetrySource::pps || port.empty() ||
+        absolute(clock.asymmetry.offset - kept_asymmetry_) < clock.asymmetry.sigma)
+        return;
+    kept_asymmetry_ = clock.asymmetry.offset;
+    const auto saved = asymmetries_.save(port, clock.asymmetry);
+    if (!saved) log(LogLevel::warning, "clock", "{}", saved.error().message());
 }
 
 void Service::board_connected() {
@@ -231,6 +246,9 @@ void Service::imu_sample(const wire::ImuSample& sample) {
 }
 
 void Service::board_event(const wire::Event& event) {
+    if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
+    if (event.kind == wire::EventKind::utc_label)
+        translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
     Happening happening;
     happening.kind = event_kind(event.kind);
     if (happening.kind == EventKind{}) return;  // of a newer board
@@ -294,6 +312,7 @@ void Service::publish_status(HostTime now) {
     status.board_needed = !imus_.empty();
     status.board = board_->report();
     status.clock = translator_.report();
+    keep_asymmetry(status.clock, status.board.port);
     status.grid = alignment_.report(now);
     if (status.board.state == BoardState::running && status.board.hint.empty())
         status.board.hint = missing_capability(configuration_, status.board.capabilities);

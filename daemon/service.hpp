@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "asymmetry_store.hpp"
 #include "board_link.hpp"
 #include "camera.hpp"
 #include "camera_pipeline.hpp"
@@ -58,6 +59,7 @@ class Service final : private BoardListener {
     void start_camera(CameraUnit& unit, pairing::Start how);
 
     void align_grid(HostTime now);
+    void keep_asymmetry(const clock::ClockReport& clock, const std::string& port);
 
     void board_restarted() override;
     void board_synchronised() override;
@@ -71,6 +73,8 @@ class Service final : private BoardListener {
     ring::OwnedDirectory directory_;
     clock::Translator translator_;
     ring::Writer status_ring_;
+    AsymmetryStore asymmetries_;
+    Duration kept_asymmetry_;
     std::unique_ptr<EventJournal> events_;
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;

@@ -68,6 +68,7 @@ json board_json(const BoardReport& board, bool needed) {
         {"state", needed ? to_string(board.state) : "unused"},
         {"since_ns", board.since.ns},
         {"hint", board.hint},
+        {"port", board.port},
         {"serial", board.serial},
         {"firmware", board.firmware},
         {"nonce", board.nonce},
@@ -121,6 +122,13 @@ json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
             {"host_max_error_ns", clock.kernel.max_error.ns},
             {"tai_offset_s", clock.kernel.tai_offset_s},
             {"tai_valid", clock.kernel.tai_offset_s != 0},
+            {"asymmetry_ns", clock.asymmetry.offset.ns},
+            {"asymmetry_sigma_ns", clock.asymmetry.sigma.ns},
+            {"asymmetry_source", to_string(clock.asymmetry_source)},
+            {"pps", to_string(clock.pps.state)},
+            {"pps_residual_ns", clock.pps.residual.ns},
+            {"pps_pulses", clock.pps.pulses},
+            {"pps_rejected", clock.pps.rejected},
             {"grid_aligned", grid.aligned},
             {"grid_error_ns", grid.error.ns}};
 }

@@ -25,6 +25,8 @@ class UnixStream final : public ByteStream {
     UnixStream(const UnixStream&) = delete;
     UnixStream& operator=(const UnixStream&) = delete;
 
+    std::string port() const override { return "unix:" + path_; }
+
     Expected<Chunk> read(Duration timeout) override {
         Chunk chunk;
         const std::int64_t wait_ns = std::max<std::int64_t>(timeout.ns, 0);

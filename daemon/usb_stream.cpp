@@ -83,6 +83,17 @@ class UsbStream final : public ByteStream {
         return {};
     }
 
+    /// As the kernel names it: bus, then the ports of the hubs on the way.
+    std::string port() const override {
+        libusb_device* device = libusb_get_device(handle_.get());
+        std::array<std::uint8_t, 7> ports{};
+        const int depth = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
+        std::string name = fmt::format("usb:{}", libusb_get_bus_number(device));
+        for (int i = 0; i < depth; ++i)
+            name += fmt::format("{}{}", i == 0 ? '-' : '.', ports[static_cast<std::size_t>(i)]);
+        return name;
+    }
+
     Expected<Chunk> read(Duration timeout) override {
         if (auto chunk = pop()) return std::move(*chunk);
         if (gone_) return failure("USB board", "the board was unplugged or reset");

@@ -21,6 +21,7 @@ using Benches = std::map<std::string, std::function<std::vector<Metric>()>>;
 Benches all_benches(const double& seconds) {
     return {{"ring", versavis::bench::bench_ring},
             {"cameras", [&] { return versavis::bench::bench_cameras(seconds); }},
+            {"clock", versavis::bench::bench_clock},
             {"end_to_end", versavis::bench::bench_end_to_end},
             {"firmware", versavis::bench::bench_firmware},
             {"output_clock", versavis::bench::bench_output_clock}};
@@ -49,8 +50,9 @@ int main(int argc, char** argv) {
     std::string json_path;
     double seconds = 30;
     const Benches benches = all_benches(seconds);
-    app.add_option("name", only, "ring, cameras, end_to_end, firmware or output_clock; without it, all")
-        ->check(CLI::IsMember({"ring", "cameras", "end_to_end", "firmware", "output_clock"}));
+    app.add_option("name", only,
+                   "ring, cameras, clock, end_to_end, firmware or output_clock; without it, all")
+        ->check(CLI::IsMember({"ring", "cameras", "clock", "end_to_end", "firmware", "output_clock"}));
     app.add_option("--seconds", seconds, "How long three cameras run")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

@@ -20,6 +20,7 @@ constexpr Duration on_the_way = milliseconds(100);  // an answer waits so long b
 /// Answers at once; time stands still on the way, but for what the stamps say.
 class PlayedBoard final : public ByteStream {
  public:
+    std::string port() const override { return "played"; }
     PlayedBoard(std::uint8_t minor, bool follows_up, std::vector<wire::Type>* heard = nullptr)
         : minor_(minor), follows_up_(follows_up), heard_(heard) {}
 

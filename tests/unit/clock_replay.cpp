@@ -198,8 +198,8 @@ TEST_CASE("clock_replay: the file of answers is whole or not there") {
     REQUIRE(done);
     CHECK(done->answers == 2);
     CHECK(done->unanswered == 1);
-    CHECK_THAT(content(settings.out),
-               Catch::StartsWith("board_ns,host_ns,sigma_ns,state\n7,") && Catch::EndsWith("\n8,0,9223372036854775807,init\n"));
+    CHECK_THAT(content(settings.out), Catch::StartsWith("board_ns,host_ns,sigma_ns,state\n7,") &&
+                                          Catch::EndsWith("\n8,0,9223372036854775807,init\n"));
     CHECK(files_in(directory) == 3);
 
     const std::string before = content(settings.out);

@@ -32,7 +32,8 @@ TEST_CASE("delay_edge: influence is the slope of one smooth function, from far b
         REQUIRE(here.curvature >= 0);
         REQUIRE(here.curvature <= 1 / (deviation * deviation));
         // By the level of the edge, so against the excess; where delays pull apart it counts as none.
-        CHECK(here.curvature == Approx(std::max(slope, 0.0)).epsilon(5e-3).margin(2e-3 / (deviation * deviation)));
+        CHECK(here.curvature ==
+              Approx(std::max(slope, 0.0)).epsilon(5e-3).margin(2e-3 / (deviation * deviation)));
     }
 }
 

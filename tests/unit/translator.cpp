@@ -81,3 +81,97 @@ TEST_CASE("translator: what the kernel says of its clock is reported as it is") 
     CHECK(relation.minus_host == report.output_minus_host);
     CHECK(relation.uncertainty > Duration{});
 }
+
+namespace {
+
+/// A board whose link is longer to the host by twice `asymmetry`, with PPS; its clock equals the host's.
+struct PpsMachine {
+    explicit PpsMachine(PpsLabels labels)
+        : translator(*OutputClock::create(OutputClockKind::realtime, false, clocks), labels) {
+        clocks->kernel.synchronised = true;
+    }
+
+    /// A second with ten exchanges and, in its middle, the pulse of the output clock's second.
+    void pass_second(bool pulse) {
+        for (int i = 0; i < 10; ++i) {
+            const HostTime now{clocks->value_ns(SystemClock::monotonic_raw)};
+            const Duration up = microseconds(20) + asymmetry * 2;
+            translator.add({now - microseconds(20), {now.ns}, {now.ns}, now + up});
+            clocks->pass(milliseconds(100));
+        }
+        const std::int64_t utc_ns = clocks->value_ns(SystemClock::realtime);
+        const std::int64_t past = utc_ns % 1'000'000'000;
+        const BoardTime at{clocks->value_ns(SystemClock::monotonic_raw) - past};
+        if (!pulse) return;
+        translator.pps_pulse(at);
+        translator.pps_label(at, utc_ns - past);
+    }
+    Duration error() {
+        const BoardTime now{clocks->value_ns(SystemClock::monotonic_raw)};
+        return translator.translate(now)->output - OutputTime{clocks->value_ns(SystemClock::realtime)};
+    }
+
+    static constexpr Duration asymmetry = microseconds(40);
+    std::shared_ptr<test::SimulatedClocks> clocks = std::make_shared<test::SimulatedClocks>();
+    Translator translator;
+};
+
+}  // namespace
+
+TEST_CASE("translator: PPS makes the stamps, and what it measured is taken off when it is gone") {
+    PpsMachine machine(PpsLabels::host);
+    for (int i = 0; i < 20; ++i) machine.pass_second(false);
+    CHECK(absolute(machine.error() - PpsMachine::asymmetry) < microseconds(5));
+    CHECK(machine.translator.report().pps.state == PpsState::waiting);
+    for (int i = 0; i < 40; ++i) machine.pass_second(true);
+    ClockReport report = machine.translator.report();
+    CHECK(report.pps.state == PpsState::used);
+    CHECK(absolute(machine.error()) < microseconds(1));
+    CHECK(report.asymmetry_source == AsymmetrySource::pps);
+    CHECK(absolute(report.asymmetry.offset - PpsMachine::asymmetry) < microseconds(3));
+    const std::uint32_t epoch = report.epoch;
+    for (int i = 0; i < 10; ++i) machine.pass_second(false);
+    report = machine.translator.report();
+    CHECK(report.pps.state == PpsState::lost);
+    CHECK(absolute(machine.error()) < microseconds(5));
+    CHECK(report.epoch == epoch);
+}
+
+TEST_CASE("translator: a host that nobody disciplines names no seconds") {
+    PpsMachine machine(PpsLabels::host);
+    machine.clocks->kernel.synchronised = false;
+    for (int i = 0; i < 40; ++i) machine.pass_second(true);
+    CHECK(machine.translator.report().pps.state == PpsState::waiting);
+    CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::none);
+}
+
+TEST_CASE(
+    "translator: seconds by a receiver hold whatever the host's clock shows, in an epoch of their own") {
+    PpsMachine machine(PpsLabels::nmea);
+    for (int i = 0; i < 20; ++i) machine.pass_second(false);
+    const std::uint32_t epoch = machine.translator.translate(BoardTime{})->epoch;
+    for (int i = 0; i < 5; ++i) {
+        machine.pass_second(false);
+        const std::int64_t utc_ns = machine.clocks->value_ns(SystemClock::realtime);
+        const std::int64_t past = utc_ns % 1'000'000'000;
+        // The host is 7 s behind.
+        machine.translator.pps_label({machine.clocks->value_ns(SystemClock::monotonic_raw) - past},
+                                     utc_ns - past + 7'000'000'000);
+    }
+    CHECK(absolute(machine.error() - seconds(7)) < microseconds(1));
+    const BoardTime now{machine.clocks->value_ns(SystemClock::monotonic_raw)};
+    CHECK(machine.translator.translate(now)->epoch == epoch + 1);
+    CHECK(machine.translator.report().pps.residual < -seconds(6));
+}
+
+TEST_CASE("translator: a stored asymmetry is used until PPS measures another") {
+    PpsMachine machine(PpsLabels::host);
+    machine.translator.use_asymmetry(Asymmetry{PpsMachine::asymmetry, microseconds(5)});
+    for (int i = 0; i < 20; ++i) machine.pass_second(false);
+    CHECK(absolute(machine.error()) < microseconds(5));
+    CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::stored);
+    for (int i = 0; i < 40; ++i) machine.pass_second(true);
+    CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::pps);
+    machine.translator.use_asymmetry(std::nullopt);
+    CHECK(machine.translator.report().asymmetry_source == AsymmetrySource::none);
+}

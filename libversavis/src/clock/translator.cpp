@@ -15,7 +15,8 @@ std::uint32_t saturated(Duration sigma) {
 }
 
 constexpr std::int64_t second_ns = 1'000'000'000;
-constexpr int inversions = 4;  // each leaves a thousandth of the error at most
+constexpr Duration largest_jump = microseconds(100);  // within an epoch, when PPS and the link take turns
+constexpr int inversions = 4;                         // each leaves a thousandth of the error at most
 
 /// A wide reading of the output clock is part of the stamp's uncertainty: it is off by up to so much, evenly.
 Duration widened(Duration sigma, const OutputReading& output) {
@@ -26,10 +27,22 @@ Duration widened(Duration sigma, const OutputReading& output) {
 
 }  // namespace
 
+const char* to_string(AsymmetrySource source) {
+    switch (source) {
+        case AsymmetrySource::none: return "none";
+        case AsymmetrySource::stored: return "stored";
+        case AsymmetrySource::pps: return "pps";
+    }
+    return "unknown";
+}
+
 void Translator::board_restarted() {
     const std::lock_guard lock(mutex_);
     ++board_lives_;
     filter_.board_restarted();
+    pps_.board_restarted();
+    pps_used_ = false;
+    newest_ = {};
 }
 
 void Translator::add(const Exchange& exchange) {
@@ -40,6 +53,48 @@ void Translator::add(const Exchange& exchange) {
 void Translator::add(const OneWay& message) {
     const std::lock_guard lock(mutex_);
     filter_.add(message);
+}
+
+void Translator::pps_pulse(BoardTime at) {
+    const std::lock_guard lock(mutex_);
+    const HostEstimate estimate = filter_.translate(at);
+    if (!filter_.initialised() || estimate.state != ClockState::locked) return;
+    pps_.pulse(at, estimate, output_.read(), output_.kernel_state().synchronised);
+    correct_link();
+}
+
+void Translator::pps_label(BoardTime at, std::int64_t utc_ns) {
+    const std::lock_guard lock(mutex_);
+    if (!filter_.initialised()) return;
+    const bool tai = output_.kind() == OutputClockKind::tai;
+    const Duration ahead = tai ? seconds(output_.kernel_state().tai_offset_s) : Duration{};
+    pps_.label(at, OutputTime{utc_ns} + ahead, filter_.translate(at), output_.read());
+}
+
+void Translator::use_asymmetry(const std::optional<Asymmetry>& stored) {
+    const std::lock_guard lock(mutex_);
+    asymmetry_source_ = stored ? AsymmetrySource::stored : AsymmetrySource::none;
+    asymmetry_ = stored.value_or(Asymmetry{});
+    filter_.set_asymmetry(stored);
+    pps_.link_corrected();
+}
+
+void Translator::correct_link() {
+    const auto left = pps_.left_in_link();
+    if (!left) return;
+    asymmetry_ = {asymmetry_.offset + left->offset, left->sigma};
+    asymmetry_source_ = AsymmetrySource::pps;
+    filter_.set_asymmetry(asymmetry_);
+    pps_.link_corrected();
+}
+
+std::optional<OutputEstimate> Translator::by_pps(BoardTime board, OutputTime by_link) {
+    newest_ = std::max(newest_, board);
+    const auto estimate = pps_.translate(board, newest_);
+    if (estimate) pps_minus_link_ = estimate->time - by_link;
+    if (estimate.has_value() != pps_used_ && absolute(pps_minus_link_) > largest_jump) ++source_jumps_;
+    pps_used_ = estimate.has_value();
+    return estimate;
 }
 
 std::optional<HostEstimate> Translator::to_host(BoardTime board) const {
@@ -53,10 +108,14 @@ std::optional<Stamp> Translator::translate(BoardTime board) {
     if (!filter_.initialised()) return std::nullopt;
     const HostEstimate estimate = filter_.translate(board);
     const OutputReading output = output_.read();
-    return Stamp{{estimate.time.ns + output.minus_host.ns},
-                 estimate.time,
-                 saturated(widened(estimate.sigma, output)),
-                 epoch(output),
+    const OutputTime by_link{estimate.time.ns + output.minus_host.ns};
+    if (const auto pps = by_pps(board, by_link))
+        return Stamp{pps->time,
+                     {pps->time.ns - output.minus_host.ns},
+                     saturated(pps->sigma),
+                     epoch(output),
+                     ClockState::locked};
+    return Stamp{by_link, estimate.time, saturated(widened(estimate.sigma, output)), epoch(output),
                  estimate.state};
 }
 
@@ -71,6 +130,8 @@ std::optional<BoardSecond> Translator::next_second(HostTime now) {
     second.board = filter_.last_contact();
     for (int i = 0; i < inversions; ++i)
         second.board = second.board + (second.host - filter_.translate(second.board).time);
+    if (const auto pps = pps_.translate(second.board, newest_))
+        second.board = second.board - (pps->time - second.output);
     const HostEstimate estimate = filter_.translate(second.board);
     second.skew_ppm = filter_.skew_ppm();
     second.sigma = estimate.sigma;
@@ -106,6 +167,9 @@ ClockReport Translator::report() {
     report.host_suspends = output_.suspends();
     report.kernel = output_.kernel_state();
     report.state = filter_.translate({}).state;
+    report.asymmetry_source = asymmetry_source_;
+    report.asymmetry = asymmetry_;
+    report.pps = pps_.report(filter_.last_contact());
     if (!filter_.initialised()) return report;
     // The board's time now is unknown here; the newest exchange is at most one interval old.
     const HostEstimate newest = filter_.translate(filter_.last_contact());

@@ -9,6 +9,7 @@
 
 #include "versavis/clock/envelope_filter.hpp"
 #include "versavis/clock/output_clock.hpp"
+#include "versavis/clock/pps_reference.hpp"
 
 namespace versavis::clock {
 
@@ -31,6 +32,10 @@ struct BoardSecond {
     std::uint32_t epoch = 0;
     ClockState state = ClockState::init;
 };
+
+/// Where an asymmetry that is taken off comes from.
+enum class AsymmetrySource { none, stored, pps };
+const char* to_string(AsymmetrySource source);
 
 /// What the status document says of the clock.
 struct ClockReport {
@@ -55,6 +60,9 @@ struct ClockReport {
     std::uint32_t output_steps = 0;
     std::uint32_t host_suspends = 0;
     KernelState kernel;
+    PpsReport pps;
+    AsymmetrySource asymmetry_source = AsymmetrySource::none;
+    Asymmetry asymmetry;
 };
 
 /// Output clock against host clock at one moment, and the epoch of stamps that are made by it.
@@ -68,13 +76,21 @@ struct OutputRelation {
 /// Thread-safe.
 class Translator {
  public:
-    explicit Translator(OutputClock output) : output_(std::move(output)) {}
+    explicit Translator(OutputClock output, PpsLabels labels = PpsLabels::off)
+        : output_(std::move(output)), pps_(labels) {}
 
     /// The board began a new life: what was known of its clock is void, and a new epoch begins.
     void board_restarted();
 
     void add(const Exchange& exchange);
     void add(const OneWay& message);
+
+    /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse began.
+    void pps_pulse(BoardTime at);
+    void pps_label(BoardTime at, std::int64_t utc_ns);
+
+    /// What an earlier measurement at this port said; none: nothing is known of this port.
+    void use_asymmetry(const std::optional<Asymmetry>& stored);
 
     /// None before the first exchange.
     std::optional<Stamp> translate(BoardTime board);
@@ -95,13 +111,22 @@ class Translator {
  private:
     /// Epoch of stamps that are made by `output`.
     std::uint32_t epoch(const OutputReading& output) const {
-        return board_lives_ + output.steps + static_cast<std::uint32_t>(filter_.restarts());
+        return board_lives_ + source_jumps_ + output.steps + static_cast<std::uint32_t>(filter_.restarts());
     }
+    void correct_link();
+    std::optional<OutputEstimate> by_pps(BoardTime board, OutputTime by_link);
 
     mutable std::mutex mutex_;
     EnvelopeFilter filter_;
     OutputClock output_;
+    PpsReference pps_;
+    bool pps_used_ = false;
+    Duration pps_minus_link_;  ///< when it was used last
+    BoardTime newest_;         ///< instant that was asked for in this life of the board
+    AsymmetrySource asymmetry_source_ = AsymmetrySource::none;
+    Asymmetry asymmetry_;
     std::uint32_t board_lives_ = 0;
+    std::uint32_t source_jumps_ = 0;  ///< PPS took over from the link, or the other way, and they disagreed
 };
 
 }  // namespace versavis::clock
