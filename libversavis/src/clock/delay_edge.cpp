@@ -69,6 +69,7 @@ std::optional<Passage> DelayEdge::take() { return std::exchange(shortest_, std::
 void DelayEdge::begin(double scale_ns) {
     shortest_.reset();
     passages_.clear();
+    newest_least_ns_.reset();
     scale_ns_ = scale_ns;
 }
 
@@ -85,6 +86,8 @@ std::optional<double> delay_scale(std::vector<double>& delays_ns) {
 void DelayEdge::rescale() {
     newest_.assign(delays_.end() - static_cast<std::ptrdiff_t>(std::min(newest, delays_.size())),
                    delays_.end());
+    newest_least_ns_.reset();
+    if (newest_.size() == newest) newest_least_ns_ = *std::min_element(newest_.begin(), newest_.end());
     const double usual = delay_scale(delays_).value_or(scale_ns_);
     scale_ns_ = std::max(usual, delay_scale(newest_).value_or(0));
 }

@@ -14,9 +14,14 @@ constexpr std::int64_t window_ns = 300'000'000'000;
 constexpr std::int64_t longest_disorder_ns = 5'000'000'000;
 constexpr std::int64_t furthest_ns = std::int64_t{1} << 60;  // 36 years: sums of a few cannot overflow
 constexpr double surprising = 3.0;                           // deviations below the edge
+constexpr double rise_deviations = 4.0;                      // of the shortest delay, that is no chance
 constexpr double most_inflation = 100.0;
-constexpr double contradicting = 6.0;  // deviations that a message seems to arrive before it was sent
+constexpr double surprise_memory = 0.9;  // per message that is used
+constexpr double surprises_of_skew = 2.0;
+constexpr double surprise_skew = 200e3;  // ns/s
+constexpr double contradicting = 6.0;    // deviations that a message seems to arrive before it was sent
 constexpr int contradictions_to_restart = 3;
+constexpr double largest_skew = 1e6;      // ns/s: no two clocks differ by 1000 ppm
 constexpr double kept_skew_sigma = 10e3;  // ns/s: the crystal is the one it was
 constexpr std::uint64_t slots_to_lock = 10;
 constexpr double locked_sigma_ns = 250e3;
@@ -58,15 +63,16 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     last_round_trip_ = round_trip;
     ++exchanges_;
     if (!begun_) return begin(exchange, round_trip);
-    if (goes_back(std::min(exchange.received, exchange.answered))) return restart(exchange, round_trip);
     const Passage down = to_board(exchange.sent, exchange.received);
     const Passage up = to_host(exchange.answered, exchange.arrived);
     const BoardTime now = std::max(exchange.received, exchange.answered);
     last_residual_ = {std::llround((delay_ns(up, up_) - delay_ns(down, down_)) / 2)};
+    const bool old = goes_back(std::min(exchange.received, exchange.answered));
     if (contradicts(up, up_) || contradicts(down, down_)) {
-        if (++contradictions_ >= contradictions_to_restart) restart(exchange, round_trip);
+        if (old || ++contradictions_ >= contradictions_to_restart) restart(exchange, round_trip);
         return;
     }
+    if (old) return;  // it was held up on its way
     contradictions_ = 0;
     contradiction_ = {};
     remember_round_trip(now, round_trip);
@@ -93,7 +99,7 @@ void EnvelopeFilter::board_restarted() {
 }
 
 void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
-    const double kept_skew = belief_.mean[1];
+    const double kept_skew = std::abs(belief_.mean[1]) < largest_skew ? belief_.mean[1] : 0;
     reference_ = middle(exchange.received, exchange.answered);
     base_ = {middle(exchange.sent, exchange.arrived).ns - reference_.ns};
     belief_ = Belief::after_exchange(static_cast<double>(round_trip.ns));
@@ -163,7 +169,24 @@ void EnvelopeFilter::close_slot(BoardTime now) {
     if (down && down_first) use(*down, down_);
     if (up) use(*up, up_);
     if (down && !down_first) use(*down, down_);
+    follow_level();
     last_innovation_ = {std::llround(belief_.offset_after(to_seconds(newest - reference_)) - expected)};
+}
+
+/// Both directions take longer than they did, by more than they spread: so does the link, and no clock has
+/// anything to do with it. Left alone, the offset would slide until one of the two edges fits.
+void EnvelopeFilter::follow_level() {
+    const auto up = up_.newest_least_ns();
+    const auto down = down_.newest_least_ns();
+    if (!up || !down) return;
+    const double up_more = *up - belief_.mean[3];
+    const double down_more = *down - belief_.mean[3];
+    const double more = std::min(up_more, down_more);
+    const bool chance = up_more < up_.scale_ns() || down_more < down_.scale_ns() ||
+                        square(more) < square(rise_deviations) * belief_.covariance(3, 3);
+    if (chance) return;
+    belief_.mean[3] += more;
+    belief_.covariance(3, 3) += square(more);
 }
 
 void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
@@ -185,8 +208,14 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
     const auto deviation = [&] {
         return std::sqrt(direction.dot(belief_.covariance * direction) + square(blur));
     };
+    recent_surprises_ *= surprise_memory;
     if (excess < -surprising * deviation()) {
         ++surprises_;
+        if (++recent_surprises_ > surprises_of_skew) {
+            // One may be anything; several in a row say that a clock runs at another pace than it did.
+            belief_.covariance(1, 1) += square(surprise_skew);
+            recent_surprises_ = 0;
+        }
         belief_.covariance *= std::min(square(excess / (surprising * deviation())), most_inflation);
     }
     const Influence influence =
@@ -194,6 +223,8 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
     const Belief::Vector gain = belief_.covariance * direction;
     belief_.mean += gain * influence.score;
     belief_.covariance -= influence.curvature * gain * gain.transpose();
+    // What rounding makes unequal is never measured away, but surprises would inflate it.
+    belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
 }
 
 void EnvelopeFilter::remember_round_trip(BoardTime now, Duration round_trip) {

@@ -13,7 +13,7 @@ TEST_CASE("clock 009: a burst of load") {
     settings.imu_hz = GENERATE(0.0, 200.0);
     settings.length = seconds(440);
     settings.link = [](Random& random) {
-        return usb_full_speed({{{seconds(400).ns}, {seconds(430).ns}}, {}}, random);
+        return usb_full_speed({.load = {{seconds(400).ns}, {seconds(430).ns}}}, random);
     };
     Score result = score<clock::EnvelopeFilter>(settings, 20, {seconds(400).ns});
     CHECK(result.largest_us() <= (settings.imu_hz > 0 ? 25 : 20));

@@ -12,7 +12,7 @@ TEST_CASE("clock 010: what stamps cannot show is within the bound, and what was 
     constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
-    settings.link = [](Random& random) { return usb_full_speed({{}, longer}, random); };
+    settings.link = [](Random& random) { return usb_full_speed({.longer_to_host = longer}, random); };
     Score as_it_is;
     Score corrected;
     for (settings.seed = 1; settings.seed <= 8; ++settings.seed) {

@@ -13,7 +13,7 @@ TEST_CASE("clock 018: PPS measures what the link does unequally, and stamps bett
     constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
-    settings.link = [](Random& random) { return usb_full_speed({{}, longer}, random); };
+    settings.link = [](Random& random) { return usb_full_speed({.longer_to_host = longer}, random); };
     Score by_pulses;
     Score afterwards;
     for (settings.seed = 1; settings.seed <= 6; ++settings.seed) {

@@ -66,6 +66,9 @@ class DelayEdge {
     double sign() const { return static_cast<double>(direction_); }
     double scale_ns() const { return scale_ns_; }
 
+    /// The least delay of the newest slots; none: there are too few.
+    std::optional<double> newest_least_ns() const { return newest_least_ns_; }
+
  private:
     static constexpr std::size_t remembered = 64;  ///< slots
 
@@ -78,6 +81,7 @@ class DelayEdge {
     std::vector<double> delays_;  ///< of the passages
     std::vector<double> newest_;
     double scale_ns_ = 0;
+    std::optional<double> newest_least_ns_;
 };
 
 }  // namespace versavis::clock

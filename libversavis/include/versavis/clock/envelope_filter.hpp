@@ -72,6 +72,7 @@ class EnvelopeFilter {
     double delay_ns(const Passage& passage, const DelayEdge& edge) const;
     void close_slot_if_due(BoardTime now);
     void close_slot(BoardTime now);
+    void follow_level();
     void use(const Passage& passage, DelayEdge& edge);
     void move(const Passage& passage, const DelayEdge& edge);
     void remember_round_trip(BoardTime now, Duration round_trip);
@@ -92,8 +93,9 @@ class EnvelopeFilter {
     Duration smallest_in_window_{INT64_MAX};
     Duration smallest_before_{INT64_MAX};
     bool down_in_slot_ = false;
-    int contradictions_ = 0;  ///< exchanges in a row
-    Duration contradiction_;  ///< by which the newest was impossible
+    double recent_surprises_ = 0;  ///< fading
+    int contradictions_ = 0;       ///< exchanges in a row
+    Duration contradiction_;       ///< by which the newest was impossible
     std::uint64_t slots_ = 0;
     std::uint64_t exchanges_ = 0;
     std::uint64_t one_way_messages_ = 0;

@@ -53,7 +53,7 @@ bool World::lost(TrueTime at) {
 }
 
 void World::exchange_all() {
-    std::uniform_real_distribution<> dither(0.75e9, 1.25e9);
+    std::uniform_real_distribution<> dither(1e9 * (1 - settings_.dither), 1e9 * (1 + settings_.dither));
     std::uniform_int_distribution<std::int64_t> answering(0, answer_spread_ns);
     const TrueTime end{settings_.length.ns};
     for (TrueTime next{1'000'000}; next < end;) {

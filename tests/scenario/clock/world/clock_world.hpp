@@ -25,6 +25,7 @@ struct Settings {
     std::uint64_t seed = 1;
     Duration length = seconds(900);
     double exchange_hz = 10;
+    double dither = 0.25;  ///< of the interval, early or late
     double imu_hz = 0;
     MakeLink link = [](Random& random) { return usb_full_speed({}, random); };
     CrystalSettings crystal;

@@ -42,11 +42,11 @@ class UsbFullSpeed final : public Link {
     Duration to_board(TrueTime sent, Random& random) override {
         const Duration awake = wake_up(sent, random) / 3;
         const Duration interrupt{std::uniform_int_distribution<std::int64_t>(0, 3'000)(random)};
-        return awake + until_next(frame, sent + awake) + transfer + interrupt;
+        return awake + until_next(frame, sent + awake) + transfer + interrupt + slowed(sent);
     }
     Duration to_host(TrueTime sent, Random& random) override {
         const Duration polled = until_next(poll, sent) + transfer;
-        return polled + wake_up(sent + polled, random) + settings_.longer_to_host;
+        return polled + wake_up(sent + polled, random) + settings_.longer_to_host + slowed(sent);
     }
 
  private:
@@ -57,6 +57,7 @@ class UsbFullSpeed final : public Link {
     Duration until_next(Duration period, TrueTime at) const {
         return {period.ns - 1 - (at.ns + frame.ns - phase_.ns) % period.ns};
     }
+    Duration slowed(TrueTime at) const { return settings_.slow.holds(at) ? settings_.slower : Duration{}; }
     Duration wake_up(TrueTime at, Random& random) const {
         double ns = std::lognormal_distribution<>(std::log(15e3), 0.5)(random);
         const double luck = std::uniform_real_distribution<>()(random);

@@ -33,7 +33,9 @@ std::unique_ptr<Link> invisible_jitter();
 
 struct UsbSettings {
     Span load{};  ///< the scheduler delays each wake-up by 6 ms more in the mean
-    Duration longer_to_host;
+    Duration longer_to_host{};
+    Span slow{};      ///< each direction takes longer
+    Duration slower{};  ///< by so much
 };
 
 /// USB full speed: to the board in the next frame of 1 ms, to the host at the next poll, every 125 us;

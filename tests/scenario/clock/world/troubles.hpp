@@ -6,16 +6,17 @@
 
 namespace versavis::clock_world {
 
-/// 420 s on any link, with load, losses, silence, a reset, steps, slews or a suspended host between 60 and
-/// 300 s.
+/// Any link, with load, losses, silence, a reset, steps, slews or a suspended host between 60 and 300 s. It
+/// ends two minutes later, or seven if there is one exchange a second with 10 ms of jitter.
 Settings troubled(std::uint64_t seed);
 
-/// Instants from 360 s on, a minute after the last trouble, at which the error is beyond its bound, six times
-/// sigma, or what the link can ever cause.
+/// Of 120 instants of the last minute those at which the error is beyond its bound, six times sigma, or what
+/// the link can ever cause. All: locked out.
 template <class Estimator>
-unsigned lock_outs(const World& world, Observer<Estimator>& observer) {
+unsigned instants_off(const World& world, Observer<Estimator>& observer) {
     unsigned count = 0;
-    for (TrueTime t{seconds(360).ns}; t < TrueTime{world.settings().length.ns}; t = t + milliseconds(500)) {
+    const TrueTime end{world.settings().length.ns};
+    for (TrueTime t = end - seconds(60); t < end; t = t + milliseconds(500)) {
         const clock::HostEstimate estimate = observer.estimate(t);
         const Duration error = absolute(estimate.time - world.host(t));
         const Duration tolerated = world.settings().exchange_hz < 5 ? milliseconds(2) : microseconds(150);
