@@ -49,8 +49,7 @@ void add_estimator(CLI::App& command, EstimatorKind& estimator, bool& fair_start
 }  // namespace
 
 ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
-    : clock_(app.add_subcommand("clock",
-                                "The board's clock: state, recordings, and its estimation again")) {
+    : clock_(app.add_subcommand("clock", "The board's clock: state, recordings, and its estimation again")) {
     clock_->require_subcommand(1);
     record_settings_.stop = std::move(stop);
     add_status();

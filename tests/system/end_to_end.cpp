@@ -278,7 +278,7 @@ TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie 
     Stack stack({"gnss", 72, 1, 20, "", "[board]\ngnss = true\n", ""});
     {
         std::ofstream file(stack.configuration_path(), std::ios::app);
-        file << "[ports]\ninputs = [\"pps\"]\nnmea = true\n";
+        file << "[ports]\ninputs = [\"pps\"]\nnmea = true\n[clock]\npps = \"nmea\"\n";
     }
     stack.start_rig();
     stack.start_service();
@@ -292,6 +292,15 @@ TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie 
         last = label.data.value;
         CHECK(absolute(label.time - OutputTime{last * 1'000'000'000}) < milliseconds(1));
     }
+    // Four of them make the stamps.
+    const auto status = stack.wait_for_status([](const auto& s) { return s["clock"]["pps"] == "used"; });
+    CHECK(status["clock"]["pps_rejected"] == 0);
+    CHECK(std::abs(status["clock"]["pps_residual_ns"].get<double>()) < 1e6);
+    const auto pulse =
+        read_until(events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::pps; });
+    const std::int64_t past = pulse.time.ns % 1'000'000'000;
+    CHECK(std::min(past, 1'000'000'000 - past) < 5'000);
+    CHECK(judge(stack, 2).ok);
 }
 
 TEST_CASE("end to end: packets that get lost are asked for again") {

@@ -20,10 +20,10 @@ enum class StampKind : std::uint32_t {
 };
 
 enum ItemFlag : std::uint32_t {
-    stamp_kind_mask = 0x3,         ///< StampKind
-    flag_suspect = 1U << 2U,       ///< the pairing is not proved: trigger and stamp are a guess
-    flag_holdover = 1U << 3U,      ///< the clocks were without contact, or messages contradict them: sigma grows
-    flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
+    stamp_kind_mask = 0x3,     ///< StampKind
+    flag_suspect = 1U << 2U,   ///< the pairing is not proved: trigger and stamp are a guess
+    flag_holdover = 1U << 3U,  ///< the clocks were without contact, or messages contradict them: sigma grows
+    flag_clamped = 1U << 4U,   ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
 };
 

@@ -14,7 +14,7 @@ constexpr std::int64_t window_ns = 300'000'000'000;
 constexpr std::int64_t longest_disorder_ns = 5'000'000'000;
 constexpr std::int64_t furthest_ns = std::int64_t{1} << 60;  // 36 years: sums of a few cannot overflow
 constexpr double surprising = 3.0;                           // deviations below the edge
-constexpr double rise_deviations = 4.0;                      // of the shortest delay, that is no chance
+constexpr double shift_deviations = 4.0;                     // of the shortest delay, that is no chance
 constexpr double most_inflation = 100.0;
 constexpr double surprise_memory = 0.9;  // per message that is used
 constexpr double surprises_of_skew = 2.0;
@@ -165,28 +165,38 @@ void EnvelopeFilter::close_slot(BoardTime now) {
     const auto down = down_.take();
     const BoardTime newest = std::max(up ? up->at : reference_, down ? down->at : reference_);
     const double expected = belief_.offset_after(to_seconds(newest - reference_));
+    if (up && down && slots_ > slots_to_lock) follow_fall(*up, *down);
     const bool down_first = down && up && down->at < up->at;
     if (down && down_first) use(*down, down_);
     if (up) use(*up, up_);
     if (down && !down_first) use(*down, down_);
-    follow_level();
+    follow_rise();
     last_innovation_ = {std::llround(belief_.offset_after(to_seconds(newest - reference_)) - expected)};
 }
 
-/// Both directions take longer than they did, by more than they spread: so does the link, and no clock has
-/// anything to do with it. Left alone, the offset would slide until one of the two edges fits.
-void EnvelopeFilter::follow_level() {
+/// Both directions take longer than they did, by more than they spread, or both are shorter than they can be:
+/// so is the link, and no clock has anything to do with it. Left alone, the offset would slide until one of
+/// the two edges fits.
+void EnvelopeFilter::follow_rise() {
     const auto up = up_.newest_least_ns();
     const auto down = down_.newest_least_ns();
     if (!up || !down) return;
     const double up_more = *up - belief_.mean[3];
     const double down_more = *down - belief_.mean[3];
-    const double more = std::min(up_more, down_more);
-    const bool chance = up_more < up_.scale_ns() || down_more < down_.scale_ns() ||
-                        square(more) < square(rise_deviations) * belief_.covariance(3, 3);
-    if (chance) return;
-    belief_.mean[3] += more;
-    belief_.covariance(3, 3) += square(more);
+    if (up_more > up_.scale_ns() && down_more > down_.scale_ns()) shift_level(std::min(up_more, down_more));
+}
+
+void EnvelopeFilter::follow_fall(const Passage& up, const Passage& down) {
+    const double up_less = belief_.mean[3] - delay_ns(up, up_);
+    const double down_less = belief_.mean[3] - delay_ns(down, down_);
+    const double blur = edge_blur(std::max(up_.scale_ns(), down_.scale_ns()));
+    if (std::min(up_less, down_less) > surprising * blur) shift_level(-std::min(up_less, down_less));
+}
+
+void EnvelopeFilter::shift_level(double by_ns) {
+    if (square(by_ns) < square(shift_deviations) * belief_.covariance(3, 3)) return;
+    belief_.mean[3] += by_ns;
+    belief_.covariance(3, 3) += square(by_ns);
 }
 
 void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {

@@ -10,10 +10,10 @@ using namespace versavis::clock_world;
 
 TEST_CASE("clock 007: a millisecond at the first exchange, a tenth soon after") {
     std::vector<double> seconds_to_tenth;
-    int worse_than_a_millisecond = 0;  // of some 20'000: first exchanges that were late by more
+    int worse_than_a_millisecond = 0;  // of some 60'000: first exchanges that were late by more
     Settings settings;
     settings.length = seconds(20);
-    for (settings.seed = 1; settings.seed <= 100; ++settings.seed) {
+    for (settings.seed = 1; settings.seed <= 300; ++settings.seed) {
         const World world(settings);
         Observer<clock::EnvelopeFilter> observer(world);
         const TrueTime first = world.deliveries().front().at;
@@ -25,8 +25,8 @@ TEST_CASE("clock 007: a millisecond at the first exchange, a tenth soon after") 
         }
         seconds_to_tenth.push_back(static_cast<double>((worse - first).ns) * 1e-9);
     }
-    CHECK(worse_than_a_millisecond <= 5);
+    CHECK(worse_than_a_millisecond <= 15);
     std::sort(seconds_to_tenth.begin(), seconds_to_tenth.end());
-    CHECK(seconds_to_tenth[50] <= 1);
-    CHECK(seconds_to_tenth[95] <= 2);
+    CHECK(seconds_to_tenth[150] <= 1);
+    CHECK(seconds_to_tenth[285] <= 2);
 }

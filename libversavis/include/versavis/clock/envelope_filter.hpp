@@ -72,7 +72,9 @@ class EnvelopeFilter {
     double delay_ns(const Passage& passage, const DelayEdge& edge) const;
     void close_slot_if_due(BoardTime now);
     void close_slot(BoardTime now);
-    void follow_level();
+    void follow_rise();
+    void follow_fall(const Passage& up, const Passage& down);
+    void shift_level(double by_ns);
     void use(const Passage& passage, DelayEdge& edge);
     void move(const Passage& passage, const DelayEdge& edge);
     void remember_round_trip(BoardTime now, Duration round_trip);

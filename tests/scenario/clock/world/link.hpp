@@ -34,7 +34,7 @@ std::unique_ptr<Link> invisible_jitter();
 struct UsbSettings {
     Span load{};  ///< the scheduler delays each wake-up by 6 ms more in the mean
     Duration longer_to_host{};
-    Span slow{};      ///< each direction takes longer
+    Span slow{};        ///< each direction takes longer
     Duration slower{};  ///< by so much
 };
 
