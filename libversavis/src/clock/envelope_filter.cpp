@@ -227,6 +227,9 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
             recent_surprises_ = 0;
         }
         belief_.covariance *= std::min(square(excess / (surprising * deviation())), most_inflation);
+        // Without an end to them no component may grow beyond all that a first exchange leaves open.
+        if (belief_.covariance(1, 1) > square(largest_skew))
+            belief_.covariance = Belief::after_exchange(static_cast<double>(last_round_trip_.ns)).covariance;
     }
     const Influence influence =
         influence_of(excess, std::max(deviation(), -excess / surprising), edge.scale_ns());
@@ -260,11 +263,12 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     const double variance = belief_.offset_variance_after(seconds);
     const double offset = belief_.offset_after(seconds);
     const double doubt = static_cast<double>(contradiction_.ns);
-    estimate.time = {board.ns + base_.ns + std::llround(offset) - (asymmetry_ ? asymmetry_->offset.ns : 0)};
+    const Duration asymmetry = asymmetry_ ? asymmetry_->offset : Duration{};
+    estimate.time = HostTime{board.ns + base_.ns + std::llround(offset)} - asymmetry;
     estimate.sigma = {
         std::llround(std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)))};
-    estimate.bound =
-        smallest_round_trip() / 2 + Duration{std::llround(bound_sigmas * std::sqrt(variance) + doubt)};
+    estimate.bound = smallest_round_trip() / 2 + absolute(asymmetry) +
+                     Duration{std::llround(bound_sigmas * std::sqrt(variance) + doubt)};
     if (doubt > 0)
         estimate.state = ClockState::step;
     else if ((board - last_contact_).ns > holdover_after_ns)
