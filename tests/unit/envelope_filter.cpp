@@ -163,6 +163,19 @@ TEST_CASE("envelope_filter: one-way messages alone say nothing, with exchanges t
     CHECK(both.one_way_messages() == 11'799);  // all but the one before the first exchange
 }
 
+TEST_CASE("envelope_filter: stamps that count from 1970 are as good as others") {
+    constexpr Duration epoch{1'800'000'000'000'000'000};
+    EnvelopeFilter filter;
+    Link link(20, 9);
+    for (HostTime t{1'000'000'000}; t.ns < 20'000'000'000; t = t + milliseconds(100)) {
+        const Exchange exchange = link.exchange(t);
+        filter.add(
+            Exchange{exchange.sent + epoch, exchange.received, exchange.answered, exchange.arrived + epoch});
+    }
+    const HostTime now{20'000'000'000};
+    CHECK(absolute(filter.translate(link.board(now)).time - (now + epoch)) < microseconds(20));
+}
+
 TEST_CASE("envelope_filter: absurd stamps are left out") {
     EnvelopeFilter filter;
     constexpr std::int64_t extremes[] = {INT64_MIN, INT64_MIN / 2, -1, 0, 1, INT64_MAX / 2, INT64_MAX};
