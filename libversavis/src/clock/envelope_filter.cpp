@@ -258,7 +258,7 @@ double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(belief_.covaria
 HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     HostEstimate estimate;
     if (reset_) estimate.state = ClockState::reset;
-    if (!begun_) return estimate;
+    if (!begun_ || !sane(board)) return estimate;
     const double seconds = to_seconds(board - reference_);
     const double variance = belief_.offset_variance_after(seconds);
     const double offset = belief_.offset_after(seconds);
