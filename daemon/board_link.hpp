@@ -29,8 +29,8 @@ class BoardListener {
     virtual ~BoardListener() = default;
     virtual void
     board_restarted() = 0;  ///< its clock and numbers begin anew; nothing of its new life came yet
-    virtual void board_synchronised() {}  ///< its clock is known; no camera can be started yet
-    virtual void board_connected() = 0;   ///< configured, its clock known: cameras may be started
+    virtual void board_synchronised() = 0;  ///< its clock is known; no camera can be started yet
+    virtual void board_connected() = 0;     ///< configured, its clock known: cameras may be started
     virtual void board_lost() = 0;
     virtual void exposure(const wire::Exposure& record) = 0;
     virtual void imu_sample(const wire::ImuSample& sample) = 0;

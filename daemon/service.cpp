@@ -197,12 +197,19 @@ void Service::board_restarted() {
 
 /// Before any camera starts: then its first exposure lies on the grid already.
 void Service::board_synchronised() {
-    const auto stored = asymmetries_.load(board_->report().port);
+    use_asymmetry_of(board_->report().port);
+    alignment_.begin();
+    align_grid(host_now());
+}
+
+/// At the same port again, what was measured meanwhile stays, also where it could not be stored.
+void Service::use_asymmetry_of(const std::string& port) {
+    if (port == asymmetry_port_) return;
+    const auto stored = asymmetries_.load(port);
     if (!stored) log(LogLevel::warning, "clock", "{}", stored.error().message());
     translator_.use_asymmetry(stored.value_or(std::nullopt));
     kept_asymmetry_ = translator_.report().asymmetry.offset;
-    alignment_.begin();
-    align_grid(host_now());
+    asymmetry_port_ = port;
 }
 
 void Service::align_grid(HostTime now) {

@@ -58,6 +58,7 @@ class Service final : private BoardListener {
     void start(CameraPipeline& pipeline, pairing::Start how);
     void start_camera(CameraUnit& unit, pairing::Start how);
 
+    void use_asymmetry_of(const std::string& port);
     void align_grid(HostTime now);
     void keep_asymmetry(const clock::ClockReport& clock, const std::string& port);
 
@@ -74,6 +75,7 @@ class Service final : private BoardListener {
     clock::Translator translator_;
     ring::Writer status_ring_;
     AsymmetryStore asymmetries_;
+    std::string asymmetry_port_;  ///< to which what the translator uses belongs
     Duration kept_asymmetry_;
     std::unique_ptr<EventJournal> events_;
     std::unique_ptr<ClockRecorder> clock_recorder_;

@@ -80,7 +80,6 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
-      gnss_(scenario.board.gnss),
       imu_name_(scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
@@ -88,6 +87,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
       truth_(truth),
       cameras_(std::move(cameras)),
       listener_(listener) {
+    if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
     boot({}, clock_errors_, zero);
     thread_ = std::thread([this] { run(); });
 }
@@ -154,7 +154,7 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
 void BoardHost::run() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
-        if (gnss_) hear_gnss();
+        if (utc_) hear_gnss();
         board_->run_until(board_now());
         exchange_bytes();
         const HostTime wake = clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
@@ -165,7 +165,7 @@ void BoardHost::run() {
 /// The pulse of each second, and its sentence.
 void BoardHost::hear_gnss() {
     constexpr std::int64_t second_ns = 1'000'000'000;
-    const Duration offset = clock::OutputClock::create(clock::OutputClockKind::realtime)->offset();
+    const Duration offset = utc_->offset();
     const HostTime now = host_now();
     if (next_utc_s_ == 0) next_utc_s_ = (now + offset + marked_ahead).ns / second_ns + 1;
     const HostTime pulse = HostTime{next_utc_s_ * second_ns} - offset;

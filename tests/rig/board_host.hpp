@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "scene.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
+#include "versavis/clock/output_clock.hpp"
 
 namespace versavis::rig {
 
@@ -51,7 +53,7 @@ class BoardHost {
     std::string serial_;
     std::uint64_t seed_;
     ClockErrors clock_errors_;
-    bool gnss_;
+    std::optional<clock::OutputClock> utc_;  ///< that the GNSS receiver tells, if there is one
     std::string imu_name_;
     std::string socket_path_;
     devices::AdisDevice imu_;

@@ -19,18 +19,20 @@ Belief some_belief() {
 
 TEST_CASE("belief: two short steps are one long one, but for a drift that fades") {
     const Belief belief = some_belief();
-    const Belief once = belief.after(2);
-    const Belief twice = belief.after(1).after(1);
+    const Belief once = belief.after(versavis::seconds(2));
+    const Belief twice = belief.after(versavis::seconds(1)).after(versavis::seconds(1));
     CHECK(once.mean.isApprox(twice.mean, 1e-4));
     CHECK(once.covariance.isApprox(twice.covariance, 1e-2));
 }
 
 TEST_CASE("belief: the offset later, and its variance, are those of the belief that has aged") {
     const Belief belief = some_belief();
-    for (const double seconds : {0.0, 0.5, 10.0, 60.0}) {
-        const Belief aged = belief.after(seconds);
-        CHECK(belief.offset_after(seconds) == Approx(aged.mean[0]));
-        CHECK(belief.offset_variance_after(seconds) == Approx(aged.covariance(0, 0)));
+    for (const std::int64_t ms : {0, 500, 10'000, 60'000}) {
+        const versavis::Duration span = versavis::milliseconds(ms);
+        const Belief aged = belief.after(span);
+        CHECK(belief.offset_after(span) == Approx(aged.mean[0]));
+        CHECK(belief.offset_variance_after(span) == Approx(aged.covariance(0, 0)));
     }
-    CHECK(belief.offset_variance_after(60) > belief.offset_variance_after(10));
+    CHECK(belief.offset_variance_after(versavis::seconds(60)) >
+          belief.offset_variance_after(versavis::seconds(10)));
 }

@@ -14,6 +14,8 @@ constexpr double drift_walk = 0.15;        // ns/s^2 per sqrt(s): 2 ppm in ten m
 constexpr double drift_memory_s = 600.0;   // a drift fades: temperature settles
 constexpr double delay_walk = 20.0;        // ns per sqrt(s)
 
+double to_seconds(Duration span) { return static_cast<double>(span.ns) * 1e-9; }
+
 }  // namespace
 
 Belief Belief::after_exchange(double round_trip_ns) {
@@ -25,7 +27,8 @@ Belief Belief::after_exchange(double round_trip_ns) {
     return belief;
 }
 
-Belief::Matrix transition(double seconds) {
+Belief::Matrix transition(Duration span) {
+    const double seconds = to_seconds(span);
     Belief::Matrix result = Belief::Matrix::Identity();
     result(0, 1) = seconds;
     result(0, 2) = 0.5 * seconds * seconds;
@@ -34,8 +37,8 @@ Belief::Matrix transition(double seconds) {
     return result;
 }
 
-Belief::Matrix process_noise(double seconds) {
-    const double t = std::abs(seconds);
+Belief::Matrix process_noise(Duration span) {
+    const double t = std::abs(to_seconds(span));
     const double t2 = t * t;
     const double skew = skew_walk * skew_walk;
     const double drift = drift_walk * drift_walk;
@@ -50,12 +53,23 @@ Belief::Matrix process_noise(double seconds) {
     return noise;
 }
 
-Belief Belief::after(double seconds) const {
-    const Matrix change = transition(seconds);
-    return {change * mean, change * covariance * change.transpose() + process_noise(seconds)};
+Belief Belief::after(Duration span) const {
+    const Matrix change = transition(span);
+    return {change * mean, change * covariance * change.transpose() + process_noise(span)};
 }
 
-double Belief::offset_variance_after(double seconds) const {
+double Belief::offset_after(Duration span) const {
+    const double seconds = to_seconds(span);
+    return mean[0] + seconds * (mean[1] + 0.5 * seconds * mean[2]);
+}
+
+Belief::Vector Belief::level_by_component(double sign, Duration span) {
+    const double seconds = to_seconds(span);
+    return {sign, sign * seconds, sign * 0.5 * seconds * seconds, 1};
+}
+
+double Belief::offset_variance_after(Duration span) const {
+    const double seconds = to_seconds(span);
     const double half_square = 0.5 * seconds * seconds;
     const Matrix& c = covariance;
     const double t = std::abs(seconds);

@@ -26,9 +26,6 @@ constexpr double kept_skew_sigma = 10e3;  // ns/s: the crystal is the one it was
 constexpr std::uint64_t slots_to_lock = 10;
 constexpr double locked_sigma_ns = 250e3;
 constexpr std::int64_t holdover_after_ns = 3'000'000'000;
-constexpr double bound_sigmas = 3.3;
-
-double to_seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
 
 template <class Clock>
 bool sane(Time<Clock> t) {
@@ -66,7 +63,7 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     const Passage down = to_board(exchange.sent, exchange.received);
     const Passage up = to_host(exchange.answered, exchange.arrived);
     const BoardTime now = std::max(exchange.received, exchange.answered);
-    last_residual_ = {std::llround((delay_ns(up, up_) - delay_ns(down, down_)) / 2)};
+    last_residual_ = rounded((delay_ns(up, up_) - delay_ns(down, down_)) / 2);
     const bool old = goes_back(std::min(exchange.received, exchange.answered));
     if (contradicts(up, up_) || contradicts(down, down_)) {
         if (old || ++contradictions_ >= contradictions_to_restart) restart(exchange, round_trip);
@@ -137,9 +134,9 @@ bool EnvelopeFilter::goes_back(BoardTime board) const {
 /// True when a message would have arrived before it was sent, by more than the estimate's own error explains.
 bool EnvelopeFilter::contradicts(const Passage& passage, const DelayEdge& edge) {
     const double delay = delay_ns(passage, edge);
-    const double seconds = to_seconds(passage.at - reference_);
-    if (delay >= -contradicting * std::sqrt(belief_.offset_variance_after(seconds))) return false;
-    contradiction_ = Duration{std::llround(-delay)} + last_round_trip_;  // it took some time, too
+    const Duration since = passage.at - reference_;
+    if (delay >= -contradicting * std::sqrt(belief_.offset_variance_after(since))) return false;
+    contradiction_ = rounded(-delay) + last_round_trip_;  // it took some time, too
     return true;
 }
 
@@ -148,7 +145,7 @@ double EnvelopeFilter::relative_ns(const Passage& passage) const {
 }
 
 double EnvelopeFilter::delay_ns(const Passage& passage, const DelayEdge& edge) const {
-    return edge.sign() * (relative_ns(passage) - belief_.offset_after(to_seconds(passage.at - reference_)));
+    return edge.sign() * (relative_ns(passage) - belief_.offset_after(passage.at - reference_));
 }
 
 void EnvelopeFilter::close_slot_if_due(BoardTime now) {
@@ -164,14 +161,14 @@ void EnvelopeFilter::close_slot(BoardTime now) {
     const auto up = up_.take();
     const auto down = down_.take();
     const BoardTime newest = std::max(up ? up->at : reference_, down ? down->at : reference_);
-    const double expected = belief_.offset_after(to_seconds(newest - reference_));
+    const double expected = belief_.offset_after(newest - reference_);
     if (up && down && slots_ > slots_to_lock) follow_fall(*up, *down);
     const bool down_first = down && up && down->at < up->at;
     if (down && down_first) use(*down, down_);
     if (up) use(*up, up_);
     if (down && !down_first) use(*down, down_);
     follow_rise();
-    last_innovation_ = {std::llround(belief_.offset_after(to_seconds(newest - reference_)) - expected)};
+    last_innovation_ = rounded(belief_.offset_after(newest - reference_) - expected);
 }
 
 /// Both directions take longer than they did, by more than they spread, or both are shorter than they can be:
@@ -201,7 +198,7 @@ void EnvelopeFilter::shift_level(double by_ns) {
 
 void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
     if (passage.at > reference_) {
-        belief_ = belief_.after(to_seconds(passage.at - reference_));
+        belief_ = belief_.after(passage.at - reference_);
         reference_ = passage.at;
     }
     edge.remember(passage, [&](const Passage& p) { return delay_ns(p, edge); });
@@ -211,8 +208,8 @@ void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
 
 /// Moments of the belief given this delay.
 void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
-    const double seconds = to_seconds(passage.at - reference_);
-    const Belief::Vector direction = Belief::level_by_component(edge.sign(), seconds);
+    const Duration since = passage.at - reference_;
+    const Belief::Vector direction = Belief::level_by_component(edge.sign(), since);
     const double blur = edge_blur(edge.scale_ns());
     const double excess = edge.sign() * relative_ns(passage) - direction.dot(belief_.mean);
     const auto deviation = [&] {
@@ -259,16 +256,16 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     HostEstimate estimate;
     if (reset_) estimate.state = ClockState::reset;
     if (!begun_ || !sane(board)) return estimate;
-    const double seconds = to_seconds(board - reference_);
-    const double variance = belief_.offset_variance_after(seconds);
-    const double offset = belief_.offset_after(seconds);
+    const Duration since = board - reference_;
+    const double variance = belief_.offset_variance_after(since);
+    const double offset = belief_.offset_after(since);
     const double doubt = static_cast<double>(contradiction_.ns);
     const Duration asymmetry = asymmetry_ ? asymmetry_->offset : Duration{};
-    estimate.time = HostTime{board.ns + base_.ns + std::llround(offset)} - asymmetry;
-    estimate.sigma = {
-        std::llround(std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)))};
-    estimate.bound = smallest_round_trip() / 2 + absolute(asymmetry) +
-                     Duration{std::llround(bound_sigmas * std::sqrt(variance) + doubt)};
+    estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
+    estimate.sigma =
+        rounded(std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)));
+    estimate.bound =
+        smallest_round_trip() / 2 + absolute(asymmetry) + rounded(bound_sigmas * std::sqrt(variance) + doubt);
     if (doubt > 0)
         estimate.state = ClockState::step;
     else if ((board - last_contact_).ns > holdover_after_ns)

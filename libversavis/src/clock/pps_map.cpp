@@ -16,8 +16,6 @@ constexpr int misfits_to_restart = 3;
 constexpr std::uint64_t pulses_to_trust = 4;
 constexpr Duration pulse_overdue = milliseconds(2500);
 
-double to_seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
-
 }  // namespace
 
 void PpsMap::begin(BoardTime at, OutputTime second) {
@@ -38,10 +36,10 @@ bool PpsMap::agrees(double residual_ns, double variance) const {
 void PpsMap::add(BoardTime at, OutputTime second) {
     ++pulses_;
     if (in_row_ == 0 || at <= reference_ || at - reference_ > longest_holdover) return begin(at, second);
-    const Belief now = belief_.after(to_seconds(at - reference_));
+    const Belief now = belief_.after(at - reference_);
     const double residual = static_cast<double>(second.ns - at.ns - base_.ns) - now.mean[0];
     const double variance = now.covariance(0, 0) + pulse_sigma_ns * pulse_sigma_ns;
-    last_residual_ = {std::llround(residual)};
+    last_residual_ = rounded(residual);
     if (!agrees(residual, variance)) {
         ++rejected_;
         if (++misfits_in_row_ >= misfits_to_restart) begin(at, second);
@@ -61,9 +59,9 @@ bool PpsMap::healthy(BoardTime now) const {
 
 std::optional<OutputEstimate> PpsMap::translate(BoardTime board) const {
     if (in_row_ < pulses_to_trust || board - reference_ > longest_holdover) return std::nullopt;
-    const double seconds = to_seconds(board - reference_);
-    return OutputEstimate{{board.ns + base_.ns + std::llround(belief_.offset_after(seconds))},
-                          {std::llround(std::sqrt(belief_.offset_variance_after(seconds)))}};
+    const Duration since = board - reference_;
+    return OutputEstimate{OutputTime{board.ns} + base_ + rounded(belief_.offset_after(since)),
+                          rounded(std::sqrt(belief_.offset_variance_after(since)))};
 }
 
 }  // namespace versavis::clock

@@ -15,21 +15,18 @@ constexpr std::size_t neighbours = 32;  // on each side
 constexpr Duration slot = seconds(2);
 constexpr Duration short_slots = seconds(32);  // from the filter's beginning on
 constexpr Duration longest_silence = seconds(3);
-constexpr double bound_sigmas = 3.3;
 
-double to_seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
 double square(double x) { return x * x; }
 
 Belief::Vector level_now(Direction direction) {
-    return Belief::level_by_component(static_cast<double>(direction), 0);
+    return Belief::level_by_component(static_cast<double>(direction), {});
 }
 
 }  // namespace
 
 bool Smoother::earlier(const Knot& a, const Knot& b) { return a.site.passage.at < b.site.passage.at; }
 
-Smoother::Smoother(const std::vector<Message>& messages, const std::optional<Asymmetry>& asymmetry)
-    : asymmetry_(asymmetry) {
+Smoother::Smoother(const std::vector<Message>& messages) {
     std::vector<EdgeSite> sites;
     EnvelopeFilter filter;
     filter.record(sites);
@@ -87,7 +84,7 @@ void Smoother::pass_forth(Segment& segment, bool first) {
     Belief belief = Belief::after_exchange(static_cast<double>(segment.first_round_trip.ns));
     BoardTime at = segment.knots.front().site.passage.at;
     for (Knot& knot : segment.knots) {
-        belief = belief.after(to_seconds(knot.site.passage.at - at));
+        belief = belief.after(knot.site.passage.at - at);
         at = knot.site.passage.at;
         const Belief::Vector direction = level_now(knot.site.direction);
         const Belief::Vector gain = belief.covariance * direction;
@@ -106,10 +103,10 @@ void Smoother::pass_back(Segment& segment) {
     knots.back().smoothed = knots.back().filtered;
     for (std::size_t i = knots.size() - 1; i-- > 0;) {
         const Belief& filtered = knots[i].filtered;
-        const double seconds = to_seconds(knots[i + 1].site.passage.at - knots[i].site.passage.at);
-        const Belief predicted = filtered.after(seconds);
+        const Duration span = knots[i + 1].site.passage.at - knots[i].site.passage.at;
+        const Belief predicted = filtered.after(span);
         const Belief::Matrix back =
-            predicted.covariance.ldlt().solve(transition(seconds) * filtered.covariance).transpose();
+            predicted.covariance.ldlt().solve(transition(span) * filtered.covariance).transpose();
         const Belief& later = knots[i + 1].smoothed;
         knots[i].smoothed.mean = filtered.mean + back * (later.mean - predicted.mean);
         knots[i].smoothed.covariance =
@@ -196,8 +193,8 @@ HostEstimate Smoother::translate(BoardTime board) const {
                          [](BoardTime at, const Knot& knot) { return at < knot.site.passage.at; });
     const Knot& next = after == knots.end() ? knots.back() : *after;
     const Knot& last = after == knots.begin() ? knots.front() : *(after - 1);
-    const double since_last = to_seconds(board - last.site.passage.at);
-    const double since_next = to_seconds(board - next.site.passage.at);
+    const Duration since_last = board - last.site.passage.at;
+    const Duration since_next = board - next.site.passage.at;
     const double last_variance = last.smoothed.offset_variance_after(since_last);
     const double next_variance = next.smoothed.offset_variance_after(since_next);
     const double share = last_variance / (last_variance + next_variance);
@@ -205,10 +202,9 @@ HostEstimate Smoother::translate(BoardTime board) const {
         last.smoothed.offset_after(since_last) * (1 - share) + next.smoothed.offset_after(since_next) * share;
     const double variance = std::min(last_variance, next_variance);
     const double shortest = next.smoothed.mean[3];
-    estimate.time = {board.ns + segment->base.ns + std::llround(offset) -
-                     (asymmetry_ ? asymmetry_->offset.ns : 0)};
-    estimate.sigma = {std::llround(std::sqrt(variance + asymmetry_variance(asymmetry_, shortest)))};
-    estimate.bound = {std::llround(std::max(shortest, 0.0) + bound_sigmas * std::sqrt(variance))};
+    estimate.time = HostTime{board.ns} + segment->base + rounded(offset);
+    estimate.sigma = rounded(std::sqrt(variance + asymmetry_variance(std::nullopt, shortest)));
+    estimate.bound = rounded(std::max(shortest, 0.0) + bound_sigmas * std::sqrt(variance));
     const bool within = segment->begin - longest_silence <= board && board <= segment->end + longest_silence;
     estimate.state = within ? ClockState::locked : ClockState::holdover;
     return estimate;

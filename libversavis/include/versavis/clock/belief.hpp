@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "versavis/time.hpp"
+
 namespace versavis::clock {
 
 /// Components: 0 offset of the host's clock against the board's (ns), 1 skew (ns/s), 2 drift of the skew
@@ -18,24 +20,20 @@ struct Belief {
     /// After one exchange with a round trip of so many ns, whose midpoint is the zero of the offset.
     static Belief after_exchange(double round_trip_ns);
 
-    /// As it is `seconds` later: two crystals whose skew walks at random and drifts as temperature does.
-    Belief after(double seconds) const;
+    /// As it is `span` later: two crystals whose skew walks at random and drifts as temperature does.
+    Belief after(Duration span) const;
 
-    /// The offset `seconds` later, and its variance; also for instants shortly before.
-    double offset_after(double seconds) const {
-        return mean[0] + seconds * (mean[1] + 0.5 * seconds * mean[2]);
-    }
-    double offset_variance_after(double seconds) const;
+    /// The offset `span` later, and its variance; also for instants shortly before.
+    double offset_after(Duration span) const;
+    double offset_variance_after(Duration span) const;
 
-    /// How the level of one direction's delays depends on the components `seconds` from now; `sign` is that
+    /// How the level of one direction's delays depends on the components `span` from now; `sign` is that
     /// of DelayEdge.
-    static Vector level_by_component(double sign, double seconds) {
-        return {sign, sign * seconds, sign * 0.5 * seconds * seconds, 1};
-    }
+    static Vector level_by_component(double sign, Duration span);
 };
 
-/// How a belief turns into that of `seconds` later, but for what is added by process_noise().
-Belief::Matrix transition(double seconds);
-Belief::Matrix process_noise(double seconds);
+/// How a belief turns into that of `span` later, but for what is added by process_noise().
+Belief::Matrix transition(Duration span);
+Belief::Matrix process_noise(Duration span);
 
 }  // namespace versavis::clock

@@ -16,6 +16,8 @@ enum class ClockState {
 };
 const char* to_string(ClockState state);
 
+constexpr double bound_sigmas = 3.3;  ///< standard deviations that a bound allows for
+
 struct HostEstimate {
     HostTime time;
     Duration sigma;  ///< one standard deviation, if the shortest delays of both directions are nearly equal

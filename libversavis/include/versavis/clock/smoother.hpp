@@ -2,7 +2,6 @@
 // Board time to host time of a recording: what all of its messages, earlier and later ones, say together.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "versavis/clock/belief.hpp"
@@ -17,8 +16,7 @@ namespace versavis::clock {
 class Smoother {
  public:
     /// In the order in which they became available.
-    explicit Smoother(const std::vector<Message>& messages,
-                      const std::optional<Asymmetry>& asymmetry = std::nullopt);
+    explicit Smoother(const std::vector<Message>& messages);
 
     /// Of the segment that holds `board`, or else the one that begins last before it. State: locked within
     /// 3 s of the messages of the segment, holdover beyond, init when there were none.
@@ -54,7 +52,6 @@ class Smoother {
 
     const Segment* segment_of(BoardTime board) const;
 
-    std::optional<Asymmetry> asymmetry_;
     std::vector<Segment> segments_;
 };
 
