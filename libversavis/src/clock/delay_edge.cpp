@@ -14,9 +14,9 @@ constexpr double tail_length = 20.0;       // scales
 constexpr double smallest_scale = 1000.0;  // ns
 constexpr double smallest_blur = 2000.0;   // ns: interrupts, cache misses
 constexpr double relative_blur = 0.005;
-constexpr double medians_to_scale = 2.0;  // exact for uniform delays, careful for those with a peak
 constexpr std::size_t delays_to_judge = 3;
-constexpr std::size_t newest = 8;  // slots
+constexpr std::size_t least_rank = 4;  // a difference of fewer delays is mostly chance
+constexpr std::size_t newest = 8;      // slots
 
 // phi(u) / Phi(u) of the normal distribution, and log Phi(u), without underflow.
 double inverse_mills(double u) {
@@ -74,12 +74,15 @@ void DelayEdge::begin(double scale_ns) {
 }
 
 std::optional<double> delay_scale(std::vector<double>& delays_ns) {
-    if (delays_ns.size() < delays_to_judge) return std::nullopt;
-    const auto middle = delays_ns.begin() + static_cast<std::ptrdiff_t>(delays_ns.size() / 2);
-    std::nth_element(delays_ns.begin(), middle, delays_ns.end());
-    const double above_least = *middle - *std::min_element(delays_ns.begin(), middle + 1);
-    const double caution = 1 + 2 / static_cast<double>(delays_ns.size());
-    return std::max(smallest_scale, medians_to_scale * caution * above_least);
+    const std::size_t count = delays_ns.size();
+    if (count < delays_to_judge) return std::nullopt;
+    const std::size_t rank = std::min(std::max(count / 4, least_rank), count / 2);
+    const auto quartile = delays_ns.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(delays_ns.begin(), quartile, delays_ns.end());
+    const double above_least = *quartile - *std::min_element(delays_ns.begin(), quartile);
+    const double caution = 1 + 2 / static_cast<double>(count);
+    return std::max(smallest_scale,
+                    caution * above_least * static_cast<double>(count) / static_cast<double>(rank));
 }
 
 /// In a burst of load delays spread more than they did for long, and say less.

@@ -18,7 +18,7 @@ constexpr double shift_deviations = 4.0;                     // of the shortest 
 constexpr double most_inflation = 100.0;
 constexpr double surprise_memory = 0.9;  // per message that is used
 constexpr double surprises_of_skew = 2.0;
-constexpr double surprise_skew = 200e3;  // ns/s
+constexpr double surprise_span_s = 2.0;  // a slot
 constexpr double contradicting = 6.0;    // deviations that a message seems to arrive before it was sent
 constexpr int contradictions_to_restart = 3;
 constexpr double largest_skew = 1e6;      // ns/s: no two clocks differ by 1000 ppm
@@ -220,7 +220,7 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
         ++surprises_;
         if (++recent_surprises_ > surprises_of_skew) {
             // One may be anything; several in a row say that a clock runs at another pace than it did.
-            belief_.covariance(1, 1) += square(surprise_skew);
+            belief_.covariance(1, 1) += square(excess / surprise_span_s);
             recent_surprises_ = 0;
         }
         belief_.covariance *= std::min(square(excess / (surprising * deviation())), most_inflation);
@@ -233,6 +233,9 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
     const Belief::Vector gain = belief_.covariance * direction;
     belief_.mean += gain * influence.score;
     belief_.covariance -= influence.curvature * gain * gain.transpose();
+    // No delay is negative; left alone, both edges could slide below what they bound.
+    if (belief_.mean[3] < 0)
+        belief_.mean -= belief_.covariance.col(3) * (belief_.mean[3] / belief_.covariance(3, 3));
     // What rounding makes unequal is never measured away, but surprises would inflate it.
     belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
 }

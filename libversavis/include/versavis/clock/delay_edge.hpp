@@ -32,7 +32,8 @@ struct Influence {
 /// to nothing, and below it it cannot be.
 Influence influence_of(double excess, double deviation, double scale);
 
-/// The scale of delays, in ns; reorders them. None: there are too few.
+/// The scale of delays, in ns, by how dense the shortest quarter of them is; reorders them. None: there are
+/// too few.
 std::optional<double> delay_scale(std::vector<double>& delays_ns);
 
 /// By so much the edge of delays of this scale is uncertain in itself, in ns.
