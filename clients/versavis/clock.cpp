@@ -2,7 +2,6 @@
 #include "clock.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 #include <sysexits.h>
 
 #include <CLI/CLI.hpp>
@@ -101,12 +100,11 @@ void ClockCommands::add_plot() {
 }
 
 bool ClockCommands::chosen() const { return clock_->parsed(); }
+bool ClockCommands::records() const { return record_->parsed(); }
 
 int ClockCommands::run(const std::string& instance) {
     if (status_->parsed()) return show_status(instance);
     if (record_->parsed()) return record(instance);
-    // Nothing below looks for the program's stop flag: a signal ends it.
-    for (const int number : {SIGINT, SIGTERM}) signal(number, SIG_DFL);
     if (fair_start_ && estimator_ == EstimatorKind::ekf) estimator_ = EstimatorKind::ekf_fair;
     return replay_->parsed() ? replay() : plot();
 }

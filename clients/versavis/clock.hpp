@@ -22,6 +22,7 @@ class ClockCommands {
 
     /// After parsing: the user asked for one of them.
     bool chosen() const;
+    bool records() const;  ///< that goes on until it is stopped
 
     /// Does it and returns the program's exit code.
     int run(const std::string& instance);

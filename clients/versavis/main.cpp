@@ -67,7 +67,6 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
 }  // namespace
 
 int main(int argc, char** argv) {
-    for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     CLI::App app{"Looks at the VersaVIS service: its state, its streams, their items"};
     app.require_subcommand(1);
     app.set_version_flag("--version", VERSAVIS_VERSION);
@@ -120,6 +119,9 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
+    // Those that go on until they are stopped end tidily; any other ends at once.
+    if (watch || *tail_command || clock.records())
+        for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
     if (*list) {
         const auto text = client::list_streams(instance, json);

@@ -92,6 +92,7 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         const Nanoseconds period = rate == 0 ? default_sync_period : uhz_ns / rate;
         if (since < period - period / sync_tolerance || since > period + period / sync_tolerance) return;
         grid_clock_.begin(at, period);
+        for (CameraChannel& camera : cameras_) camera.grid_began();
         begin_trains(hal_.clock.now());
     }
     start_cameras(on_sync_.cameras, on_sync_.flags);

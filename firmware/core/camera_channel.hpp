@@ -34,6 +34,9 @@ class CameraChannel {
     /// Ends the wait for exposures.
     void give_up() { tracker_.give_up(); }
 
+    /// The grid begins anew, and counts its ticks from 0; while the camera does not run.
+    void grid_began() { next_tick_ = 0; }
+
     /// From `trigger` on, exposures last for `exposure`, until others are measured.
     void announce(std::uint64_t trigger, Nanoseconds exposure);
 

@@ -181,6 +181,25 @@ TEST_CASE("035-sync-and-start: a start that waits for sync disturbs nobody, and 
     CHECK(world.judge() == "");
 }
 
+TEST_CASE("035-sync-and-start: how long cameras ran before does not matter to one that waits for sync") {
+    Scenario world;
+    world.add_camera(0);
+    world.configuration.ports.inputs = 1U << wire::pulse_sync;
+    REQUIRE(world.begin());
+    world.run(20 * second);
+    world.stop();
+    world.run(second);
+    world.start(1, wire::start_on_sync);
+    const std::size_t before = world.camera(0).pulses().size();
+    for (const Nanoseconds seconds : {22, 23, 24}) {
+        const Nanoseconds at = seconds * second;
+        world.board().schedule_edge({at, firmware::input_pulse + unsigned{wire::pulse_sync}, true});
+        world.board().schedule_edge({at + ms, firmware::input_pulse + unsigned{wire::pulse_sync}, false});
+    }
+    world.run(4 * second);
+    CHECK(world.camera(0).pulses().size() > before + 30);
+}
+
 TEST_CASE("035-light-and-configurations: another configuration is no reason for more light") {
     Scenario world;
     world.add_camera(0, exposing_for(10 * ms));

@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What cameras do wrong, live through Aravis: each stamp that is published still belongs to its frame.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <fstream>
 #include <set>
 
+#include "../support/process.hpp"
 #include "../support/stack.hpp"
+#include "../support/temporary_directory.hpp"
 #include "judge.hpp"
 
 using namespace versavis;
@@ -172,6 +179,16 @@ TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs ag
     CHECK(stack.tool({"pair", "replay", path}, &output) == 69);
     CHECK_THAT(output, Catch::Contains("line 1"));
     CHECK(stack.tool({"pair", "replay", "/nowhere"}, &output) == 69);
+}
+
+TEST_CASE("cameras: a replay that waits for its recording is ended by a signal") {
+    const TemporaryDirectory directory;
+    const std::string pipe = directory.path() / "recording";
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    Process replay({program("versavis"), "pair", "replay", pipe}, directory.path() / "log");
+    const int writer = ::open(pipe.c_str(), O_WRONLY | O_CLOEXEC);  // returns when it is being read
+    CHECK(replay.terminate() == 128 + SIGTERM);
+    ::close(writer);
 }
 
 TEST_CASE("cameras: a share of the link is planned for each, and too many are said") {
