@@ -7,8 +7,9 @@
 namespace versavis {
 
 Duration rounded(double ns) {
-    constexpr double limit = 0x1p60;
-    return {std::llround(std::fmin(std::fmax(ns, -limit), limit))};  // these take no notice of a NaN
+    constexpr std::int64_t limit = std::int64_t{1} << 60;
+    if (!(ns > -limit)) return {-limit};  // a NaN, too
+    return {ns < limit ? std::llround(ns) : limit};
 }
 
 HostTime host_now() {

@@ -75,6 +75,7 @@ void smooth(Metrics& metrics) {
         }
     }
     metrics.push_back({"clock_smoothed", score.p99_us(), "us p99", 4.5});
+    metrics.push_back({"clock_smoothed_nees", octaves(score), "octaves", 1});
 }
 
 void start(Metrics& metrics) {

@@ -9,7 +9,7 @@ namespace {
 
 // A share of the delay, and some instructions more or less on short ones.
 constexpr double share = 0.04;
-constexpr double share_of_short = 0.1;
+constexpr double share_of_short = 0.08;
 constexpr double most_of_short_ns = 3000;
 
 double square(double x) { return x * x; }
