@@ -69,7 +69,7 @@ void smooth(Metrics& metrics) {
     for (settings.seed = 1; settings.seed <= 12; ++settings.seed) {
         const World world(settings);
         const clock::Smoother smoother(messages_of(world));
-        for (TrueTime t{seconds(300).ns}; t.ns < seconds(899).ns; t = t + milliseconds(100)) {
+        for (TrueTime t{seconds(1).ns}; t.ns < seconds(899).ns; t = t + milliseconds(100)) {
             const clock::HostEstimate estimate = smoother.translate(world.board(t));
             score.add(estimate.time - world.host(t), estimate);
         }
