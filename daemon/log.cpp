@@ -24,7 +24,8 @@ const char* name(LogLevel level) {
     return "";
 }
 
-/// The variable is inherited by programs whose output leads elsewhere: only the stream that it names counts.
+/// The variable is inherited by programs whose output leads elsewhere: only the stream that it
+/// names counts.
 bool standard_error_is_journal() {
     const char* stream = std::getenv("JOURNAL_STREAM");
     struct stat file {};

@@ -15,8 +15,8 @@ enum class LogLevel { error = 3, warning = 4, info = 6, debug = 7 };
 /// Messages below `level` are dropped from now on.
 void set_log_level(LogLevel level);
 
-/// One line about `subject` (a camera's name, "board", "service"), also as journal field VERSAVIS_SUBJECT.
-/// Thread-safe.
+/// One line about `subject` (a camera's name, "board", "service"), also as journal field
+/// VERSAVIS_SUBJECT. Thread-safe.
 void log_line(LogLevel level, const std::string& subject, const std::string& text);
 
 template <class... Arguments>

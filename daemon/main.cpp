@@ -8,7 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <cerrno>
 
-#include "configuration.hpp"
+#include "configuration/configuration.hpp"
 #include "log.hpp"
 #include "service.hpp"
 
@@ -77,10 +77,12 @@ int run(const std::string& path, bool check_only) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"VersaVIS service: hardware-stamped camera frames and IMU samples in shared memory"};
+    CLI::App app{
+        "VersaVIS service: hardware-stamped camera frames and IMU samples in shared memory"};
     std::string path = default_configuration;
     bool check_only = false;
-    app.add_option("-c,--config", path, "Configuration file (docs/configuration.md)")->capture_default_str();
+    app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
+        ->capture_default_str();
     app.add_flag("--check-config", check_only, "Check the configuration file and exit");
     app.set_version_flag("--version", VERSAVIS_VERSION);
     try {

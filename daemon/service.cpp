@@ -15,7 +15,8 @@ constexpr std::uint64_t status_size = 64 * 1024;
 constexpr std::uint32_t status_slots = 8;
 constexpr std::uint32_t imu_items = 16384;  // 16 s at 1 kHz
 constexpr std::uint32_t event_items = 4096;
-constexpr std::uint32_t clock_items = 65536;  // 8 MiB: a minute of an IMU at 1 kHz, 5 of one at 200 Hz
+constexpr std::uint32_t clock_items =
+    65536;  // 8 MiB: a minute of an IMU at 1 kHz, 5 of one at 200 Hz
 
 EventKind event_kind(wire::EventKind kind) {
     switch (kind) {
@@ -66,16 +67,17 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
-    auto output = clock::OutputClock::create(configuration.clock.output, configuration.clock.force_tai);
-    if (!output) return tl::unexpected(output.error());
+    auto output =
+        clock::OutputClock::create(configuration.clock.output, configuration.clock.force_tai);
+    if (!output) return Unexpected(output.error());
     auto directory = ring::OwnedDirectory::claim(instance_directory(configuration.instance));
-    if (!directory) return tl::unexpected(directory.error());
+    if (!directory) return Unexpected(directory.error());
     ring::Shape shape{"status", ring::StreamKind::status, status_slots, status_slots, status_size};
     auto status_ring = ring::Writer::create(directory->path(), shape);
-    if (!status_ring) return tl::unexpected(status_ring.error());
-    std::unique_ptr<Service> service(
-        new Service(configuration, std::move(*directory), std::move(*output), std::move(*status_ring)));
-    if (auto made = service->make_parts(); !made) return tl::unexpected(made.error());
+    if (!status_ring) return Unexpected(status_ring.error());
+    std::unique_ptr<Service> service(new Service(configuration, std::move(*directory),
+                                                 std::move(*output), std::move(*status_ring)));
+    if (auto made = service->make_parts(); !made) return Unexpected(made.error());
     return service;
 }
 
@@ -93,26 +95,28 @@ Expected<> Service::make_parts() {
     surroundings_.ring_directory = directory_.path();
     const std::filesystem::path own_presets = configuration_.preset_directory;
     auto presets = load_presets(own_presets.empty() ? default_preset_directory() : own_presets);
-    if (!presets) return tl::unexpected(presets.error());
+    if (!presets) return Unexpected(presets.error());
     surroundings_.presets = std::move(*presets);
     auto event_ring =
         ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
-    if (!event_ring) return tl::unexpected(event_ring.error());
+    if (!event_ring) return Unexpected(event_ring.error());
     events_ = std::make_unique<EventJournal>(std::move(*event_ring), translator_);
     auto clock_ring =
         ring::Writer::create(directory_.path(), {"clock", ring::StreamKind::clock, clock_items});
-    if (!clock_ring) return tl::unexpected(clock_ring.error());
+    if (!clock_ring) return Unexpected(clock_ring.error());
     clock_recorder_ = std::make_unique<ClockRecorder>(std::move(*clock_ring), translator_);
     for (const ImuConfiguration& imu : configuration_.imus) {
-        auto ring = ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
-        if (!ring) return tl::unexpected(ring.error());
+        auto ring =
+            ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
+        if (!ring) return Unexpected(ring.error());
         imus_.push_back(std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_));
     }
     for (const CameraConfiguration& camera : configuration_.cameras) add_camera(camera);
     BoardListener& self = *this;
-    board_ = std::make_unique<BoardLink>(
-        [this] { return open_byte_stream(configuration_.board); }, board_configuration(configuration_),
-        configuration_.clock.exchange_rate_hz, translator_, *clock_recorder_, self);
+    board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
+                                         board_configuration(configuration_),
+                                         configuration_.clock.exchange_rate_hz, translator_,
+                                         *clock_recorder_, self);
     return {};
 }
 
@@ -127,7 +131,8 @@ void Service::add_camera(const CameraConfiguration& configuration) {
         events_->add({EventKind::camera_connected, EventReason::none, index, name});
         if (pipeline->triggered()) start(*pipeline, pipeline->first_start());
     };
-    hooks.lost = [this, pipeline, index, name = configuration.name, master_name = configuration.master] {
+    hooks.lost = [this, pipeline, index, name = configuration.name,
+                  master_name = configuration.master] {
         if (pipeline->triggered()) board_->stop_cameras(pipeline->board_mask());
         // A slave's start may have slowed its master down.
         const CameraUnit* master = find_camera(master_name);
@@ -136,19 +141,22 @@ void Service::add_camera(const CameraConfiguration& configuration) {
         events_->add({EventKind::camera_lost, EventReason::none, index, name});
     };
     hooks.exposure = [this, pipeline, configuration](Duration exposure) {
-        const std::uint64_t from = pipeline->newest_trigger() + 1 + configuration.auto_exposure.delay_frames;
+        const std::uint64_t from =
+            pipeline->newest_trigger() + 1 + configuration.auto_exposure.delay_frames;
         if (pipeline->triggered()) board_->announce_exposure(configuration.output, from, exposure);
     };
-    unit.camera = std::make_unique<Camera>(configuration, surroundings_, *pipeline, std::move(hooks));
+    unit.camera =
+        std::make_unique<Camera>(configuration, surroundings_, *pipeline, std::move(hooks));
     cameras_.push_back(std::move(unit));
 }
 
 void Service::start() {
     const bool board_needed =
-        !imus_.empty() || std::any_of(cameras_.begin(), cameras_.end(),
-                                      [](const CameraUnit& unit) { return unit.pipeline->triggered(); });
-    // Before the cameras make their rings: readers of streams that are no longer configured learn that they
-    // are gone.
+        !imus_.empty() || std::any_of(cameras_.begin(), cameras_.end(), [](const CameraUnit& unit) {
+            return unit.pipeline->triggered();
+        });
+    // Before the cameras make their rings: readers of streams that are no longer configured learn
+    // that they are gone.
     std::vector<std::string> configured;
     for (const CameraUnit& unit : cameras_) {
         configured.push_back(unit.configuration.name);
@@ -160,7 +168,8 @@ void Service::start() {
 }
 
 Service::~Service() {
-    for (CameraUnit& unit : cameras_) unit.camera->request_stop();  // all at once: each may take its time
+    for (CameraUnit& unit : cameras_)
+        unit.camera->request_stop();  // all at once: each may take its time
     for (CameraUnit& unit : cameras_) unit.camera->stop();
     if (board_) board_->stop();
 }
@@ -213,7 +222,8 @@ void Service::use_asymmetry_of(const std::string& port) {
 }
 
 void Service::align_grid(HostTime now) {
-    if (!alignment_.wanted() || (board_->report().capabilities & wire::capability_host_grid) == 0) return;
+    if (!alignment_.wanted() || (board_->report().capabilities & wire::capability_host_grid) == 0)
+        return;
     if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
 }
 
@@ -228,7 +238,8 @@ void Service::keep_asymmetry(const clock::ClockReport& clock, const std::string&
 }
 
 void Service::board_connected() {
-    events_->add({EventKind::board_connected, EventReason::none, 0, "board", board_->report().nonce});
+    events_->add(
+        {EventKind::board_connected, EventReason::none, 0, "board", board_->report().nonce});
     for (CameraUnit& unit : cameras_) {
         if (!unit.pipeline->triggered()) continue;
         unit.pipeline->reset();
@@ -243,7 +254,8 @@ void Service::exposure(const wire::Exposure& record) {
     if (unit == nullptr) return;
     unit->pipeline->add(record);
     if (!alignment_.wanted() || (record.flags & wire::exposure_measured) == 0) return;
-    const auto stamp = translator_.translate(middle(BoardTime{record.start_ns}, BoardTime{record.end_ns}));
+    const auto stamp =
+        translator_.translate(middle(BoardTime{record.start_ns}, BoardTime{record.end_ns}));
     if (stamp) alignment_.exposure(record, stamp->output, host_now());
 }
 
@@ -263,17 +275,19 @@ void Service::board_event(const wire::Event& event) {
     happening.source_name = "board";
     happening.value = event.value;
     happening.board_time = BoardTime{event.time_ns};
-    if (event.kind == wire::EventKind::trigger_skipped) happening.reason = skip_reason(event.detail);
+    if (event.kind == wire::EventKind::trigger_skipped)
+        happening.reason = skip_reason(event.detail);
     if (of_camera(event.kind)) {
         const CameraUnit* unit = camera_at(event.source);
-        happening.source = unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
+        happening.source =
+            unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
         if (unit != nullptr) happening.source_name = unit->configuration.name;
     } else if (of_imu(event.kind)) {
         for (auto& imu : imus_)
             if (imu->port() == event.source) happening.source_name = imu->report().name;
         const bool ready = event.kind == wire::EventKind::imu_ready;
-        log(ready ? LogLevel::info : LogLevel::warning, happening.source_name, "{}: step {}, value {}",
-            to_string(happening.kind), event.detail, event.value);
+        log(ready ? LogLevel::info : LogLevel::warning, happening.source_name,
+            "{}: step {}, value {}", to_string(happening.kind), event.detail, event.value);
     }
     events_->add(happening);
 }
@@ -297,12 +311,14 @@ std::vector<StreamStatus> Service::stream_status(HostTime now) {
     const auto add = [&](const std::string& name, const char* kind, std::uint64_t items) {
         auto& [before, at] = last_items_[name];
         const double seconds = static_cast<double>((now - at).ns) * 1e-9;
-        streams.push_back({name, kind, items,
-                           at.ns == 0 ? 0 : static_cast<double>(items - std::min(items, before)) / seconds});
+        streams.push_back(
+            {name, kind, items,
+             at.ns == 0 ? 0 : static_cast<double>(items - std::min(items, before)) / seconds});
         before = items;
         at = now;
     };
-    for (CameraUnit& unit : cameras_) add(unit.configuration.name, "frames", unit.pipeline->items());
+    for (CameraUnit& unit : cameras_)
+        add(unit.configuration.name, "frames", unit.pipeline->items());
     for (auto& imu : imus_) add(imu->report().name, "imu", imu->report().published);
     add("events", "events", events_->items());
     add("clock", "clock", clock_recorder_->items());
@@ -329,10 +345,10 @@ void Service::publish_status(HostTime now) {
         const Duration patience =
             seconds(1) + Duration{static_cast<std::int64_t>(3e9 / unit.configuration.rate_hz)};
         const bool stalled = unit.pipeline->triggered() && now - report.last_frame > patience;
-        const bool unproved =
-            unit.pipeline->triggered() && !stalled && now - report.last_proof > patience + seconds(5);
-        status.cameras.push_back({unit.configuration.name, unit.pipeline->triggered(), stalled, unproved,
-                                  unit.camera->report(), report});
+        const bool unproved = unit.pipeline->triggered() && !stalled &&
+                              now - report.last_proof > patience + seconds(5);
+        status.cameras.push_back({unit.configuration.name, unit.pipeline->triggered(), stalled,
+                                  unproved, unit.camera->report(), report});
     }
     for (auto& imu : imus_) status.imus.push_back(imu->report());
     status.streams = stream_status(now);

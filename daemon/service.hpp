@@ -6,24 +6,24 @@
 #include <memory>
 #include <vector>
 
-#include "asymmetry_store.hpp"
-#include "board_link.hpp"
-#include "camera.hpp"
-#include "camera_pipeline.hpp"
-#include "clock_recorder.hpp"
-#include "configuration.hpp"
-#include "event_journal.hpp"
-#include "grid_alignment.hpp"
-#include "imu_pipeline.hpp"
-#include "status.hpp"
-#include "versavis/ring/directory.hpp"
+#include "board/asymmetry_store.hpp"
+#include "board/board_link.hpp"
+#include "board/grid_alignment.hpp"
+#include "camera/camera.hpp"
+#include "configuration/configuration.hpp"
+#include "engine/ring/directory.hpp"
+#include "stream/camera_pipeline.hpp"
+#include "stream/clock_recorder.hpp"
+#include "stream/event_journal.hpp"
+#include "stream/imu_pipeline.hpp"
+#include "stream/status.hpp"
 
 namespace versavis::daemon {
 
 class Service final : private BoardListener {
  public:
-    /// Errors: the instance is served by another process, the rings cannot be made, the output clock is not
-    /// set.
+    /// Errors: the instance is served by another process, the rings cannot be made, the output
+    /// clock is not set.
     static Expected<std::unique_ptr<Service>> create(const Configuration& configuration);
     ~Service() override;
     Service(const Service&) = delete;
@@ -46,8 +46,8 @@ class Service final : private BoardListener {
         std::unique_ptr<Camera> camera;
     };
 
-    Service(const Configuration& configuration, ring::OwnedDirectory directory, clock::OutputClock output,
-            ring::Writer status_ring);
+    Service(const Configuration& configuration, ring::OwnedDirectory directory,
+            clock::OutputClock output, ring::Writer status_ring);
 
     Expected<> make_parts();
     void add_camera(const CameraConfiguration& configuration);

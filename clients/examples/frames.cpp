@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reads a camera's frames in place and prints the mean brightness with the time of the middle of the
-// exposure.
+// Reads a camera's frames in place and prints the mean brightness with the time of the middle of
+// the exposure.
 #include <versavis/stream.hpp>
 
 #include <cstdint>
@@ -16,12 +16,15 @@ int main(int argc, char** argv) {
     for (;;) {
         const auto frame = stream->wait(versavis::seconds(1));
         if (frame.found == versavis::Found::lost)
-            std::printf("too slow: %llu frames lost\n", static_cast<unsigned long long>(frame.lost));
+            std::printf("too slow: %llu frames lost\n",
+                        static_cast<unsigned long long>(frame.lost));
         if (frame.found != versavis::Found::item) continue;
         const auto* pixels = reinterpret_cast<const std::uint8_t*>(frame.payload);
         const double sum = std::accumulate(pixels, pixels + frame.payload_size, 0.0);
-        if (!stream->intact(frame)) continue;  // the writer needed the slot meanwhile: forget what was read
-        std::printf("%lld ns +- %u ns: mean brightness %.1f\n", static_cast<long long>(frame.time.ns),
-                    frame.data.sigma_ns, sum / frame.payload_size);
+        if (!stream->intact(frame))
+            continue;  // the writer needed the slot meanwhile: forget what was read
+        std::printf("%lld ns +- %u ns: mean brightness %.1f\n",
+                    static_cast<long long>(frame.time.ns), frame.data.sigma_ns,
+                    sum / frame.payload_size);
     }
 }

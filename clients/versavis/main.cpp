@@ -10,13 +10,13 @@
 #include <fstream>
 #include <iostream>
 
-#include "clock.hpp"
-#include "list.hpp"
-#include "pair_replay.hpp"
-#include "snapshot.hpp"
-#include "status_document.hpp"
-#include "status_view.hpp"
-#include "tail.hpp"
+#include "clock/clock.hpp"
+#include "pairing/pair_replay.hpp"
+#include "status/status_document.hpp"
+#include "status/status_view.hpp"
+#include "stream/list.hpp"
+#include "stream/snapshot.hpp"
+#include "stream/tail.hpp"
 #include "versavis/ring/path.hpp"
 
 namespace {
@@ -57,8 +57,8 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
     if (!file) return fail({recording, "cannot be read", ""});
     if (!decisions.empty()) out.open(decisions);
     if (!out) return fail({decisions, "cannot be written", ""});
-    const auto summary =
-        client::replay_pairing(recording == "-" ? std::cin : file, decisions.empty() ? nullptr : &out);
+    const auto summary = client::replay_pairing(recording == "-" ? std::cin : file,
+                                                decisions.empty() ? nullptr : &out);
     if (!summary) return fail(summary.error());
     fmt::print("{}", client::to_text(*summary, json));
     return EX_OK;
@@ -76,30 +76,35 @@ int main(int argc, char** argv) {
     bool json = false;
 
     bool watch = false;
-    auto* status = app.add_subcommand("status",
-                                      "State of board, clock, cameras and streams; exit code 0: all well, 1: "
-                                      "not all delivers, 69: not running");
+    auto* status =
+        app.add_subcommand("status",
+                           "State of board, clock, cameras and streams; exit code 0: all well, 1: "
+                           "not all delivers, 69: not running");
     status->add_flag("--watch", watch, "Show it again every second");
-    status->add_flag("--json", json, "The status document itself (docs/status.md)");
+    status->add_flag("--json", json, "The status document itself (docs/contracts/status.md)");
 
     auto* list = app.add_subcommand("list", "The streams that can be read");
     list->add_flag("--json", json, "As a JSON array");
 
     client::TailSettings tail;
-    auto* tail_command = app.add_subcommand("tail", "Print a stream as it comes, one line per item");
+    auto* tail_command =
+        app.add_subcommand("tail", "Print a stream as it comes, one line per item");
     tail_command->add_option("stream", tail.stream, "Name of the stream")->required();
     tail_command->add_option("-n,--count", tail.count, "Stop after that many items");
     tail_command->add_flag("--json", json, "One JSON object per line");
-    tail_command->add_flag("--oldest", tail.oldest, "Begin with the oldest item that is still there");
+    tail_command->add_flag("--oldest", tail.oldest,
+                           "Begin with the oldest item that is still there");
 
     auto* pair = app.add_subcommand("pair", "Pairing of frames and exposures");
     pair->require_subcommand(1);
     std::string recording;
     std::string decisions;
     auto* replay = pair->add_subcommand(
-        "replay", "Pair again from a recording, made by: versavis tail CAMERA-evidence --oldest --json");
+        "replay",
+        "Pair again from a recording, made by: versavis tail CAMERA-evidence --oldest --json");
     replay->add_option("recording", recording, "File to read; - for standard input")->required();
-    replay->add_option("-o,--output", decisions, "File for the decisions, one JSON object per line");
+    replay->add_option("-o,--output", decisions,
+                       "File for the decisions, one JSON object per line");
     replay->add_flag("--json", json, "The summary as a JSON object");
 
     client::ClockCommands clock(app, [] { return stop_requested != 0; });
@@ -107,7 +112,8 @@ int main(int argc, char** argv) {
     std::string stream;
     std::string output;
     double timeout_s = 5;
-    auto* snapshot = app.add_subcommand("snapshot", "Write the next frame of a stream to a PNG file");
+    auto* snapshot =
+        app.add_subcommand("snapshot", "Write the next frame of a stream to a PNG file");
     snapshot->add_option("stream", stream, "Name of the stream")->required();
     snapshot->add_option("-o,--output", output, "File to write")->required();
     snapshot->add_option("--timeout", timeout_s, "Seconds to wait for a frame")

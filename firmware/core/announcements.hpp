@@ -30,7 +30,8 @@ class Announcements {
     /// The newest that holds for `trigger`; null: none does.
     const Announcement* find(std::uint64_t trigger) const {
         const Announcement* found = nullptr;
-        for (std::size_t i = 0; i < count_ && entries_[i].trigger <= trigger; ++i) found = &entries_[i];
+        for (std::size_t i = 0; i < count_ && entries_[i].trigger <= trigger; ++i)
+            found = &entries_[i];
         return found;
     }
 

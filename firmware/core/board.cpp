@@ -11,15 +11,17 @@ namespace {
 
 constexpr Nanoseconds health_interval = 1'000'000'000;
 constexpr Nanoseconds feed_interval = 200'000'000;
-constexpr Nanoseconds stuck_limit = 500'000'000;   // the output hardware moves on, or the watchdog bites
-constexpr Nanoseconds unseen_step = 1'000;         // of the grid: pulses of trains need not begin anew
+constexpr Nanoseconds stuck_limit =
+    500'000'000;                            // the output hardware moves on, or the watchdog bites
+constexpr Nanoseconds unseen_step = 1'000;  // of the grid: pulses of trains need not begin anew
 constexpr Nanoseconds longest_wait = 200'000'000;  // for exposures, before a new configuration
 constexpr Nanoseconds stray_interval = 100'000'000;
 
 constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
     wire::capability_slaves | wire::capability_illumination | wire::capability_pulse_inputs |
-    wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid | wire::capability_nmea;
+    wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
+    wire::capability_nmea;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
@@ -123,7 +125,8 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
 }
 
 void Board::greet(const wire::HostHello& hello) {
-    // A board of another major version still says who it is: the host then tells the user what to update.
+    // A board of another major version still says who it is: the host then tells the user what to
+    // update.
     greeted_ = true;
     if (configuring_) begin_trains(hal_.clock.now());
     configuring_ = false;
@@ -145,14 +148,17 @@ void Board::greet(const wire::HostHello& hello) {
 }
 
 void Board::configure(const wire::Configuration& configuration) {
-    if (any_running()) return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
+    if (any_running())
+        return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
     refused_ = 0;
     checked_id_ = configuration.id;
     check(configuration, *this);
-    if (refused_ != 0) return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
+    if (refused_ != 0)
+        return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
     wanted_ = configuration;
     on_sync_ = {};
-    // Pulses that were decided end first, and their exposures: none is cut, and each has its record.
+    // Pulses that were decided end first, and their exposures: none is cut, and each has its
+    // record.
     sync_.stop();
     test_.stop();
     configuring_ = true;
@@ -182,15 +188,17 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     apply_nmea();
     for (std::size_t port = 0; port < wire::imu_count; ++port) {
         wire::ImuConfiguration& imu = configuration_.imus[port];
-        imu.rate_millihertz = port == 0                         ? SpiImu::true_rate(imu)
-                              : imu.kind == wire::ImuKind::none ? imu.rate_millihertz
-                                                                : Vn100::true_rate(imu.rate_millihertz);
+        imu.rate_millihertz = port == 0 ? SpiImu::true_rate(imu)
+                              : imu.kind == wire::ImuKind::none
+                                  ? imu.rate_millihertz
+                                  : Vn100::true_rate(imu.rate_millihertz);
     }
     std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
     for (unsigned i = 0; i < camera_count; ++i) {
         cameras_[i].give_up();
         const bool lit = (configuration.illumination.cameras >> i & 1U) != 0;
-        cameras_[i].configure(configuration.cameras[i], lit ? configuration.illumination.lead_ns : 0);
+        cameras_[i].configure(configuration.cameras[i],
+                              lit ? configuration.illumination.lead_ns : 0);
         outputs_.rest(i, cameras_[i].trigger_inverted(), now);
         if (cameras_[i].has_strobe()) inputs |= 1U << i;
     }
@@ -245,9 +253,11 @@ void Board::begin_trains(Nanoseconds now) {
     const wire::PortConfiguration& ports = configuration_.ports;
     sync_.stop();
     test_.stop();
-    if (ports.sync_rate_uhz != 0) sync_.begin(Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
+    if (ports.sync_rate_uhz != 0)
+        sync_.begin(Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
     const bool paced = (configuration_.imus[0].options & wire::imu_data_ready) == 0;
-    if (ports.test == wire::test_imu0 && paced && configuration_.imus[0].kind != wire::ImuKind::none)
+    if (ports.test == wire::test_imu0 && paced &&
+        configuration_.imus[0].kind != wire::ImuKind::none)
         test_.begin(spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
 }
 
@@ -287,11 +297,12 @@ void Board::start(const wire::Start& start) {
 
 void Board::align(const wire::AlignGrid& wanted) {
     const Nanoseconds now = hal_.clock.now();
-    const bool in_reach =
-        wanted.board_ns >= now - wire::align_reach_ns && wanted.board_ns <= now + wire::align_reach_ns;
-    const bool pace_possible =
-        wanted.pace_ppb >= -wire::align_largest_pace_ppb && wanted.pace_ppb <= wire::align_largest_pace_ppb;
-    const bool slew_possible = wanted.max_slew_ppb > 0 && wanted.max_slew_ppb <= wire::align_largest_slew_ppb;
+    const bool in_reach = wanted.board_ns >= now - wire::align_reach_ns &&
+                          wanted.board_ns <= now + wire::align_reach_ns;
+    const bool pace_possible = wanted.pace_ppb >= -wire::align_largest_pace_ppb &&
+                               wanted.pace_ppb <= wire::align_largest_pace_ppb;
+    const bool slew_possible =
+        wanted.max_slew_ppb > 0 && wanted.max_slew_ppb <= wire::align_largest_slew_ppb;
     if (!in_reach || !pace_possible || !slew_possible) {
         ++health_.ignored;
         return send(wire::Log{wire::LogLevel::warning, "align_grid is out of range, and ignored"});
@@ -306,7 +317,8 @@ void Board::align(const wire::AlignGrid& wanted) {
 void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
     for (unsigned i = 0; i < camera_count; ++i) {
         if ((cameras >> i & 1U) == 0) continue;
-        CameraChannel& camera = cameras_[i].is_slave() ? cameras_[cameras_[i].master()] : cameras_[i];
+        CameraChannel& camera =
+            cameras_[i].is_slave() ? cameras_[cameras_[i].master()] : cameras_[i];
         if (cameras_[i].is_slave()) slaves_ = static_cast<std::uint8_t>(slaves_ | 1U << i);
         // The gaps of a slave are its master's.
         const bool other_gaps = flags != 0 || camera.slow();
@@ -316,13 +328,15 @@ void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
     switch_slaves();
 }
 
-/// A slave is switched on and off while its master does not expose: each of its pulses is whole, and counted.
+/// A slave is switched on and off while its master does not expose: each of its pulses is whole,
+/// and counted.
 void Board::switch_slaves() {
     bool changed = false;
     for (unsigned i = 0; i < camera_count; ++i) {
         CameraChannel& slave = cameras_[i];
         const bool wanted = (slaves_ >> i & 1U) != 0 && slave.enabled();
-        if (!slave.is_slave() || slave.running() == wanted || (exposing_ >> slave.master() & 1U) != 0)
+        if (!slave.is_slave() || slave.running() == wanted ||
+            (exposing_ >> slave.master() & 1U) != 0)
             continue;
         if (wanted)
             slave.start(hal_.clock.now(), 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board: link, cameras, IMUs, light and pulses behind one poll(), on any port that offers the HAL.
+// The board: link, cameras, IMUs, light and pulses behind one poll(), on any port that offers the
+// HAL.
 #pragma once
 
 #include "camera_channel.hpp"
@@ -29,8 +30,8 @@ class Board final : private ChannelReports, private RefusalSink {
     Board(const Board&) = delete;
     Board& operator=(const Board&) = delete;
 
-    /// Does all that is due. Call it at next_wake(); when bytes, edges or an output word came or went; and
-    /// when a transfer completed.
+    /// Does all that is due. Call it at next_wake(); when bytes, edges or an output word came or
+    /// went; and when a transfer completed.
     void poll();
 
     Nanoseconds next_wake() const { return due_; }

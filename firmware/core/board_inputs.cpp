@@ -59,7 +59,8 @@ void Board::take_exposure_edge(const Edge& edge, Nanoseconds now) {
     const std::uint64_t tick = master.tick_at(edge.at);
     master.edge(edge.at, edge.level);
     for (CameraChannel& slave : cameras_)
-        if (slave.enabled() && slave.master() == edge.input) slave.master_edge(edge.at, exposing, tick);
+        if (slave.enabled() && slave.master() == edge.input)
+            slave.master_edge(edge.at, exposing, tick);
     light_.edge(edge.input, exposing, now);
     const auto bit = static_cast<std::uint8_t>(1U << edge.input);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
@@ -75,8 +76,8 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
             return event(wire::EventKind::pps, 0, at, number, 0);
         case wire::pulse_aux0:
         case wire::pulse_aux1:
-            return event(wire::EventKind::aux_pulse, static_cast<std::uint8_t>(input - wire::pulse_aux0), at,
-                         number, 0);
+            return event(wire::EventKind::aux_pulse,
+                         static_cast<std::uint8_t>(input - wire::pulse_aux0), at, number, 0);
         case wire::pulse_sync: break;
     }
     event(wire::EventKind::sync_pulse, 0, at, number, 0);
@@ -90,7 +91,8 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         // Two that are a period apart are pulses; one may be anything.
         const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
         const Nanoseconds period = rate == 0 ? default_sync_period : uhz_ns / rate;
-        if (since < period - period / sync_tolerance || since > period + period / sync_tolerance) return;
+        if (since < period - period / sync_tolerance || since > period + period / sync_tolerance)
+            return;
         grid_clock_.begin(at, period);
         for (CameraChannel& camera : cameras_) camera.grid_began();
         begin_trains(hal_.clock.now());
@@ -113,7 +115,8 @@ void Board::poll_nmea() {
     UtcLabel label;
     while (const std::size_t size = hal_.imu_uart.read(bytes, sizeof bytes, received))
         for (std::size_t i = 0; i < size; ++i) {
-            const Nanoseconds at = received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
+            const Nanoseconds at =
+                received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
             if (nmea_.take(bytes[i], at, label))
                 event(wire::EventKind::utc_label, 0, label.pulse, label.utc_s, 0);
         }

@@ -5,7 +5,8 @@ namespace versavis::firmware {
 
 namespace {
 
-constexpr Nanoseconds start_delay = 5'000'000;  // from the command to the first grid point, at least
+constexpr Nanoseconds start_delay =
+    5'000'000;  // from the command to the first grid point, at least
 constexpr Nanoseconds start_timeout_floor = 2'000'000;
 constexpr Nanoseconds start_timeout_limit = 50'000'000;
 constexpr Nanoseconds latest_trigger = 1'000'000;
@@ -67,7 +68,8 @@ bool CameraChannel::wanted(std::uint64_t tick) const {
     if ((start_flags_ & wire::start_slow) != 0) {
         return since_start % wire::slow_start_ticks(configuration_.rate_uhz, camera_) == 0;
     }
-    if ((start_flags_ & wire::start_pattern) == 0 || since_start >= wire::start_pattern_length) return true;
+    if ((start_flags_ & wire::start_pattern) == 0 || since_start >= wire::start_pattern_length)
+        return true;
     return (wire::start_pattern_bits[camera_] >> since_start & 1U) != 0;
 }
 
@@ -90,14 +92,14 @@ void CameraChannel::decide(Nanoseconds now) {
 
 void CameraChannel::skip(wire::SkipReason reason, Nanoseconds at) {
     ++skipped_;
-    reports_.event(wire::EventKind::trigger_skipped, camera_, at, static_cast<std::int64_t>(grid_.tick()),
-                   static_cast<std::uint16_t>(reason));
+    reports_.event(wire::EventKind::trigger_skipped, camera_, at,
+                   static_cast<std::int64_t>(grid_.tick()), static_cast<std::uint16_t>(reason));
 }
 
 std::uint16_t CameraChannel::phase_flags() const {
     if ((start_flags_ & wire::start_slow) != 0) return wire::exposure_slow;
-    const bool pattern =
-        (start_flags_ & wire::start_pattern) != 0 && grid_.tick() - first_tick_ < wire::start_pattern_length;
+    const bool pattern = (start_flags_ & wire::start_pattern) != 0 &&
+                         grid_.tick() - first_tick_ < wire::start_pattern_length;
     return pattern ? std::uint16_t{wire::exposure_pattern} : std::uint16_t{0};
 }
 

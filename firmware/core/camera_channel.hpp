@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One camera: places its triggers so that the middles of its exposures lie on the grid, or follows its
-// master, and records what it did.
+// One camera: places its triggers so that the middles of its exposures lie on the grid, or follows
+// its master, and records what it did.
 #pragma once
 
 #include "announcements.hpp"
@@ -13,15 +13,20 @@ namespace versavis::firmware {
 
 class CameraChannel {
  public:
-    CameraChannel(std::uint8_t camera, const GridClock& clock, OutputQueue& outputs, ChannelReports& reports)
-        : camera_(camera), clock_(clock), outputs_(outputs), reports_(reports), tracker_(camera, reports) {}
+    CameraChannel(std::uint8_t camera, const GridClock& clock, OutputQueue& outputs,
+                  ChannelReports& reports)
+        : camera_(camera),
+          clock_(clock),
+          outputs_(outputs),
+          reports_(reports),
+          tracker_(camera, reports) {}
 
-    /// Only while stopped and idle. Numbers go on. Triggers are decided `lead` sooner than the outputs ask
-    /// for.
+    /// Only while stopped and idle. Numbers go on. Triggers are decided `lead` sooner than the
+    /// outputs ask for.
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds lead);
 
-    /// Begins triggering at the first grid point that can be met after `now`; flags: wire::StartFlag. A
-    /// channel that runs begins its pattern anew.
+    /// Begins triggering at the first grid point that can be met after `now`; flags:
+    /// wire::StartFlag. A channel that runs begins its pattern anew.
     void start(Nanoseconds now, std::uint8_t flags);
 
     /// Pulses that were decided are still sent, and recorded.

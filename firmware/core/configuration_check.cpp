@@ -41,11 +41,16 @@ class Checker {
     RefusalSink& sink_;
 };
 
-bool enabled(const wire::CameraConfiguration& camera) { return (camera.flags & wire::camera_enabled) != 0; }
-bool slave(const wire::CameraConfiguration& camera) { return (camera.flags & wire::camera_slave) != 0; }
+bool enabled(const wire::CameraConfiguration& camera) {
+    return (camera.flags & wire::camera_enabled) != 0;
+}
+bool slave(const wire::CameraConfiguration& camera) {
+    return (camera.flags & wire::camera_slave) != 0;
+}
 
 /// A master has an exposure line and a schedule of its own.
-bool can_be_master(const wire::Configuration& configuration, std::size_t master, std::size_t slave_index) {
+bool can_be_master(const wire::Configuration& configuration, std::size_t master,
+                   std::size_t slave_index) {
     if (master >= wire::camera_count || master == slave_index) return false;
     const wire::CameraConfiguration& camera = configuration.cameras[master];
     return enabled(camera) && !slave(camera) && (camera.flags & wire::camera_no_strobe) == 0;
@@ -60,7 +65,8 @@ void check_master(const wire::Configuration& configuration, std::size_t index, C
     for (std::size_t i = 0; i < wire::camera_count && possible < 0; ++i)
         if (can_be_master(configuration, i, index)) possible = static_cast<std::int64_t>(i);
     // The range names one that could be; an empty one: no camera can.
-    checker.range(Field::master, master == possible ? -1 : master, possible < 0 ? 0 : possible, possible);
+    checker.range(Field::master, master == possible ? -1 : master, possible < 0 ? 0 : possible,
+                  possible);
 }
 
 void check_camera(const wire::Configuration& configuration, std::size_t index, RefusalSink& sink) {
@@ -103,7 +109,8 @@ void check_illumination(const wire::IlluminationConfiguration& light, RefusalSin
     Checker checker(Part::illumination, 0, sink);
     checker.range(Field::cameras, light.cameras, 1, (1 << wire::camera_count) - 1);
     checker.range(Field::lead, light.lead_ns, 0, 1'000'000);
-    checker.range(Field::max_on, light.max_on_ns, 10'000 + std::int64_t{light.lead_ns}, 1'000'000'000);
+    checker.range(Field::max_on, light.max_on_ns, 10'000 + std::int64_t{light.lead_ns},
+                  1'000'000'000);
     checker.range(Field::duty, light.duty_ppm, 1, 1'000'000);
 }
 
@@ -111,7 +118,8 @@ void check_illumination(const wire::IlluminationConfiguration& light, RefusalSin
 void check_test(const wire::Configuration& configuration, Checker& checker) {
     const wire::PortConfiguration& ports = configuration.ports;
     const wire::ImuConfiguration& uart_imu = configuration.imus[1];
-    const bool uart_ticks = (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows them
+    const bool uart_ticks =
+        (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows them
     const int last = wire::test_imu0 + (uart_ticks ? 1 : 0);
     checker.range(Field::test, ports.test, 0, last);
     if (ports.test == wire::test_none || ports.test > last) return;
@@ -135,7 +143,8 @@ void check_ports(const wire::Configuration& configuration, RefusalSink& sink) {
         checker.range(Field::sync_rate, ports.sync_rate_uhz, 100'000, 10'000'000);
         checker.range(Field::pulse, ports.pulse_ns, 1'000, longest_pulse);
     }
-    if ((ports.options & wire::port_imu_output) != 0 && configuration.imus[0].kind == wire::ImuKind::none)
+    if ((ports.options & wire::port_imu_output) != 0 &&
+        configuration.imus[0].kind == wire::ImuKind::none)
         checker.range(Field::port_options, ports.options, 0, 0);
     if ((ports.options & wire::port_nmea) == 0) return;
     if (configuration.imus[1].kind != wire::ImuKind::none)  // it has the UART

@@ -2,7 +2,7 @@
 // Holds a configuration from the host against what the board can do.
 #pragma once
 
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 

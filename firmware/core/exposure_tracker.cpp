@@ -9,7 +9,8 @@ constexpr Nanoseconds certain_latency = 200'000;  // shorter ones may vary by as
 
 }  // namespace
 
-void ExposureTracker::configure(const wire::CameraConfiguration& configuration, Nanoseconds patience) {
+void ExposureTracker::configure(const wire::CameraConfiguration& configuration,
+                                Nanoseconds patience) {
     configuration_ = configuration;
     patience_ = patience;
     period_ = configuration.rate_uhz == 0 ? never : 1'000'000'000'000'000 / configuration.rate_uhz;
@@ -35,8 +36,8 @@ ExposureTracker::Completed ExposureTracker::edge(Nanoseconds at, bool exposing) 
     return {};
 }
 
-/// The edge belongs to the newest trigger that can have caused it: older ones that wait for a start were
-/// ignored by the camera.
+/// The edge belongs to the newest trigger that can have caused it: older ones that wait for a start
+/// were ignored by the camera.
 void ExposureTracker::start_edge(Nanoseconds at) {
     const Nanoseconds latency = configuration_.latency_ns;
     const Nanoseconds soonest = latency > certain_latency ? latency / 2 : 0;
@@ -47,7 +48,8 @@ void ExposureTracker::start_edge(Nanoseconds at) {
         edges_lost();  // if the line rose twice, an end in between was missed
         return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
     }
-    // The line has one level: whatever still waits before this trigger was ignored, or its end edge was lost.
+    // The line has one level: whatever still waits before this trigger was ignored, or its end edge
+    // was lost.
     for (; found > 0; --found)
         finish_first(started(flights_[0]) ? wire::exposure_no_end : wire::exposure_no_start);
     flights_[0].record.start_ns = at;
@@ -62,8 +64,8 @@ ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
     record.end_ns = at;
     const Completed completed{record.trigger, at - record.start_ns};
     const bool overlong = completed.duration > period_;
-    finish_first(static_cast<std::uint16_t>(overlong ? wire::exposure_measured | wire::exposure_overlong
-                                                     : wire::exposure_measured));
+    finish_first(static_cast<std::uint16_t>(
+        overlong ? wire::exposure_measured | wire::exposure_overlong : wire::exposure_measured));
     return completed;
 }
 
@@ -77,8 +79,9 @@ Nanoseconds ExposureTracker::busy_until(Nanoseconds now) const {
         if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < now)
             return never / 2;
     const Flight& newest = flights_[count_ - 1];
-    const Nanoseconds start =
-        started(newest) ? newest.record.start_ns : newest.record.trigger_ns + configuration_.latency_ns;
+    const Nanoseconds start = started(newest)
+                                  ? newest.record.start_ns
+                                  : newest.record.trigger_ns + configuration_.latency_ns;
     return start + newest.expected;
 }
 
@@ -96,7 +99,9 @@ Nanoseconds ExposureTracker::deadline(const Flight& flight) const {
     return flight.record.trigger_ns + configuration_.latency_ns + patience_;
 }
 
-Nanoseconds ExposureTracker::next_deadline() const { return count_ == 0 ? never : deadline(flights_[0]); }
+Nanoseconds ExposureTracker::next_deadline() const {
+    return count_ == 0 ? never : deadline(flights_[0]);
+}
 
 void ExposureTracker::expire(Nanoseconds now) {
     while (count_ > 0 && deadline(flights_[0]) <= now) {

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Joins the edges of one exposure line with the triggers that were sent: one record for each trigger,
-// whatever comes.
+// Joins the edges of one exposure line with the triggers that were sent: one record for each
+// trigger, whatever comes.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "hal.hpp"
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 
 /// Where a channel reports to.
 struct ChannelReports {
     virtual void exposure(const wire::Exposure& record) = 0;
-    virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-                       std::uint16_t detail = 0) = 0;
+    virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at,
+                       std::int64_t value, std::uint16_t detail = 0) = 0;
     /// A trigger was decided: an exposure of `duration` is expected at `start`.
     virtual void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) = 0;
 
@@ -25,7 +25,8 @@ struct ChannelReports {
 
 class ExposureTracker {
  public:
-    ExposureTracker(std::uint8_t camera, ChannelReports& reports) : camera_(camera), reports_(reports) {}
+    ExposureTracker(std::uint8_t camera, ChannelReports& reports)
+        : camera_(camera), reports_(reports) {}
 
     /// `patience`: how long after it was expected a start may still come.
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds patience);
@@ -39,15 +40,16 @@ class ExposureTracker {
     /// The word of `asked` left later.
     void left_late(Nanoseconds asked, Nanoseconds left);
 
-    /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure that it
-    /// completed, with its duration; trigger 0: it completed none.
+    /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure
+    /// that it completed, with its duration; trigger 0: it completed none.
     struct Completed {
         std::uint64_t trigger = 0;
         Nanoseconds duration = 0;
     };
     Completed edge(Nanoseconds at, bool exposing);
 
-    /// Edges were lost: an end that comes now may belong to another exposure than the start that was seen.
+    /// Edges were lost: an end that comes now may belong to another exposure than the start that
+    /// was seen.
     void edges_lost();
 
     /// Gives up what did not happen.
@@ -86,8 +88,9 @@ class ExposureTracker {
     wire::CameraConfiguration configuration_{};
     Nanoseconds patience_ = 0;
     Nanoseconds period_ = 0;
-    Nanoseconds last_end_ = INT64_MIN / 2;  ///< when the newest finished exposure ended, or was given up
-    std::uint64_t last_tick_ = 0;           ///< of the newest finished record
+    Nanoseconds last_end_ =
+        INT64_MIN / 2;             ///< when the newest finished exposure ended, or was given up
+    std::uint64_t last_tick_ = 0;  ///< of the newest finished record
     Flight flights_[max_flights] = {};
     std::size_t count_ = 0;
 };

@@ -14,7 +14,10 @@ class Grid {
  public:
     Grid() = default;
     Grid(Nanoseconds origin, std::uint32_t rate_uhz)
-        : next_(origin), rate_uhz_(rate_uhz), whole_(ns_uhz / rate_uhz), remainder_(ns_uhz % rate_uhz) {}
+        : next_(origin),
+          rate_uhz_(rate_uhz),
+          whole_(ns_uhz / rate_uhz),
+          remainder_(ns_uhz % rate_uhz) {}
 
     Nanoseconds next() const { return next_; }
     std::uint64_t tick() const { return tick_; }

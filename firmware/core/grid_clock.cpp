@@ -20,7 +20,8 @@ Nanoseconds nearest_second(Nanoseconds at) {
 
 }  // namespace
 
-GridLine::GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb) : board_(board), grid_(grid) {
+GridLine::GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb)
+    : board_(board), grid_(grid) {
     const std::int64_t scaled = pace_ppb * (std::int64_t{1} << 40);
     pace_ = (scaled + (scaled < 0 ? -billion : billion) / 2) / billion;
 }
@@ -31,7 +32,8 @@ bool GridClock::sync_pulse(Nanoseconds at) {
     const Nanoseconds periods = (since + period_ / 2) / period_;
     if (periods <= 0) return false;
     const Nanoseconds nominal = periods * period_;
-    // Pulses may be missing. Once the pace is known, it says when the next one comes, however long that is.
+    // Pulses may be missing. Once the pace is known, it says when the next one comes, however long
+    // that is.
     const Nanoseconds off = at - board_time(line_.grid() + nominal);
     Nanoseconds tolerance = (periods > longest_first_gap ? period_ : nominal) / largest_pace;
     if (pace_known_) tolerance = period_ / largest_change;

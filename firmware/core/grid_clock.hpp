@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The one grid that all cameras share: its origin, and how it follows another board's sync pulses, or the
-// host's time.
+// The one grid that all cameras share: its origin, and how it follows another board's sync pulses,
+// or the host's time.
 #pragma once
 
 #include "hal.hpp"
 
 namespace versavis::firmware {
 
-/// Board time over grid time, straight through an anchor; without divisions, which take long on small
-/// processors. Exact to a nanosecond within some minutes of the anchor.
+/// Board time over grid time, straight through an anchor; without divisions, which take long on
+/// small processors. Exact to a nanosecond within some minutes of the anchor.
 class GridLine {
  public:
     GridLine() = default;
@@ -46,12 +46,13 @@ class GridLine {
     std::int64_t pace_ = 0;  ///< parts of 2^40
 };
 
-/// Grid time counts from the origin. By itself it passes as board time does. While sync pulses come, it
-/// passes as the board that sends them has it: between two pulses at the pace of the two before. Aligned, it
-/// passes as the host says, whose whole seconds are approached without a step.
+/// Grid time counts from the origin. By itself it passes as board time does. While sync pulses
+/// come, it passes as the board that sends them has it: between two pulses at the pace of the two
+/// before. Aligned, it passes as the host says, whose whole seconds are approached without a step.
 class GridClock {
  public:
-    /// Grid time 0 is at `origin`; `sync_period` as the sender has it, 0: unknown, pulses are not followed.
+    /// Grid time 0 is at `origin`; `sync_period` as the sender has it, 0: unknown, pulses are not
+    /// followed.
     void begin(Nanoseconds origin, Nanoseconds sync_period) {
         *this = {};
         line_ = GridLine(origin, 0, 0);
@@ -71,10 +72,11 @@ class GridClock {
     /// False: the pulse is none of the sender's, and is not followed.
     bool sync_pulse(Nanoseconds at);
 
-    /// A whole second of grid time belongs at `second`, and board time passes by `pace_ppb` faster from there
-    /// on. The nearest one goes there, from `now` on, by no more than `max_slew_ppb` of the time beyond the
-    /// pace. Sync pulses are no longer followed.
-    void align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb, Nanoseconds now);
+    /// A whole second of grid time belongs at `second`, and board time passes by `pace_ppb` faster
+    /// from there on. The nearest one goes there, from `now` on, by no more than `max_slew_ppb` of
+    /// the time beyond the pace. Sync pulses are no longer followed.
+    void align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb,
+               Nanoseconds now);
 
     /// The same at once.
     void place(Nanoseconds second, std::int32_t pace_ppb);
@@ -86,8 +88,8 @@ class GridClock {
     static constexpr Nanoseconds no_bend = INT64_MIN;
 
     Nanoseconds period_ = 0;
-    GridLine line_;               ///< from the newest pulse, or towards the second that the host named
-    GridLine approach_;           ///< until line_ is reached
+    GridLine line_;      ///< from the newest pulse, or towards the second that the host named
+    GridLine approach_;  ///< until line_ is reached
     Nanoseconds bend_ = no_bend;  ///< grid time from which on line_ holds
     bool pace_known_ = false;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the portable core needs of a board: time, scheduled outputs, stamped edges, routing, buses and a byte
-// link.
+// What the portable core needs of a board: time, scheduled outputs, stamped edges, routing, buses
+// and a byte link.
 #pragma once
 
 #include <cstddef>
@@ -74,8 +74,8 @@ inline constexpr std::uint8_t not_routed = 0xFF;
 
 /// What follows from levels without waiting for code.
 struct Routes {
-    /// Camera whose exposure line drives the trigger of this one: active while it exposes. not_routed: the
-    /// schedule drives it.
+    /// Camera whose exposure line drives the trigger of this one: active while it exposes.
+    /// not_routed: the schedule drives it.
     std::uint8_t master[camera_count] = {not_routed, not_routed, not_routed, not_routed};
     std::uint8_t inverted_triggers = 0;   ///< bit mask: low is active, of routed triggers
     std::uint8_t inverted_exposures = 0;  ///< bit mask: low is exposing
@@ -128,7 +128,8 @@ struct ImuBus {
 struct ImuUart {
     virtual void set_baud(std::uint32_t baud) = 0;
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
-    /// `received` is when the last of the bytes had arrived. One call never spans a pause on the line.
+    /// `received` is when the last of the bytes had arrived. One call never spans a pause on the
+    /// line.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
 
  protected:
@@ -137,12 +138,14 @@ struct ImuUart {
 
 /// What another SPI master reads from the board as if it were an ADIS16448.
 struct ImuImage {
-    std::uint16_t burst[13] = {};  ///< status, gyro, accelerometer, magnetometer, pressure, temperature, CRC
+    std::uint16_t burst[13] =
+        {};  ///< status, gyro, accelerometer, magnetometer, pressure, temperature, CRC
     std::uint16_t product = 0;
 };
 
 struct ImuOutput {
-    /// A read that is under way ends with the image it began with; then the port pulses its data-ready line.
+    /// A read that is under way ends with the image it began with; then the port pulses its
+    /// data-ready line.
     virtual void publish(const ImuImage& image) = 0;
 
  protected:
@@ -155,8 +158,8 @@ struct ByteLink {
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
     /// `received` is when the newest of the bytes entered the board.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
-    /// Asks when the newest byte that was written leaves: is acknowledged, or handed to what does not tell
-    /// more. The newest question alone is answered. A link that cannot tell never answers.
+    /// Asks when the newest byte that was written leaves: is acknowledged, or handed to what does
+    /// not tell more. The newest question alone is answered. A link that cannot tell never answers.
     virtual void watch_departure() {}
     /// True, once: the byte that was asked for left at `at`, not later than the host could have it.
     virtual bool take_departure(Nanoseconds& /*at*/) { return false; }

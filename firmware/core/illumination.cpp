@@ -5,7 +5,8 @@ namespace versavis::firmware {
 
 namespace {
 
-constexpr Nanoseconds lead_overlap = 50'000;       // the lead lasts into the exposure: no gap when it begins
+constexpr Nanoseconds lead_overlap =
+    50'000;  // the lead lasts into the exposure: no gap when it begins
 constexpr Nanoseconds start_patience = 2'000'000;  // a camera that exposes so late still gets light
 constexpr Nanoseconds shortest_light = 10'000;
 constexpr std::int64_t million = 1'000'000;
@@ -15,11 +16,12 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 }  // namespace
 
-void Illumination::configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now) {
+void Illumination::configure(const wire::IlluminationConfiguration& configuration,
+                             Nanoseconds now) {
     stop(now);
     // Another configuration is no reason for more light; the first finds a full store.
-    saved_ =
-        configuration_.max_on_ns == 0 ? configuration.max_on_ns : min(budget(now), configuration.max_on_ns);
+    saved_ = configuration_.max_on_ns == 0 ? configuration.max_on_ns
+                                           : min(budget(now), configuration.max_on_ns);
     saved_at_ = now;
     if (configuration.cameras != 0) configuration_ = configuration;
     configuration_.cameras = configuration.cameras;
@@ -35,7 +37,8 @@ void Illumination::stop(Nanoseconds now) {
 /// On-time that a span of time earns.
 Nanoseconds Illumination::earned(Nanoseconds span) const {
     span = min(span, configuration_.max_on_ns * million);  // enough for all, and no overflow
-    return span / million * configuration_.duty_ppm + span % million * configuration_.duty_ppm / million;
+    return span / million * configuration_.duty_ppm +
+           span % million * configuration_.duty_ppm / million;
 }
 
 /// What may be spent at `at`: never more than one longest light.
@@ -43,8 +46,8 @@ Nanoseconds Illumination::budget(Nanoseconds at) const {
     return min(configuration_.max_on_ns, saved_ + earned(at - saved_at_));
 }
 
-void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe,
-                        Nanoseconds now) {
+void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration,
+                        bool has_strobe, Nanoseconds now) {
     if (!lights(camera)) return;
     forget_past(now);
     if (plan_count_ == max_plans)
@@ -110,7 +113,8 @@ void Illumination::open_gate(Nanoseconds on, Nanoseconds now) {
 
 void Illumination::close_gate(Nanoseconds now) {
     if (!open()) return;
-    const Nanoseconds closed = min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
+    const Nanoseconds closed =
+        min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
     last_off_ = closed;
     saved_ = gate_off_ - closed + earned(max(0, closed - gate_on_));
     saved_at_ = closed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Light while any camera exposes, never for longer than it may: the hardware lets the exposure lines through
-// only while the gate is open, and the end of the gate is set before it opens.
+// Light while any camera exposes, never for longer than it may: the hardware lets the exposure
+// lines through only while the gate is open, and the end of the gate is set before it opens.
 #pragma once
 
 #include "exposure_tracker.hpp"
@@ -10,7 +10,8 @@ namespace versavis::firmware {
 
 class Illumination {
  public:
-    Illumination(OutputQueue& outputs, ChannelReports& reports) : outputs_(outputs), reports_(reports) {}
+    Illumination(OutputQueue& outputs, ChannelReports& reports)
+        : outputs_(outputs), reports_(reports) {}
 
     void configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now);
 
@@ -18,7 +19,8 @@ class Illumination {
     void stop(Nanoseconds now);
 
     /// A camera will expose; without an exposure line the light follows the plan alone.
-    void plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe, Nanoseconds now);
+    void plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe,
+              Nanoseconds now);
 
     /// An exposure line changed.
     void edge(std::uint8_t camera, bool exposing, Nanoseconds now);

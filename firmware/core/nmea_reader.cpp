@@ -7,7 +7,8 @@ namespace {
 
 constexpr Nanoseconds oldest_pulse = 900'000'000;
 constexpr std::int64_t day_s = 86'400;
-constexpr unsigned first_year_of_century = 80;  // two digits from 80 on are of the 20th: GPS began then
+constexpr unsigned first_year_of_century =
+    80;  // two digits from 80 on are of the 20th: GPS began then
 constexpr std::size_t most_fields = 24;
 
 struct Text {
@@ -83,21 +84,25 @@ bool leap(unsigned year) { return (year % 4 == 0 && year % 100 != 0) || year % 4
 
 /// Days since 1970. False: there is no such day.
 bool days(unsigned year, unsigned month, unsigned day, std::int64_t& out) {
-    constexpr unsigned before_month[] = {0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334, 365};
+    constexpr unsigned before_month[] = {0,   31,  59,  90,  120, 151, 181,
+                                         212, 243, 273, 304, 334, 365};
     if (year < 1970 || month < 1 || month > 12 || day < 1) return false;
     const unsigned leap_day = leap(year) ? 1 : 0;
-    const unsigned length = before_month[month] - before_month[month - 1] + (month == 2 ? leap_day : 0);
+    const unsigned length =
+        before_month[month] - before_month[month - 1] + (month == 2 ? leap_day : 0);
     if (day > length) return false;
     const unsigned past = year - 1;
-    const unsigned leap_days = past / 4 - past / 100 + past / 400 - (1969 / 4 - 1969 / 100 + 1969 / 400);
-    out = std::int64_t{year - 1970} * 365 + leap_days + before_month[month - 1] + (month > 2 ? leap_day : 0) +
-          day - 1;
+    const unsigned leap_days =
+        past / 4 - past / 100 + past / 400 - (1969 / 4 - 1969 / 100 + 1969 / 400);
+    out = std::int64_t{year - 1970} * 365 + leap_days + before_month[month - 1] +
+          (month > 2 ? leap_day : 0) + day - 1;
     return true;
 }
 
 bool rmc(const Text* fields, std::size_t count, std::int64_t& day, std::int64_t& seconds) {
     unsigned parts[3] = {};
-    if (count < 10 || fields[2].size != 1 || fields[2].begin[0] != 'A' || fields[9].size != 6) return false;
+    if (count < 10 || fields[2].size != 1 || fields[2].begin[0] != 'A' || fields[9].size != 6)
+        return false;
     for (std::size_t i = 0; i < 3; ++i)
         if (!number(fields[9], 2 * i, 2, parts[i])) return false;
     const unsigned year = parts[2] + (parts[2] < first_year_of_century ? 2000 : 1900);
@@ -108,7 +113,8 @@ bool zda(const Text* fields, std::size_t count, std::int64_t& day, std::int64_t&
     unsigned day_of_month = 0;
     unsigned month = 0;
     unsigned year = 0;
-    if (count < 5 || fields[2].size != 2 || fields[3].size != 2 || fields[4].size != 4) return false;
+    if (count < 5 || fields[2].size != 2 || fields[3].size != 2 || fields[4].size != 4)
+        return false;
     return number(fields[2], 0, 2, day_of_month) && number(fields[3], 0, 2, month) &&
            number(fields[4], 0, 4, year) && time_of_day(fields[1], seconds) &&
            days(year, month, day_of_month, day);
@@ -122,8 +128,9 @@ bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s) {
     const std::size_t count = split(sentence, size, fields);
     std::int64_t day = 0;
     std::int64_t seconds = 0;
-    const bool read = is(fields[0], "RMC") ? rmc(fields, count, day, seconds)
-                                           : is(fields[0], "ZDA") && zda(fields, count, day, seconds);
+    const bool read = is(fields[0], "RMC")
+                          ? rmc(fields, count, day, seconds)
+                          : is(fields[0], "ZDA") && zda(fields, count, day, seconds);
     utc_s = day * day_s + seconds;
     return read;
 }

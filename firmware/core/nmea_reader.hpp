@@ -9,8 +9,9 @@
 
 namespace versavis::firmware {
 
-/// Seconds since 1970 of an RMC or ZDA sentence of any talker, "$GPRMC,..*hh" without the end of the line.
-/// False: it is none, is damaged, warns of itself (status V), is of no whole second or of a leap second.
+/// Seconds since 1970 of an RMC or ZDA sentence of any talker, "$GPRMC,..*hh" without the end of
+/// the line. False: it is none, is damaged, warns of itself (status V), is of no whole second or of
+/// a leap second.
 bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s);
 
 /// A pulse and its name.
@@ -19,7 +20,8 @@ struct UtcLabel {
     std::int64_t utc_s = 0;
 };
 
-/// A sentence names the pulse that came last before the sentence began, if that is less than 0.9 s old.
+/// A sentence names the pulse that came last before the sentence began, if that is less than 0.9 s
+/// old.
 class NmeaReader {
  public:
     void begin(std::uint32_t baud);
@@ -36,7 +38,8 @@ class NmeaReader {
 
  private:
     static constexpr Nanoseconds long_ago = INT64_MIN / 2;
-    static constexpr std::size_t longest = 100;  // by the standard 82, which not every receiver keeps
+    static constexpr std::size_t longest =
+        100;  // by the standard 82, which not every receiver keeps
 
     bool finish(UtcLabel& label);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Keeps an input that changes without end, like one that is not connected, from taking all the time.
+// Keeps an input that changes without end, like one that is not connected, from taking all the
+// time.
 #pragma once
 
 #include "hal.hpp"
@@ -25,7 +26,8 @@ class NoiseGuard {
             for (std::uint16_t& count : counts_) count = 0;
         }
         if (edge.input >= input_count || ++counts_[edge.input] < limit) return true;
-        if ((muted_ >> edge.input & 1U) != 0) return true;  // what was stamped before it fell silent
+        if ((muted_ >> edge.input & 1U) != 0)
+            return true;  // what was stamped before it fell silent
         muted_ |= 1U << edge.input;
         until_ = edge.at + silence;
         edges_.listen(inputs_ & ~muted_);

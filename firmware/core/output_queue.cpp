@@ -22,7 +22,8 @@ void OutputQueue::remove_first(std::size_t count) {
     size_ -= count;
 }
 
-/// True: the first edge cannot leave when it should, and was put off, with those of its output behind it.
+/// True: the first edge cannot leave when it should, and was put off, with those of its output
+/// behind it.
 bool OutputQueue::postpone_first(Nanoseconds now) {
     const std::uint8_t output = edges_[0].output;
     const auto earliest = [&](const PendingEdge& edge, Nanoseconds before) {
@@ -48,7 +49,8 @@ bool OutputQueue::postpone_first(Nanoseconds now) {
 bool OutputQueue::commit(Nanoseconds now) {
     while (size_ > 0 && edges_[0].at <= now + horizon) {
         if (postpone_first(now)) continue;
-        // An edge that would undo another of the same word waits for the next, which it is put off to.
+        // An edge that would undo another of the same word waits for the next, which it is put off
+        // to.
         const Nanoseconds at = edges_[0].at;
         std::uint32_t levels = levels_;
         std::uint32_t changed = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Edges of all outputs in one order: what was decided for each output, merged into words for the hardware.
+// Edges of all outputs in one order: what was decided for each output, merged into words for the
+// hardware.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +21,9 @@ class OutputQueue {
     bool has_room() const { return size_ + 8 <= capacity; }
     bool empty() const { return size_ == 0; }
 
-    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed, and not
-    /// sooner than `hold` after its level before: a pulse that is late keeps its width. Returns the instant
-    /// that is asked for. Without room nothing is set.
+    /// Sets the level of `output` at `at`, or as soon as possible after what was already committed,
+    /// and not sooner than `hold` after its level before: a pulse that is late keeps its width.
+    /// Returns the instant that is asked for. Without room nothing is set.
     Nanoseconds set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold = 0);
 
     /// A pulse of `width` and, before it, the shortest pause that tells it from the one before.

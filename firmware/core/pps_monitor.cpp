@@ -17,9 +17,11 @@ void PpsMonitor::pulse(Nanoseconds at) {
     const Nanoseconds seconds = (gap + second / 2) / second;
     const Nanoseconds off = gap - seconds * second;
     const bool regular = count_ > 0 && gap <= longest_gap && seconds > 0 &&
-                         off <= seconds * tolerance_per_second && -off <= seconds * tolerance_per_second;
+                         off <= seconds * tolerance_per_second &&
+                         -off <= seconds * tolerance_per_second;
     if (!regular) {
-        // Noise, or a new phase: begin with it. A source that goes on is trusted again after a few pulses.
+        // Noise, or a new phase: begin with it. A source that goes on is trusted again after a few
+        // pulses.
         count_ = 0;
     } else if (count_ == capacity) {
         for (std::size_t i = 1; i < capacity; ++i) {
@@ -34,7 +36,8 @@ void PpsMonitor::pulse(Nanoseconds at) {
     Nanoseconds span = 0;
     for (std::size_t i = 1; i < count_; ++i) span += seconds_[i];
     if (span > 0)
-        error_ppb_ = static_cast<std::int32_t>((pulses_[count_ - 1] - pulses_[0] - span * second) / span);
+        error_ppb_ =
+            static_cast<std::int32_t>((pulses_[count_ - 1] - pulses_[0] - span * second) / span);
 }
 
 wire::PpsState PpsMonitor::state(Nanoseconds now) const {

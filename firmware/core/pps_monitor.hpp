@@ -3,7 +3,7 @@
 #pragma once
 
 #include "hal.hpp"
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 

@@ -31,7 +31,9 @@ class PulseTrain {
         }
     }
 
-    Nanoseconds next_wake() const { return clock_ == nullptr ? never : at() - OutputQueue::horizon; }
+    Nanoseconds next_wake() const {
+        return clock_ == nullptr ? never : at() - OutputQueue::horizon;
+    }
 
  private:
     Nanoseconds at() const { return clock_->board_time(grid_.next()); }

@@ -31,8 +31,9 @@ void Transmitter::begin() {
 }
 
 std::size_t Transmitter::waiting_packets() const {
-    return hellos_.size() + refusals_.size() + answers_.size() + follow_ups_.size() + clock_answers_.size() +
-           exposures_.size() + events_.size() + healths_.size() + samples_.size() + logs_.size();
+    return hellos_.size() + refusals_.size() + answers_.size() + follow_ups_.size() +
+           clock_answers_.size() + exposures_.size() + events_.size() + healths_.size() +
+           samples_.size() + logs_.size();
 }
 
 template <class Queue>
@@ -49,9 +50,9 @@ bool Transmitter::stage() {
     if (stage_first_of(hellos_) || stage_first_of(follow_ups_)) return true;
     answering_ = !clock_answers_.empty();
     if (answering_) answer_id_ = clock_answers_.front().id;
-    return stage_first_of(clock_answers_) || stage_first_of(refusals_) || stage_first_of(answers_) ||
-           stage_first_of(exposures_) || stage_first_of(events_) || stage_first_of(healths_) ||
-           stage_first_of(samples_) || stage_first_of(logs_);
+    return stage_first_of(clock_answers_) || stage_first_of(refusals_) ||
+           stage_first_of(answers_) || stage_first_of(exposures_) || stage_first_of(events_) ||
+           stage_first_of(healths_) || stage_first_of(samples_) || stage_first_of(logs_);
 }
 
 /// What is staged next carries the time of now.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Packets that wait for the host, by class: when it does not read, the newest of each class stay, and what is
-// missing is counted.
+// Packets that wait for the host, by class: when it does not read, the newest of each class stay,
+// and what is missing is counted.
 #pragma once
 
 #include "hal.hpp"
-#include "versavis/wire/packet.hpp"
+#include "wire/packet.hpp"
 
 namespace versavis::firmware {
 
@@ -37,8 +37,8 @@ class MessageQueue {
     std::uint32_t dropped_ = 0;
 };
 
-/// Sends what matters most first: answers, exposures, events, health, samples, text. Packets are numbered as
-/// they leave, so that a gap is a loss on the line.
+/// Sends what matters most first: answers, exposures, events, health, samples, text. Packets are
+/// numbered as they leave, so that a gap is a loss on the line.
 class Transmitter {
  public:
     Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce)
@@ -50,7 +50,8 @@ class Transmitter {
     void send(const wire::BoardHello& message) { hellos_.push(message); }
     void send(const wire::Refusal& message) { refusals_.push(message); }
     void send(const wire::ConfigurationAnswer& message) { answers_.push(message); }
-    /// Its time of sending is filled when it is handed to the link; when it truly left follows after it.
+    /// Its time of sending is filled when it is handed to the link; when it truly left follows
+    /// after it.
     void send(const wire::ClockAnswer& message) { clock_answers_.push(message); }
     void send(const wire::Exposure& message) { exposures_.push(message); }
     void send(const wire::Event& message) { events_.push(message); }

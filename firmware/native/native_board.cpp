@@ -10,7 +10,8 @@ NativeBoard::NativeBoard(const Identity& identity, Surroundings surroundings, Na
     : surroundings_(std::move(surroundings)),
       now_(boot),
       fed_(boot),
-      board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this}, identity) {}
+      board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this},
+             identity) {}
 
 void NativeBoard::set_input(std::uint8_t input, bool level) {
     const std::uint32_t bit = 1U << input;
@@ -130,7 +131,8 @@ void NativeBoard::drive_pins(Nanoseconds at) {
 }
 
 void NativeBoard::consume(std::size_t size, Nanoseconds at) {
-    transmitted_.erase(transmitted_.begin(), transmitted_.begin() + static_cast<std::ptrdiff_t>(size));
+    transmitted_.erase(transmitted_.begin(),
+                       transmitted_.begin() + static_cast<std::ptrdiff_t>(size));
     consumed_ += size;
     if (watched_ && consumed_ >= *watched_) {
         departure_ = at;
@@ -181,7 +183,8 @@ bool NativeBoard::complete(ImuReply& reply) {
     reply = {};
     reply.started = burst.at;
     if (surroundings_.imu_transfer)
-        surroundings_.imu_transfer(burst.at, burst.transfer, std::span(reply.bytes, burst.transfer.size));
+        surroundings_.imu_transfer(burst.at, burst.transfer,
+                                   std::span(reply.bytes, burst.transfer.size));
     return true;
 }
 
@@ -190,14 +193,17 @@ void NativeBoard::Uart::write(const std::uint8_t* data, std::size_t size) {
         board.surroundings_.uart_sent(board.now_, board.baud_, std::span(data, size));
 }
 
-std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) {
-    if (board.uart_bytes_.empty() || board.uart_bytes_.front().at > board.now_ || capacity == 0) return 0;
+std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity,
+                                    Nanoseconds& received) {
+    if (board.uart_bytes_.empty() || board.uart_bytes_.front().at > board.now_ || capacity == 0)
+        return 0;
     UartBytes& first = board.uart_bytes_.front();
     const std::size_t size = std::min(capacity, first.bytes.size());
     std::copy_n(first.bytes.begin(), size, data);
     first.bytes.erase(first.bytes.begin(), first.bytes.begin() + static_cast<std::ptrdiff_t>(size));
     // Ten bits for each byte that is still to be read.
-    received = first.at - static_cast<Nanoseconds>(first.bytes.size()) * 10'000'000'000 / board.baud_;
+    received =
+        first.at - static_cast<Nanoseconds>(first.bytes.size()) * 10'000'000'000 / board.baud_;
     if (first.bytes.empty()) board.uart_bytes_.pop_front();
     return size;
 }
@@ -258,7 +264,8 @@ std::vector<std::uint16_t> NativeBoard::read_imu_output(std::span<const std::uin
 
 std::size_t NativeBoard::load(std::uint8_t* data, std::size_t capacity) {
     if (surroundings_.flash == nullptr) return 0;
-    std::copy_n(surroundings_.flash->begin(), std::min(capacity, surroundings_.flash->size()), data);
+    std::copy_n(surroundings_.flash->begin(), std::min(capacity, surroundings_.flash->size()),
+                data);
     return surroundings_.flash->size();
 }
 

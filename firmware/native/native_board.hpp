@@ -15,17 +15,20 @@
 
 namespace versavis::firmware {
 
-/// Pins that are outputs, as Surroundings sees them. The triggers of cameras 0 to 3 are bits 0 to 3.
+/// Pins that are outputs, as Surroundings sees them. The triggers of cameras 0 to 3 are bits 0
+/// to 3.
 enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
-/// What is connected to the board. Called from run_until(), with the instants at which the hardware would
-/// act. What is not set is not connected.
+/// What is connected to the board. Called from run_until(), with the instants at which the hardware
+/// would act. What is not set is not connected.
 struct Surroundings {
     std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
     /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
-    std::function<void(Nanoseconds at, const ImuTransfer& transfer, std::span<std::uint8_t> received)>
+    std::function<void(Nanoseconds at, const ImuTransfer& transfer,
+                       std::span<std::uint8_t> received)>
         imu_transfer;
-    std::function<void(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes)> uart_sent;
+    std::function<void(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes)>
+        uart_sent;
     std::function<void(Nanoseconds at)> imu_output_ready;
     std::function<void(bool to_boot_loader)> reboot;
     /// What the board stores, and finds when it begins.

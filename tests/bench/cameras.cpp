@@ -78,10 +78,11 @@ void receive_bare(const std::string& address, Bare& bare) {
     arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
     arv_camera_gv_set_packet_size(camera, 9000, nullptr);
     bare.stream = arv_camera_create_stream(camera, on_frame, &bare, nullptr);
-    g_object_set(bare.stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-                 32 << 20, nullptr);
+    g_object_set(bare.stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED,
+                 "socket-buffer-size", 32 << 20, nullptr);
     for (int i = 0; i < 6; ++i)
-        arv_stream_push_buffer(bare.stream, arv_buffer_new_allocate(arv_camera_get_payload(camera, nullptr)));
+        arv_stream_push_buffer(bare.stream,
+                               arv_buffer_new_allocate(arv_camera_get_payload(camera, nullptr)));
     std::thread waiter([&bare] { bare.wait(); });
     arv_camera_start_acquisition(camera, nullptr);
     const timespec time{latency_time.ns / 1'000'000'000, 0};
@@ -115,7 +116,8 @@ double median_us(const Arrivals& arrivals, const Arrivals& departures) {
         if (const auto left = departures.find(serial); left != departures.end())
             latencies.push_back(static_cast<double>((at - left->second).ns) * 1e-3);
     if (latencies.size() < 50) throw std::runtime_error("too few frames for a latency");
-    std::nth_element(latencies.begin(), latencies.begin() + static_cast<std::ptrdiff_t>(latencies.size() / 2),
+    std::nth_element(latencies.begin(),
+                     latencies.begin() + static_cast<std::ptrdiff_t>(latencies.size() / 2),
                      latencies.end());
     return latencies[latencies.size() / 2];
 }
@@ -143,7 +145,8 @@ std::vector<Metric> latency() {
     const double callback_us = median_us(bare.in_callback, left);
     const double waiter_us = median_us(bare.by_waiter, left);
     const double read_us = median_us(read, left);
-    // A callback has not woken anybody yet: the goal is against a thread that waits, as a reader does.
+    // A callback has not woken anybody yet: the goal is against a thread that waits, as a reader
+    // does.
     return {{"frame_latency_p50", read_us, "us", 1000},
             {"frame_latency_to_bare_callback", read_us / callback_us, "ratio", 10},
             {"frame_latency_to_thread_woken_by_it", read_us / waiter_us, "ratio", 1.5}};
@@ -171,10 +174,10 @@ std::vector<Metric> three_cameras(double seconds) {
         lost += static_cast<double>(stream.lost);
         if (name != stack.scenario().imu) rate += stream.rate_hz;
     }
-    return {
-        {"three_cameras_wrong", wrong, "items", 0},
-        {"three_cameras_lost", lost, "items", 0},
-        {"three_cameras_cpu_to_arv_camera_test", cpu / (rate * elapsed * frame_gb) / aravis, "ratio", 1.1}};
+    return {{"three_cameras_wrong", wrong, "items", 0},
+            {"three_cameras_lost", lost, "items", 0},
+            {"three_cameras_cpu_to_arv_camera_test", cpu / (rate * elapsed * frame_gb) / aravis,
+             "ratio", 1.1}};
 }
 
 }  // namespace

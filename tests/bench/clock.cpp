@@ -3,12 +3,12 @@
 #include <chrono>
 #include <cmath>
 
+#include "engine/clock/ekf.hpp"
+#include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/smoother.hpp"
 #include "metric.hpp"
 #include "score.hpp"
 #include "troubles.hpp"
-#include "versavis/clock/ekf.hpp"
-#include "versavis/clock/envelope_filter.hpp"
-#include "versavis/clock/smoother.hpp"
 
 namespace versavis::bench {
 
@@ -22,8 +22,8 @@ using clock_world::TrueTime;
 using clock_world::World;
 using Metrics = std::vector<Metric>;
 
-/// The published filter as it would be with a fair start: its own values keep it outside its gate for
-/// minutes.
+/// The published filter as it would be with a fair start: its own values keep it outside its gate
+/// for minutes.
 struct FairEkf : clock::Ekf {
     FairEkf() : Ekf(clock::EkfStart::fair()) {}
 };
@@ -59,7 +59,8 @@ void compare(Metrics& metrics, const std::string& name, const Settings& settings
     Score ours = clock_world::score<EnvelopeFilter>(settings, seeds, from);
     Score published = clock_world::score<FairEkf>(settings, std::min(seeds, 8U), from);
     metrics.push_back({"clock_" + name, ours.p99_us(), "us p99", goal_us});
-    metrics.push_back({"clock_" + name + "_of_published", ours.p99_us() / published.p99_us(), "times", 0.5});
+    metrics.push_back(
+        {"clock_" + name + "_of_published", ours.p99_us() / published.p99_us(), "times", 0.5});
     metrics.push_back({"clock_" + name + "_nees", octaves(ours), "octaves", 1});
 }
 
@@ -124,7 +125,8 @@ void burst(Metrics& metrics, const std::string& name, double imu_hz) {
     Settings settings = usb(imu_hz);
     settings.length = seconds(440);
     settings.link = [](clock_world::Random& random) {
-        return clock_world::usb_full_speed({.load = {{seconds(400).ns}, {seconds(430).ns}}}, random);
+        return clock_world::usb_full_speed({.load = {{seconds(400).ns}, {seconds(430).ns}}},
+                                           random);
     };
     Score score = clock_world::score<EnvelopeFilter>(settings, 60, {seconds(400).ns});
     metrics.push_back({name, score.largest_us(), "us max", 20});
@@ -165,7 +167,8 @@ void cost(Metrics& metrics) {
     std::int64_t sum = 0;
     const BoardTime newest = filter.last_contact();
     const double translating = seconds_of([&] {
-        for (int i = 0; i < translations; ++i) sum += filter.translate(newest + nanoseconds(i)).sigma.ns;
+        for (int i = 0; i < translations; ++i)
+            sum += filter.translate(newest + nanoseconds(i)).sigma.ns;
     });
     if (sum == 0) throw std::runtime_error("nothing was translated");
     metrics.push_back({"clock_translation", translating * 1e9 / translations, "ns", 50});
@@ -176,10 +179,10 @@ void cost(Metrics& metrics) {
 std::vector<Metric> bench_clock() {
     using clock_world::Random;
     Metrics metrics;
-    compare(metrics, "paper_visible", jittery([](Random&) { return clock_world::visible_jitter(); }), 240,
-            48);
-    compare(metrics, "paper_invisible", jittery([](Random&) { return clock_world::invisible_jitter(); }), 390,
-            48);
+    compare(metrics, "paper_visible",
+            jittery([](Random&) { return clock_world::visible_jitter(); }), 240, 48);
+    compare(metrics, "paper_invisible",
+            jittery([](Random&) { return clock_world::invisible_jitter(); }), 390, 48);
     compare(metrics, "usb", usb(), 16, 24);
     compare(metrics, "usb_imu", usb(200), 9, 24);
     compare(metrics, "loaded_trace", loaded_trace(), 10, 24, {seconds(20).ns});

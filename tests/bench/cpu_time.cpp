@@ -30,9 +30,10 @@ double aravis_cpu_per_gb(test::Stack& stack, double seconds_each) {
     rusage after{};
     std::string output;
     getrusage(RUSAGE_CHILDREN, &before);
-    test::run({"arv-camera-test-0.8", "-n", stack.scenario().cameras[0].address, "--duration",
-               std::to_string(static_cast<int>(seconds_each)), "--no-packet-socket", "-i", "9000", "-a"},
-              stack.log_path("aravis.log"), &output);
+    test::run(
+        {"arv-camera-test-0.8", "-n", stack.scenario().cameras[0].address, "--duration",
+         std::to_string(static_cast<int>(seconds_each)), "--no-packet-socket", "-i", "9000", "-a"},
+        stack.log_path("aravis.log"), &output);
     getrusage(RUSAGE_CHILDREN, &after);
     const auto seconds = [](const rusage& usage) {
         return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
@@ -40,7 +41,8 @@ double aravis_cpu_per_gb(test::Stack& stack, double seconds_each) {
     };
     const auto at = output.find("n_completed_buffers    = ");
     const double frames = at == std::string::npos ? 0 : std::stod(output.substr(at + 25));
-    if (frames < seconds_each) throw std::runtime_error("arv-camera-test received nothing:\n" + output);
+    if (frames < seconds_each)
+        throw std::runtime_error("arv-camera-test received nothing:\n" + output);
     return (seconds(after) - seconds(before)) / (frames * frame_gb);
 }
 

@@ -15,7 +15,8 @@ constexpr double seconds_each = 20;
 
 }  // namespace
 
-/// Both receive by sockets with packets of 9000 bytes. The service also pairs, reads an IMU and publishes.
+/// Both receive by sockets with packets of 9000 bytes. The service also pairs, reads an IMU and
+/// publishes.
 std::vector<Metric> bench_end_to_end() {
     test::Stack stack({"bench", 40, 2, 20, "", "", "", 1920, 1200});
     stack.start_rig();
@@ -43,7 +44,8 @@ std::vector<Metric> bench_end_to_end() {
     return {{"wrong_pairs", wrong, "items", 0},
             {"frames_lost", lost, "frames", 0},
             {"stamp_error_p99", p99_us, "us", 100},
-            {"cpu_per_gb_to_arv_camera_test", cpu / (rate * elapsed * frame_gb) / aravis, "ratio", 1.15}};
+            {"cpu_per_gb_to_arv_camera_test", cpu / (rate * elapsed * frame_gb) / aravis, "ratio",
+             1.15}};
 }
 
 }  // namespace versavis::bench

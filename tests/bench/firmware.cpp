@@ -42,17 +42,19 @@ void work_at_full_load(bool traced) {
     world.run(60 * ms);
 }
 
-/// A child that is stepped through: how many instructions each call of `function` takes, what it calls
-/// included.
+/// A child that is stepped through: how many instructions each call of `function` takes, what it
+/// calls included.
 class InstructionCounter {
  public:
-    InstructionCounter(void (*work)(bool), std::uintptr_t function) : function_(function), child_(::fork()) {
+    InstructionCounter(void (*work)(bool), std::uintptr_t function)
+        : function_(function), child_(::fork()) {
         if (child_ == 0) {
             ::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
             work(true);
             ::_exit(0);
         }
-        if (!stops_with(SIGSTOP)) throw std::runtime_error("the firmware cannot be traced on this machine");
+        if (!stops_with(SIGSTOP))
+            throw std::runtime_error("the firmware cannot be traced on this machine");
     }
     ~InstructionCounter() {
         ::kill(child_, SIGKILL);
@@ -80,7 +82,8 @@ class InstructionCounter {
  private:
     bool stops_with(int signal) const {
         int status = 0;
-        return ::waitpid(child_, &status, 0) == child_ && WIFSTOPPED(status) && WSTOPSIG(status) == signal;
+        return ::waitpid(child_, &status, 0) == child_ && WIFSTOPPED(status) &&
+               WSTOPSIG(status) == signal;
     }
     user_regs_struct read_registers() const {
         user_regs_struct registers{};
@@ -117,9 +120,10 @@ std::vector<Metric> bench_firmware() {
     if (counts.empty()) throw std::runtime_error("no poll was counted");
     std::sort(counts.begin(), counts.end());
     // A port at 125 MHz has 125'000 cycles until what is committed a millisecond ahead is due.
-    return {{"firmware_poll_median", counts[counts.size() / 2], "instr.", 5'000},
-            {"firmware_poll_worst", counts.back(), "instr.", 60'000},
-            {"firmware_static_memory", static_cast<double>(sizeof(firmware::Board)) / 1024, "KiB", 64}};
+    return {
+        {"firmware_poll_median", counts[counts.size() / 2], "instr.", 5'000},
+        {"firmware_poll_worst", counts.back(), "instr.", 60'000},
+        {"firmware_static_memory", static_cast<double>(sizeof(firmware::Board)) / 1024, "KiB", 64}};
 }
 
 }  // namespace versavis::bench

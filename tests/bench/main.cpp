@@ -32,11 +32,13 @@ nlohmann::json run(const Benches& benches, const std::string& only) {
     for (const auto& [name, bench] : benches) {
         if (!only.empty() && only != name) continue;
         for (const Metric& metric : bench()) {
-            fmt::print("{:<36} {:>12.3f} {:<8} goal {:>10.3f}  {}\n", metric.name, metric.value, metric.unit,
-                       metric.goal, metric.met() ? "met" : "NOT MET");
+            fmt::print("{:<36} {:>12.3f} {:<8} goal {:>10.3f}  {}\n", metric.name, metric.value,
+                       metric.unit, metric.goal, metric.met() ? "met" : "NOT MET");
             std::fflush(stdout);
-            document[metric.name] = {
-                {"value", metric.value}, {"unit", metric.unit}, {"goal", metric.goal}, {"met", metric.met()}};
+            document[metric.name] = {{"value", metric.value},
+                                     {"unit", metric.unit},
+                                     {"goal", metric.goal},
+                                     {"met", metric.met()}};
         }
     }
     return document;
@@ -52,7 +54,8 @@ int main(int argc, char** argv) {
     const Benches benches = all_benches(seconds);
     app.add_option("name", only,
                    "ring, cameras, clock, end_to_end, firmware or output_clock; without it, all")
-        ->check(CLI::IsMember({"ring", "cameras", "clock", "end_to_end", "firmware", "output_clock"}));
+        ->check(
+            CLI::IsMember({"ring", "cameras", "clock", "end_to_end", "firmware", "output_clock"}));
     app.add_option("--seconds", seconds, "How long three cameras run")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

@@ -22,13 +22,15 @@ std::vector<Metric> bench_ring();
 /// Translation of host time to the output clock.
 std::vector<Metric> bench_output_clock();
 
-/// The service against Aravis's own test program on the same stream, and its stamps against the rig's truth.
+/// The service against Aravis's own test program on the same stream, and its stamps against the
+/// rig's truth.
 std::vector<Metric> bench_end_to_end();
 
 /// Estimators of the board's clock in simulated worlds: errors, honesty of sigma, cost.
 std::vector<Metric> bench_clock();
 
-/// Three cameras and a fast IMU for `seconds`, and how soon a frame can be read, against a bare callback.
+/// Three cameras and a fast IMU for `seconds`, and how soon a frame can be read, against a bare
+/// callback.
 std::vector<Metric> bench_cameras(double seconds);
 
 /// Instructions and memory of the firmware's core.

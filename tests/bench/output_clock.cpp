@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/output_clock.hpp"
+#include "engine/clock/output_clock.hpp"
 
 #include <algorithm>
 #include <stdexcept>

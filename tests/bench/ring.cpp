@@ -5,18 +5,18 @@
 #include <thread>
 
 #include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
 #include "metric.hpp"
 #include "versavis/metadata.hpp"
 #include "versavis/ring/reader.hpp"
-#include "versavis/ring/writer.hpp"
 
 namespace versavis::bench {
 
 namespace {
 
 double median(std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                     values.end());
+    std::nth_element(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
     return values[values.size() / 2];
 }
 
@@ -39,8 +39,8 @@ double publish_to_poll_ns() {
         while (delays.size() < samples) {
             const ring::Item item = reader->next();
             if (item.found == ring::Found::item)
-                delays.push_back(
-                    static_cast<double>(host_now().ns - static_cast<std::int64_t>(item.metadata[0])));
+                delays.push_back(static_cast<double>(host_now().ns -
+                                                     static_cast<std::int64_t>(item.metadata[0])));
         }
     });
     while (!ready) std::this_thread::yield();
@@ -57,7 +57,8 @@ double publish_to_poll_ns() {
 /// What it takes to acquire and publish one frame that somebody else has filled.
 double frame_publication_ns(std::uint64_t size) {
     const test::TemporaryDirectory directory("/dev/shm");
-    ring::Writer writer = make_ring(directory.path(), {"frames", ring::StreamKind::frames, 64, 8, size});
+    ring::Writer writer =
+        make_ring(directory.path(), {"frames", ring::StreamKind::frames, 64, 8, size});
     std::vector<double> costs;
     for (int i = 0; i < 20000; ++i) {
         const HostTime begin = host_now();

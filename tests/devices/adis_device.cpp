@@ -29,20 +29,20 @@ std::uint16_t crc16(const std::vector<std::uint16_t>& words, std::size_t first, 
 const AdisDevice::Map& AdisDevice::map(AdisModel model) {
     static const std::map<AdisModel, Map> maps{
         {AdisModel::adis16445,
-         {0x403D, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.01, 0.00025, 0.07386, 31, 819.2, true, false, 9 * us,
-          55 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x403D, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.01, 0.00025, 0.07386, 31, 819.2, true, false,
+          9 * us, 55 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
         {AdisModel::adis16448a,
-         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true, 9 * us,
-          90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true,
+          9 * us, 90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
         {AdisModel::adis16448b,
-         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true, 9 * us,
-          90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true,
+          9 * us, 90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
         {AdisModel::adis16460,
-         {0x404C, 0x56, 0x3E, 0x32, 0x36, 0x38, 0.005, 0.00025, 0.05, 25, 2048, false, false, 16 * us,
-          225 * ms, 24 * us, 0x00C1, 0x0000, 0x0500}},
+         {0x404C, 0x56, 0x3E, 0x32, 0x36, 0x38, 0.005, 0.00025, 0.05, 25, 2048, false, false,
+          16 * us, 225 * ms, 24 * us, 0x00C1, 0x0000, 0x0500}},
         {AdisModel::adis16470,
-         {0x4056, 0x72, 0x68, 0x60, 0x64, 0x5C, 0.1, 0.00125, 0.1, 0, 2000, false, false, 16 * us, 193 * ms,
-          24 * us, 0x00C1, 0x0000, 0x0000}},
+         {0x4056, 0x72, 0x68, 0x60, 0x64, 0x5C, 0.1, 0.00125, 0.1, 0, 2000, false, false, 16 * us,
+          193 * ms, 24 * us, 0x00C1, 0x0000, 0x0000}},
     };
     return maps.at(model);
 }
@@ -62,7 +62,8 @@ void AdisDevice::reset(Nanoseconds ready_at) {
 
 UpdateTimes AdisDevice::updates() const {
     const unsigned rate = registers_.at(map_.rate_at);
-    const double hz = map_.octaves ? map_.base_hz / (1U << (rate >> 8U)) : map_.base_hz / (rate + 1);
+    const double hz =
+        map_.octaves ? map_.base_hz / (1U << (rate >> 8U)) : map_.base_hz / (rate + 1);
     return {ready_at_, 1e9 / hz};
 }
 
@@ -122,7 +123,8 @@ void AdisDevice::write(unsigned address, std::uint8_t byte, Nanoseconds at) {
     const auto found = registers_.find(even);
     if (found == registers_.end()) return;
     const unsigned word = found->second;
-    found->second = static_cast<std::uint16_t>(high ? (word & 0xFFU) | byte << 8U : (word & 0xFF00U) | byte);
+    found->second =
+        static_cast<std::uint16_t>(high ? (word & 0xFFU) | byte << 8U : (word & 0xFF00U) | byte);
 }
 
 void AdisDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
@@ -131,9 +133,12 @@ void AdisDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
     const bool burst = transfer.word_gap_ns == 0 && transfer.size > 2;
     if (transfer.chip != 0 || transfer.size % 2 != 0) ++breaches_;
     if (transfer.clock_hz > (burst ? burst_clock_limit_hz : clock_limit_hz)) ++breaches_;
-    const auto bits = [&](Nanoseconds bytes) { return bytes * 8 * 1'000'000'000 / transfer.clock_hz; };
+    const auto bits = [&](Nanoseconds bytes) {
+        return bytes * 8 * 1'000'000'000 / transfer.clock_hz;
+    };
     const auto gap = static_cast<Nanoseconds>(transfer.word_gap_ns);
-    if (!burst && transfer.size > 2 && (gap < map_.stall || bits(2) + gap < map_.word_interval)) ++breaches_;
+    if (!burst && transfer.size > 2 && (gap < map_.stall || bits(2) + gap < map_.word_interval))
+        ++breaches_;
     if (at - last_end_ < map_.stall) ++breaches_;
     last_end_ = at + bits(transfer.size) + transfer.size / 2 * gap;
     if (resetting(at)) {
@@ -148,7 +153,8 @@ void AdisDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
     if (burst) {
         if (transfer.bytes[0] != map_.command_at) return;
         const std::vector<std::uint16_t> words = burst_words(at);
-        for (std::size_t i = 0; i < words.size() && 2 * i + 3 < received.size(); ++i) put(i + 1, words[i]);
+        for (std::size_t i = 0; i < words.size() && 2 * i + 3 < received.size(); ++i)
+            put(i + 1, words[i]);
         diagnosis_ = 0;
         if (corrupted_ > 0) {
             --corrupted_;

@@ -27,7 +27,8 @@ class AdisDevice final : public SpiImuDevice {
     /// Bits that DIAG_STAT shows from now on.
     void diagnose(std::uint16_t bits) { diagnosis_ = bits; }
 
-    /// Bytes on the wire for a burst of the data taken at or before `at`, without the junk of the command.
+    /// Bytes on the wire for a burst of the data taken at or before `at`, without the junk of the
+    /// command.
     std::vector<std::uint16_t> burst_words(Nanoseconds at) const;
 
  private:

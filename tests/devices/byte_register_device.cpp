@@ -29,8 +29,9 @@ void Icm42688pDevice::reset() {
 }
 
 UpdateTimes Icm42688pDevice::updates() const {
-    static const std::map<unsigned, double> rates{{3, 8000}, {4, 4000}, {5, 2000}, {6, 1000}, {15, 500},
-                                                  {7, 200},  {8, 100},  {9, 50},   {10, 25},  {11, 12.5}};
+    static const std::map<unsigned, double> rates{{3, 8000}, {4, 4000}, {5, 2000}, {6, 1000},
+                                                  {15, 500}, {7, 200},  {8, 100},  {9, 50},
+                                                  {10, 25},  {11, 12.5}};
     const auto found = rates.find(registers_[0x4F] & 0x0FU);
     return {on_at_, 1e9 / (found == rates.end() ? 1000 : found->second)};
 }
@@ -50,7 +51,8 @@ void Icm42688pDevice::write(unsigned address, std::uint8_t value, Nanoseconds at
         return;
     }
     const bool mode = address == 0x4E || address == 0x4F || address == 0x50;
-    // While it runs only rate, range and mode may change; and nothing right after it was switched on.
+    // While it runs only rate, range and mode may change; and nothing right after it was switched
+    // on.
     if (running() && (!mode || at < on_at_ + 200 * us)) ++breaches_;
     if (address == 0x4E && (value & 0x0FU) == 0x0F && !running()) on_at_ = at;
     registers_[address] = value;
@@ -130,14 +132,15 @@ void Bmi088Device::write(unsigned chip, unsigned address, std::uint8_t value, Na
         return chip == 1 ? reset_accel(at) : reset_gyro(at);
     if (address == 0x00) return;
     if (chip == 1 && address == 0x7D) accel_on_at_ = at;
-    registers[address] = chip == 0 && address == 0x10 ? static_cast<std::uint8_t>(value | 0x80U) : value;
+    registers[address] =
+        chip == 0 && address == 0x10 ? static_cast<std::uint8_t>(value | 0x80U) : value;
 }
 
 std::uint8_t Bmi088Device::read_gyro(unsigned address, Nanoseconds at) const {
     if (address < 0x02 || address > 0x07) return gyro_[address];
     const UpdateTimes times = updates();
-    const std::int16_t value =
-        counts(world_(times.time(times.index_at(at))).gyro_deg_s[(address - 2) / 2], 2000.0 / 32768);
+    const std::int16_t value = counts(
+        world_(times.time(times.index_at(at))).gyro_deg_s[(address - 2) / 2], 2000.0 / 32768);
     return address % 2 == 0 ? low(value) : high(value);
 }
 
@@ -149,7 +152,8 @@ std::uint8_t Bmi088Device::read_accel(unsigned address, Nanoseconds at) const {
     const UpdateTimes times{accel_on_at_, 1.004e9 / rates[accel_[0x40] & 0xFU]};
     const Inertial felt = world_(times.time(times.index_at(at)));
     if (address >= 0x22) {
-        const auto eleven_bits = static_cast<std::int16_t>(counts(felt.temperature_c - 23, 0.125) * 32);
+        const auto eleven_bits =
+            static_cast<std::int16_t>(counts(felt.temperature_c - 23, 0.125) * 32);
         return address == 0x22 ? high(eleven_bits) : low(eleven_bits);
     }
     constexpr double full_scale_g[] = {3, 6, 12, 24};

@@ -7,7 +7,8 @@
 namespace versavis::devices {
 
 std::int64_t UpdateTimes::index_at(Nanoseconds at) const {
-    auto index = static_cast<std::int64_t>(std::floor(static_cast<double>(at - origin) / period_ns));
+    auto index =
+        static_cast<std::int64_t>(std::floor(static_cast<double>(at - origin) / period_ns));
     while (time(index + 1) <= at) ++index;
     while (time(index) > at) --index;
     return index;

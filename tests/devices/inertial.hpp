@@ -24,7 +24,8 @@ struct Inertial {
 /// True motion and surroundings at a time.
 using World = std::function<Inertial(Nanoseconds at)>;
 
-/// Instants at which a sensor takes new data: `period_ns` apart, counted from `origin`, without drift.
+/// Instants at which a sensor takes new data: `period_ns` apart, counted from `origin`, without
+/// drift.
 struct UpdateTimes {
     Nanoseconds origin = 0;
     double period_ns = 1e9;

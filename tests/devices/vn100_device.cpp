@@ -96,7 +96,8 @@ std::vector<Vn100Device::Burst> Vn100Device::receive(Nanoseconds at, std::uint32
 }
 
 Vn100Device::Burst Vn100Device::chatter(Nanoseconds at) const {
-    const std::string text = framed("VNYMR,+100.949,-006.786,+000.390,+01.0640,-00.2531,+03.0614,+00.005");
+    const std::string text =
+        framed("VNYMR,+100.949,-006.786,+000.390,+01.0640,-00.2531,+03.0614,+00.005");
     return send(at, {text.begin(), text.end()}, baud_);
 }
 
@@ -110,7 +111,9 @@ bool Vn100Device::pulses(Nanoseconds at) const {
     return sync_mode_ == 1 && at / base_period % (sync_skip_ + 1) == sync_skip_ / 2;
 }
 
-bool Vn100Device::sends(Nanoseconds at) const { return divider_ != 0 && at / base_period % divider_ == 0; }
+bool Vn100Device::sends(Nanoseconds at) const {
+    return divider_ != 0 && at / base_period % divider_ == 0;
+}
 
 Vn100Device::Burst Vn100Device::packet(Nanoseconds at) {
     const Inertial felt = world_(at);

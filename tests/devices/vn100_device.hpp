@@ -20,7 +20,8 @@ class Vn100Device {
     };
 
     /// Takes bytes sent at `baud`; returns answers.
-    std::vector<Burst> receive(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
+    std::vector<Burst> receive(Nanoseconds at, std::uint32_t baud,
+                               std::span<const std::uint8_t> bytes);
 
     /// When it takes its next sample, at 800 Hz; none: it is mute or paused.
     std::optional<Nanoseconds> next_sample(Nanoseconds after) const;

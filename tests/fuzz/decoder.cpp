@@ -16,8 +16,10 @@ constexpr firmware::Nanoseconds step_ns = 200'000;
 /// An IMU that answers with its input bytes over and over.
 firmware::Surroundings babbling(std::span<const std::uint8_t> bytes) {
     firmware::Surroundings surroundings;
-    surroundings.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&, auto received) mutable {
-        for (std::uint8_t& byte : received) byte = bytes.empty() ? 0xFF : bytes[next++ % bytes.size()];
+    surroundings.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&,
+                                                               auto received) mutable {
+        for (std::uint8_t& byte : received)
+            byte = bytes.empty() ? 0xFF : bytes[next++ % bytes.size()];
     };
     return surroundings;
 }
@@ -90,11 +92,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     // A chunk is an edge, bytes of the IMU on the UART, or a packet, as its first byte says.
     for (std::span<const std::uint8_t> rest = bytes; !rest.empty();) {
         const std::uint8_t head = rest[0];
-        const std::size_t wanted = head >= 0xE0 ? 1 : head >= 0xC0 ? head & 0x1FU : 2 * std::size_t{head};
+        const std::size_t wanted = head >= 0xE0   ? 1
+                                   : head >= 0xC0 ? head & 0x1FU
+                                                  : 2 * std::size_t{head};
         const auto chunk = rest.subspan(1, std::min(rest.size() - 1, wanted));
         if (head >= 0xE0)
-            board.schedule_edge({now, static_cast<std::uint8_t>((head >> 1U & 0xFU) % firmware::input_count),
-                                 (head & 1U) != 0});
+            board.schedule_edge(
+                {now, static_cast<std::uint8_t>((head >> 1U & 0xFU) % firmware::input_count),
+                 (head & 1U) != 0});
         else if (head >= 0xC0)
             board.uart_receive(chunk, now);
         else

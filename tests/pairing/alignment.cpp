@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/alignment.hpp"
+#include "engine/pairing/alignment.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -45,7 +45,8 @@ using Triggers = std::vector<std::uint64_t>;
 
 }  // namespace
 
-TEST_CASE("alignment: irregular gaps name the triggers, regular ones and too few frames name nothing") {
+TEST_CASE(
+    "alignment: irregular gaps name the triggers, regular ones and too few frames name nothing") {
     Bench bench({0, 1, 3, 4, 7, 9, 11});
     for (const std::uint64_t trigger : {1, 2, 3, 4}) bench.frame(trigger);
     CHECK(bench.align().empty());

@@ -33,7 +33,8 @@ std::uint64_t end_after(std::uint64_t last_fault, double rate_hz) {
     return last_fault + quiet_end + static_cast<std::uint64_t>(quiet_end_s * rate_hz);
 }
 
-WorldSettings cell(FaultKind kind, CameraClock clock, bool wide_ids, double rate_hz, std::uint64_t seed) {
+WorldSettings cell(FaultKind kind, CameraClock clock, bool wide_ids, double rate_hz,
+                   std::uint64_t seed) {
     WorldSettings settings = variation(seed);
     settings.clock = clock;
     settings.wide_ids = wide_ids;
@@ -73,8 +74,10 @@ std::vector<Row> run_matrix(unsigned seeds) {
             for (const bool wide_ids : {false, true})
                 for (const double rate_hz : rates_hz)
                     for (unsigned seed = 0; seed < seeds; ++seed) {
-                        const std::uint64_t number = seed + 1000 * (kind + 1) + (wide_ids ? 500 : 0);
-                        const WorldSettings settings = cell(row.kind, clock, wide_ids, rate_hz, number);
+                        const std::uint64_t number =
+                            seed + 1000 * (kind + 1) + (wide_ids ? 500 : 0);
+                        const WorldSettings settings =
+                            cell(row.kind, clock, wide_ids, rate_hz, number);
                         row.totals.add(settings, run_world(settings));
                     }
             rows.push_back(std::move(row));
@@ -108,8 +111,8 @@ Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
 
 Duration quantile(std::vector<Duration> values, double share) {
     if (values.empty()) return {};
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    const auto at = values.begin() +
+                    static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
 }
@@ -119,19 +122,21 @@ std::string to_text(const std::string& name, const Totals& totals) {
     return fmt::format("{:<32}{:>6}{:>8}{:>10}{:>7}{:>9.3f}{:>10.4f}{:>7}{:>8.3f}{:>8.3f}\n", name,
                        totals.runs, totals.faults, totals.frames, totals.wrong,
                        100 * static_cast<double>(totals.withheld) / frames,
-                       100 * static_cast<double>(totals.withheld_needlessly) / frames, totals.not_locked,
+                       100 * static_cast<double>(totals.withheld_needlessly) / frames,
+                       totals.not_locked,
                        static_cast<double>(quantile(totals.first_published, 1).ns) * 1e-9,
                        static_cast<double>(quantile(totals.recoveries, 0.99).ns) * 1e-9);
 }
 
 std::string to_table(const std::vector<Row>& rows) {
-    std::string text =
-        fmt::format("{:<32}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>8}\n", "fault, camera clock", "runs",
-                    "faults", "frames", "wrong", "withheld", "needless", "not", "first", "again");
-    text += fmt::format("{:<32}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>8}\n", "", "", "", "", "", "%",
-                        "%", "locked", "s", "s, p99");
+    std::string text = fmt::format("{:<32}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>8}\n",
+                                   "fault, camera clock", "runs", "faults", "frames", "wrong",
+                                   "withheld", "needless", "not", "first", "again");
+    text += fmt::format("{:<32}{:>6}{:>8}{:>10}{:>7}{:>9}{:>10}{:>7}{:>8}{:>8}\n", "", "", "", "",
+                        "", "%", "%", "locked", "s", "s, p99");
     for (const Row& row : rows)
-        text += to_text(fmt::format("{}, {}", to_string(row.kind), to_string(row.clock)), row.totals);
+        text +=
+            to_text(fmt::format("{}, {}", to_string(row.kind), to_string(row.clock)), row.totals);
     return text;
 }
 

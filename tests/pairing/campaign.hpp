@@ -20,7 +20,8 @@ struct Totals {
     std::uint64_t withheld = 0;
     std::uint64_t withheld_needlessly = 0;
     std::uint64_t slips = 0;
-    std::uint64_t not_locked = 0;  ///< worlds that ended without proof, although the last fault was long past
+    std::uint64_t not_locked =
+        0;  ///< worlds that ended without proof, although the last fault was long past
     std::vector<Duration> first_published;  ///< of starts at 20 Hz without a late frame
     std::vector<Duration> recoveries;       ///< at 20 Hz
     std::vector<std::uint64_t> wrong_seeds;
@@ -28,7 +29,8 @@ struct Totals {
     void add(const WorldSettings& settings, const Verdict& verdict);
 };
 
-/// One row of the matrix: a fault with a kind of camera clock, over both widths of ids and all rates.
+/// One row of the matrix: a fault with a kind of camera clock, over both widths of ids and all
+/// rates.
 struct Row {
     FaultKind kind{};
     CameraClock clock{};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// campaign: faults by the hundred thousand against the pairing; a table of what became of the frames.
+// campaign: faults by the hundred thousand against the pairing; a table of what became of the
+// frames.
 #include <fmt/format.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -13,14 +14,16 @@ using namespace versavis::test;
 
 int main(int argc, char** argv) {
     CLI::App app{
-        "Faults of all kinds against the pairing, in virtual time; exit code 1: a frame got a wrong trigger"};
+        "Faults of all kinds against the pairing, in virtual time; exit code 1: a frame got a "
+        "wrong trigger"};
     std::uint64_t faults = 100'000;
     std::uint64_t seed = 1;
     unsigned variations = 20;
     app.add_option("--faults", faults, "Faults at random, for each kind of camera clock")
         ->capture_default_str();
     app.add_option("--seed", seed, "First seed of the random faults")->capture_default_str();
-    app.add_option("--variations", variations, "Worlds in each cell of the matrix")->capture_default_str();
+    app.add_option("--variations", variations, "Worlds in each cell of the matrix")
+        ->capture_default_str();
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -37,11 +40,13 @@ int main(int argc, char** argv) {
         fmt::print("\r{} of {} faults ", totals.faults, faults);
         std::fflush(stdout);
     };
-    for (const CameraClock clock : {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
+    for (const CameraClock clock :
+         {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
         const Totals totals = run_random(faults, seed, clock, progress);
         fmt::print("{}{}", terminal ? "\r" : "",
                    to_text(fmt::format("all at random, {}", to_string(clock)), totals));
-        for (const std::uint64_t bad : totals.wrong_seeds) fmt::print("  wrong with seed {}\n", bad);
+        for (const std::uint64_t bad : totals.wrong_seeds)
+            fmt::print("  wrong with seed {}\n", bad);
         std::fflush(stdout);
         wrong += totals.wrong;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/exposure_log.hpp"
+#include "engine/pairing/exposure_log.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -23,7 +23,8 @@ Exposure exposure(std::uint64_t trigger, std::int64_t start_ms, bool exposed = t
 TEST_CASE("exposure_log: the nearest within the tolerance, on either timeline") {
     ExposureLog log(milliseconds(50));
     CHECK(log.near(Timeline::camera, 0, 1'000'000'000) == nullptr);
-    for (int i = 0; i < 5; ++i) REQUIRE(log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i)));
+    for (int i = 0; i < 5; ++i)
+        REQUIRE(log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i)));
     CHECK(log.near(Timeline::camera, 101'000'000, 5'000'000)->exposure.trigger == 3);
     CHECK(log.near(Timeline::camera, 124'000'000, 100'000'000)->exposure.trigger == 3);
     CHECK(log.near(Timeline::camera, 126'000'000, 100'000'000)->exposure.trigger == 4);

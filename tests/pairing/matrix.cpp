@@ -35,7 +35,8 @@ TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") 
         CHECK(totals.not_locked == 0);
         CHECK(quantile(totals.first_published, 1) < milliseconds(600));
         CHECK(quantile(totals.recoveries, 0.95) < seconds(1));
-        const bool outage = row.kind == FaultKind::camera_reboot || row.kind == FaultKind::board_reset;
+        const bool outage =
+            row.kind == FaultKind::camera_reboot || row.kind == FaultKind::board_reset;
         if (outage) CHECK_FALSE(totals.recoveries.empty());
         with_clock.frames += totals.frames;
         with_clock.withheld_needlessly += totals.withheld_needlessly;
@@ -44,7 +45,8 @@ TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") 
 }
 
 TEST_CASE("matrix: faults at random, close together at times") {
-    for (const CameraClock clock : {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
+    for (const CameraClock clock :
+         {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
         const Totals totals = run_random(clock == CameraClock::good ? 8000 : 1000, 1, clock);
         INFO("clock " << to_string(clock));
         CHECK(totals.wrong == 0);

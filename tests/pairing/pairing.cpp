@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/pairing.hpp"
+#include "engine/pairing/pairing.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -35,7 +35,8 @@ Verdict run(const WorldSettings& settings) {
 
 }  // namespace
 
-TEST_CASE("pairing: a clean start publishes every frame, the first ones within half a second at 20 Hz") {
+TEST_CASE(
+    "pairing: a clean start publishes every frame, the first ones within half a second at 20 Hz") {
     WorldSettings settings = world();
     settings.rate_hz = GENERATE(5.0, 20.0, 155.0);
     settings.clock = GENERATE(CameraClock::good, CameraClock::drifting);
@@ -58,7 +59,8 @@ TEST_CASE("pairing: a camera without a clock is started slowly, then paired by i
     CHECK(verdict.first_published < seconds(settings.clock_known_absent ? 3 : 6));
 }
 
-TEST_CASE("pairing: lost frames leave their triggers unpaired, with the reason, and shift nothing") {
+TEST_CASE(
+    "pairing: lost frames leave their triggers unpaired, with the reason, and shift nothing") {
     Verdict verdict = run(with(FaultKind::frame_lost));
     CHECK(verdict.exposure_reasons[EventReason::frame_missing] == 1);
     for (const FaultKind kind : {FaultKind::last_packet_lost, FaultKind::leader_lost}) {
@@ -79,7 +81,8 @@ TEST_CASE("pairing: an ignored trigger is known from the silent exposure line") 
     CHECK(verdict.exposure_reasons[EventReason::trigger_ignored] == 3);
 }
 
-TEST_CASE("pairing: without an exposure line an ignored trigger is a slip, found at once and repaired") {
+TEST_CASE(
+    "pairing: without an exposure line an ignored trigger is a slip, found at once and repaired") {
     WorldSettings settings = with(FaultKind::trigger_ignored);
     settings.strobe = false;
     const Verdict verdict = run(settings);
@@ -113,7 +116,8 @@ TEST_CASE("pairing: a frame that comes after a newer one, or twice, is left out 
     CHECK(verdict.slips == 0);
 }
 
-TEST_CASE("pairing: ids that begin anew are a slip that clock and arrival repair within five frames") {
+TEST_CASE(
+    "pairing: ids that begin anew are a slip that clock and arrival repair within five frames") {
     const Verdict verdict = run(with(GENERATE(FaultKind::id_restart, FaultKind::duplicate_id)));
     CHECK(verdict.slips == 1);
     CHECK(verdict.withheld <= 5);
@@ -124,7 +128,8 @@ TEST_CASE("pairing: a camera clock that jumps, even by whole periods, is found, 
     WorldSettings settings = with(FaultKind::clock_jump);
     settings.seed = GENERATE(range(1, 30));
     settings.faults[120] = FaultKind::clock_jump;
-    settings.readout = GENERATE(microseconds(2500), milliseconds(60));  // below and above the period
+    settings.readout =
+        GENERATE(microseconds(2500), milliseconds(60));  // below and above the period
     const Verdict verdict = run(settings);
     CHECK(verdict.withheld_needlessly == 0);
     CHECK(verdict.starts <= 2);  // only whole periods need the pattern
@@ -137,7 +142,8 @@ TEST_CASE("pairing: frames from before the start are never published") {
 }
 
 TEST_CASE(
-    "pairing: frames that queue in the camera until one is dropped are not taken for their neighbours") {
+    "pairing: frames that queue in the camera until one is dropped are not taken for their "
+    "neighbours") {
     WorldSettings settings = world();
     settings.seed = GENERATE(range(1, 6));
     settings.pulses = 2000;

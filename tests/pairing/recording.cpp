@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/recording.hpp"
+#include "engine/pairing/recording.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/relation.hpp"
+#include "engine/pairing/relation.hpp"
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -38,8 +38,10 @@ TEST_CASE("relation: a late frame moves a delay by little, an early one by more"
     Relation latency(false);
     for (int i = 0; i < 200; ++i) latency.track(i * period + 3'000'000, i * period);
     latency.track(200 * period + 43'000'000, 200 * period);
-    CHECK(latency.expected_instant_ns(300 * period + 3'000'000) == Approx(300 * period).margin(300'000));
+    CHECK(latency.expected_instant_ns(300 * period + 3'000'000) ==
+          Approx(300 * period).margin(300'000));
     CHECK(latency.deviation_ns() < 500'000);
     for (int i = 201; i < 260; ++i) latency.track(i * period + 2'000'000, i * period);
-    CHECK(latency.expected_instant_ns(300 * period + 2'000'000) == Approx(300 * period).margin(100'000));
+    CHECK(latency.expected_instant_ns(300 * period + 2'000'000) ==
+          Approx(300 * period).margin(100'000));
 }

@@ -6,7 +6,7 @@
 #include <functional>
 #include <set>
 
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::test {
 
@@ -78,7 +78,8 @@ class World final : private pairing::Outcome {
     pairing::Limits limits() const {
         pairing::Limits limits;
         limits.period = period_;
-        limits.camera_clock = settings_.clock != CameraClock::absent || !settings_.clock_known_absent;
+        limits.camera_clock =
+            settings_.clock != CameraClock::absent || !settings_.clock_known_absent;
         limits.pattern_duration = period_ * (wire::start_pattern_length + 2);
         limits.frames_held = 8 + static_cast<std::uint32_t>(settings_.rate_hz * 0.12);
         return limits;
@@ -87,7 +88,9 @@ class World final : private pairing::Outcome {
     void at(HostTime time, std::function<void()> happen) {
         events_.push({std::max(time, now_), ++order_, std::move(happen)});
     }
-    double uniform(double from, double to) { return std::uniform_real_distribution<>(from, to)(random_); }
+    double uniform(double from, double to) {
+        return std::uniform_real_distribution<>(from, to)(random_);
+    }
     bool chance(double probability) { return uniform(0, 1) < probability; }
     Duration between(Duration from, Duration to) {
         return {std::llround(uniform(static_cast<double>(from.ns), static_cast<double>(to.ns)))};
@@ -127,7 +130,8 @@ class World final : private pairing::Outcome {
     bool wanted(unsigned output) const {
         const std::uint64_t since = ticks_ - first_tick_;
         if (mode_ == Start::slow)
-            return since % wire::slow_start_ticks(std::llround(settings_.rate_hz * 1e6), output) == 0;
+            return since % wire::slow_start_ticks(std::llround(settings_.rate_hz * 1e6), output) ==
+                   0;
         if (mode_ == Start::steady || since >= wire::start_pattern_length) return true;
         return (wire::start_pattern_bits[output] >> since & 1U) != 0;
     }
@@ -172,8 +176,8 @@ class World final : private pairing::Outcome {
         if (!lost) send_record(exposure);
         if (!swapped_) expose(start, truth, takes);
         // It follows the light.
-        exposure_ =
-            std::clamp(exposure_ + between(-exposure_ / 10, exposure_ / 10), period_ / 50, period_ / 3);
+        exposure_ = std::clamp(exposure_ + between(-exposure_ / 10, exposure_ / 10), period_ / 50,
+                               period_ / 3);
     }
 
     BoardTime to_board(HostTime host) const {
@@ -182,7 +186,8 @@ class World final : private pairing::Outcome {
 
     void send_record(const Exposure& exposure) {
         if (fault_ == FaultKind::usb_stall) link_free_ = now_ + seconds(2);
-        const Duration delay = fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
+        const Duration delay =
+            fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
         link_free_ = std::max(link_free_, exposure.end_on_host + delay);
         at(link_free_, [this, exposure, life = life_] {
             if (life == life_) pairing_.add(exposure);
@@ -203,12 +208,14 @@ class World final : private pairing::Outcome {
         }
         const HostTime end = start + exposure_;
         HostTime arrives = end + settings_.readout + between(-settings_.jitter, settings_.jitter);
-        if (settings_.link_load > 0) arrives = link_busy_ = std::max(link_busy_, end) + frame_on_link();
+        if (settings_.link_load > 0)
+            arrives = link_busy_ = std::max(link_busy_, end) + frame_on_link();
         if (chance(settings_.late_frames)) arrives = arrives + between({}, milliseconds(40));
         if (fault_ == FaultKind::frame_lost) return;
         if (fault_ == FaultKind::last_packet_lost || fault_ == FaultKind::leader_lost) {
             const bool known = fault_ == FaultKind::last_packet_lost;
-            frames_free_ = std::max(frames_free_, arrives + missing_packets_timeout);  // later ones wait
+            frames_free_ =
+                std::max(frames_free_, arrives + missing_packets_timeout);  // later ones wait
             at(frames_free_, [this, id = known ? unwrap(id) : 0] {
                 pairing_.add(Shortfall{id, EventReason::frame_incomplete});
             });
@@ -270,7 +277,8 @@ class World final : private pairing::Outcome {
             case FaultKind::clock_jump: {
                 const Duration step = clock_step();
                 camera_offset_ += step.ns;
-                // Only the pattern can tell that it is the clock: the others could have stepped together.
+                // Only the pattern can tell that it is the clock: the others could have stepped
+                // together.
                 if (step.ns % period_.ns == 0) grace_.back().second += frames_of_pattern;
                 break;
             }
@@ -336,7 +344,8 @@ class World final : private pairing::Outcome {
 
     void recovers() {
         recovering_since_ = now_;
-        grace_.push_back({pulses_ - std::min<std::uint64_t>(pulses_, 20), pulses_ + 2 * frames_of_grace});
+        grace_.push_back(
+            {pulses_ - std::min<std::uint64_t>(pulses_, 20), pulses_ + 2 * frames_of_grace});
     }
 
     // --- what pairing decides
@@ -344,16 +353,20 @@ class World final : private pairing::Outcome {
         const Truth& truth = truths_[arrival.slot];
         last_published_ = now_;
         if (verdict_.published++ == 0) verdict_.first_published = now_ - started_;
-        if (truth.trigger != exposure.trigger || truth.life != exposure.tick >> 32U) ++verdict_.wrong;
+        if (truth.trigger != exposure.trigger || truth.life != exposure.tick >> 32U)
+            ++verdict_.wrong;
         if (recovering_since_) verdict_.recoveries.push_back(now_ - *recovering_since_);
         recovering_since_.reset();
-        if (slipped_) verdict_.longest_relock = std::max(verdict_.longest_relock, frames_since_slip_);
+        if (slipped_)
+            verdict_.longest_relock = std::max(verdict_.longest_relock, frames_since_slip_);
         slipped_ = false;
     }
-    void frame_unpaired(const Arrival& arrival, EventReason reason, const Exposure* guess) override {
+    void frame_unpaired(const Arrival& arrival, EventReason reason,
+                        const Exposure* guess) override {
         const Truth& truth = truths_[arrival.slot];
         ++verdict_.frame_reasons[reason];
-        if (guess != nullptr && (truth.trigger != guess->trigger || truth.life != guess->tick >> 32U))
+        if (guess != nullptr &&
+            (truth.trigger != guess->trigger || truth.life != guess->tick >> 32U))
             ++verdict_.suspects_wrong;
         if (truth.trigger == 0 || !truth.recorded) return;
         ++verdict_.withheld;

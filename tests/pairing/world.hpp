@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Camera, trigger board and USB link in virtual time, all that can fail of them, and the judge of what
-// pairing makes of it.
+// Camera, trigger board and USB link in virtual time, all that can fail of them, and the judge of
+// what pairing makes of it.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "versavis/pairing/block_id.hpp"
-#include "versavis/pairing/pairing.hpp"
+#include "engine/pairing/block_id.hpp"
+#include "engine/pairing/pairing.hpp"
 
 namespace versavis::test {
 
@@ -51,9 +51,10 @@ struct WorldSettings {
     bool chunks = false;             ///< frames carry their exposure time, which varies
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
-    double late_frames = 0.005;  ///< share of frames that the host is slow to take, by 40 ms at most
-    double link_load = 0;  ///< time that a frame takes on the link, in periods; above 1 frames queue in the
-                           ///< camera, and triggers are lost when three wait
+    double late_frames =
+        0.005;             ///< share of frames that the host is slow to take, by 40 ms at most
+    double link_load = 0;  ///< time that a frame takes on the link, in periods; above 1 frames
+                           ///< queue in the camera, and triggers are lost when three wait
     bool drops_after_exposure = false;          ///< ... not ignored, but exposed and then dropped
     std::map<std::uint64_t, FaultKind> faults;  ///< by the number of the pulse at which they happen
     std::uint64_t pulses = 300;
@@ -63,9 +64,10 @@ struct Verdict {
     std::uint64_t frames = 0;  ///< that arrived whole
     std::uint64_t published = 0;
     std::uint64_t wrong = 0;
-    std::uint64_t withheld = 0;             ///< ... although it was whole
-    std::uint64_t withheld_needlessly = 0;  ///< ... more than five frames after the last fault had ended
-    std::uint64_t suspects_wrong = 0;       ///< guesses that are not the true exposure
+    std::uint64_t withheld = 0;  ///< ... although it was whole
+    std::uint64_t withheld_needlessly =
+        0;                             ///< ... more than five frames after the last fault had ended
+    std::uint64_t suspects_wrong = 0;  ///< guesses that are not the true exposure
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
     std::uint64_t starts = 0;  ///< after the first

@@ -16,7 +16,7 @@
 #include <random>
 #include <system_error>
 
-#include "versavis/clock/output_clock.hpp"
+#include "engine/clock/output_clock.hpp"
 
 namespace versavis::rig {
 
@@ -44,9 +44,9 @@ std::string rmc(std::int64_t utc_s) {
     const std::time_t seconds = utc_s;
     std::tm utc{};
     gmtime_r(&seconds, &utc);
-    const std::string body =
-        fmt::format("GPRMC,{:02}{:02}{:02}.00,A,4722.6,N,00832.9,E,0.0,0.0,{:02}{:02}{:02},,,A", utc.tm_hour,
-                    utc.tm_min, utc.tm_sec, utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
+    const std::string body = fmt::format(
+        "GPRMC,{:02}{:02}{:02}.00,A,4722.6,N,00832.9,E,0.0,0.0,{:02}{:02}{:02},,,A", utc.tm_hour,
+        utc.tm_min, utc.tm_sec, utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
     unsigned sum = 0;
     for (const char c : body) sum ^= static_cast<unsigned char>(c);
     return fmt::format("${}*{:02X}\r\n", body, sum);
@@ -55,8 +55,9 @@ std::string rmc(std::int64_t utc_s) {
 }  // namespace
 
 Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
-                                                       const std::string& socket_path, HostTime zero,
-                                                       const Motion& motion, GroundTruth& truth,
+                                                       const std::string& socket_path,
+                                                       HostTime zero, const Motion& motion,
+                                                       GroundTruth& truth,
                                                        std::vector<TriggeredCamera*> cameras) {
     sockaddr_un self{};
     self.sun_family = AF_UNIX;
@@ -69,14 +70,16 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
         ::listen(listener, 1) != 0) {
         const std::string reason = std::generic_category().message(errno);
         ::close(listener);
-        return failure(socket_path, fmt::format("cannot listen: {}", reason), "choose another with --socket");
+        return failure(socket_path, fmt::format("cannot listen: {}", reason),
+                       "choose another with --socket");
     }
     return std::unique_ptr<BoardHost>(
         new BoardHost(scenario, socket_path, zero, motion, truth, std::move(cameras), listener));
 }
 
-BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
-                     GroundTruth& truth, std::vector<TriggeredCamera*> cameras, int listener)
+BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
+                     const Motion& motion, GroundTruth& truth,
+                     std::vector<TriggeredCamera*> cameras, int listener)
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
@@ -116,7 +119,8 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
         imu_transfer(at, transfer, received);
     };
     surroundings.reboot = [this](bool) { reset(); };
-    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings), board_now());
+    board_ =
+        std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings), board_now());
 }
 
 void BoardHost::restart() {
@@ -157,7 +161,8 @@ void BoardHost::run() {
         if (utc_) hear_gnss();
         board_->run_until(board_now());
         exchange_bytes();
-        const HostTime wake = clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
+        const HostTime wake =
+            clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
         wait(std::min(wake, host_now() + longest_wait));
     }
 }

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "adis_device.hpp"
+#include "engine/clock/output_clock.hpp"
 #include "ground_truth.hpp"
 #include "native_board.hpp"
 #include "scene.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
-#include "versavis/clock/output_clock.hpp"
 
 namespace versavis::rig {
 
@@ -23,8 +23,9 @@ class BoardHost {
  public:
     /// Error: the socket cannot be made.
     static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
-                                                       const std::string& socket_path, HostTime zero,
-                                                       const Motion& motion, GroundTruth& truth,
+                                                       const std::string& socket_path,
+                                                       HostTime zero, const Motion& motion,
+                                                       GroundTruth& truth,
                                                        std::vector<TriggeredCamera*> cameras);
     ~BoardHost();
     BoardHost(const BoardHost&) = delete;
@@ -34,8 +35,9 @@ class BoardHost {
     void reset() { reset_pending_ = true; }
 
  private:
-    BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero, const Motion& motion,
-              GroundTruth& truth, std::vector<TriggeredCamera*> cameras, int listener);
+    BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
+              const Motion& motion, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
+              int listener);
 
     void run();
     void boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero);

@@ -54,7 +54,8 @@ std::uint16_t half(std::span<const std::uint8_t> bytes, std::size_t at) {
 }
 
 void put_word(std::vector<std::uint8_t>& out, std::uint32_t value) {
-    for (const unsigned shift : {24U, 16U, 8U, 0U}) out.push_back(static_cast<std::uint8_t>(value >> shift));
+    for (const unsigned shift : {24U, 16U, 8U, 0U})
+        out.push_back(static_cast<std::uint8_t>(value >> shift));
 }
 
 void put_half(std::vector<std::uint8_t>& out, std::uint16_t value) {
@@ -66,8 +67,8 @@ bool same(const sockaddr_in& a, const sockaddr_in& b) {
     return a.sin_addr.s_addr == b.sin_addr.s_addr && a.sin_port == b.sin_port;
 }
 
-/// Hears what is sent to everybody. Never on loopback: a rig there must not show up on the machine's real
-/// networks.
+/// Hears what is sent to everybody. Never on loopback: a rig there must not show up on the
+/// machine's real networks.
 int open_broadcast_socket(sockaddr_in self) {
     if ((ntohl(self.sin_addr.s_addr) >> 24U) == 127) return -1;
     self.sin_addr.s_addr = INADDR_BROADCAST;
@@ -88,8 +89,9 @@ std::vector<Fault> faults_of(const Scenario& scenario, const std::string& camera
 }  // namespace
 
 Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenario,
-                                                         const CameraScenario& settings, HostTime zero,
-                                                         const Motion& motion, GroundTruth& truth) {
+                                                         const CameraScenario& settings,
+                                                         HostTime zero, const Motion& motion,
+                                                         GroundTruth& truth) {
     const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_in self{};
     self.sin_family = AF_INET;
@@ -100,12 +102,13 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
         ::bind(socket, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0) {
         const std::string reason = std::generic_category().message(errno);
         ::close(socket);
-        return failure(fmt::format("camera {}", settings.name),
-                       fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
-                       "is another rig running? use other addresses of 127.0.0.0/8");
+        return failure(
+            fmt::format("camera {}", settings.name),
+            fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
+            "is another rig running? use other addresses of 127.0.0.0/8");
     }
-    return std::unique_ptr<GigeCamera>(
-        new GigeCamera(scenario, settings, zero, motion, truth, socket, open_broadcast_socket(self)));
+    return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, motion, truth,
+                                                      socket, open_broadcast_socket(self)));
 }
 
 GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
@@ -151,8 +154,8 @@ void GigeCamera::receive(int socket) {
     std::uint8_t buffer[2048];
     sockaddr_in from{};
     socklen_t from_size = sizeof from;
-    const ssize_t size =
-        ::recvfrom(socket, buffer, sizeof buffer, 0, reinterpret_cast<sockaddr*>(&from), &from_size);
+    const ssize_t size = ::recvfrom(socket, buffer, sizeof buffer, 0,
+                                    reinterpret_cast<sockaddr*>(&from), &from_size);
     if (size >= 8 && !muted()) handle({buffer, static_cast<std::size_t>(size)}, from);
 }
 
@@ -161,7 +164,8 @@ void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in&
     const std::uint16_t command = half(packet, 2);
     if (same(from, controller_)) last_contact_ = host_now();
     std::uint16_t status = success;
-    const std::vector<std::uint8_t> body = answer(command, packet.subspan(8, half(packet, 4)), from, status);
+    const std::vector<std::uint8_t> body =
+        answer(command, packet.subspan(8, half(packet, 4)), from, status);
     if ((packet[1] & acknowledge_wanted) == 0) return;
     std::vector<std::uint8_t> reply;
     put_half(reply, status);
@@ -169,10 +173,12 @@ void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in&
     put_half(reply, static_cast<std::uint16_t>(body.size()));
     put_half(reply, half(packet, 6));
     reply.insert(reply.end(), body.begin(), body.end());
-    ::sendto(socket_, reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from), sizeof from);
+    ::sendto(socket_, reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from),
+             sizeof from);
 }
 
-std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command, std::span<const std::uint8_t> body,
+std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command,
+                                             std::span<const std::uint8_t> body,
                                              const sockaddr_in& from, std::uint16_t& status) {
     std::vector<std::uint8_t> out;
     switch (command) {
@@ -203,23 +209,25 @@ std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command, std::span<co
             }
             out.resize(4 + size);
             std::copy_n(body.begin(), 4, out.begin());
-            if (!registers_.read(word(body, 0), std::span(out).subspan(4))) status = invalid_address;
+            if (!registers_.read(word(body, 0), std::span(out).subspan(4)))
+                status = invalid_address;
             break;
         }
         case write_memory:
             if (body.size() % 4 != 0 || body.size() < 8) status = invalid_parameter;
             for (std::size_t at = 4; at + 4 <= body.size() && status == success; at += 4)
-                status =
-                    write_register(word(body, 0) + static_cast<std::uint32_t>(at - 4), word(body, at), from);
+                status = write_register(word(body, 0) + static_cast<std::uint32_t>(at - 4),
+                                        word(body, at), from);
             put_half(out, 0);
             put_half(out, static_cast<std::uint16_t>(body.size() - 4));
             break;
         case packet_resend:
             if (body.size() >= 20)
-                transmitter_.resend(std::uint64_t{word(body, 12)} << 32U | word(body, 16), word(body, 4),
-                                    word(body, 8));
+                transmitter_.resend(std::uint64_t{word(body, 12)} << 32U | word(body, 16),
+                                    word(body, 4), word(body, 8));
             else if (body.size() >= 12)
-                transmitter_.resend(half(body, 2), word(body, 4) & 0xFFFFFFU, word(body, 8) & 0xFFFFFFU);
+                transmitter_.resend(half(body, 2), word(body, 4) & 0xFFFFFFU,
+                                    word(body, 8) & 0xFFFFFFU);
             break;
         default: status = not_implemented;
     }
@@ -241,8 +249,8 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
     } else if (!in_control(from)) {
         return access_denied;
     }
-    const bool fire_test_packet =
-        address == reg_fire_test_packet || (address == reg_stream_packet_size && (value & fire_bit) != 0);
+    const bool fire_test_packet = address == reg_fire_test_packet ||
+                                  (address == reg_stream_packet_size && (value & fire_bit) != 0);
     if (address == reg_stream_packet_size)
         value = std::clamp<std::uint32_t>(value & 0xFFFFU, 256, 16000) & ~3U;
     if (!registers_.write(address, value)) return invalid_address;
@@ -265,7 +273,8 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
 void GigeCamera::configure_stream() {
     StreamSettings settings;
     settings.destination.sin_family = AF_INET;
-    settings.destination.sin_port = htons(static_cast<std::uint16_t>(registers_.value(reg_stream_port)));
+    settings.destination.sin_port =
+        htons(static_cast<std::uint16_t>(registers_.value(reg_stream_port)));
     settings.destination.sin_addr.s_addr = htonl(registers_.value(reg_stream_address));
     settings.packet_size = registers_.value(reg_stream_packet_size);
     settings.packet_delay_ns = registers_.value(reg_stream_packet_delay);  // a tick is a nanosecond
@@ -319,13 +328,16 @@ void GigeCamera::reset_board_at(std::vector<std::uint64_t> exposures, std::funct
     reset_board_ = std::move(reset);
 }
 
-std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level, const TriggerPulse& pulse) {
+std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
+                                                             const TriggerPulse& pulse) {
     const bool falling = registers_.value(reg_trigger_activation) == 1;
     if (level == falling) return std::nullopt;
     std::optional<Interval> interval;
-    const bool listens = registers_.value(reg_trigger_mode) == 1 && registers_.value(reg_trigger_source) == 1;
+    const bool listens =
+        registers_.value(reg_trigger_mode) == 1 && registers_.value(reg_trigger_source) == 1;
     if (listens && !muted()) interval = expose(pulse.at, &pulse);
-    truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at, interval.has_value()});
+    truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
+                           interval.has_value()});
     return interval;
 }
 
@@ -335,7 +347,8 @@ Duration GigeCamera::exposure_at(HostTime at) const {
         const double seconds = static_cast<double>((at - zero_).ns) * 1e-9;
         const double phase = 2 * 3.14159265358979 * seconds / settings_.exposure_swing_s;
         exposure_us *= 1 + settings_.exposure_swing * std::sin(phase);
-        exposure_us = std::min(exposure_us, static_cast<double>(registers_.real(reg_exposure_limit)));
+        exposure_us =
+            std::min(exposure_us, static_cast<double>(registers_.real(reg_exposure_limit)));
     }
     return Duration{std::llround(exposure_us * 1e3)};
 }
@@ -366,7 +379,8 @@ void GigeCamera::light_up(StreamFrame& frame, Duration exposure) const {
     std::array<std::uint8_t, 256> table{};
     for (std::size_t i = 0; i < table.size(); ++i)
         table[i] = static_cast<std::uint8_t>(std::min(255.0, static_cast<double>(i) * gain));
-    auto lit = std::make_shared<std::vector<std::uint8_t>>(frame.pixels.begin(), frame.pixels.end());
+    auto lit =
+        std::make_shared<std::vector<std::uint8_t>>(frame.pixels.begin(), frame.pixels.end());
     for (std::uint8_t& value : *lit) value = table[value];
     frame.pixels = *lit;
     frame.owned_pixels = std::move(lit);
@@ -377,7 +391,8 @@ std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure) const {
     std::vector<std::uint8_t> out;
     put_word(out, chunk_id_image);
     put_word(out, settings_.width * settings_.height);
-    put_word(out, std::bit_cast<std::uint32_t>(static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
+    put_word(out, std::bit_cast<std::uint32_t>(
+                      static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
     put_word(out, chunk_id_exposure);
     put_word(out, sizeof(float));
     return out;
@@ -396,14 +411,16 @@ void GigeCamera::apply_outages() {
 }
 
 /// An exposure, if the camera can take the trigger now. Counts it, and queues its frame.
-std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const TriggerPulse* pulse) {
+std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
+                                                       const TriggerPulse* pulse) {
     StreamFrame frame;
     TrueExposure truth;
     {
         const std::lock_guard lock(mutex_);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
-        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) != board_resets_.end())
+        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) !=
+            board_resets_.end())
             reset_board_();
         if (active_fault(FaultKind::ignore_trigger) != nullptr) {
             if (settings_.ids_count_ignored) next_block_id();
@@ -433,7 +450,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger, const T
         return Interval{truth.start, truth.end};
     }
     frame.extended_id = settings_.extended_ids;
-    frame.camera_time_ns = static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
+    frame.camera_time_ns =
+        static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
     frame.width = settings_.width;
     frame.height = settings_.height;
     frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));

@@ -25,8 +25,9 @@ class GigeCamera final : public TriggeredCamera {
  public:
     /// Binds the control port. Error: the address is not there or taken.
     static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario,
-                                                        const CameraScenario& settings, HostTime zero,
-                                                        const Motion& motion, GroundTruth& truth);
+                                                        const CameraScenario& settings,
+                                                        HostTime zero, const Motion& motion,
+                                                        GroundTruth& truth);
     ~GigeCamera() override;
     GigeCamera(const GigeCamera&) = delete;
     GigeCamera& operator=(const GigeCamera&) = delete;
@@ -39,15 +40,16 @@ class GigeCamera final : public TriggeredCamera {
     const CameraScenario& settings() const override { return settings_; }
 
  private:
-    GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero, const Motion& motion,
-               GroundTruth& truth, int socket, int broadcast_socket);
+    GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
+               const Motion& motion, GroundTruth& truth, int socket, int broadcast_socket);
 
     void serve();
     void receive(int socket);
     void handle(std::span<const std::uint8_t> packet, const sockaddr_in& from);
     std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body,
                                      const sockaddr_in& from, std::uint16_t& status);
-    std::uint16_t write_register(std::uint32_t address, std::uint32_t value, const sockaddr_in& from);
+    std::uint16_t write_register(std::uint32_t address, std::uint32_t value,
+                                 const sockaddr_in& from);
     bool in_control(const sockaddr_in& from) const;
     void lose_controller();
     void start_acquisition();

@@ -39,7 +39,8 @@ void GigeRegisters::reset() {
     set_text(reg_serial, identity_.serial, 16);
     set_text(reg_user_name, identity_.name, 16);
     const std::string xml = gige_xml(identity_.width, identity_.height);
-    set_text(reg_xml_url, fmt::format("Local:rig.xml;{:x};{:x}", std::uint32_t{reg_xml}, xml.size()), 512);
+    set_text(reg_xml_url,
+             fmt::format("Local:rig.xml;{:x};{:x}", std::uint32_t{reg_xml}, xml.size()), 512);
     std::memcpy(memory_.data() + reg_xml, xml.data(), xml.size());
     set(reg_interface_count, 1);
     set(reg_stream_count, 1);
@@ -70,7 +71,8 @@ void GigeRegisters::set_text(Register address, const std::string& text, std::siz
 
 bool GigeRegisters::read(std::uint32_t address, std::uint32_t& value) const {
     std::uint32_t wire = 0;
-    if (!read(address, std::span(reinterpret_cast<std::uint8_t*>(&wire), sizeof wire))) return false;
+    if (!read(address, std::span(reinterpret_cast<std::uint8_t*>(&wire), sizeof wire)))
+        return false;
     value = ntohl(wire);
     return true;
 }

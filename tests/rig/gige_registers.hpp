@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Register space of an emulated GigE Vision camera: bootstrap registers, features, and the XML that names
-// them.
+// Register space of an emulated GigE Vision camera: bootstrap registers, features, and the XML that
+// names them.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace versavis::rig {
 
-/// Addresses of GigE Vision bootstrap registers (GigE Vision specification 1.2, chapter 28) and of our
-/// features.
+/// Addresses of GigE Vision bootstrap registers (GigE Vision specification 1.2, chapter 28) and of
+/// our features.
 enum Register : std::uint32_t {
     reg_version = 0x0000,
     reg_device_mode = 0x0004,

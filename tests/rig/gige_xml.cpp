@@ -14,10 +14,11 @@ using Entries = std::vector<std::pair<std::string, std::uint32_t>>;
 /// Collects feature nodes and the category that lists them.
 class XmlWriter {
  public:
-    void integer(const std::string& name, Register address, const std::string& range, bool writable = true) {
+    void integer(const std::string& name, Register address, const std::string& range,
+                 bool writable = true) {
         list(name);
-        nodes_ +=
-            fmt::format("<Integer Name=\"{0}\"><pValue>{0}Register</pValue>{1}</Integer>\n", name, range);
+        nodes_ += fmt::format("<Integer Name=\"{0}\"><pValue>{0}Register</pValue>{1}</Integer>\n",
+                              name, range);
         int_register(name, address, writable);
     }
 
@@ -26,9 +27,11 @@ class XmlWriter {
         list(name);
         nodes_ += fmt::format(
             "<Float "
-            "Name=\"{0}\"><pValue>{0}Register</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</Unit></Float>\n"
+            "Name=\"{0}\"><pValue>{0}Register</pValue><Min>{1}</Min><Max>{2}</Max><Unit>{3}</"
+            "Unit></Float>\n"
             "<FloatReg "
-            "Name=\"{0}Register\"><Address>{4:#x}</Address><Length>4</Length><AccessMode>RW</AccessMode>"
+            "Name=\"{0}Register\"><Address>{4:#x}</Address><Length>4</Length><AccessMode>RW</"
+            "AccessMode>"
             "<pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n",
             name, minimum, maximum, unit, std::uint32_t{address});
     }
@@ -37,7 +40,8 @@ class XmlWriter {
         list(name);
         nodes_ += fmt::format("<Enumeration Name=\"{}\">\n", name);
         for (const auto& [entry, value] : entries)
-            nodes_ += fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>\n", entry, value);
+            nodes_ +=
+                fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>\n", entry, value);
         nodes_ += fmt::format("<pValue>{}Register</pValue></Enumeration>\n", name);
         int_register(name, address, true);
     }
@@ -45,7 +49,8 @@ class XmlWriter {
     void command(const std::string& name, Register address) {
         list(name);
         nodes_ += fmt::format(
-            "<Command Name=\"{0}\"><pValue>{0}Register</pValue><CommandValue>1</CommandValue></Command>\n",
+            "<Command "
+            "Name=\"{0}\"><pValue>{0}Register</pValue><CommandValue>1</CommandValue></Command>\n",
             name);
         int_register(name, address, true);
     }
@@ -53,14 +58,16 @@ class XmlWriter {
     void text(const std::string& name, Register address, unsigned length) {
         list(name);
         nodes_ += fmt::format(
-            "<StringReg Name=\"{}\"><Address>{:#x}</Address><Length>{}</Length><AccessMode>RO</AccessMode>"
+            "<StringReg "
+            "Name=\"{}\"><Address>{:#x}</Address><Length>{}</Length><AccessMode>RO</AccessMode>"
             "<pPort>Device</pPort></StringReg>\n",
             name, std::uint32_t{address}, length);
     }
 
     void boolean(const std::string& name, Register address) {
         list(name);
-        nodes_ += fmt::format("<Boolean Name=\"{0}\"><pValue>{0}Register</pValue></Boolean>\n", name);
+        nodes_ +=
+            fmt::format("<Boolean Name=\"{0}\"><pValue>{0}Register</pValue></Boolean>\n", name);
         int_register(name, address, true);
     }
 
@@ -77,7 +84,8 @@ class XmlWriter {
     std::string document() const {
         return fmt::format(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
-            "<RegisterDescription ModelName=\"RigCamera\" VendorName=\"VersaVIS\" ToolTip=\"Emulated "
+            "<RegisterDescription ModelName=\"RigCamera\" VendorName=\"VersaVIS\" "
+            "ToolTip=\"Emulated "
             "camera\" "
             "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" "
             "SchemaSubMinorVersion=\"0\" "
@@ -86,7 +94,8 @@ class XmlWriter {
             "VersionGuid=\"8B2C7F4E-1A6D-4B64-8A6F-2E3C4D5E6F70\" "
             "xmlns=\"http://www.genicam.org/GenApi/Version_1_0\" "
             "xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "
-            "xsi:schemaLocation=\"http://www.genicam.org/GenApi/Version_1_0 GenApiSchema_Version_1_0.xsd\">\n"
+            "xsi:schemaLocation=\"http://www.genicam.org/GenApi/Version_1_0 "
+            "GenApiSchema_Version_1_0.xsd\">\n"
             "<Category Name=\"Root\" NameSpace=\"Standard\">\n{}</Category>\n{}"
             "<Port Name=\"Device\" NameSpace=\"Standard\"/>\n</RegisterDescription>\n",
             root_, nodes_);
@@ -98,7 +107,8 @@ class XmlWriter {
     void int_register(const std::string& name, Register address, bool writable) {
         nodes_ += fmt::format(
             "<IntReg "
-            "Name=\"{}Register\"><Address>{:#x}</Address><Length>4</Length><AccessMode>{}</AccessMode>"
+            "Name=\"{}Register\"><Address>{:#x}</Address><Length>4</Length><AccessMode>{}</"
+            "AccessMode>"
             "<pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
             name, std::uint32_t{address}, writable ? "RW" : "RO");
     }
@@ -107,7 +117,9 @@ class XmlWriter {
     std::string nodes_;
 };
 
-std::string fixed(std::uint32_t value) { return fmt::format("<Min>{0}</Min><Max>{0}</Max>", value); }
+std::string fixed(std::uint32_t value) {
+    return fmt::format("<Min>{0}</Min><Max>{0}</Max>", value);
+}
 
 }  // namespace
 
@@ -126,14 +138,16 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.integer("OffsetY", reg_offset, fixed(0), false);
     xml.enumeration("PixelFormat", reg_pixel_format, {{"Mono8", 0x01080001}});
     xml.integer("PayloadSize", reg_payload_size, "", false);
-    xml.enumeration("AcquisitionMode", reg_acquisition_mode, {{"SingleFrame", 1}, {"Continuous", 2}});
+    xml.enumeration("AcquisitionMode", reg_acquisition_mode,
+                    {{"SingleFrame", 1}, {"Continuous", 2}});
     xml.command("AcquisitionStart", reg_acquisition_start);
     xml.command("AcquisitionStop", reg_acquisition_stop);
     xml.real("AcquisitionFrameRate", reg_frame_rate, "Hz", 0.1, 1000);
     xml.enumeration("TriggerSelector", reg_trigger_selector, {{"FrameStart", 0}});
     xml.enumeration("TriggerMode", reg_trigger_mode, {{"Off", 0}, {"On", 1}});
     xml.enumeration("TriggerSource", reg_trigger_source, {{"Software", 0}, {"Line0", 1}});
-    xml.enumeration("TriggerActivation", reg_trigger_activation, {{"RisingEdge", 0}, {"FallingEdge", 1}});
+    xml.enumeration("TriggerActivation", reg_trigger_activation,
+                    {{"RisingEdge", 0}, {"FallingEdge", 1}});
     xml.enumeration("TriggerOverlap", reg_trigger_overlap, {{"Off", 0}, {"ReadOut", 1}});
     xml.command("TriggerSoftware", reg_trigger_software);
     xml.enumeration("ExposureMode", reg_exposure_mode, {{"Timed", 0}, {"TriggerWidth", 1}});

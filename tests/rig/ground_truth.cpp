@@ -10,14 +10,15 @@ Expected<std::unique_ptr<GroundTruth>> GroundTruth::create(const std::string& pa
     if (path.empty()) return truth;
     truth->file_.open(path, std::ios::trunc);
     if (!truth->file_)
-        return failure(path, "the ground truth cannot be written", "choose another file with --truth");
+        return failure(path, "the ground truth cannot be written",
+                       "choose another file with --truth");
     return truth;
 }
 
 void GroundTruth::add(const TrueTrigger& t) {
     write(fmt::format(
-        R"({{"type":"trigger","camera":"{}","board_life":{},"trigger":{},"at_ns":{},"taken":{}}})", t.camera,
-        t.board_life, t.trigger, t.at.ns, t.taken));
+        R"({{"type":"trigger","camera":"{}","board_life":{},"trigger":{},"at_ns":{},"taken":{}}})",
+        t.camera, t.board_life, t.trigger, t.at.ns, t.taken));
 }
 
 void GroundTruth::add(const TrueExposure& e) {
@@ -28,13 +29,13 @@ void GroundTruth::add(const TrueExposure& e) {
 }
 
 void GroundTruth::add(const TrueDeparture& d) {
-    write(fmt::format(R"({{"type":"departure","camera":"{}","serial":{},"at_ns":{}}})", d.camera, d.serial,
-                      d.at.ns));
+    write(fmt::format(R"({{"type":"departure","camera":"{}","serial":{},"at_ns":{}}})", d.camera,
+                      d.serial, d.at.ns));
 }
 
 void GroundTruth::add(const TrueImuSample& s) {
-    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})", s.imu,
-                      s.board_life, s.number, s.at.ns));
+    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})",
+                      s.imu, s.board_life, s.number, s.at.ns));
 }
 
 void GroundTruth::write(const std::string& line) {

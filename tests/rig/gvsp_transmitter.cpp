@@ -32,8 +32,8 @@ using PacketHeader = std::vector<std::uint8_t>;
 template <class T>
 void put(std::vector<std::uint8_t>& out, T value) {
     for (int shift = static_cast<int>(sizeof(T) * 8) - 8; shift >= 0; shift -= 8)
-        out.push_back(
-            static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> static_cast<unsigned>(shift)));
+        out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >>
+                                                static_cast<unsigned>(shift)));
 }
 
 std::uint32_t header_size(const StreamFrame& frame) { return frame.extended_id ? 20 : 8; }
@@ -91,7 +91,9 @@ std::uint32_t data_packets(const StreamFrame& frame, const StreamSettings& setti
     return static_cast<std::uint32_t>((data_bytes(frame) + size - 1) / size);
 }
 
-std::chrono::nanoseconds until(HostTime time) { return std::chrono::nanoseconds((time - host_now()).ns); }
+std::chrono::nanoseconds until(HostTime time) {
+    return std::chrono::nanoseconds((time - host_now()).ns);
+}
 
 }  // namespace
 
@@ -205,7 +207,8 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
     const double ns_per_packet = link_ns + static_cast<double>(settings.packet_delay_ns);
     const HostTime begin = host_now();
     for (std::uint32_t first = 1; first < end; first += batch) {
-        const HostTime due = begin + Duration{static_cast<std::int64_t>((first - 1) * ns_per_packet)};
+        const HostTime due =
+            begin + Duration{static_cast<std::int64_t>((first - 1) * ns_per_packet)};
         if (const auto left = until(due); left.count() > 0) std::this_thread::sleep_for(left);
         send_packets(frame, settings, first, std::min<std::uint32_t>(first + batch, end) - 1, true);
     }
@@ -216,7 +219,8 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
 
 /// One packet that is made up, not taken from the pixels as they are. Empty: it is.
 std::vector<std::uint8_t> GvspTransmitter::special_body(const StreamFrame& frame,
-                                                        const StreamSettings& settings, std::uint32_t id) {
+                                                        const StreamSettings& settings,
+                                                        std::uint32_t id) {
     if (id == 0) return leader_body(frame);
     if (id == data_packets(frame, settings) + 1) return trailer_body(frame);
     const std::size_t size = data_per_packet(frame, settings);
@@ -242,17 +246,20 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
     sockaddr_in destination = settings.destination;
     std::size_t count = 0;
     for (std::uint32_t id = first; id <= last && count < batch; ++id) {
-        if (lossy && packet_loss_ > 0 && std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_)
+        if (lossy && packet_loss_ > 0 &&
+            std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_)
             continue;
         const PacketFormat format = id == 0 ? leader : id == trailer_id ? trailer : payload;
         headers[count] = packet_header(frame, format, id);
         special[count] = special_body(frame, settings, id);
         std::span<const std::uint8_t> body = special[count];
         if (body.empty())
-            body = frame.pixels.subspan((id - 1) * size, std::min(size, data_bytes(frame) - (id - 1) * size));
+            body = frame.pixels.subspan((id - 1) * size,
+                                        std::min(size, data_bytes(frame) - (id - 1) * size));
         parts[count][0] = {headers[count].data(), headers[count].size()};
         parts[count][1] = {const_cast<std::uint8_t*>(body.data()), body.size()};
-        messages[count].msg_hdr = {&destination, sizeof destination, parts[count].data(), 2, nullptr, 0, 0};
+        messages[count].msg_hdr = {
+            &destination, sizeof destination, parts[count].data(), 2, nullptr, 0, 0};
         ++count;
     }
     if (count > 0) ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
@@ -263,8 +270,9 @@ void GvspTransmitter::resend(std::uint64_t block_id, std::uint32_t first, std::u
     StreamSettings settings;
     {
         const std::lock_guard lock(mutex_);
-        const auto found = std::find_if(sent_.begin(), sent_.end(),
-                                        [&](const StreamFrame& f) { return f.block_id == block_id; });
+        const auto found = std::find_if(sent_.begin(), sent_.end(), [&](const StreamFrame& f) {
+            return f.block_id == block_id;
+        });
         if (found == sent_.end() || host_now() < muted_until_) return;
         frame = *found;
         settings = settings_;

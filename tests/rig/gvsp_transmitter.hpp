@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sends frames as GigE Vision stream packets, paced like a real link, and sends lost packets again on
-// request.
+// Sends frames as GigE Vision stream packets, paced like a real link, and sends lost packets again
+// on request.
 #pragma once
 
 #include <netinet/in.h>
@@ -50,7 +50,8 @@ struct StreamSettings {
 /// Thread-safe.
 class GvspTransmitter {
  public:
-    GvspTransmitter(const std::string& address, double link_mbps, double packet_loss, std::uint64_t seed);
+    GvspTransmitter(const std::string& address, double link_mbps, double packet_loss,
+                    std::uint64_t seed);
     ~GvspTransmitter();
 
     void configure(const StreamSettings& settings);
@@ -58,7 +59,8 @@ class GvspTransmitter {
     /// UDP port that the packets come from.
     std::uint16_t source_port() const;
 
-    /// Queues a frame; when too many wait already it is dropped, as a camera with a full buffer does.
+    /// Queues a frame; when too many wait already it is dropped, as a camera with a full buffer
+    /// does.
     void send(StreamFrame frame);
 
     /// Packets `first` to `last` of a frame that was sent a short while ago.
@@ -78,8 +80,8 @@ class GvspTransmitter {
     void transmit(const StreamFrame& frame, const StreamSettings& settings);
     void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first,
                       std::uint32_t last, bool lossy);
-    static std::vector<std::uint8_t> special_body(const StreamFrame& frame, const StreamSettings& settings,
-                                                  std::uint32_t id);
+    static std::vector<std::uint8_t> special_body(const StreamFrame& frame,
+                                                  const StreamSettings& settings, std::uint32_t id);
     bool muted() const;
 
     int socket_;

@@ -12,8 +12,8 @@
 #include <optional>
 #include <set>
 
+#include "engine/clock/output_clock.hpp"
 #include "scene.hpp"
-#include "versavis/clock/output_clock.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::rig {
@@ -54,8 +54,8 @@ class Recorder {
     void poll() {
         for (auto& [name, stream] : frames_) {
             if (!open(name, stream)) continue;
-            for (auto item = stream->next(); item.found != Found::nothing && item.found != Found::gone;
-                 item = stream->next())
+            for (auto item = stream->next();
+                 item.found != Found::nothing && item.found != Found::gone; item = stream->next())
                 take(name, *stream, item);
         }
         if (!open(imu_name_, imu_)) return;
@@ -90,7 +90,8 @@ class Recorder {
 
     std::int64_t to_host_ns(OutputTime time) { return time.ns - clock_.offset().ns; }
 
-    void take(const std::string& name, const FrameStream& stream, const Received<FrameMetadata>& item) {
+    void take(const std::string& name, const FrameStream& stream,
+              const Received<FrameMetadata>& item) {
         Recording& recording = recordings_[name];
         if (item.found == Found::lost) recording.missed += item.lost;
         if (item.found != Found::item) return;
@@ -101,14 +102,16 @@ class Recorder {
             ++recording.missed;
         else
             recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0,
-                                       item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
+                                       item.data.trigger, to_host_ns(item.time),
+                                       item.data.sigma_ns});
     }
 
     void take(const Received<ImuMetadata>& item) {
         Recording& recording = recordings_[imu_name_];
         if (item.found == Found::lost) recording.missed += item.lost;
         if (item.found == Found::item)
-            recording.items.push_back({item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
+            recording.items.push_back(
+                {item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
     }
 
     std::string instance_;
@@ -140,10 +143,11 @@ Expected<Truth> load_truth(const std::string& path) {
         if (record["type"] == "exposure") {
             const std::int64_t start = record["start_ns"];
             const std::int64_t end = record["end_ns"];
-            truth.frames[record["camera"]][record["serial"]] = {record["trigger"], start + (end - start) / 2,
-                                                                record["sent"]};
+            truth.frames[record["camera"]][record["serial"]] = {
+                record["trigger"], start + (end - start) / 2, record["sent"]};
         } else if (record["type"] == "imu") {
-            truth.imu.emplace(record["number"].get<std::uint64_t>(), record["at_ns"].get<std::int64_t>());
+            truth.imu.emplace(record["number"].get<std::uint64_t>(),
+                              record["at_ns"].get<std::int64_t>());
         }
     }
     return truth;
@@ -152,14 +156,16 @@ Expected<Truth> load_truth(const std::string& path) {
 void summarise(std::vector<double>& errors, StreamVerdict& verdict) {
     if (errors.empty()) return;
     std::sort(errors.begin(), errors.end());
-    const auto quantile = [&](double q) { return errors[static_cast<std::size_t>(q * (errors.size() - 1))]; };
+    const auto quantile = [&](double q) {
+        return errors[static_cast<std::size_t>(q * (errors.size() - 1))];
+    };
     verdict.error_p50_ns = quantile(0.5);
     verdict.error_p99_ns = quantile(0.99);
     verdict.error_max_ns = errors.back();
 }
 
-/// When the streams were recorded, in host time: the start pattern comes before, and does not count for the
-/// rates.
+/// When the streams were recorded, in host time: the start pattern comes before, and does not count
+/// for the rates.
 struct Interval {
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
@@ -174,7 +180,8 @@ void count(const Recording& recording, const Interval& interval, StreamVerdict& 
         last = item.host_ns;
     }
     if (verdict.items > 1)
-        verdict.rate_hz = static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
+        verdict.rate_hz =
+            static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
 }
 
 /// A stamp that is further off than it claims is as wrong as one of another exposure.
@@ -182,7 +189,8 @@ bool honest(const Published& item, double error_ns) {
     return error_ns <= std::max(honest_sigmas * item.sigma_ns, honest_floor_ns);
 }
 
-StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint64_t, TrueFrame>& truth,
+StreamVerdict judge_frames(const Recording& recording,
+                           const std::map<std::uint64_t, TrueFrame>& truth,
                            const Interval& interval) {
     StreamVerdict verdict;
     count(recording, interval, verdict);
@@ -190,8 +198,8 @@ StreamVerdict judge_frames(const Recording& recording, const std::map<std::uint6
     std::set<std::uint64_t> seen;
     for (const Published& item : recording.items) {
         const auto found = truth.find(item.key);
-        const bool paired =
-            found != truth.end() && found->second.trigger == item.trigger && seen.insert(item.key).second;
+        const bool paired = found != truth.end() && found->second.trigger == item.trigger &&
+                            seen.insert(item.key).second;
         const double error =
             paired ? std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)) : 0;
         if (!paired || !honest(item, error))
@@ -248,7 +256,8 @@ json read_status(const std::string& instance) {
 std::uint64_t withheld(const json& status, const std::string& camera) {
     if (!status.is_object()) return 0;
     for (const json& entry : status.value("cameras", json::array()))
-        if (entry.value("name", "") == camera) return entry.value("frames_without_trigger", std::uint64_t{0});
+        if (entry.value("name", "") == camera)
+            return entry.value("frames_without_trigger", std::uint64_t{0});
     return 0;
 }
 
@@ -284,10 +293,12 @@ Expected<Interval> record(Recorder& recorder, const JudgeSettings& settings) {
         const HostTime now = host_now();
         if (!flowing && recorder.complete()) flowing = now;
         if (!flowing && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
-            return failure(settings.instance, "these streams did not begin in time:" + recorder.missing(),
+            return failure(settings.instance,
+                           "these streams did not begin in time:" + recorder.missing(),
                            "see 'versavis status' and the service's log");
         if (flowing && !recording && now - *flowing > start_pattern_time) recording = now;
-        const bool over = recording && static_cast<double>((now - *recording).ns) * 1e-9 >= settings.seconds;
+        const bool over =
+            recording && static_cast<double>((now - *recording).ns) * 1e-9 >= settings.seconds;
         const bool stopped = settings.stop_requested && settings.stop_requested();
         if (over || stopped) return Interval{recording.value_or(now).ns, now.ns};
         if (now >= next_report) {
@@ -316,12 +327,12 @@ void complain(Verdict& verdict) {
 
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings) {
     auto clock = output_clock(settings);
-    if (!clock) return tl::unexpected(clock.error());
+    if (!clock) return Unexpected(clock.error());
     Recorder recorder(scenario, settings.instance, std::move(*clock));
     const auto interval = record(recorder, settings);
-    if (!interval) return tl::unexpected(interval.error());
+    if (!interval) return Unexpected(interval.error());
     auto truth = load_truth(settings.truth_path);
-    if (!truth) return tl::unexpected(truth.error());
+    if (!truth) return Unexpected(truth.error());
     Verdict verdict;
     verdict.seconds = static_cast<double>(interval->end_ns - interval->begin_ns) * 1e-9;
     const json status = read_status(settings.instance);
@@ -331,7 +342,8 @@ Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings)
         stream.unpaired = withheld(status, camera.name);
         verdict.streams[camera.name] = stream;
     }
-    verdict.streams[scenario.imu] = judge_imu(recorder.recordings()[scenario.imu], *truth, *interval);
+    verdict.streams[scenario.imu] =
+        judge_imu(recorder.recordings()[scenario.imu], *truth, *interval);
     complain(verdict);
     return verdict;
 }
@@ -345,23 +357,26 @@ std::string to_json(const Verdict& verdict) {
             {"lost", s.lost},
             {"unpaired", s.unpaired},
             {"wrong_pairs", s.wrong_pairs},
-            {"stamp_error_ns", {{"p50", s.error_p50_ns}, {"p99", s.error_p99_ns}, {"max", s.error_max_ns}}}};
-    const json document{
-        {"ok", verdict.ok}, {"seconds", std::round(verdict.seconds * 100) / 100}, {"streams", streams}};
+            {"stamp_error_ns",
+             {{"p50", s.error_p50_ns}, {"p99", s.error_p99_ns}, {"max", s.error_max_ns}}}};
+    const json document{{"ok", verdict.ok},
+                        {"seconds", std::round(verdict.seconds * 100) / 100},
+                        {"streams", streams}};
     return document.dump();
 }
 
 std::string to_table(const Verdict& verdict) {
     std::string out =
-        fmt::format("{:<8} {:>8} {:>9} {:>6} {:>9} {:>12} {:>30}\n", "stream", "items", "rate/Hz", "lost",
-                    "unpaired", "wrong pairs", "clock error p50/p99/max, us");
+        fmt::format("{:<8} {:>8} {:>9} {:>6} {:>9} {:>12} {:>30}\n", "stream", "items", "rate/Hz",
+                    "lost", "unpaired", "wrong pairs", "clock error p50/p99/max, us");
     for (const auto& [name, s] : verdict.streams)
-        out += fmt::format("{:<8} {:>8} {:>9.3f} {:>6} {:>9} {:>12} {:>30}\n", name, s.items, s.rate_hz,
-                           s.lost, s.unpaired, s.wrong_pairs,
-                           fmt::format("{:.1f} / {:.1f} / {:.1f}", s.error_p50_ns / 1e3, s.error_p99_ns / 1e3,
-                                       s.error_max_ns / 1e3));
+        out += fmt::format("{:<8} {:>8} {:>9.3f} {:>6} {:>9} {:>12} {:>30}\n", name, s.items,
+                           s.rate_hz, s.lost, s.unpaired, s.wrong_pairs,
+                           fmt::format("{:.1f} / {:.1f} / {:.1f}", s.error_p50_ns / 1e3,
+                                       s.error_p99_ns / 1e3, s.error_max_ns / 1e3));
     for (const std::string& complaint : verdict.complaints) out += complaint + "\n";
-    return out + (verdict.ok ? fmt::format("ok: {:.1f} s, every stamp belongs to its item\n", verdict.seconds)
+    return out + (verdict.ok ? fmt::format("ok: {:.1f} s, every stamp belongs to its item\n",
+                                           verdict.seconds)
                              : std::string("FAILED\n"));
 }
 

@@ -16,9 +16,11 @@ namespace versavis::rig {
 struct StreamVerdict {
     std::uint64_t items = 0;
     double rate_hz = 0;
-    std::uint64_t lost = 0;  ///< happened and was sent between the first and the last item, but not published
-    std::uint64_t unpaired = 0;     ///< frames that the service received and withheld
-    std::uint64_t wrong_pairs = 0;  ///< stamps of another exposure or sample, or further off than they claim
+    std::uint64_t lost =
+        0;  ///< happened and was sent between the first and the last item, but not published
+    std::uint64_t unpaired = 0;  ///< frames that the service received and withheld
+    std::uint64_t wrong_pairs =
+        0;  ///< stamps of another exposure or sample, or further off than they claim
     double error_p50_ns = 0;
     double error_p99_ns = 0;
     double error_max_ns = 0;
@@ -40,8 +42,8 @@ struct JudgeSettings {
     std::function<bool()> stop_requested;  ///< ends the recording early
 };
 
-/// Records the streams of `scenario` for the time given, counted from when all of them flow, then compares.
-/// Error: a stream did not begin in time, or the ground truth cannot be read.
+/// Records the streams of `scenario` for the time given, counted from when all of them flow, then
+/// compares. Error: a stream did not begin in time, or the ground truth cannot be read.
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings);
 
 std::string to_json(const Verdict& verdict);

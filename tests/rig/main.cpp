@@ -24,7 +24,8 @@ int fail(const Error& error, int code) {
     return code;
 }
 
-int run(const std::string& scenario_path, const std::string& socket_path, const std::string& truth_path) {
+int run(const std::string& scenario_path, const std::string& socket_path,
+        const std::string& truth_path) {
     // Threads inherit the mask: only sigwait() below sees these signals.
     sigset_t signals;
     sigemptyset(&signals);
@@ -63,9 +64,10 @@ std::string status_line(const std::string& instance) {
                            status["clock"]["sigma_ns"].get<std::int64_t>() / 1000);
         for (const auto& stream_status : status["streams"])
             if (stream_status["kind"] == "frames" || stream_status["kind"] == "imu")
-                line += fmt::format(" | {} {} ({:.1f} Hz)", stream_status["name"].get<std::string>(),
-                                    stream_status["items"].get<std::uint64_t>(),
-                                    stream_status["rate_hz"].get<double>());
+                line +=
+                    fmt::format(" | {} {} ({:.1f} Hz)", stream_status["name"].get<std::string>(),
+                                stream_status["items"].get<std::uint64_t>(),
+                                stream_status["rate_hz"].get<double>());
     }
     return line;
 }
@@ -103,9 +105,12 @@ int main(int argc, char** argv) {
     std::string scenario_path;
     std::string socket_path = "/tmp/versavis-rig.socket";
     std::string truth_path;
-    auto* run_command = app.add_subcommand("run", "Run the rig of a scenario until SIGINT or SIGTERM");
-    run_command->add_option("scenario", scenario_path, "Scenario file (docs/rig.md)")->required();
-    run_command->add_option("--socket", socket_path, "Unix socket of the board")->capture_default_str();
+    auto* run_command =
+        app.add_subcommand("run", "Run the rig of a scenario until SIGINT or SIGTERM");
+    run_command->add_option("scenario", scenario_path, "Scenario file (docs/user/rig.md)")
+        ->required();
+    run_command->add_option("--socket", socket_path, "Unix socket of the board")
+        ->capture_default_str();
     run_command->add_option("--truth", truth_path, "File for the ground truth, JSON lines");
 
     JudgeSettings settings;
@@ -113,14 +118,17 @@ int main(int argc, char** argv) {
     bool as_json = false;
     auto* judge_command =
         app.add_subcommand("judge", "Compare what the service publishes with the ground truth");
-    judge_command->add_option("scenario", scenario_path, "Scenario file that the rig runs")->required();
-    judge_command->add_option("--truth", settings.truth_path, "Ground truth that the rig writes")->required();
+    judge_command->add_option("scenario", scenario_path, "Scenario file that the rig runs")
+        ->required();
+    judge_command->add_option("--truth", settings.truth_path, "Ground truth that the rig writes")
+        ->required();
     judge_command->add_option("--instance", settings.instance, "Instance of the service")
         ->capture_default_str();
     judge_command->add_option("--seconds", settings.seconds, "How long to record")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    judge_command->add_flag("--json", as_json, "Print the verdict as one JSON object in the last line");
+    judge_command->add_flag("--json", as_json,
+                            "Print the verdict as one JSON object in the last line");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

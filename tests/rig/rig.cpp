@@ -20,18 +20,18 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
     const HostTime zero = host_now();
     std::unique_ptr<Rig> rig(new Rig(zero));
     auto truth = GroundTruth::create(truth_path);
-    if (!truth) return tl::unexpected(truth.error());
+    if (!truth) return Unexpected(truth.error());
     rig->truth_ = std::move(*truth);
     std::vector<GigeCamera*> wired;
     for (const CameraScenario& settings : scenario.cameras) {
         auto camera = GigeCamera::create(scenario, settings, zero, rig->motion_, *rig->truth_);
-        if (!camera) return tl::unexpected(camera.error());
+        if (!camera) return Unexpected(camera.error());
         wired.push_back(camera->get());
         rig->cameras_.push_back(std::move(*camera));
     }
     auto board = BoardHost::create(scenario, socket_path, zero, rig->motion_, *rig->truth_,
                                    {wired.begin(), wired.end()});
-    if (!board) return tl::unexpected(board.error());
+    if (!board) return Unexpected(board.error());
     rig->board_ = std::move(*board);
     for (GigeCamera* camera : wired)
         camera->reset_board_at(board_resets(scenario, camera->settings().name),

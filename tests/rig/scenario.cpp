@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scenario.hpp"
 
-#include "versavis/toml/table_reader.hpp"
+#include "engine/toml/table_reader.hpp"
 
 namespace versavis::rig {
 
@@ -38,7 +38,8 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("temperature_c", camera.temperature_c, -40, 150);
     read_clock(reader, camera.clock);
     if (camera.name.empty()) reader.fail("name", "a camera needs a 'name'");
-    if (camera.address.empty()) reader.fail("address", "a camera needs an 'address', such as 127.0.0.2");
+    if (camera.address.empty())
+        reader.fail("address", "a camera needs an 'address', such as 127.0.0.2");
     return camera;
 }
 
@@ -68,8 +69,8 @@ Fault read_fault(TableReader& reader) {
 
 Expected<Scenario> load_scenario(const std::string& path) {
     const auto root = parse_toml(path);
-    if (!root) return tl::unexpected(root.error());
-    TomlFile file{path, "docs/rig.md"};
+    if (!root) return Unexpected(root.error());
+    TomlFile file{path, "docs/user/rig.md"};
     Scenario scenario;
     TableReader top(file, *root);
     top.read("seed", scenario.seed, 0, INT64_MAX);
@@ -92,7 +93,7 @@ Expected<Scenario> load_scenario(const std::string& path) {
         reader.finish();
     }
     top.finish();
-    if (!file.result) return tl::unexpected(file.result.error());
+    if (!file.result) return Unexpected(file.result.error());
     return scenario;
 }
 

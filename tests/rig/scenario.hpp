@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What is in the rig and what fails when, from a TOML file (docs/rig.md).
+// What is in the rig and what fails when, from a TOML file (docs/user/rig.md).
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,14 @@ struct BoardScenario {
 struct CameraScenario {
     std::string name;
     std::string address;  ///< loopback address that the camera answers on
-    unsigned output = 0;  ///< board output that triggers it, and input that its exposure line leads to
+    unsigned output =
+        0;  ///< board output that triggers it, and input that its exposure line leads to
     std::string serial;
     std::uint32_t width = 1920;
     std::uint32_t height = 1200;
     double exposure_us = 3000;
-    double exposure_swing = 0;    ///< auto exposure follows a brightness that varies by this fraction ...
+    double exposure_swing =
+        0;  ///< auto exposure follows a brightness that varies by this fraction ...
     double exposure_swing_s = 7;  ///< ... with this period
     double trigger_latency_us = 20;
     double readout_us = 2000;        ///< end of exposure to first packet
@@ -34,14 +36,15 @@ struct CameraScenario {
     bool extended_ids = false;       ///< block ids of 64 bits
     bool ids_count_ignored = false;  ///< a trigger that is ignored takes a block id, too
     bool early_leader = false;       ///< a frame's leader leaves when its exposure begins
-    double light = 0;                ///< brightness of the image per millisecond of exposure; 0: as painted
+    double light = 0;  ///< brightness of the image per millisecond of exposure; 0: as painted
     double temperature_c = 45;
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 
 enum class FaultKind {
     drop_frame,      ///< the exposure happens, no packet leaves
-    drop_leader,     ///< the frame's first packet never leaves, not even when it is asked for again ...
+    drop_leader,     ///< the frame's first packet never leaves, not even when it is asked for again
+                     ///< ...
     drop_last,       ///< ... nor its last ones
     half_frame,      ///< the frame ends in its middle, as if it were whole
     swap_frames,     ///< the frame leaves after the next one
@@ -51,14 +54,15 @@ enum class FaultKind {
     ignore_trigger,  ///< the camera does not expose
     camera_mute,     ///< no answer and no packet for `seconds`
     camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
-    board_reset,     ///< the board starts anew with another nonce; `camera` names whose exposures count
+    board_reset,     ///< the board starts anew with another nonce; `camera` names whose exposures
+                     ///< count
 };
 
 struct Fault {
     FaultKind kind = FaultKind::drop_frame;
     std::string camera;
     std::uint64_t at_exposure =
-        0;                    ///< happens with this exposure of the camera, counted since the rig's start
+        0;  ///< happens with this exposure of the camera, counted since the rig's start
     std::uint64_t count = 1;  ///< that many exposures in a row
     double seconds = 1;       ///< negative for a clock that steps back
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A device's clock as a function of true host time: offset, skew and linear drift, exactly invertible.
+// A device's clock as a function of true host time: offset, skew and linear drift, exactly
+// invertible.
 #pragma once
 
 #include <cstdint>

@@ -23,8 +23,8 @@ class TriggeredCamera {
     using Interval = std::pair<HostTime, HostTime>;
 
     virtual ~TriggeredCamera() = default;
-    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active, if it
-    /// exposes.
+    /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active,
+    /// if it exposes.
     virtual std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) = 0;
     virtual const CameraScenario& settings() const = 0;
 };

@@ -4,7 +4,8 @@
 using namespace versavis;
 using namespace versavis::scenario;
 
-TEST_CASE("002-exposure-step-up: one exposure is off the grid by half the step, the next lie on it") {
+TEST_CASE(
+    "002-exposure-step-up: one exposure is off the grid by half the step, the next lie on it") {
     Scenario world;
     CameraSettings settings;
     settings.exposure = [](std::uint64_t pulse, auto) { return pulse < 50 ? 4 * ms : 16 * ms; };

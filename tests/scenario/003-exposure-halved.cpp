@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "003-exposure-halved: an exposure that ends before its expected middle has a stamp, and no phase "
+    "003-exposure-halved: an exposure that ends before its expected middle has a stamp, and no "
+    "phase "
     "shifts") {
     Scenario world;
     CameraSettings settings;

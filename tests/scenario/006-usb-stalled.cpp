@@ -7,11 +7,13 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "006-usb-stalled: a host that does not read disturbs no trigger and no sample, exposures outlive "
+    "006-usb-stalled: a host that does not read disturbs no trigger and no sample, exposures "
+    "outlive "
     "samples") {
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera);
-    auto device = std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
+    auto device =
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
     world.add_imu(std::move(device), wire::ImuKind::adis16448b, 800, true);
     world.drops_allowed = true;
     REQUIRE(world.begin());
@@ -29,7 +31,8 @@ TEST_CASE(
     }
     REQUIRE(world.inbox().clock_answers.size() == 1);
     CHECK(world.inbox().clock_answers[0].id == 7);
-    // Samples were dropped, are counted, and each that came is still right (judge); the newest stayed.
+    // Samples were dropped, are counted, and each that came is still right (judge); the newest
+    // stayed.
     const wire::Health& health = world.inbox().healths.back();
     CHECK(health.dropped_exposures == 0);
     CHECK(health.dropped_clock_answers == 0);

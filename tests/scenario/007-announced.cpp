@@ -4,7 +4,8 @@
 using namespace versavis;
 using namespace versavis::scenario;
 
-TEST_CASE("007-announced: exposures that the host announces lie on the grid from the first one on") {
+TEST_CASE(
+    "007-announced: exposures that the host announces lie on the grid from the first one on") {
     Scenario world;
     const auto exposure = [](std::uint64_t pulse) {
         return (2 + static_cast<Nanoseconds>(pulse * 7 % 23)) * ms;

@@ -27,7 +27,9 @@ TEST_CASE("008-readout: no trigger is sent into the read-out of a camera") {
     Scenario world;
     CameraSettings settings;
     settings.readout = 30 * ms;
-    settings.exposure = [](std::uint64_t pulse, auto) { return pulse % 50 < 25 ? 10 * ms : 25 * ms; };
+    settings.exposure = [](std::uint64_t pulse, auto) {
+        return pulse % 50 < 25 ? 10 * ms : 25 * ms;
+    };
     world.add_camera(0, settings);
     REQUIRE(world.begin());
     world.run(30 * second);

@@ -6,7 +6,8 @@
 using namespace versavis;
 using namespace versavis::scenario;
 
-TEST_CASE("009-auto-exposure: the grid error is at most half the change since the exposure before") {
+TEST_CASE(
+    "009-auto-exposure: the grid error is at most half the change since the exposure before") {
     const auto seed = GENERATE(range(1U, 4U));
     Scenario world(seed);
     // Brightness swings by a factor of 20 within seconds, with steps like those of a tunnel.
@@ -25,8 +26,8 @@ TEST_CASE("009-auto-exposure: the grid error is at most half the change since th
     const auto& records = world.inbox().exposures[0];
     REQUIRE(records.size() > 5900);
     for (std::size_t i = 2; i < records.size(); ++i) {
-        const Nanoseconds change =
-            (records[i].end_ns - records[i].start_ns) - (records[i - 1].end_ns - records[i - 1].start_ns);
+        const Nanoseconds change = (records[i].end_ns - records[i].start_ns) -
+                                   (records[i - 1].end_ns - records[i - 1].start_ns);
         REQUIRE(std::abs(world.grid_error(records[i])) <= std::abs(change) / 2 + 1);
     }
 }

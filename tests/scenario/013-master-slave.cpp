@@ -26,7 +26,9 @@ TEST_CASE("013-master-slave: slaves expose as long as their master, whatever its
     master.exposure = [](std::uint64_t pulse, auto) {
         return (1 + static_cast<Nanoseconds>(pulse % 9)) * ms;
     };
-    master.fault = [](std::uint64_t pulse) { return pulse % 13 == 0 ? Fault::ignored : Fault::none; };
+    master.fault = [](std::uint64_t pulse) {
+        return pulse % 13 == 0 ? Fault::ignored : Fault::none;
+    };
     world.add_camera(0, master);
     make_slave(world, 1, true, false);
     make_slave(world, 2, false, true);
@@ -35,19 +37,22 @@ TEST_CASE("013-master-slave: slaves expose as long as their master, whatever its
     world.finish();
     CHECK(world.judge() == "");
     const auto& masters = world.camera(0).pulses();
-    const auto exposures = static_cast<std::size_t>(
-        std::count_if(masters.begin(), masters.end(), [](const TruePulse& pulse) { return pulse.taken; }));
+    const auto exposures = static_cast<std::size_t>(std::count_if(
+        masters.begin(), masters.end(), [](const TruePulse& pulse) { return pulse.taken; }));
     for (const unsigned slave : {1U, 2U}) {
-        // A slave has a pulse, and a record, for each exposure of the master, not for each of its triggers.
+        // A slave has a pulse, and a record, for each exposure of the master, not for each of its
+        // triggers.
         REQUIRE(world.inbox().exposures[slave].size() == exposures);
         for (std::size_t i = 0; i < exposures; ++i) {
             const wire::Exposure& record = world.inbox().exposures[slave][i];
             const auto& of_master = world.inbox().exposures[0];
-            const auto found = std::find_if(of_master.begin(), of_master.end(),
-                                            [&](const wire::Exposure& m) { return m.tick == record.tick; });
+            const auto found =
+                std::find_if(of_master.begin(), of_master.end(),
+                             [&](const wire::Exposure& m) { return m.tick == record.tick; });
             REQUIRE(found != of_master.end());
             REQUIRE(record.end_ns - record.start_ns == found->end_ns - found->start_ns);
-            const Nanoseconds later = slave == 1 ? 5 * us + firmware::NativeBoard::routing_latency : 0;
+            const Nanoseconds later =
+                slave == 1 ? 5 * us + firmware::NativeBoard::routing_latency : 0;
             REQUIRE(record.start_ns == found->start_ns + later);
         }
     }
@@ -71,7 +76,8 @@ TEST_CASE("013-slave-pattern: a slave that asks for the start pattern gets it by
     const std::size_t first =
         slave[0].tick + 1 == slave[1].tick && slave[1].tick + 1 == slave[2].tick ? 1 : 0;
     std::vector<std::uint64_t> gaps;
-    for (std::size_t i = first; i < first + 10; ++i) gaps.push_back(slave[i + 1].tick - slave[i].tick);
+    for (std::size_t i = first; i < first + 10; ++i)
+        gaps.push_back(slave[i + 1].tick - slave[i].tick);
     CHECK(gaps == std::vector<std::uint64_t>{1, 2, 1, 3, 2, 2, 3, 3, 1, 1});
 }
 

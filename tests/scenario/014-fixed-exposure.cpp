@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "014-fixed-exposure: a thermal or time-of-flight camera without exposure line is predicted, and said to "
+    "014-fixed-exposure: a thermal or time-of-flight camera without exposure line is predicted, "
+    "and said to "
     "be") {
     Scenario world;
     CameraSettings settings;

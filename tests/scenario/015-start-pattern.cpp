@@ -20,7 +20,8 @@ const std::vector<std::uint64_t> patterns[] = {{1, 2, 1, 3, 2, 2, 3, 3, 1, 1, 1,
 }  // namespace
 
 TEST_CASE(
-    "015-start-pattern: each camera begins with the gaps of the protocol, at its own rate, whenever asked") {
+    "015-start-pattern: each camera begins with the gaps of the protocol, at its own rate, "
+    "whenever asked") {
     Scenario world;
     world.add_camera(0);
     world.add_camera(1, {}, 50'000'000);

@@ -65,11 +65,13 @@ TEST_CASE("018-no-strobe: a camera without exposure line is lit as it is expecte
     CameraSettings settings;
     settings.strobe = false;
     world.add_camera(0, settings);
-    world.configuration.illumination = {1, wire::illumination_inverted, 0, 100'000, 10'000'000, 500'000};
+    world.configuration.illumination = {1,      wire::illumination_inverted, 0, 100'000, 10'000'000,
+                                        500'000};
     world.configuration.illumination.flags = 0;
     REQUIRE(world.begin());
     world.run(5 * second);
     world.finish();
     CHECK(world.judge() == "");
-    for (const Interval& interval : world.lights()) REQUIRE(interval.off - interval.on == 3 * ms + 100 * us);
+    for (const Interval& interval : world.lights())
+        REQUIRE(interval.off - interval.on == 3 * ms + 100 * us);
 }

@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "020-aux-pulses: each pulse of two LiDARs is stamped, at rates that have nothing to do with the grid") {
+    "020-aux-pulses: each pulse of two LiDARs is stamped, at rates that have nothing to do with "
+    "the grid") {
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera);
     world.add_pulses(wire::pulse_aux0, 117 * ms, 1e9 / 10.0137, 5 * us);

@@ -48,7 +48,8 @@ TEST_CASE("021-sync-chain: two boards with crystals of their own expose together
                     return std::abs(on_second(a.start) - pulse.start) <
                            std::abs(on_second(b.start) - pulse.start);
                 });
-            if (pulse.start < 8 * second || pulse.start > 119 * second) continue;  // it learns the pace first
+            if (pulse.start < 8 * second || pulse.start > 119 * second)
+                continue;  // it learns the pace first
             REQUIRE(std::abs(on_second(nearest->start) - pulse.start) <= 100);
             ++together;
         }

@@ -22,8 +22,9 @@ TEST_CASE("022-test-output: a pulse at the grid point, where the middle of the e
 TEST_CASE("022-test-imu: a pulse at each tick of the IMU") {
     const bool data_ready = GENERATE(false, true);
     Scenario world;
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-                  wire::ImuKind::adis16448b, 200, data_ready);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+        wire::ImuKind::adis16448b, 200, data_ready);
     world.configuration.ports.test = wire::test_imu0;
     world.configuration.ports.pulse_ns = 50'000;
     REQUIRE(world.begin());

@@ -16,7 +16,8 @@ struct Part {
 }  // namespace
 
 TEST_CASE(
-    "023-imus: every part is set up, read and checked as its data sheet says, stamped by its own edges") {
+    "023-imus: every part is set up, read and checked as its data sheet says, stamped by its own "
+    "edges") {
     const Part part = GENERATE(values<Part>({
         {"adis16445", wire::ImuKind::adis16445, 200, 204.8},
         {"adis16448a", wire::ImuKind::adis16448a, 400, 409.6},
@@ -42,10 +43,10 @@ TEST_CASE(
 }
 
 TEST_CASE("023-imus-without-data-ready: every part is read on the board's grid") {
-    const wire::ImuKind kind =
-        GENERATE(values({wire::ImuKind::adis16445, wire::ImuKind::adis16448a, wire::ImuKind::adis16448b,
-                         wire::ImuKind::adis16460, wire::ImuKind::adis16470, wire::ImuKind::icm42688p,
-                         wire::ImuKind::bmi088}));
+    const wire::ImuKind kind = GENERATE(
+        values({wire::ImuKind::adis16445, wire::ImuKind::adis16448a, wire::ImuKind::adis16448b,
+                wire::ImuKind::adis16460, wire::ImuKind::adis16470, wire::ImuKind::icm42688p,
+                wire::ImuKind::bmi088}));
     INFO(int(kind));
     Scenario world;
     world.add_imu(make_imu(kind), kind, 200, false);

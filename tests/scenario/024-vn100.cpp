@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "024-vn100: set up by text, read as binary, stamped by its sync output, at a baud rate that carries it") {
+    "024-vn100: set up by text, read as binary, stamped by its sync output, at a baud rate that "
+    "carries it") {
     const double rate_hz = GENERATE(100.0, 400.0, 800.0);
     Scenario world;
     world.add_vn100(rate_hz, true);
@@ -14,22 +15,26 @@ TEST_CASE(
     CHECK(world.judge() == "");
     const auto& samples = world.inbox().samples[1];
     CHECK(static_cast<double>(samples.size()) == Approx(9.9 * rate_hz).epsilon(0.03));
-    for (std::size_t i = 1; i < samples.size(); ++i) REQUIRE((samples[i].flags & wire::imu_stamped) != 0);
+    for (std::size_t i = 1; i < samples.size(); ++i)
+        REQUIRE((samples[i].flags & wire::imu_stamped) != 0);
 }
 
-TEST_CASE("024-vn100-late: a packet that comes much later than its sample is not stamped by another's edge") {
+TEST_CASE(
+    "024-vn100-late: a packet that comes much later than its sample is not stamped by another's "
+    "edge") {
     Scenario world;
     world.add_vn100(100, true).delay(GENERATE(1000 * us, 1300 * us, 2600 * us));
     REQUIRE(world.begin());
     world.run(5 * second);
     CHECK(world.inbox().samples[1].size() > 400);
-    // An age of more than its own period cannot be seen; it is the same for all then, and less than the
-    // period.
+    // An age of more than its own period cannot be seen; it is the same for all then, and less than
+    // the period.
     for (const wire::ImuSample& sample : world.inbox().samples[1])
         if ((sample.flags & wire::imu_stamped) != 0) REQUIRE(sample.time_ns % (1250 * us) == 0);
 }
 
-TEST_CASE("024-vn100-still-streaming: a part that still talks as fast as it was told before is found") {
+TEST_CASE(
+    "024-vn100-still-streaming: a part that still talks as fast as it was told before is found") {
     Scenario world;
     world.add_vn100(800, true);
     REQUIRE(world.begin());
@@ -41,7 +46,9 @@ TEST_CASE("024-vn100-still-streaming: a part that still talks as fast as it was 
     CHECK(world.inbox().samples[1].size() > before + 1500);
 }
 
-TEST_CASE("024-vn100-faults: damaged packets are counted and missing by number, a mute part is found again") {
+TEST_CASE(
+    "024-vn100-faults: damaged packets are counted and missing by number, a mute part is found "
+    "again") {
     Scenario world;
     devices::Vn100Device& part = world.add_vn100(200, true);
     world.add_camera(0);

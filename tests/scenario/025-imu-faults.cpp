@@ -6,7 +6,8 @@ using namespace versavis::scenario;
 
 TEST_CASE("025-failed-read: it is flagged and counted, and the next sample is none the worse") {
     Scenario world;
-    auto device = std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
+    auto device =
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
     devices::AdisDevice& part = *device;
     world.add_imu(std::move(device), wire::ImuKind::adis16448b, 819.2, true);
     REQUIRE(world.begin());
@@ -15,7 +16,8 @@ TEST_CASE("025-failed-read: it is flagged and counted, and the next sample is no
         part.corrupt(2);
     }
     world.run(second);
-    CHECK(world.judge() == "");  // every good sample is right, stamped by its edge, and none is missing
+    CHECK(world.judge() ==
+          "");  // every good sample is right, stamped by its edge, and none is missing
     std::size_t failed = 0;
     for (const wire::ImuSample& sample : world.inbox().samples[0])
         failed += (sample.flags & wire::imu_check_failed) != 0 ? 1 : 0;
@@ -26,7 +28,8 @@ TEST_CASE("025-failed-read: it is flagged and counted, and the next sample is no
 
 TEST_CASE("025-self-test: what the part says of itself is passed on") {
     Scenario world;
-    auto device = std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16470, &World::motion);
+    auto device =
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16470, &World::motion);
     devices::AdisDevice& part = *device;
     world.add_imu(std::move(device), wire::ImuKind::adis16470, 500, true);
     REQUIRE(world.begin());
@@ -40,7 +43,8 @@ TEST_CASE("025-self-test: what the part says of itself is passed on") {
 }
 
 TEST_CASE(
-    "025-unplugged: a part that comes off is told, flagged, and set up again when it is back, cameras go "
+    "025-unplugged: a part that comes off is told, flagged, and set up again when it is back, "
+    "cameras go "
     "on") {
     Scenario world;
     auto device = std::make_unique<devices::Icm42688pDevice>(&World::motion);
@@ -64,10 +68,12 @@ TEST_CASE(
         if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
 }
 
-TEST_CASE("025-wrong-part: another part than configured is refused by its identity, once a second") {
+TEST_CASE(
+    "025-wrong-part: another part than configured is refused by its identity, once a second") {
     Scenario world;
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16445, &World::motion),
-                  wire::ImuKind::adis16448b, 200, true);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16445, &World::motion),
+        wire::ImuKind::adis16448b, 200, true);
     REQUIRE(world.begin());
     world.run(10 * second);
     const auto failures = world.inbox().events_of(wire::EventKind::imu_failed);
@@ -77,7 +83,8 @@ TEST_CASE("025-wrong-part: another part than configured is refused by its identi
     CHECK(world.inbox().samples[0].empty());
 }
 
-TEST_CASE("025-dead-bus: zeros or ones are no data, whatever the part, it is told, and set up again") {
+TEST_CASE(
+    "025-dead-bus: zeros or ones are no data, whatever the part, it is told, and set up again") {
     const std::uint8_t level = GENERATE(std::uint8_t{0x00}, std::uint8_t{0xFF});
     const bool data_ready = GENERATE(true, false);
     for (const wire::ImuKind kind : spi_imu_kinds) {
@@ -98,7 +105,8 @@ TEST_CASE("025-dead-bus: zeros or ones are no data, whatever the part, it is tol
         CHECK(samples.size() > before + 250);
         CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
         world.drops_allowed = true;  // the time without it has no samples
-        // On the board's grid the judge does not know when the part took its data before it was set up again.
+        // On the board's grid the judge does not know when the part took its data before it was set
+        // up again.
         if (data_ready) CHECK(world.judge() == "");
     }
 }
@@ -107,7 +115,8 @@ TEST_CASE("025-brown-out: a part that lost its settings is found out and set up 
     const bool data_ready = GENERATE(true, false);
     for (const wire::ImuKind kind : spi_imu_kinds) {
         const bool adis = kind != wire::ImuKind::icm42688p && kind != wire::ImuKind::bmi088;
-        if (adis && !data_ready && kind != wire::ImuKind::adis16448b) continue;  // its data is as good
+        if (adis && !data_ready && kind != wire::ImuKind::adis16448b)
+            continue;  // its data is as good
         INFO("kind " << int(kind));
         Scenario world;
         world.add_imu(make_imu(kind), kind, 200, data_ready);

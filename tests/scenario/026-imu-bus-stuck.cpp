@@ -7,8 +7,9 @@ using namespace versavis::scenario;
 TEST_CASE("026-imu-bus-stuck: a transfer that never ends holds up nothing else") {
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera);
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16460, &World::motion),
-                  wire::ImuKind::adis16460, 200, true);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16460, &World::motion),
+        wire::ImuKind::adis16460, 200, true);
     world.add_pulses(wire::pulse_pps, 300 * ms, 1e9);
     REQUIRE(world.begin());
     world.run(3 * second);

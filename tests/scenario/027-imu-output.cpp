@@ -13,8 +13,8 @@ std::vector<std::uint16_t> burst(Scenario& world) {
     return world.board().read_imu_output(words);
 }
 
-void check_words(const std::vector<std::uint16_t>& words, Nanoseconds at, double gyro_tolerance_deg_s,
-                 double accel_tolerance_g) {
+void check_words(const std::vector<std::uint16_t>& words, Nanoseconds at,
+                 double gyro_tolerance_deg_s, double accel_tolerance_g) {
     const devices::Inertial felt = World::motion(at);
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto gyro = static_cast<std::int16_t>(words[2 + axis]);
@@ -29,16 +29,18 @@ void check_words(const std::vector<std::uint16_t>& words, Nanoseconds at, double
 }  // namespace
 
 TEST_CASE(
-    "027-imu-output: a flight controller reads any IMU as an ADIS16448, and the host's samples do not "
+    "027-imu-output: a flight controller reads any IMU as an ADIS16448, and the host's samples do "
+    "not "
     "suffer") {
     const bool adis = GENERATE(true, false);
     Scenario world;
     if (adis)
-        world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-                      wire::ImuKind::adis16448b, 819.2, true);
+        world.add_imu(
+            std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+            wire::ImuKind::adis16448b, 819.2, true);
     else
-        world.add_imu(std::make_unique<devices::Icm42688pDevice>(&World::motion), wire::ImuKind::icm42688p,
-                      1000, true);
+        world.add_imu(std::make_unique<devices::Icm42688pDevice>(&World::motion),
+                      wire::ImuKind::icm42688p, 1000, true);
     world.configuration.ports.options = wire::port_imu_output;
     REQUIRE(world.begin());
     world.run(second);
@@ -53,9 +55,11 @@ TEST_CASE(
     CHECK(world.judge() == "");
 }
 
-TEST_CASE("027-imu-output-alone: with a stored configuration it serves from power-up, without any host") {
+TEST_CASE(
+    "027-imu-output-alone: with a stored configuration it serves from power-up, without any host") {
     Scenario world;
-    auto device = std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
+    auto device =
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
     devices::AdisDevice& part = *device;
     world.add_imu(std::move(device), wire::ImuKind::adis16448b, 819.2, true);
     world.configuration.ports.options = wire::port_imu_output;
@@ -71,5 +75,6 @@ TEST_CASE("027-imu-output-alone: with a stored configuration it serves from powe
     const std::vector<std::uint16_t> before = burst(world);
     part.corrupt(1000);
     world.run(5 * ms);
-    CHECK(std::abs(static_cast<std::int16_t>(burst(world)[2]) - static_cast<std::int16_t>(before[2])) < 20);
+    CHECK(std::abs(static_cast<std::int16_t>(burst(world)[2]) -
+                   static_cast<std::int16_t>(before[2])) < 20);
 }

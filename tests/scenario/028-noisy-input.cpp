@@ -17,14 +17,17 @@ TEST_CASE("028-unconnected: edges at an input that nothing is configured for cos
 }
 
 TEST_CASE(
-    "028-noisy-input: an input that changes without end is not listened to for a while, all else goes on") {
+    "028-noisy-input: an input that changes without end is not listened to for a while, all else "
+    "goes on") {
     Scenario world;
     for (unsigned camera = 0; camera < 3; ++camera) world.add_camera(camera);
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-                  wire::ImuKind::adis16448b, 819.2, true);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+        wire::ImuKind::adis16448b, 819.2, true);
     world.configuration.ports.inputs = 1U << wire::pulse_aux0;
     REQUIRE(world.begin());
-    world.add_noise(firmware::input_pulse + unsigned{wire::pulse_aux0}, 10 * us, 2 * second, 4500 * ms);
+    world.add_noise(firmware::input_pulse + unsigned{wire::pulse_aux0}, 10 * us, 2 * second,
+                    4500 * ms);
     world.run(10 * second);
     world.finish();
     const auto noisy = world.inbox().events_of(wire::EventKind::input_noisy);
@@ -55,5 +58,6 @@ TEST_CASE(
     CHECK(world.inbox().events_of(wire::EventKind::stray_edge).size() <= 30);
     CHECK(world.inbox().events_of(wire::EventKind::input_noisy).size() == 1);
     for (const wire::Exposure& record : world.inbox().exposures[1])
-        if (record.trigger_ns > from + 1100 * ms) REQUIRE((record.flags & wire::exposure_no_start) != 0);
+        if (record.trigger_ns > from + 1100 * ms)
+            REQUIRE((record.flags & wire::exposure_no_start) != 0);
 }

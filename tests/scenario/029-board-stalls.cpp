@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "029-board-stalls: code that stands still past its triggers skips them, tells, and goes on at once") {
+    "029-board-stalls: code that stands still past its triggers skips them, tells, and goes on at "
+    "once") {
     const Nanoseconds stall = GENERATE(500 * us, 3 * ms, 30 * ms, 130 * ms);
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera, {}, 50'000'000);
@@ -24,9 +25,9 @@ TEST_CASE(
         CHECK(event.detail == static_cast<std::uint16_t>(wire::SkipReason::late));
     if (stall > 20 * ms) CHECK(skipped.size() > 100);
     const auto& healths = world.inbox().healths;
-    const auto longest = std::max_element(healths.begin(), healths.end(), [](const auto& a, const auto& b) {
-        return a.loop_max_ns < b.loop_max_ns;
-    });
+    const auto longest = std::max_element(
+        healths.begin(), healths.end(),
+        [](const auto& a, const auto& b) { return a.loop_max_ns < b.loop_max_ns; });
     CHECK(longest->loop_max_ns >= stall / 2);
     // A sync pulse is at its time, or not at all.
     for (const Nanoseconds at : world.rises(firmware::pin_sync)) {

@@ -7,8 +7,9 @@ using namespace versavis::scenario;
 TEST_CASE("030-host-restarts: a new hello stops the cameras, numbers go on, samples never stop") {
     Scenario world;
     world.add_camera(0);
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-                  wire::ImuKind::adis16448b, 204.8, true);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+        wire::ImuKind::adis16448b, 204.8, true);
     world.gaps_allowed = true;
     for (int life = 0; life < 20; ++life) {
         REQUIRE(world.begin(wire::start_pattern));
@@ -36,7 +37,9 @@ TEST_CASE("030-silent-until-hello: nothing is sent to what may be an echoing ter
     REQUIRE(world.begin());
 }
 
-TEST_CASE("030-reconfigured-in-flight: a configuration waits for the pulse that is on its way, none is cut") {
+TEST_CASE(
+    "030-reconfigured-in-flight: a configuration waits for the pulse that is on its way, none is "
+    "cut") {
     Scenario world;
     world.add_camera(0, {}, 100'000'000);
     world.configuration.cameras[0].pulse_ns = 2'000'000;

@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "031-configuration: it is taken whole or not at all, and each field that is refused is named with its "
+    "031-configuration: it is taken whole or not at all, and each field that is refused is named "
+    "with its "
     "range") {
     Scenario world;
     world.add_camera(0);
@@ -32,8 +33,9 @@ TEST_CASE(
         refused.push_back(refusal.field);
     }
     CHECK(refused == std::vector<Field>{Field::pulse, Field::master, Field::rate, Field::imu_rate,
-                                        Field::imu_filter, Field::imu_kind, Field::lead, Field::max_on,
-                                        Field::duty, Field::inputs, Field::sync_rate, Field::pulse});
+                                        Field::imu_filter, Field::imu_kind, Field::lead,
+                                        Field::max_on, Field::duty, Field::inputs, Field::sync_rate,
+                                        Field::pulse});
     const wire::ConfigurationAnswer& answer = world.inbox().answers.back();
     CHECK(answer.status == wire::ConfigurationStatus::refused);
     CHECK(answer.refused == refused.size());
@@ -63,7 +65,8 @@ TEST_CASE("031-while-running: a configuration is refused while cameras run") {
 }
 
 TEST_CASE(
-    "031-announcement-for-nobody: words about cameras that do not exist, or impossible ones, change "
+    "031-announcement-for-nobody: words about cameras that do not exist, or impossible ones, "
+    "change "
     "nothing") {
     Scenario world;
     world.add_camera(0);

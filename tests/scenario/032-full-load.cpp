@@ -4,17 +4,20 @@
 using namespace versavis;
 using namespace versavis::scenario;
 
-TEST_CASE("032-full-load: an IMU at 8 kHz and four cameras at 200 Hz, without a drop, at the link's budget") {
+TEST_CASE(
+    "032-full-load: an IMU at 8 kHz and four cameras at 200 Hz, without a drop, at the link's "
+    "budget") {
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) {
         CameraSettings settings;
         settings.exposure = [](auto, auto) { return 2 * ms; };
         world.add_camera(camera, settings, 200'000'000);
     }
-    world.add_imu(std::make_unique<devices::Icm42688pDevice>(&World::motion), wire::ImuKind::icm42688p, 8000,
-                  true);
-    world.set_link(76'923, 64,
-                   128);  // thirteen of the nineteen packets that a millisecond of full speed carries
+    world.add_imu(std::make_unique<devices::Icm42688pDevice>(&World::motion),
+                  wire::ImuKind::icm42688p, 8000, true);
+    world.set_link(
+        76'923, 64,
+        128);  // thirteen of the nineteen packets that a millisecond of full speed carries
     world.add_pulses(wire::pulse_pps, 300 * ms, 1e9);
     REQUIRE(world.begin());
     world.run(20 * second);
@@ -25,5 +28,6 @@ TEST_CASE("032-full-load: an IMU at 8 kHz and four cameras at 200 Hz, without a 
               health.dropped_imu_samples + health.lost_edges + health.late_outputs ==
           0);
     CHECK(world.inbox().samples[0].size() >= 158'000);
-    for (unsigned camera = 0; camera < 4; ++camera) CHECK(world.inbox().exposures[camera].size() >= 3990);
+    for (unsigned camera = 0; camera < 4; ++camera)
+        CHECK(world.inbox().exposures[camera].size() >= 3990);
 }

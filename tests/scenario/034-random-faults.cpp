@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "034-random-faults: whatever cameras, strobes, code and host do at once, no record says what did not "
+    "034-random-faults: whatever cameras, strobes, code and host do at once, no record says what "
+    "did not "
     "happen") {
     const auto seed = GENERATE(range(1U, 41U));
     Scenario world(seed);
@@ -25,12 +26,14 @@ TEST_CASE(
         settings.exposure = [salt](std::uint64_t pulse, auto) {
             return static_cast<Nanoseconds>(1 + (pulse * 40503U + salt) % 60) * ms / 2;
         };
-        world.add_camera(camera, settings, static_cast<std::uint32_t>(1'000'000 + draw(60'000'000)));
+        world.add_camera(camera, settings,
+                         static_cast<std::uint32_t>(1'000'000 + draw(60'000'000)));
     }
-    world.configuration.illumination = {15,      0,          0,
-                                        100'000, 20'000'000, static_cast<std::uint32_t>(1 + draw(900'000))};
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448a, &World::motion),
-                  wire::ImuKind::adis16448a, 409.6, true);
+    world.configuration.illumination = {
+        15, 0, 0, 100'000, 20'000'000, static_cast<std::uint32_t>(1 + draw(900'000))};
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448a, &World::motion),
+        wire::ImuKind::adis16448a, 409.6, true);
     world.drops_allowed = world.busy_allowed = world.gaps_allowed = true;
     REQUIRE(world.begin(seed % 2 == 0 ? wire::start_pattern : 0));
     for (int i = 0; i < 40; ++i) {
@@ -41,8 +44,10 @@ TEST_CASE(
             world.start(static_cast<std::uint8_t>(draw(16)), static_cast<std::uint8_t>(draw(3)));
         if (draw(7) == 0) world.stop(static_cast<std::uint8_t>(draw(16)));
         if (draw(3) == 0)
-            world.send(wire::ExpectedExposure{
-                static_cast<std::uint8_t>(draw(5)), {}, draw(300), static_cast<Nanoseconds>(draw(60)) * ms});
+            world.send(wire::ExpectedExposure{static_cast<std::uint8_t>(draw(5)),
+                                              {},
+                                              draw(300),
+                                              static_cast<Nanoseconds>(draw(60)) * ms});
     }
     world.run(200 * ms);
     world.finish();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What happens between the cases: commands in the middle of exposures, pulses that would meet, edges that are
-// lost.
+// What happens between the cases: commands in the middle of exposures, pulses that would meet,
+// edges that are lost.
 #include "scenario.hpp"
 
 using namespace versavis;
@@ -20,7 +20,8 @@ void add_slave(Scenario& world, unsigned output) {
 void run_into_exposure(Scenario& world) {
     const auto exposing = [&] {
         const auto& pulses = world.camera(0).pulses();
-        return !pulses.empty() && world.now() > pulses.back().start && world.now() < pulses.back().end;
+        return !pulses.empty() && world.now() > pulses.back().start &&
+               world.now() < pulses.back().end;
     };
     while (exposing()) world.run(ms);
     while (!exposing()) world.run(ms);
@@ -87,7 +88,8 @@ TEST_CASE("035-pulses-that-would-meet: two triggers never become one pulse") {
     CHECK(world.judge() == "");
 }
 
-TEST_CASE("035-stall-at-a-trigger: words that could not be handed over in time leave as whole pulses") {
+TEST_CASE(
+    "035-stall-at-a-trigger: words that could not be handed over in time leave as whole pulses") {
     Scenario world;
     world.add_camera(0, {}, 100'000'000);
     world.configuration.cameras[0].pulse_ns = 2'000'000;
@@ -101,7 +103,8 @@ TEST_CASE("035-stall-at-a-trigger: words that could not be handed over in time l
 }
 
 TEST_CASE(
-    "035-slave-in-mid-exposure: a slave is started and stopped between exposures, with whole pulses that "
+    "035-slave-in-mid-exposure: a slave is started and stopped between exposures, with whole "
+    "pulses that "
     "count") {
     Scenario world;
     world.add_camera(0, exposing_for(20 * ms));
@@ -117,11 +120,13 @@ TEST_CASE(
     }
     world.finish();
     CHECK(world.judge() == "");
-    for (const TruePulse& pulse : world.camera(1).pulses()) CHECK(pulse.end - pulse.start == 20 * ms);
+    for (const TruePulse& pulse : world.camera(1).pulses())
+        CHECK(pulse.end - pulse.start == 20 * ms);
 }
 
 TEST_CASE(
-    "035-edges-lost: what was lost makes no record of two exposures, and a slave says that it may miscount") {
+    "035-edges-lost: what was lost makes no record of two exposures, and a slave says that it may "
+    "miscount") {
     Scenario world;
     world.add_camera(0, exposing_for(300 * us), 1'000'000'000);
     add_slave(world, 1);
@@ -146,7 +151,9 @@ TEST_CASE("035-late-start: a start that comes after the next trigger is still it
     Scenario world;
     CameraSettings settings = exposing_for(300 * us);
     settings.latency = 9'500 * us;
-    settings.fault = [](std::uint64_t pulse) { return pulse % 7 == 0 ? Fault::late_start : Fault::none; };
+    settings.fault = [](std::uint64_t pulse) {
+        return pulse % 7 == 0 ? Fault::late_start : Fault::none;
+    };
     world.add_camera(0, settings, 100'000'000);
     world.busy_allowed = true;
     REQUIRE(world.begin());
@@ -163,10 +170,12 @@ TEST_CASE("035-sync-and-start: a start that waits for sync disturbs nobody, and 
     REQUIRE(world.configure());
     const auto pulse = [&](Nanoseconds at) {
         world.board().schedule_edge({at, firmware::input_pulse + unsigned{wire::pulse_sync}, true});
-        world.board().schedule_edge({at + ms, firmware::input_pulse + unsigned{wire::pulse_sync}, false});
+        world.board().schedule_edge(
+            {at + ms, firmware::input_pulse + unsigned{wire::pulse_sync}, false});
     };
     world.start(1, wire::start_on_sync);
-    for (const Nanoseconds at : {700 * ms, 1000 * ms, 1400 * ms}) pulse(at);  // noise: none a period apart
+    for (const Nanoseconds at : {700 * ms, 1000 * ms, 1400 * ms})
+        pulse(at);  // noise: none a period apart
     world.run(1900 * ms);
     CHECK(world.camera(0).pulses().empty());
     world.start(1);  // it shall not wait any longer
@@ -181,7 +190,8 @@ TEST_CASE("035-sync-and-start: a start that waits for sync disturbs nobody, and 
     CHECK(world.judge() == "");
 }
 
-TEST_CASE("035-sync-and-start: how long cameras ran before does not matter to one that waits for sync") {
+TEST_CASE(
+    "035-sync-and-start: how long cameras ran before does not matter to one that waits for sync") {
     Scenario world;
     world.add_camera(0);
     world.configuration.ports.inputs = 1U << wire::pulse_sync;
@@ -194,7 +204,8 @@ TEST_CASE("035-sync-and-start: how long cameras ran before does not matter to on
     for (const Nanoseconds seconds : {22, 23, 24}) {
         const Nanoseconds at = seconds * second;
         world.board().schedule_edge({at, firmware::input_pulse + unsigned{wire::pulse_sync}, true});
-        world.board().schedule_edge({at + ms, firmware::input_pulse + unsigned{wire::pulse_sync}, false});
+        world.board().schedule_edge(
+            {at + ms, firmware::input_pulse + unsigned{wire::pulse_sync}, false});
     }
     world.run(4 * second);
     CHECK(world.camera(0).pulses().size() > before + 30);

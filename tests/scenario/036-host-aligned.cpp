@@ -24,11 +24,13 @@ struct Aligned {
         return std::llround(static_cast<double>(board - zero) / (1 + ppm * 1e-6));
     }
 
-    void run_to(Nanoseconds host) { world.run(std::max<Nanoseconds>(to_board(host) - world.now(), 0)); }
+    void run_to(Nanoseconds host) {
+        world.run(std::max<Nanoseconds>(to_board(host) - world.now(), 0));
+    }
 
     void tell(Nanoseconds host_second, std::uint32_t slew_ppb) {
-        world.send(wire::AlignGrid{to_board(host_second), static_cast<std::int32_t>(std::lround(ppm * 1e3)),
-                                   slew_ppb});
+        world.send(wire::AlignGrid{to_board(host_second),
+                                   static_cast<std::int32_t>(std::lround(ppm * 1e3)), slew_ppb});
     }
 
     /// Middles of the exposures in host time.
@@ -52,7 +54,9 @@ Nanoseconds off_grid(Nanoseconds at, Nanoseconds phase, Nanoseconds period) {
 
 }  // namespace
 
-TEST_CASE("036-host-aligned: a board that is told before its cameras start exposes on the host's seconds") {
+TEST_CASE(
+    "036-host-aligned: a board that is told before its cameras start exposes on the host's "
+    "seconds") {
     const double ppm = GENERATE(-60.0, 0.0, 35.0);
     Aligned board(1, ppm, 2 * second + 345'678'901);
     board.run_to(321 * ms);
@@ -68,12 +72,15 @@ TEST_CASE("036-host-aligned: a board that is told before its cameras start expos
     CHECK(board.world.judge() == "");
     REQUIRE(board.middles(0).size() > 1'000);
     REQUIRE(board.middles(1).size() > 2'500);
-    for (const Nanoseconds middle : board.middles(0)) REQUIRE(std::abs(off_grid(middle, 0, 50 * ms)) <= 20);
+    for (const Nanoseconds middle : board.middles(0))
+        REQUIRE(std::abs(off_grid(middle, 0, 50 * ms)) <= 20);
     for (const Nanoseconds middle : board.middles(1))
         REQUIRE(std::abs(off_grid(middle, 7 * ms, 20 * ms)) <= 20);
 }
 
-TEST_CASE("036-host-aligned-late: boards that run already slew to the same seconds, and no interval jumps") {
+TEST_CASE(
+    "036-host-aligned-late: boards that run already slew to the same seconds, and no interval "
+    "jumps") {
     Aligned first(1, -60.0, 3 * second);
     Aligned other(2, 35.0, 11 * second + 30 * ms);
     const std::uint32_t slew_ppb = 500'000;

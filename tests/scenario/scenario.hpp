@@ -29,8 +29,9 @@ class Scenario : public World {
 };
 
 inline std::size_t count(const std::vector<wire::Exposure>& records, wire::ExposureFlag flag) {
-    return static_cast<std::size_t>(std::count_if(
-        records.begin(), records.end(), [flag](const auto& record) { return (record.flags & flag) != 0; }));
+    return static_cast<std::size_t>(
+        std::count_if(records.begin(), records.end(),
+                      [flag](const auto& record) { return (record.flags & flag) != 0; }));
 }
 
 /// A part on the SPI bus, moved by World::motion().
@@ -38,20 +39,24 @@ inline std::unique_ptr<devices::SpiImuDevice> make_imu(wire::ImuKind kind) {
     using Model = devices::AdisModel;
     const devices::World motion = &World::motion;
     switch (kind) {
-        case wire::ImuKind::adis16445: return std::make_unique<devices::AdisDevice>(Model::adis16445, motion);
+        case wire::ImuKind::adis16445:
+            return std::make_unique<devices::AdisDevice>(Model::adis16445, motion);
         case wire::ImuKind::adis16448a:
             return std::make_unique<devices::AdisDevice>(Model::adis16448a, motion);
         case wire::ImuKind::adis16448b:
             return std::make_unique<devices::AdisDevice>(Model::adis16448b, motion);
-        case wire::ImuKind::adis16460: return std::make_unique<devices::AdisDevice>(Model::adis16460, motion);
-        case wire::ImuKind::adis16470: return std::make_unique<devices::AdisDevice>(Model::adis16470, motion);
+        case wire::ImuKind::adis16460:
+            return std::make_unique<devices::AdisDevice>(Model::adis16460, motion);
+        case wire::ImuKind::adis16470:
+            return std::make_unique<devices::AdisDevice>(Model::adis16470, motion);
         case wire::ImuKind::icm42688p: return std::make_unique<devices::Icm42688pDevice>(motion);
         default: return std::make_unique<devices::Bmi088Device>(motion);
     }
 }
 
 inline constexpr wire::ImuKind spi_imu_kinds[] = {
-    wire::ImuKind::adis16445, wire::ImuKind::adis16448a, wire::ImuKind::adis16448b, wire::ImuKind::adis16460,
-    wire::ImuKind::adis16470, wire::ImuKind::icm42688p,  wire::ImuKind::bmi088};
+    wire::ImuKind::adis16445, wire::ImuKind::adis16448a, wire::ImuKind::adis16448b,
+    wire::ImuKind::adis16460, wire::ImuKind::adis16470,  wire::ImuKind::icm42688p,
+    wire::ImuKind::bmi088};
 
 }  // namespace versavis::scenario

@@ -13,7 +13,8 @@ namespace versavis::test {
 
 class Process {
  public:
-    /// Starts `arguments[0]`; its standard output and error go to `log`. Throws when it cannot be started.
+    /// Starts `arguments[0]`; its standard output and error go to `log`. Throws when it cannot be
+    /// started.
     Process(const std::vector<std::string>& arguments, const std::string& log);
     ~Process();  ///< kills it
     Process(const Process&) = delete;
@@ -21,8 +22,8 @@ class Process {
 
     void signal(int number) const;
 
-    /// Waits for its end; its exit code, or 128 + the signal that ended it, or -1 when it is still running at
-    /// `timeout`.
+    /// Waits for its end; its exit code, or 128 + the signal that ended it, or -1 when it is still
+    /// running at `timeout`.
     int wait(Duration timeout);
 
     /// SIGTERM, then wait().
@@ -40,8 +41,10 @@ class Process {
     int code_ = -1;
 };
 
-/// Runs a program to its end and returns its exit code; `output` takes what it printed on both streams.
-int run(const std::vector<std::string>& arguments, const std::string& log, std::string* output = nullptr);
+/// Runs a program to its end and returns its exit code; `output` takes what it printed on both
+/// streams.
+int run(const std::vector<std::string>& arguments, const std::string& log,
+        std::string* output = nullptr);
 
 /// Path of a program of this build.
 std::string program(const std::string& name);

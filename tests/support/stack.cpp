@@ -16,7 +16,9 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
     const auto at = [](const std::vector<std::string>& texts, unsigned i) {
         return i < texts.size() ? texts[i] : std::string();
     };
-    const auto address = [&](unsigned i) { return fmt::format("127.0.{}.{}", settings.subnet, i + 2); };
+    const auto address = [&](unsigned i) {
+        return fmt::format("127.0.{}.{}", settings.subnet, i + 2);
+    };
     for (unsigned i = 0; i < settings.cameras; ++i) {
         scenario += fmt::format(
             "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = {2}\nheight = "
@@ -26,7 +28,8 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
         const bool slave = i > 0 && !settings.slave_extra.empty();
         const unsigned real = settings.swapped ? settings.cameras - 1 - i : i;
         configuration += fmt::format(
-            "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nlatency_us = 20\npacket_size = "
+            "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nlatency_us = "
+            "20\npacket_size = "
             "9000\n"
             "{2}\n{3}\n{4}\n",
             i, settings.device.empty() ? address(real) : settings.device,
@@ -49,10 +52,11 @@ Stack::~Stack() {
 
 void Stack::start_rig() {
     rig_ = std::make_unique<Process>(
-        std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket", socket_path(),
-                                 "--truth", truth_path()},
+        std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket",
+                                 socket_path(), "--truth", truth_path()},
         log_path("rig.log"));
-    if (!rig_->wait_for_output("rig ready", seconds(20))) throw std::runtime_error("rig: " + rig_->output());
+    if (!rig_->wait_for_output("rig ready", seconds(20)))
+        throw std::runtime_error("rig: " + rig_->output());
 }
 
 void Stack::start_service() {

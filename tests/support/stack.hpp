@@ -26,10 +26,11 @@ struct StackSettings {
     std::string camera_extra;     ///< keys for each camera of the service
     std::uint32_t width = 320;
     std::uint32_t height = 240;
-    std::string link{};         ///< of the service to the board; empty: the rig's socket
-    std::string slave_extra{};  ///< instead of a rate, for the cameras of the service after the first
-    std::string device{};       ///< of every camera, as the service is told; empty: its address
-    bool swapped = false;       ///< the service takes each camera for another
+    std::string link{};  ///< of the service to the board; empty: the rig's socket
+    std::string
+        slave_extra{};     ///< instead of a rate, for the cameras of the service after the first
+    std::string device{};  ///< of every camera, as the service is told; empty: its address
+    bool swapped = false;  ///< the service takes each camera for another
     std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
     std::string imu_extra{};               ///< more keys of the IMU
@@ -56,7 +57,9 @@ class Stack {
     std::string configuration_path() const { return configuration_path_; }
     std::string truth_path() const { return (directory_.path() / "truth.jsonl").string(); }
     std::string socket_path() const { return (directory_.path() / "board").string(); }
-    std::string log_path(const std::string& name) const { return (directory_.path() / name).string(); }
+    std::string log_path(const std::string& name) const {
+        return (directory_.path() / name).string();
+    }
     const std::string& instance() const { return settings_.name; }
 
     /// For rig::judge(), on what this rig does and this service publishes.
@@ -81,7 +84,8 @@ class Stack {
 
 /// Opens a stream as soon as it is there; throws when it is not in time.
 template <class S>
-S wait_for_stream(const std::string& name, const std::string& instance, Duration timeout = seconds(20)) {
+S wait_for_stream(const std::string& name, const std::string& instance,
+                  Duration timeout = seconds(20)) {
     const HostTime deadline = host_now() + timeout;
     for (;;) {
         auto stream = S::open(name, instance);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What cameras do wrong, live through Aravis: each stamp that is published still belongs to its frame.
+// What cameras do wrong, live through Aravis: each stamp that is published still belongs to its
+// frame.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -28,7 +29,8 @@ rig::Verdict judge(const Stack& stack, double seconds) {
     return *verdict;
 }
 
-std::string fault(const std::string& camera, const std::string& kind, int at, const std::string& more = "") {
+std::string fault(const std::string& camera, const std::string& kind, int at,
+                  const std::string& more = "") {
     return "[[fault]]\nkind = \"" + kind + "\"\ncamera = \"" + camera +
            "\"\nat_exposure = " + std::to_string(at) + "\n" + more + "\n";
 }
@@ -58,18 +60,20 @@ std::set<EventReason> reasons(const Stack& stack, const std::string& camera) {
 
 }  // namespace
 
-TEST_CASE("cameras: frames that are lost, cut, late, repeated or misnumbered, with all kinds of ids") {
+TEST_CASE(
+    "cameras: frames that are lost, cut, late, repeated or misnumbered, with all kinds of ids") {
     StackSettings settings{"badcams", 50, 3, 20, "exposure_us = 3000", "", ""};
     settings.scenarios = {"", "extended_ids = true\nexposure_swing = 0.5",
                           "ids_count_ignored = true\nearly_leader = true"};
     settings.extras = {"", "chunks = true", ""};
-    settings.faults = fault("cam0", "drop_leader", 50) + fault("cam0", "drop_last", 70) +
-                      fault("cam0", "swap_frames", 90) + fault("cam0", "repeat_id", 110) +
-                      fault("cam0", "half_frame", 130) + fault("cam0", "ignore_trigger", 150) +
-                      fault("cam1", "restart_ids", 130) + fault("cam1", "jump_clock", 50, "seconds = 0.05") +
-                      fault("cam1", "jump_clock", 80, "seconds = -0.123") + fault("cam1", "drop_frame", 110) +
-                      fault("cam2", "ignore_trigger", 50, "count = 2") + fault("cam2", "drop_frame", 80) +
-                      fault("cam2", "jump_clock", 110, "seconds = 100") + fault("cam2", "drop_last", 140);
+    settings.faults =
+        fault("cam0", "drop_leader", 50) + fault("cam0", "drop_last", 70) +
+        fault("cam0", "swap_frames", 90) + fault("cam0", "repeat_id", 110) +
+        fault("cam0", "half_frame", 130) + fault("cam0", "ignore_trigger", 150) +
+        fault("cam1", "restart_ids", 130) + fault("cam1", "jump_clock", 50, "seconds = 0.05") +
+        fault("cam1", "jump_clock", 80, "seconds = -0.123") + fault("cam1", "drop_frame", 110) +
+        fault("cam2", "ignore_trigger", 50, "count = 2") + fault("cam2", "drop_frame", 80) +
+        fault("cam2", "jump_clock", 110, "seconds = 100") + fault("cam2", "drop_last", 140);
     Stack stack(settings);
     stack.start_rig();
     stack.start_service();
@@ -147,22 +151,26 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
 
 TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs again") {
     StackSettings settings{
-        "replay", 55, 1, 20, "", fault("cam0", "restart_ids", 120) + fault("cam0", "drop_last", 130), ""};
+        "replay", 55, 1,
+        20,       "", fault("cam0", "restart_ids", 120) + fault("cam0", "drop_last", 130),
+        ""};
     Stack stack(settings);
     stack.start_rig();
     stack.start_service();
     wait_for_stream<FrameStream>("cam0", stack.instance());
-    Process live({program("versavis"), "--instance", stack.instance(), "tail", "cam0", "--oldest", "--json"},
-                 stack.log_path("live.jsonl"));
+    Process live(
+        {program("versavis"), "--instance", stack.instance(), "tail", "cam0", "--oldest", "--json"},
+        stack.log_path("live.jsonl"));
     judge(stack, 6);
     stack.wait_for_status(healthy);
     std::string recording;
-    CHECK(stack.tool({"tail", "cam0-evidence", "--oldest", "-n", "290", "--json"}, &recording) == 0);
+    CHECK(stack.tool({"tail", "cam0-evidence", "--oldest", "-n", "290", "--json"}, &recording) ==
+          0);
     const std::string path = stack.log_path("evidence.jsonl");
     std::ofstream(path) << recording;
     std::string output;
-    CHECK(stack.tool({"pair", "replay", path, "--json", "-o", stack.log_path("decisions.jsonl")}, &output) ==
-          0);
+    CHECK(stack.tool({"pair", "replay", path, "--json", "-o", stack.log_path("decisions.jsonl")},
+                     &output) == 0);
     const auto summary = nlohmann::json::parse(output);
     CHECK(summary["slips"] == 1);
     CHECK(summary["locks"] == 2);
@@ -197,7 +205,8 @@ TEST_CASE("cameras: a share of the link is planned for each, and too many are sa
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {
-        return healthy(s) && s["cameras"][0]["packet_delay_ns"] > 0 && s["cameras"][1]["packet_delay_ns"] > 0;
+        return healthy(s) && s["cameras"][0]["packet_delay_ns"] > 0 &&
+               s["cameras"][1]["packet_delay_ns"] > 0;
     });
     const double needed = status["cameras"][0]["needed_mbps"];
     CHECK(needed == Approx(320 * 240 * 8 * 20 * 1e-6).epsilon(0.03));
@@ -245,8 +254,8 @@ TEST_CASE("cameras: an address in no network of this host is unreachable") {
     settings.device = "203.0.113.9";
     Stack stack(settings);
     stack.start_service();
-    const auto status =
-        stack.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
+    const auto status = stack.wait_for_status(
+        [](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
     CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
                Catch::Contains("in no network of this host"));
 }
@@ -257,8 +266,8 @@ TEST_CASE("cameras: a hot one is said") {
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {  // it delivers all the same
-        return healthy(s) &&
-               s["cameras"][0]["hint"].template get<std::string>().find("90 degrees") != std::string::npos;
+        return healthy(s) && s["cameras"][0]["hint"].template get<std::string>().find(
+                                 "90 degrees") != std::string::npos;
     });
     CHECK(status["cameras"][0]["state"] == "streaming");
 }

@@ -43,8 +43,8 @@ std::vector<std::string> fields(const std::string& line) {
     return all;
 }
 
-/// After each exchange of the trace, the newest first: when is it now on the board? Both clocks were the
-/// same.
+/// After each exchange of the trace, the newest first: when is it now on the board? Both clocks
+/// were the same.
 std::string questions() {
     std::string text;
     const auto rows = lines(trace);
@@ -61,8 +61,9 @@ TEST_CASE("clock: a recorded trace is translated again") {
     const Command clock;
     const std::string query = clock.directory.write("q.csv", questions());
     std::string output;
-    REQUIRE(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", clock.path("r.csv")},
-                      &output) == 0);
+    REQUIRE(
+        clock.run({"replay", "--exchanges", trace, "--query", query, "--out", clock.path("r.csv")},
+                  &output) == 0);
     CHECK_THAT(output, Contains("300 answers from 300 messages"));
     const auto answers = lines(clock.path("r.csv"));
     REQUIRE(answers.size() == 301);
@@ -71,7 +72,8 @@ TEST_CASE("clock: a recorded trace is translated again") {
     for (std::size_t i = 1; i < answers.size(); ++i) {
         const auto answer = fields(answers[i]);
         REQUIRE(answer.size() == 4);
-        const double error = std::abs(static_cast<double>(std::stoll(answer[1]) - std::stoll(answer[0])));
+        const double error =
+            std::abs(static_cast<double>(std::stoll(answer[1]) - std::stoll(answer[0])));
         CHECK(error < 60e3);
         if (answer[3] != "locked") continue;
         ++locked;
@@ -80,8 +82,9 @@ TEST_CASE("clock: a recorded trace is translated again") {
     CHECK(locked > 200);
 
     // The published filter, as shipped, is still half a second off.
-    const std::vector<std::string> ekf{"replay", "--exchanges",       trace,         "--query", query,
-                                       "--out",  clock.path("e.csv"), "--estimator", "ekf"};
+    const std::vector<std::string> ekf{
+        "replay", "--exchanges",       trace,         "--query", query,
+        "--out",  clock.path("e.csv"), "--estimator", "ekf"};
     REQUIRE(clock.run(ekf, &output) == 0);
     const auto newest = fields(lines(clock.path("e.csv"))[1]);
     CHECK(std::stoll(newest[1]) - std::stoll(newest[0]) > 500'000'000);
@@ -91,17 +94,20 @@ TEST_CASE("clock: a recorded trace is translated again") {
 TEST_CASE("clock: a recorded trace is drawn") {
     const Command clock;
     std::string output;
-    REQUIRE(clock.run({"plot", "--exchanges", trace, "--out", clock.path("p.svg"), "--title", "a < b"},
-                      &output) == 0);
+    REQUIRE(
+        clock.run({"plot", "--exchanges", trace, "--out", clock.path("p.svg"), "--title", "a < b"},
+                  &output) == 0);
     std::string svg;
     for (const std::string& line : lines(clock.path("p.svg"))) svg += line + "\n";
-    CHECK_THAT(svg, Catch::StartsWith("<?xml") && Catch::EndsWith("</svg>\n") && Contains("a &lt; b"));
+    CHECK_THAT(svg,
+               Catch::StartsWith("<?xml") && Catch::EndsWith("</svg>\n") && Contains("a &lt; b"));
 }
 
 TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     const Command clock;
     const std::string query = clock.directory.write("q.csv", "available_ns,board_ns\n1,2\n");
-    const std::string bad = clock.directory.write("bad.csv", "h1_ns,m2_ns,m3_ns,h4_ns\n1,2,three,4\n");
+    const std::string bad =
+        clock.directory.write("bad.csv", "h1_ns,m2_ns,m3_ns,h4_ns\n1,2,three,4\n");
     const std::string out = clock.path("r.csv");
     std::string output;
     CHECK(clock.run({"replay", "--exchanges", bad, "--query", query, "--out", out}, &output) == 69);
@@ -113,10 +119,11 @@ TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     CHECK(clock.run({}, &output) == 64);
     CHECK(clock.run({"replay", "--exchanges", trace}, &output) == 64);
     CHECK_THAT(output, Contains("--query"));
-    CHECK(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", out, "--estimator", "best"},
+    CHECK(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", out, "--estimator",
+                     "best"},
                     &output) == 64);
-    CHECK(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", out, "--estimator", "ekf",
-                     "--smoothed"},
+    CHECK(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", out, "--estimator",
+                     "ekf", "--smoothed"},
                     &output) == 64);
     for (const char* command : {"status", "replay", "plot"})
         CHECK(clock.run({command, "--help"}, &output) == 0);

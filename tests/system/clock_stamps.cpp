@@ -8,7 +8,8 @@
 #include <sstream>
 
 #include "../support/stack.hpp"
-#include "versavis/clock/output_clock.hpp"
+#include "engine/clock/output_clock.hpp"
+#include "engine/clock/recording.hpp"
 
 using namespace versavis;
 using namespace versavis::test;
@@ -43,8 +44,10 @@ ClockStream from_the_first(const Stack& stack) {
     return std::move(*stream);
 }
 
-/// Rows of a CSV file of whole numbers; the header must be `header`, and every row must have as many columns.
-std::vector<std::vector<std::int64_t>> read_csv(const std::string& path, const std::string& header) {
+/// Rows of a CSV file of whole numbers; the header must be `header`, and every row must have as
+/// many columns.
+std::vector<std::vector<std::int64_t>> read_csv(const std::string& path,
+                                                const std::string& header) {
     std::ifstream file(path);
     std::string line;
     std::getline(file, line);
@@ -128,7 +131,8 @@ TEST_CASE("clock stamps: each exchange, each sample's way and the output clock a
     CHECK_THAT(text, Catch::Contains("arrived_ns="));
 }
 
-TEST_CASE("clock stamps: recorded for some seconds, until it is stopped, and never across a restart") {
+TEST_CASE(
+    "clock stamps: recorded for some seconds, until it is stopped, and never across a restart") {
     Stack stack({"record", 67, 1, 20, "",
                  "[[fault]]\nkind = \"board_reset\"\ncamera = \"cam0\"\nat_exposure = 260\n", ""});
     std::string text;
@@ -138,11 +142,13 @@ TEST_CASE("clock stamps: recorded for some seconds, until it is stopped, and nev
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status(healthy);
-    CHECK(stack.tool({"clock", "record", "--seconds", "0.2", "--exchanges", "/nowhere/x.csv"}, &text) == 69);
+    CHECK(stack.tool({"clock", "record", "--seconds", "0.2", "--exchanges", "/nowhere/x.csv"},
+                     &text) == 69);
     CHECK_THAT(text, Catch::Contains("/nowhere/x.csv"));
 
-    CHECK(stack.tool({"clock", "record", "--seconds", "2", "--exchanges", exchanges, "--oneway", one_way},
-                     &text) == 0);
+    CHECK(stack.tool(
+              {"clock", "record", "--seconds", "2", "--exchanges", exchanges, "--oneway", one_way},
+              &text) == 0);
     const auto rows = read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns");
     CHECK(rows.size() > 10);
     CHECK(rows.size() < 40);
@@ -166,7 +172,8 @@ TEST_CASE("clock stamps: recorded for some seconds, until it is stopped, and nev
     REQUIRE_FALSE(until_stopped.empty());
     CHECK(until_stopped.back()[3] >= seen.arrived.ns);
 
-    CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", exchanges}, &text) == 69);
+    CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", exchanges}, &text) ==
+          69);
     CHECK_THAT(text, Catch::Contains("was restarted"));
     check_exchanges(read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns"));
     ClockStream all = from_the_first(stack);
@@ -176,7 +183,8 @@ TEST_CASE("clock stamps: recorded for some seconds, until it is stopped, and nev
     CHECK(next_of<ExchangeTold>(all).nonce == second.nonce);
 }
 
-TEST_CASE("clock stamps: TAI that the kernel does not know is refused, or forced and said to be UTC") {
+TEST_CASE(
+    "clock stamps: TAI that the kernel does not know is refused, or forced and said to be UTC") {
     const std::int32_t kernel_offset_s = kernel_clocks()->kernel_state().tai_offset_s;
     Stack stack({"tai", 68, 1, 20, "", "", ""});
     std::ofstream file(stack.configuration_path(), std::ios::app);
@@ -201,5 +209,6 @@ TEST_CASE("clock stamps: TAI that the kernel does not know is refused, or forced
     while (frame.found != Found::item) frame = stream.wait(seconds(5));
     auto clock = OutputClock::create(OutputClockKind::tai, true);
     REQUIRE(clock);
-    CHECK(absolute(Duration{frame.time.ns - frame.data.host_time.ns} - clock->offset()) < milliseconds(1));
+    CHECK(absolute(Duration{frame.time.ns - frame.data.host_time.ns} - clock->offset()) <
+          milliseconds(1));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rig, service and readers as processes, over the real protocols, held against the rig's ground truth.
+// Rig, service and readers as processes, over the real protocols, held against the rig's ground
+// truth.
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -44,7 +45,8 @@ bool is_item(const ring::Item& item) { return item.found == Found::item; }
 }  // namespace
 
 TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item") {
-    Stack stack({"e2e", 10, 2, 20, "exposure_us = 4000\nexposure_swing = 0.5\nexposure_swing_s = 3", "", ""});
+    Stack stack({"e2e", 10, 2, 20, "exposure_us = 4000\nexposure_swing = 0.5\nexposure_swing_s = 3",
+                 "", ""});
     stack.start_rig();
     stack.start_service();
     const rig::Verdict verdict = judge(stack, 8);
@@ -93,7 +95,8 @@ TEST_CASE("end to end: a slave is exposed by its master, and its stamps are its 
     stack.start_rig();
     stack.start_service();
     const rig::Verdict verdict = judge(stack, 6);
-    for (const auto& name : {"cam0", "cam1"}) CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(2));
+    for (const auto& name : {"cam0", "cam1"})
+        CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(2));
     stack.wait_for_status(healthy);
 }
 
@@ -147,10 +150,12 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
     CHECK(judge(stack, 2).ok);
 }
 
-TEST_CASE("end to end: a camera that stops answering is named, the other goes on, and it comes back") {
-    Stack stack({"mute", 14, 2, 20, "",
-                 "[[fault]]\nkind = \"camera_mute\"\ncamera = \"cam1\"\nat_exposure = 60\nseconds = 4\n",
-                 ""});
+TEST_CASE(
+    "end to end: a camera that stops answering is named, the other goes on, and it comes back") {
+    Stack stack(
+        {"mute", 14, 2, 20, "",
+         "[[fault]]\nkind = \"camera_mute\"\ncamera = \"cam1\"\nat_exposure = 60\nseconds = 4\n",
+         ""});
     stack.start_rig();
     stack.start_service();
     const auto broken = stack.wait_for_status([](const auto& s) {
@@ -169,12 +174,14 @@ TEST_CASE("end to end: a camera that stops answering is named, the other goes on
 }
 
 TEST_CASE("end to end: a camera that reboots is set up anew") {
-    Stack stack({"reboot", 15, 1, 20, "",
-                 "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam0\"\nat_exposure = 60\nseconds = 1\n",
-                 ""});
+    Stack stack(
+        {"reboot", 15, 1, 20, "",
+         "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam0\"\nat_exposure = 60\nseconds = 1\n",
+         ""});
     stack.start_rig();
     stack.start_service();
-    stack.wait_for_status([](const auto& s) { return s["cameras"][0]["connections"] >= 2; }, seconds(60));
+    stack.wait_for_status([](const auto& s) { return s["cameras"][0]["connections"] >= 2; },
+                          seconds(60));
     stack.wait_for_status(healthy, seconds(60));
     judge(stack, 2);
 }
@@ -186,8 +193,9 @@ TEST_CASE("end to end: a board that resets begins a new epoch") {
     stack.start_service();
     auto stream = wait_for_stream<FrameStream>("cam0", "reset");
     const auto first = read_until(stream, is_item);
-    const auto later = read_until(
-        stream, [&](const auto& item) { return is_item(item) && item.data.epoch != first.data.epoch; });
+    const auto later = read_until(stream, [&](const auto& item) {
+        return is_item(item) && item.data.epoch != first.data.epoch;
+    });
     CHECK(later.data.epoch == first.data.epoch + 1);
     CHECK(later.time > first.time);
     const auto status = stack.wait_for_status(healthy);
@@ -197,10 +205,11 @@ TEST_CASE("end to end: a board that resets begins a new epoch") {
 }
 
 TEST_CASE("end to end: lost frames and ignored triggers are records, and shift nothing") {
-    Stack stack({"faults", 17, 1, 20, "",
-                 "[[fault]]\nkind = \"drop_frame\"\ncamera = \"cam0\"\nat_exposure = 40\ncount = 2\n"
-                 "[[fault]]\nkind = \"ignore_trigger\"\ncamera = \"cam0\"\nat_exposure = 50\n",
-                 ""});
+    Stack stack(
+        {"faults", 17, 1, 20, "",
+         "[[fault]]\nkind = \"drop_frame\"\ncamera = \"cam0\"\nat_exposure = 40\ncount = 2\n"
+         "[[fault]]\nkind = \"ignore_trigger\"\ncamera = \"cam0\"\nat_exposure = 50\n",
+         ""});
     stack.start_rig();
     stack.start_service();
     auto events = wait_for_stream<EventStream>("events", "faults");
@@ -219,14 +228,17 @@ TEST_CASE("end to end: lost frames and ignored triggers are records, and shift n
 }
 
 TEST_CASE(
-    "end to end: an exposure that outlasts what the board waits for is predicted, says so, and is not called "
+    "end to end: an exposure that outlasts what the board waits for is predicted, says so, and is "
+    "not called "
     "healthy") {
     Stack stack({"overlong", 23, 1, 10, "exposure_us = 60000", "", "max_exposure_us = 40000.0"});
     stack.start_rig();
     stack.start_service();
-    const auto status = stack.wait_for_status(
-        [](const auto& s) { return s["cameras"][0]["pairing"] == "locked" && s["health"] == "degraded"; });
-    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("max_exposure_us"));
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["pairing"] == "locked" && s["health"] == "degraded";
+    });
+    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(),
+               Catch::Contains("max_exposure_us"));
     auto stream = wait_for_stream<FrameStream>("cam0", "overlong");
     const auto frame = read_until(stream, is_item);
     CHECK(frame.data.stamp_kind() == StampKind::predicted_middle);
@@ -258,13 +270,16 @@ TEST_CASE("end to end: frames of an aligned board lie at whole seconds of the ou
     }
     stack.start_rig();
     stack.start_service();
-    const auto aligned = [](const auto& s) { return healthy(s) && s["clock"]["grid_aligned"] == true; };
+    const auto aligned = [](const auto& s) {
+        return healthy(s) && s["clock"]["grid_aligned"] == true;
+    };
     stack.wait_for_status(aligned);
     for (const unsigned camera : {0U, 1U}) {
         auto stream = wait_for_stream<FrameStream>("cam" + std::to_string(camera), "aligned");
         for (int i = 0; i < 60; ++i) {
             const auto frame = read_until(stream, is_item);
-            const double past_ms = static_cast<double>(frame.time.ns % 1'000'000'000) * 1e-6 - camera * 10.0;
+            const double past_ms =
+                static_cast<double>(frame.time.ns % 1'000'000'000) * 1e-6 - camera * 10.0;
             REQUIRE(std::abs(std::remainder(past_ms, 50.0)) < 0.2);
         }
     }
@@ -286,18 +301,20 @@ TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie 
     auto events = wait_for_stream<EventStream>("events", "gnss");
     std::int64_t last = 0;
     for (int i = 0; i < 4; ++i) {
-        const auto label = read_until(
-            events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::utc_label; });
+        const auto label = read_until(events, [](const auto& e) {
+            return is_item(e) && e.data.kind == EventKind::utc_label;
+        });
         if (i > 0) CHECK(label.data.value == last + 1);
         last = label.data.value;
         CHECK(absolute(label.time - OutputTime{last * 1'000'000'000}) < milliseconds(1));
     }
     // Four of them make the stamps.
-    const auto status = stack.wait_for_status([](const auto& s) { return s["clock"]["pps"] == "used"; });
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["clock"]["pps"] == "used"; });
     CHECK(status["clock"]["pps_rejected"] == 0);
     CHECK(std::abs(status["clock"]["pps_residual_ns"].get<double>()) < 1e6);
-    const auto pulse =
-        read_until(events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::pps; });
+    const auto pulse = read_until(
+        events, [](const auto& e) { return is_item(e) && e.data.kind == EventKind::pps; });
     const std::int64_t past = pulse.time.ns % 1'000'000'000;
     CHECK(std::min(past, 1'000'000'000 - past) < 5'000);
     CHECK(judge(stack, 2).ok);
@@ -314,11 +331,13 @@ TEST_CASE("end to end: packets that get lost are asked for again") {
 TEST_CASE("end to end: without a board the service says so and waits, it also stops then") {
     Stack stack({"lonely", 19, 1, 20, "", "", ""});
     stack.start_service();
-    const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
     CHECK(status["board"]["state"] == "absent");
     CHECK_THAT(status["board"]["hint"].template get<std::string>(),
                Catch::Contains("is the board's process"));
-    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(), Catch::Contains("no such camera"));
+    CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(),
+               Catch::Contains("no such camera"));
     CHECK(stack.service().terminate() == 0);
 }
 
@@ -359,17 +378,18 @@ TEST_CASE("end to end: one service per instance") {
     Stack stack({"twice", 20, 1, 20, "", "", ""});
     stack.start_service();
     std::string output;
-    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("second.log"),
-              &output) == 69);
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()},
+              stack.log_path("second.log"), &output) == 69);
     CHECK_THAT(output, Catch::Contains("another versavisd serves this instance"));
 }
 
 TEST_CASE("end to end: a bad configuration ends with 78 and its place, a good one is said to be") {
     Stack stack({"config", 21, 1, 20, "", "", "rate = 3\n"});
     std::string output;
-    CHECK(run({program("versavisd"), "--config", stack.configuration_path()}, stack.log_path("bad.log"),
-              &output) == 78);
-    CHECK_THAT(output, Catch::Contains("versavis.toml:11:1: unknown key 'rate'; did you mean 'rate_hz'?"));
+    CHECK(run({program("versavisd"), "--config", stack.configuration_path()},
+              stack.log_path("bad.log"), &output) == 78);
+    CHECK_THAT(output,
+               Catch::Contains("versavis.toml:11:1: unknown key 'rate'; did you mean 'rate_hz'?"));
     Stack good({"config2", 21, 1, 20, "", "", ""});
     CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()},
               good.log_path("ok.log"), &output) == 0);
@@ -385,7 +405,8 @@ TEST_CASE("end to end: a camera without a trigger line is stamped on arrival, an
         directory.write("versavis.toml",
                         "instance = \"free\"\n[[camera]]\nname = \"cam0\"\ndevice = \"127.0.0.1\"\n"
                         "trigger = \"free\"\npacket_size = 1400\n");
-    Process service({program("versavisd"), "--config", path}, (directory.path() / "service.log").string());
+    Process service({program("versavisd"), "--config", path},
+                    (directory.path() / "service.log").string());
     auto stream = wait_for_stream<FrameStream>("cam0", "free", seconds(30));
     for (int i = 0; i < 5; ++i) {
         const auto frame = read_until(stream, is_item);

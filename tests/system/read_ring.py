@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads frames of a stream by docs/shm-layout.md alone: prints item number, output time, trigger and size.
+"""Reads frames of a stream by docs/contracts/shm-layout.md alone: prints item number, output time, trigger and size.
 
 read_ring.py FILE COUNT: exit code 0 after COUNT intact frames, 1 when the file is no ring or none come in ten seconds.
 """

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "auto_exposure.hpp"
+#include "camera/auto_exposure.hpp"
 
 #include <catch2/catch.hpp>
 #include <cstring>
@@ -62,12 +62,13 @@ TEST_CASE("auto_exposure: a frame is used once, and only if it was exposed as as
 
 TEST_CASE("auto_exposure: it settles at the target, from below and above, within its limits") {
     const double light = GENERATE(0.00002, 0.0002, 0.002);  // brightness per microsecond
-    const Duration first =
-        GENERATE(microseconds(50), milliseconds(20), milliseconds(100));  // the last is beyond the limits
+    const Duration first = GENERATE(microseconds(50), milliseconds(20),
+                                    milliseconds(100));  // the last is beyond the limits
     AutoExposure control(settings(), first);
     int changes = 0;
     for (int frame = 0; frame < 60; ++frame) {
-        const double seen = std::min(1.0, light * static_cast<double>(control.exposure().ns) * 1e-3);
+        const double seen =
+            std::min(1.0, light * static_cast<double>(control.exposure().ns) * 1e-3);
         const Duration before = control.exposure();
         const auto next = control.update(seen);
         if (!next) continue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bandwidth_plan.hpp"
+#include "camera/bandwidth_plan.hpp"
 
 #include <arpa/inet.h>
 
@@ -22,7 +22,8 @@ BandwidthNeed need(double rate_hz, const std::string& link = "eth0") {
 
 /// Time that a frame takes with this pause, against the time between frames.
 double busy(const BandwidthNeed& need, Duration delay) {
-    const double packets = std::ceil(static_cast<double>(need.frame_size) / (need.packet_size - 36));
+    const double packets =
+        std::ceil(static_cast<double>(need.frame_size) / (need.packet_size - 36));
     const double packet_us =
         (need.packet_size + 38) * 8 / need.link_mbps + static_cast<double>(delay.ns) * 1e-3;
     return packets * packet_us * 1e-6 * need.rate_hz;
@@ -35,7 +36,8 @@ TEST_CASE("bandwidth_plan: headers count") {
     CHECK(needed_mbps(need(20)) == Approx((1920 * 1200 + 260 * 74) * 8 * 20 * 1e-6));
 }
 
-TEST_CASE("bandwidth_plan: a camera alone does not pause, sharers keep to their parts, and come and go") {
+TEST_CASE(
+    "bandwidth_plan: a camera alone does not pause, sharers keep to their parts, and come and go") {
     BandwidthPlan plan;
     plan.join("cam0", need(20));
     CHECK(plan.share("cam0").packet_delay.ns == 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/belief.hpp"
+#include "engine/clock/belief.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/pairing/block_id.hpp"
+#include "engine/pairing/block_id.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -33,7 +33,8 @@ TEST_CASE("board: a host of another major version is told who is there, and noth
 }
 
 TEST_CASE(
-    "board: a clock request is answered with the instants at which it came and at which the answer left") {
+    "board: a clock request is answered with the instants at which it came and at which the answer "
+    "left") {
     World world;
     world.connect();
     world.run(second);
@@ -54,7 +55,8 @@ TEST_CASE("board: its health comes once a second") {
     CHECK(world.inbox().lost == 0);
 }
 
-TEST_CASE("board: when a clock answer left is told after it, also when the host was slow to take it") {
+TEST_CASE(
+    "board: when a clock answer left is told after it, also when the host was slow to take it") {
     World world;
     world.connect();
     for (const Nanoseconds stall : {Nanoseconds{0}, 300 * ms}) {
@@ -75,8 +77,9 @@ TEST_CASE("board: when a clock answer left is told after it, also when the host 
 
 TEST_CASE("board: each sample says how old it was when it left") {
     World world;
-    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-                  wire::ImuKind::adis16448b, 204.8, true);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+        wire::ImuKind::adis16448b, 204.8, true);
     REQUIRE(world.begin());
     world.run(2 * second);
     REQUIRE(world.inbox().samples[0].size() > 200);
@@ -86,7 +89,8 @@ TEST_CASE("board: each sample says how old it was when it left") {
     }
 }
 
-TEST_CASE("board: the host places the grid at once while no camera runs, and slews it when one does") {
+TEST_CASE(
+    "board: the host places the grid at once while no camera runs, and slews it when one does") {
     World world;
     world.add_camera(0);
     world.gaps_allowed = true;
@@ -105,7 +109,8 @@ TEST_CASE("board: the host places the grid at once while no camera runs, and sle
     auto& records = world.inbox().exposures[0];
     REQUIRE(records.size() > 40);
     for (std::size_t i = 1; i < records.size(); ++i) REQUIRE(off(records[i], wanted) == 0);
-    // Moved by 1 ms at 1000 ppm: a second later it is there, and no interval was wrong by more than the slew.
+    // Moved by 1 ms at 1000 ppm: a second later it is there, and no interval was wrong by more than
+    // the slew.
     const std::size_t slewed_from = records.size();
     world.send(wire::AlignGrid{wanted + 7 * second + ms, 0, 1'000'000});
     world.run(3 * second);
@@ -129,10 +134,11 @@ TEST_CASE("board: an alignment out of range is ignored, counted and told") {
     REQUIRE(world.begin());
     world.run(second);
     const Nanoseconds now = world.now();
-    const wire::AlignGrid junk[] = {
-        {now, 500'001, 1000}, {now, -500'001, 1000},         {now, INT32_MIN, 1000},     {now, 0, 0},
-        {now, 0, 1'000'001},  {now + 101 * second, 0, 1000}, {now - 101 * second, 0, 1}, {INT64_MIN, 0, 1000},
-        {INT64_MAX, 0, 1000}};
+    const wire::AlignGrid junk[] = {{now, 500'001, 1000},       {now, -500'001, 1000},
+                                    {now, INT32_MIN, 1000},     {now, 0, 0},
+                                    {now, 0, 1'000'001},        {now + 101 * second, 0, 1000},
+                                    {now - 101 * second, 0, 1}, {INT64_MIN, 0, 1000},
+                                    {INT64_MAX, 0, 1000}};
     for (const wire::AlignGrid& message : junk) world.send(message);
     world.run(2 * second);
     for (const wire::Exposure& record : world.inbox().exposures[0])
@@ -153,7 +159,8 @@ TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
     std::vector<Nanoseconds> pulses;
     for (std::string line : lines) {
         unsigned sum = 0;
-        for (std::size_t i = 1; i + 1 < line.size(); ++i) sum ^= static_cast<unsigned char>(line[i]);
+        for (std::size_t i = 1; i + 1 < line.size(); ++i)
+            sum ^= static_cast<unsigned char>(line[i]);
         line += {"0123456789ABCDEF"[sum >> 4U], "0123456789ABCDEF"[sum & 15U], '\r', '\n'};
         const std::size_t before = world.inbox().events_of(wire::EventKind::pps).size();
         while (world.inbox().events_of(wire::EventKind::pps).size() == before) world.run(ms);

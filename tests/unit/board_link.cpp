@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The link against a board that is played: what it makes of answers, follow-ups and older boards.
-#include "board_link.hpp"
+#include "board/board_link.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -15,7 +15,8 @@ using namespace versavis::daemon;
 
 namespace {
 
-constexpr Duration on_the_way = milliseconds(100);  // an answer waits so long before it leaves the board
+constexpr Duration on_the_way =
+    milliseconds(100);  // an answer waits so long before it leaves the board
 
 /// Answers at once; time stands still on the way, but for what the stamps say.
 class PlayedBoard final : public ByteStream {
@@ -27,14 +28,16 @@ class PlayedBoard final : public ByteStream {
     Expected<Chunk> read(Duration timeout) override {
         std::unique_lock lock(mutex_);
         const auto any = [this] { return !chunks_.empty(); };
-        if (!came_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), any)) return Chunk{host_now(), {}};
+        if (!came_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), any))
+            return Chunk{host_now(), {}};
         Chunk chunk = std::move(chunks_.front());
         chunks_.pop_front();
         return chunk;
     }
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
-        decoder_.feed(bytes.data(), bytes.size(), [this](const wire::Packet& packet) { answer(packet); });
+        decoder_.feed(bytes.data(), bytes.size(),
+                      [this](const wire::Packet& packet) { answer(packet); });
         return {};
     }
 
@@ -59,7 +62,8 @@ class PlayedBoard final : public ByteStream {
         } else if (packet.read(request)) {
             send(wire::ClockAnswer{request.id, 0, now.ns, now.ns}, now + on_the_way);
             const Duration until = on_the_way - microseconds(10);
-            if (follows_up_) send(wire::ClockFollowUp{request.id, 0, (now + until).ns}, now + on_the_way);
+            if (follows_up_)
+                send(wire::ClockFollowUp{request.id, 0, (now + until).ns}, now + on_the_way);
         }
     }
 
@@ -95,10 +99,12 @@ struct Listener final : BoardListener {
 };
 
 struct Clock {
-    clock::Translator translator{*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
+    clock::Translator translator{
+        *clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
     test::TemporaryDirectory directory{"/dev/shm"};
-    ClockRecorder recorder{*ring::Writer::create(directory.path(), {"clock", ring::StreamKind::clock, 64}),
-                           translator};
+    ClockRecorder recorder{
+        *ring::Writer::create(directory.path(), {"clock", ring::StreamKind::clock, 64}),
+        translator};
 };
 
 /// The clock as it stands when the cameras may be started.
@@ -111,7 +117,8 @@ clock::ClockReport connect(std::uint8_t minor, bool follows_up) {
         },
         {}, 1, clock.translator, clock.recorder, listener);
     link.start();
-    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) ==
+            std::future_status::ready);
     return clock.translator.report();
 }
 
@@ -123,7 +130,9 @@ TEST_CASE("board_link: an exchange ends when the answer truly left, if the board
     CHECK(clock.round_trip < on_the_way / 2);
 }
 
-TEST_CASE("board_link: without a follow-up the answer's own stamp is used, whether one could come or not") {
+TEST_CASE(
+    "board_link: without a follow-up the answer's own stamp is used, whether one could come or "
+    "not") {
     for (const std::uint8_t minor : {std::uint8_t{1}, std::uint8_t{2}}) {
         const clock::ClockReport clock = connect(minor, false);
         CHECK(clock.exchanges == 4);
@@ -145,7 +154,8 @@ TEST_CASE("board_link: the grid is aligned before any camera can be started") {
         link.align_grid({1, 2, 3});
     };
     link.start();
-    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) ==
+            std::future_status::ready);
     CHECK((link.report().capabilities & wire::capability_host_grid) != 0);
     link.stop();
     CHECK(std::count(heard.begin(), heard.end(), wire::Type::align_grid) == 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera_pipeline.hpp"
+#include "stream/camera_pipeline.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -68,7 +68,8 @@ const std::uint64_t pattern[] = {0, 1, 3, 4, 7, 9, 11};
 
 }  // namespace
 
-TEST_CASE("camera_pipeline: a proved frame carries the measured middle, and all that is known of it") {
+TEST_CASE(
+    "camera_pipeline: a proved frame carries the measured middle, and all that is known of it") {
     Bench bench(camera(20));
     auto reader = bench.reader("cam0");
     for (const std::uint64_t tick : pattern) {
@@ -90,7 +91,9 @@ TEST_CASE("camera_pipeline: a proved frame carries the measured middle, and all 
     CHECK(bench.pipeline.report().published == std::size(pattern));
 }
 
-TEST_CASE("camera_pipeline: an end that was not seen costs no pairing, and sigma reaches to the arrival") {
+TEST_CASE(
+    "camera_pipeline: an end that was not seen costs no pairing, and sigma reaches to the "
+    "arrival") {
     Bench bench(camera(20));
     auto reader = bench.reader("cam0");
     for (const std::uint64_t tick : pattern) {
@@ -99,7 +102,8 @@ TEST_CASE("camera_pipeline: an end that was not seen costs no pairing, and sigma
     }
     std::optional<FrameMetadata> predicted;
     for (auto item = reader.next(); item.found == ring::Found::item; item = reader.next())
-        if (unpack<FrameMetadata>(item.metadata).tick == 9) predicted = unpack<FrameMetadata>(item.metadata);
+        if (unpack<FrameMetadata>(item.metadata).tick == 9)
+            predicted = unpack<FrameMetadata>(item.metadata);
     REQUIRE(predicted);
     CHECK(predicted->stamp_kind() == StampKind::predicted_middle);
     CHECK(predicted->exposure.ns == 0);
@@ -119,7 +123,8 @@ TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") 
 }
 
 TEST_CASE(
-    "camera_pipeline: an exposure line that shows another exposure than the camera tells proves nothing") {
+    "camera_pipeline: an exposure line that shows another exposure than the camera tells proves "
+    "nothing") {
     auto configuration = camera(20);
     configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);
     configuration.check_exposure = GENERATE(true, false);
@@ -143,7 +148,9 @@ TEST_CASE(
     CHECK(frame.trigger == 1);
 }
 
-TEST_CASE("camera_pipeline: slow cameras are given the time of their pattern before they are started again") {
+TEST_CASE(
+    "camera_pipeline: slow cameras are given the time of their pattern before they are started "
+    "again") {
     Bench bench(camera(0.4));
     bench.pipeline.start_requested(pairing::Start::pattern, host_now());
     bench.trigger(4);
@@ -152,7 +159,8 @@ TEST_CASE("camera_pipeline: slow cameras are given the time of their pattern bef
     CHECK(bench.pipeline.advance(host_now() + seconds(15)));
 }
 
-TEST_CASE("camera_pipeline: a camera that runs freely is published as it comes, of unknown accuracy") {
+TEST_CASE(
+    "camera_pipeline: a camera that runs freely is published as it comes, of unknown accuracy") {
     auto configuration = camera(20);
     configuration.trigger = TriggerSource::free_run;
     Bench bench(configuration);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera_preset.hpp"
+#include "camera/camera_preset.hpp"
 
 #include <catch2/catch.hpp>
 #include <map>
@@ -26,7 +26,7 @@ class Book final : public FeatureBook {
 };
 
 std::vector<CameraPreset> all() {
-    auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/presets");
+    auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/camera/presets");
     REQUIRE(presets);
     return *presets;
 }
@@ -87,7 +87,8 @@ TEST_CASE("camera_preset: each family is known by what its cameras call themselv
     CHECK(chosen("Teledyne DALSA", "Nano-C2420") == "dalsa");
     CHECK(chosen("Somebody", "Else") == "generic");
     CHECK(choose_preset(all(), "lucid", "Basler", "a")->name == "lucid");
-    CHECK_THAT(choose_preset(all(), "lucied", "a", "b").error().message(), Catch::Contains("one of: auto, "));
+    CHECK_THAT(choose_preset(all(), "lucied", "a", "b").error().message(),
+               Catch::Contains("one of: auto, "));
 }
 
 TEST_CASE("camera_preset: steps become what this camera has") {
@@ -100,10 +101,12 @@ TEST_CASE("camera_preset: steps become what this camera has") {
     CHECK(value_of(*actions, "TriggerOverlap") == "ReadOut");
     CHECK(value_of(*actions, "TriggerSelector") == "FrameStart");
     CHECK(value_of(*actions, "AcquisitionFrameRateEnable") == "false");
-    CHECK(value_of(*plan(*flir, "strobe", variables, blackfly_s), "LineSource") == "ExposureActive");
+    CHECK(value_of(*plan(*flir, "strobe", variables, blackfly_s), "LineSource") ==
+          "ExposureActive");
     CHECK(value_of(*plan(*flir, "exposure_limit", {{"max_exposure_us", "45000"}}, blackfly_s),
                    "AutoExposureExposureTimeUpperLimit") == "45000");
-    CHECK(value_of(*plan(*flir, "pulse_width", variables, blackfly_s), "ExposureMode") == "TriggerWidth");
+    CHECK(value_of(*plan(*flir, "pulse_width", variables, blackfly_s), "ExposureMode") ==
+          "TriggerWidth");
 
     const auto allied = choose_preset(all(), "allied-vision-gige", "", "");
     const std::map<std::string, std::string> lines{
@@ -117,7 +120,8 @@ TEST_CASE("camera_preset: all that a camera lacks is said at once") {
     const auto actions = plan(*flir, "strobe", variables, mako);
     REQUIRE_FALSE(actions);
     CHECK_THAT(actions.error().message(), Catch::Contains("no LineSelector") &&
-                                              Catch::Contains("no LineSource") && Catch::Contains("preset"));
+                                              Catch::Contains("no LineSource") &&
+                                              Catch::Contains("preset"));
     const std::map<std::string, std::string> wrong{
         {"trigger_line", "Line7"}, {"strobe_line", "Line1"}, {"edge", "RisingEdge"}};
     CHECK_THAT(plan(*flir, "trigger", wrong, blackfly_s).error().message(),
@@ -126,9 +130,11 @@ TEST_CASE("camera_preset: all that a camera lacks is said at once") {
 
 TEST_CASE("camera_preset: errors of preset files name line and key") {
     test::TemporaryDirectory directory;
-    CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("no camera presets"));
-    directory.write("bad.toml",
-                    "vendors = [\"a\"]\n[[trigger]]\nset = [\"A\"]\nto = [\"B\"]\noptinal = true\n");
+    CHECK_THAT(load_presets(directory.path()).error().message(),
+               Catch::Contains("no camera presets"));
+    directory.write(
+        "bad.toml",
+        "vendors = [\"a\"]\n[[trigger]]\nset = [\"A\"]\nto = [\"B\"]\noptinal = true\n");
     const std::string message = load_presets(directory.path()).error().message();
     CHECK_THAT(message, Catch::Contains("bad.toml") && Catch::Contains("optional"));
     directory.write("bad.toml", "[[trigger]]\nset = [\"A\"]\n");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "clock_csv.hpp"
+#include "clock/clock_csv.hpp"
 
 #include <catch2/catch.hpp>
 #include <limits>
@@ -79,7 +79,8 @@ TEST_CASE("clock_csv: a missing column names those that are there") {
 }
 
 TEST_CASE("clock_csv: what is no whole number is named with line and column") {
-    const std::string field = GENERATE("abc", "1.5", "1e9", "0x10", "+1", "1 2", "nan", "--1", "1_000", "-");
+    const std::string field =
+        GENERATE("abc", "1.5", "1e9", "0x10", "+1", "1 2", "nan", "--1", "1_000", "-");
     CHECK_THAT(error("a_ns,b_ns\n1,2\n\n3," + field + "\n"),
                Contains("x.csv, line 4, column b_ns") && Contains("'" + field + "' is no integer"));
 }

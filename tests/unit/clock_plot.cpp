@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "clock_plot.hpp"
+#include "clock/clock_plot.hpp"
 
 #include <boost/property_tree/ptree.hpp>
 #include <boost/property_tree/xml_parser.hpp>
@@ -8,7 +8,7 @@
 #include <limits>
 #include <sstream>
 
-#include "svg_panel.hpp"
+#include "clock/svg_panel.hpp"
 
 using namespace versavis;
 using namespace versavis::client;
@@ -46,14 +46,16 @@ boost::property_tree::ptree parsed(const std::string& svg) {
 /// All texts of the drawing, one per line.
 std::string texts(const boost::property_tree::ptree& tree) {
     std::string out;
-    for (const auto& [name, child] : tree) out += name == "text" ? child.data() + "\n" : texts(child);
+    for (const auto& [name, child] : tree)
+        out += name == "text" ? child.data() + "\n" : texts(child);
     return out;
 }
 
 }  // namespace
 
 TEST_CASE("clock_plot: history has a point per exchange, with what it measured and changed") {
-    const auto points = clock_history(recording(600, seconds(1)), *make_estimator(EstimatorKind::ekf_fair));
+    const auto points =
+        clock_history(recording(600, seconds(1)), *make_estimator(EstimatorKind::ekf_fair));
     REQUIRE(points.size() == 600);
     CHECK(points[0].time_s == 0);
     CHECK(points[0].residual_ns == 0);
@@ -77,7 +79,8 @@ TEST_CASE("clock_plot: the drawing is XML with all four panels twice, each with 
     const auto count = GENERATE(1, 2, 40, 2000);
     const std::string svg = clock_svg(history(count), {"title", "envelope"});
     const std::string all = texts(parsed(svg));
-    for (const char* label : {"offset [", "skew [ppm]", "residual [", "innovation [", "time since"}) {
+    for (const char* label :
+         {"offset [", "skew [ppm]", "residual [", "innovation [", "time since"}) {
         const auto first = all.find(label);
         CHECK(first != std::string::npos);
         CHECK(all.find(label, first + 1) != std::string::npos);
@@ -88,7 +91,8 @@ TEST_CASE("clock_plot: the drawing is XML with all four panels twice, each with 
 
 TEST_CASE("clock_plot: a title may hold anything") {
     const std::string title = "<&\">\x01 \xC3\xA9 \xFF \xED\xA0\x80 \xE2\x82";
-    CHECK_THAT(texts(parsed(clock_svg(history(5), {title, "x"}))), Contains("<&\">? \xC3\xA9 ? ??? ??"));
+    CHECK_THAT(texts(parsed(clock_svg(history(5), {title, "x"}))),
+               Contains("<&\">? \xC3\xA9 ? ??? ??"));
 }
 
 TEST_CASE("clock_plot: its size does not grow with the recording") {

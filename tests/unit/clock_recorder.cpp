@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "clock_recorder.hpp"
+#include "stream/clock_recorder.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -62,7 +62,8 @@ struct Recording {
 
 }  // namespace
 
-TEST_CASE("clock_recorder: what it is told is in the ring, with the board's nonce and the output time") {
+TEST_CASE(
+    "clock_recorder: what it is told is in the ring, with the board's nonce and the output time") {
     Recording recording;
     recording.recorder.board_restarted(77);
     CHECK(recording.expect<OutputTold>().epoch == 0);

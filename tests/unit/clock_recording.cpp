@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/recording.hpp"
+#include "engine/clock/recording.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "clock_json.hpp"
+#include "clock/clock_json.hpp"
 #include "versavis/metadata.hpp"
 
 using namespace versavis;
@@ -83,5 +83,6 @@ TEST_CASE("clock_recording: as JSON") {
     CHECK(line["answered_ns"] == 3);
     CHECK(client::to_json(ClockItem{OneWayTold{9, {10}, {11}}})["departed_ns"] == 10);
     CHECK(client::to_json(ClockItem{RestartTold{12}})["clock"] == "board_restarted");
-    CHECK(client::to_json(ClockItem{OutputTold{13, {14}, {-15}, {16}}})["output_minus_host_ns"] == -15);
+    CHECK(client::to_json(ClockItem{OutputTold{13, {14}, {-15}, {16}}})["output_minus_host_ns"] ==
+          -15);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "clock_replay.hpp"
+#include "clock/clock_replay.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -26,7 +26,9 @@ constexpr std::int64_t high = std::numeric_limits<std::int64_t>::max();
 std::vector<clock::Exchange> exchanges(std::size_t count, bool board_begins = false) {
     std::mt19937_64 random(7);
     std::uniform_int_distribution<std::int64_t> delay(100'000, 600'000);
-    const auto board = [](std::int64_t host) { return BoardTime{host - 5'000'000'000 + host / 50'000}; };
+    const auto board = [](std::int64_t host) {
+        return BoardTime{host - 5'000'000'000 + host / 50'000};
+    };
     std::vector<clock::Exchange> all;
     for (std::size_t i = 0; i < count; ++i) {
         const std::int64_t t = 10'000'000'000 + static_cast<std::int64_t>(i) * 100'000'000;
@@ -62,8 +64,8 @@ std::vector<ClockQuery> random_queries(std::size_t count) {
     return queries;
 }
 
-ClockAnswers answers(const std::vector<TimedMessage>& messages, const std::vector<ClockQuery>& queries,
-                     EstimatorKind kind) {
+ClockAnswers answers(const std::vector<TimedMessage>& messages,
+                     const std::vector<ClockQuery>& queries, EstimatorKind kind) {
     return replayed_answers(messages, queries, *make_estimator(kind));
 }
 
@@ -75,7 +77,8 @@ std::string csv(const std::vector<clock::Exchange>& all) {
     std::ostringstream out;
     out << "h1_ns,m2_ns,m3_ns,h4_ns\n";
     for (const clock::Exchange& e : all)
-        out << e.sent.ns << ',' << e.received.ns << ',' << e.answered.ns << ',' << e.arrived.ns << '\n';
+        out << e.sent.ns << ',' << e.received.ns << ',' << e.answered.ns << ',' << e.arrived.ns
+            << '\n';
     return out.str();
 }
 
@@ -85,7 +88,8 @@ std::string content(const std::string& path) {
 }
 
 std::size_t files_in(const test::TemporaryDirectory& directory) {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(directory.path()), {}));
+    return static_cast<std::size_t>(
+        std::distance(std::filesystem::directory_iterator(directory.path()), {}));
 }
 
 const std::vector<EstimatorKind> every_kind{EstimatorKind::envelope, EstimatorKind::ekf,
@@ -99,7 +103,8 @@ TEST_CASE("clock_replay: later messages change no earlier answer") {
     const auto queries = random_queries(200);
     const auto with_all = answers(all, queries, kind);
     for (const std::size_t count : {0U, 1U, 2U, 50U, 299U}) {
-        const std::vector<TimedMessage> some(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
+        const std::vector<TimedMessage> some(all.begin(),
+                                             all.begin() + static_cast<std::ptrdiff_t>(count));
         const auto with_some = answers(some, queries, kind);
         std::size_t compared = 0;
         for (std::size_t i = 0; i < queries.size(); ++i)
@@ -125,7 +130,8 @@ TEST_CASE("clock_replay: a message is used from the instant on at which it is av
     const auto all = timed(exchanges(1));
     const HostTime at = all[0].available;
     const BoardTime board{5'000'000'000};
-    const auto answer = answers(all, {{at - nanoseconds(1), board}, {at, board}}, EstimatorKind::envelope);
+    const auto answer =
+        answers(all, {{at - nanoseconds(1), board}, {at, board}}, EstimatorKind::envelope);
     CHECK(answer[0].state == ClockState::init);
     CHECK(answer[1].state == ClockState::converging);
 }
@@ -143,7 +149,8 @@ TEST_CASE("clock_replay: exchanges that the board began are as good") {
     CHECK(error_us(answers(recording->messages, {{{host}, board}}, kind)[0], host) < 200);
 }
 
-TEST_CASE("clock_replay: messages are fed as they became available, exchanges before one-way ones") {
+TEST_CASE(
+    "clock_replay: messages are fed as they became available, exchanges before one-way ones") {
     const test::TemporaryDirectory directory;
     const std::string x = directory.write(
         "x.csv", "available_ns,h4_ns,m3_ns,m2_ns,h1_ns\n300,110,57,53,100\n200,130,77,73,120\n");
@@ -171,9 +178,10 @@ TEST_CASE("clock_replay: absurd stamps are left out, and absurd questions not an
     REQUIRE(recording);
     CHECK(recording->ignored == 4);
     CHECK(recording->messages.size() == 50);
-    const auto answer = answers(recording->messages,
-                                {{{high}, {low}}, {{high}, {high}}, {{high}, {9'000'000'000}}, {{low}, {0}}},
-                                GENERATE(from_range(every_kind)));
+    const auto answer =
+        answers(recording->messages,
+                {{{high}, {low}}, {{high}, {high}}, {{high}, {9'000'000'000}}, {{low}, {0}}},
+                GENERATE(from_range(every_kind)));
     CHECK(answer[0].state == ClockState::init);
     CHECK(answer[1].state == ClockState::init);
     CHECK(answer[2].state != ClockState::init);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/wire/cobs.hpp"
+#include "wire/cobs.hpp"
 
 #include <rapidcheck.h>
 
@@ -65,6 +65,7 @@ TEST_CASE("cobs: malformed input is refused") {
     const Bytes long_one(20, 1);
     CHECK(cobs_decode(zero_code.data(), zero_code.size(), out.data(), out.size()) == cobs_invalid);
     CHECK(cobs_decode(cut.data(), cut.size(), out.data(), out.size()) == cobs_invalid);
-    CHECK(cobs_decode(zero_inside.data(), zero_inside.size(), out.data(), out.size()) == cobs_invalid);
+    CHECK(cobs_decode(zero_inside.data(), zero_inside.size(), out.data(), out.size()) ==
+          cobs_invalid);
     CHECK(cobs_decode(long_one.data(), long_one.size(), out.data(), out.size()) == cobs_invalid);
 }

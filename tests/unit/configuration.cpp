@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration.hpp"
+#include "configuration/configuration.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -45,9 +45,9 @@ TEST_CASE("configuration: the output clock") {
 }
 
 TEST_CASE("configuration: what the board is told") {
-    const auto configuration = load(
-        camera +
-        "output = 2\nrate_hz = 29.97\nstrobe = \"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
+    const auto configuration = load(camera +
+                                    "output = 2\nrate_hz = 29.97\nstrobe = "
+                                    "\"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
     REQUIRE(configuration);
     const wire::Configuration board = board_configuration(*configuration);
     CHECK(board.cameras[0].flags == 0);
@@ -60,15 +60,18 @@ TEST_CASE("configuration: what the board is told") {
 }
 
 TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is told") {
-    const auto configuration = load(
-        camera +
-        "rate_hz = 50\n[[camera]]\nname = \"cam1\"\ndevice = \"x\"\noutput = 3\nmaster = \"cam0\"\n" +
-        "[[imu]]\nmodel = \"icm42688p\"\nrate_hz = 8000\ndata_ready = true\nfilter = 3\n" +
-        "[[imu]]\nname = \"imu1\"\nmodel = \"vn100\"\n" +
-        "[illumination]\ncameras = [\"cam0\", \"cam1\"]\nlead_us = 50\nmax_on_us = 8000\nduty_percent = "
-        "30\n" +
-        "[ports]\ninputs = [\"pps\", \"sync\"]\nfalling = [\"sync\"]\nimu_output = true\ntest = \"cam1\"\n"
-        "sync_rate_hz = 1\npulse_us = 20\n[board]\nkeep_configuration = true\n");
+    const auto configuration =
+        load(camera +
+             "rate_hz = 50\n[[camera]]\nname = \"cam1\"\ndevice = \"x\"\noutput = 3\nmaster = "
+             "\"cam0\"\n" +
+             "[[imu]]\nmodel = \"icm42688p\"\nrate_hz = 8000\ndata_ready = true\nfilter = 3\n" +
+             "[[imu]]\nname = \"imu1\"\nmodel = \"vn100\"\n" +
+             "[illumination]\ncameras = [\"cam0\", \"cam1\"]\nlead_us = 50\nmax_on_us = "
+             "8000\nduty_percent = "
+             "30\n" +
+             "[ports]\ninputs = [\"pps\", \"sync\"]\nfalling = [\"sync\"]\nimu_output = true\ntest "
+             "= \"cam1\"\n"
+             "sync_rate_hz = 1\npulse_us = 20\n[board]\nkeep_configuration = true\n");
     REQUIRE(configuration);
     const wire::Configuration board = board_configuration(*configuration);
     CHECK(board.flags == wire::configuration_store);
@@ -93,7 +96,8 @@ TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is to
 }
 
 TEST_CASE("configuration: a GNSS receiver at the UART") {
-    const auto configuration = load("[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
+    const auto configuration =
+        load("[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
     REQUIRE(configuration);
     const wire::Configuration board = board_configuration(*configuration);
     CHECK(board.ports.options == wire::port_nmea);
@@ -102,7 +106,8 @@ TEST_CASE("configuration: a GNSS receiver at the UART") {
 
 TEST_CASE("configuration: features are kept in text, in their own types") {
     const auto configuration =
-        load(camera + "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
+        load(camera +
+             "[camera.features]\nGain = 6.5\nExposureAuto = \"Off\"\nReverseX = true\nBin = 2\n");
     REQUIRE(configuration);
     const auto& features = configuration->cameras[0].features;
     const auto value = [&](const std::string& name) {
@@ -118,26 +123,34 @@ TEST_CASE("configuration: features are kept in text, in their own types") {
 
 TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of("instance = \n"), Catch::Contains("versavis.toml:1:"));
-    CHECK_THAT(error_of(camera + "rate_hzz = 20\n"),
-               Catch::Contains("versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"));
+    CHECK_THAT(
+        error_of(camera + "rate_hzz = 20\n"),
+        Catch::Contains("versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"));
     CHECK_THAT(error_of(camera + "rate_hz = 2000\n"),
                Catch::Contains("versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000"));
     CHECK_THAT(error_of(camera + "rate_hz = \"20\"\n"), Catch::Contains("must be a number"));
     CHECK_THAT(error_of(camera + "output = 4\n"), Catch::Contains("from 0 to 3"));
-    CHECK_THAT(error_of(camera + "trigger = \"bord\"\n"), Catch::Contains("must be one of: board, free"));
+    CHECK_THAT(error_of(camera + "trigger = \"bord\"\n"),
+               Catch::Contains("must be one of: board, free"));
     CHECK_THAT(error_of("[[camera]]\nname = \"cam0\"\n"), Catch::Contains("needs a 'device'"));
-    CHECK_THAT(error_of(camera + camera + "output = 1\n"), Catch::Contains("the name 'cam0' is taken"));
+    CHECK_THAT(error_of(camera + camera + "output = 1\n"),
+               Catch::Contains("the name 'cam0' is taken"));
     CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"),
                Catch::Contains("uses output 0, which is taken"));
-    CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"), Catch::Contains("is no name"));
-    CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"), Catch::Contains("is taken"));
+    CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"),
+               Catch::Contains("is no name"));
+    CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"),
+               Catch::Contains("is taken"));
     CHECK_THAT(error_of("[[imu]]\nname = \"clock\"\n"), Catch::Contains("is taken"));
-    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"), Catch::Contains("must be one of: adis16448b"));
+    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"),
+               Catch::Contains("must be one of: adis16448b"));
     CHECK_THAT(error_of("[[imu]]\n[[imu]]\nname = \"b\"\n"), Catch::Contains("one SPI port"));
     CHECK_THAT(error_of("[[imu]]\nrate_hz = 2000\n"), Catch::Contains("from 1 to 1000"));
-    CHECK_THAT(error_of(camera + "master = \"cam9\"\n"), Catch::Contains("cannot have 'cam9' as its master"));
+    CHECK_THAT(error_of(camera + "master = \"cam9\"\n"),
+               Catch::Contains("cannot have 'cam9' as its master"));
     CHECK_THAT(error_of(camera + "master = \"cam0\"\n"), Catch::Contains("as its master"));
-    CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"), Catch::Contains("its master's rate"));
+    CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"),
+               Catch::Contains("its master's rate"));
     CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"), Catch::Contains("is no camera"));
     CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"), Catch::Contains("list of texts"));
     CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is no input"));
@@ -154,7 +167,7 @@ TEST_CASE("configuration: errors name line, column and cure") {
 }
 
 TEST_CASE("configuration: every key of the manual is known, and its example loads") {
-    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/configuration.md");
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/configuration.md");
     REQUIRE(file);
     std::stringstream text;
     text << file.rdbuf();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/wire/crc32.hpp"
+#include "wire/crc32.hpp"
 
 #include <rapidcheck.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/delay_edge.hpp"
+#include "engine/clock/delay_edge.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -19,7 +19,8 @@ TEST_CASE("delay_edge: what is far above the edge says nothing, what is below it
     CHECK(at.curvature > far.curvature);
 }
 
-TEST_CASE("delay_edge: influence is the slope of one smooth function, from far below to far above") {
+TEST_CASE(
+    "delay_edge: influence is the slope of one smooth function, from far below to far above") {
     const double deviation = GENERATE(10.0, 1e3, 1e5);
     const double scale = GENERATE(100.0, 1e4);
     for (double excess = -50 * deviation; excess < 50 * deviation; excess += 0.37 * deviation) {
@@ -31,7 +32,8 @@ TEST_CASE("delay_edge: influence is the slope of one smooth function, from far b
         REQUIRE(std::isfinite(here.score));
         REQUIRE(here.curvature >= 0);
         REQUIRE(here.curvature <= 1 / (deviation * deviation));
-        // By the level of the edge, so against the excess; where delays pull apart it counts as none.
+        // By the level of the edge, so against the excess; where delays pull apart it counts as
+        // none.
         CHECK(here.curvature ==
               Approx(std::max(slope, 0.0)).epsilon(5e-3).margin(2e-3 / (deviation * deviation)));
     }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/ring/directory.hpp"
+#include "engine/ring/directory.hpp"
 
 #include <sys/stat.h>
 
 #include <catch2/catch.hpp>
 
 #include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
 #include "versavis/ring/reader.hpp"
-#include "versavis/ring/writer.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -21,7 +21,8 @@ TEST_CASE("directory: one owner at a time, readable for its group only") {
         struct stat info {};
         REQUIRE(stat(path.c_str(), &info) == 0);
         CHECK((info.st_mode & 0777U) == 0750U);
-        CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("another versavisd"));
+        CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+                   Catch::Contains("another versavisd"));
     }
     CHECK(OwnedDirectory::claim(path));
 }
@@ -38,7 +39,8 @@ TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     {
         std::fstream file(stranger, std::ios::in | std::ios::out | std::ios::binary);
         const std::uint32_t pid = 1;
-        file.seekp(offsetof(Header, writer_pid)).write(reinterpret_cast<const char*>(&pid), sizeof pid);
+        file.seekp(offsetof(Header, writer_pid))
+            .write(reinterpret_cast<const char*>(&pid), sizeof pid);
     }
     auto reader = Reader::open(stranger);
     REQUIRE(reader);

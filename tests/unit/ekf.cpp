@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/ekf.hpp"
+#include "engine/clock/ekf.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -13,8 +13,8 @@ using namespace versavis::clock;
 
 namespace {
 
-/// A board whose skew walks at random, by 0.01 ppm per sqrt(s), read at host times that never go back by
-/// much.
+/// A board whose skew walks at random, by 0.01 ppm per sqrt(s), read at host times that never go
+/// back by much.
 class Board {
  public:
     Board(double skew_ppm, std::mt19937_64& random) : skew_(skew_ppm * 1e-6), random_(random) {}
@@ -22,11 +22,12 @@ class Board {
     /// Integer nanoseconds on both sides, far from zero, as in a recording.
     BoardTime at(HostTime host) {
         while (host > knots_.back().host) append();
-        const auto after =
-            std::partition_point(knots_.begin(), knots_.end(), [&](const Knot& k) { return k.host < host; });
+        const auto after = std::partition_point(knots_.begin(), knots_.end(),
+                                                [&](const Knot& k) { return k.host < host; });
         const Knot& begin = after == knots_.begin() ? *after : *std::prev(after);
         const double since = static_cast<double>((host - begin.host).ns);
-        return {host.ns - start.ns + 77'000'000'000 + std::llround(begin.ahead_ns + begin.skew * since)};
+        return {host.ns - start.ns + 77'000'000'000 +
+                std::llround(begin.ahead_ns + begin.skew * since)};
     }
 
     static constexpr HostTime start{1'700'000'000'000'000'000};
@@ -62,7 +63,8 @@ std::vector<double> errors_us(Duration interval, Draw draw) {
         Board board(std::uniform_real_distribution<>(-30, 30)(random), random);
         Ekf filter(EkfStart::fair());
         HostTime next = Board::start;
-        for (HostTime t = Board::start; t < Board::start + seconds(1800); t = t + milliseconds(100)) {
+        for (HostTime t = Board::start; t < Board::start + seconds(1800);
+             t = t + milliseconds(100)) {
             if (t >= next) {
                 const auto [there, back] = draw(t, random);
                 const HostTime received = t + there;
@@ -71,8 +73,8 @@ std::vector<double> errors_us(Duration interval, Draw draw) {
                 next = next + interval;
             }
             if (t < Board::start + seconds(300)) continue;
-            errors.push_back(std::abs(static_cast<double>((filter.translate(board.at(t)).time - t).ns)) *
-                             1e-3);
+            errors.push_back(
+                std::abs(static_cast<double>((filter.translate(board.at(t)).time - t).ns)) * 1e-3);
         }
     }
     std::sort(errors.begin(), errors.end());
@@ -137,7 +139,8 @@ TEST_CASE("ekf: the gain settles where the published noises put it") {
     filter.add(exact(1'000'000'000, 0));
     CHECK(filter.translate({0}).time == HostTime{1'000'000'000});
     CHECK(filter.translate({0}).state == ClockState::converging);
-    for (std::int64_t i = 1; i <= 1000; ++i) filter.add(exact((1 + i) * 1'000'000'000, i * 1'000'000'000));
+    for (std::int64_t i = 1; i <= 1000; ++i)
+        filter.add(exact((1 + i) * 1'000'000'000, i * 1'000'000'000));
     CHECK(filter.gain() == Approx(0.0515).margin(0.0005));
     const BoardTime last = filter.last_contact();
     CHECK(filter.translate(last).state == ClockState::locked);
@@ -176,7 +179,8 @@ TEST_CASE("ekf: which side began makes no difference") {
         board_began.add({{t + s / 2}, {t + 3'000'000}, {t - 3'000'000}, {t + s / 2}});
     }
     const BoardTime at{60'000'000'000};
-    CHECK(absolute(host_began.translate(at).time - board_began.translate(at).time) <= nanoseconds(1));
+    CHECK(absolute(host_began.translate(at).time - board_began.translate(at).time) <=
+          nanoseconds(1));
 }
 
 TEST_CASE("ekf: stamps at the ends of their range are no reason to fail") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/envelope_filter.hpp"
+#include "engine/clock/envelope_filter.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -12,7 +12,8 @@ using namespace versavis::clock;
 
 namespace {
 
-/// A board whose clock is off by a constant skew, behind a link of random delays; all in exact virtual time.
+/// A board whose clock is off by a constant skew, behind a link of random delays; all in exact
+/// virtual time.
 class Link {
  public:
     Link(double skew_ppm, std::uint64_t seed) : skew_ppm_(skew_ppm), random_(seed) {}
@@ -83,7 +84,8 @@ TEST_CASE("envelope_filter: follows skewed clocks through delays with heavy tail
 TEST_CASE("envelope_filter: sigma grows without contact, and says so") {
     EnvelopeFilter filter;
     Link link(20, 4);
-    for (HostTime t{0}; t.ns < 20'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
+    for (HostTime t{0}; t.ns < 20'000'000'000; t = t + milliseconds(100))
+        filter.add(link.exchange(t));
     const BoardTime last = filter.last_contact();
     const auto at_once = filter.translate(last);
     const auto after_10_s = filter.translate(last + seconds(10));
@@ -118,8 +120,8 @@ TEST_CASE("envelope_filter: a slow link locks, too, with a bound that owns up to
     constexpr Duration one_way = milliseconds(1);
     for (HostTime t{0}; t.ns < 30'000'000'000; t = t + milliseconds(100)) {
         const BoardTime received{t.ns + one_way.ns};
-        filter.add(
-            Exchange{t, received, received, t + one_way * 2 + nanoseconds(t.ns / 1'000'000 % 7 * 10'000)});
+        filter.add(Exchange{t, received, received,
+                            t + one_way * 2 + nanoseconds(t.ns / 1'000'000 % 7 * 10'000)});
     }
     const auto now = filter.translate(filter.last_contact());
     CHECK(now.state == ClockState::locked);
@@ -169,8 +171,8 @@ TEST_CASE("envelope_filter: stamps that count from 1970 are as good as others") 
     Link link(20, 9);
     for (HostTime t{1'000'000'000}; t.ns < 20'000'000'000; t = t + milliseconds(100)) {
         const Exchange exchange = link.exchange(t);
-        filter.add(
-            Exchange{exchange.sent + epoch, exchange.received, exchange.answered, exchange.arrived + epoch});
+        filter.add(Exchange{exchange.sent + epoch, exchange.received, exchange.answered,
+                            exchange.arrived + epoch});
     }
     const HostTime now{20'000'000'000};
     CHECK(absolute(filter.translate(link.board(now)).time - (now + epoch)) < microseconds(20));
@@ -178,7 +180,8 @@ TEST_CASE("envelope_filter: stamps that count from 1970 are as good as others") 
 
 TEST_CASE("envelope_filter: absurd stamps are left out") {
     EnvelopeFilter filter;
-    constexpr std::int64_t extremes[] = {INT64_MIN, INT64_MIN / 2, -1, 0, 1, INT64_MAX / 2, INT64_MAX};
+    constexpr std::int64_t extremes[] = {INT64_MIN, INT64_MIN / 2, -1,       0,
+                                         1,         INT64_MAX / 2, INT64_MAX};
     for (const std::int64_t a : extremes)
         for (const std::int64_t b : extremes)
             for (const std::int64_t c : extremes)

@@ -15,12 +15,12 @@ struct Reports final : ChannelReports {
     std::vector<wire::Exposure> exposures;
     std::vector<wire::EventKind> events;
     void exposure(const wire::Exposure& record) override { exposures.push_back(record); }
-    void event(wire::EventKind kind, std::uint8_t /*source*/, Nanoseconds /*at*/, std::int64_t /*value*/,
-               std::uint16_t /*detail*/) override {
+    void event(wire::EventKind kind, std::uint8_t /*source*/, Nanoseconds /*at*/,
+               std::int64_t /*value*/, std::uint16_t /*detail*/) override {
         events.push_back(kind);
     }
-    void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/, Nanoseconds /*duration*/) override {
-    }
+    void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/,
+                          Nanoseconds /*duration*/) override {}
 };
 
 /// A tracker that waits for triggers at 98, 148, ... ms, patient with exposures of up to a second.
@@ -87,7 +87,8 @@ TEST_CASE("exposure_tracker: a word that left late corrects the trigger's time, 
 }
 
 TEST_CASE(
-    "exposure_tracker: an exposure that is overdue may last for any time, one that was given up is over") {
+    "exposure_tracker: an exposure that is overdue may last for any time, one that was given up is "
+    "over") {
     Bench bench;
     CHECK(bench.tracker.busy_until(90 * ms) == 102 * ms);
     bench.tracker.edge(98 * ms, true);

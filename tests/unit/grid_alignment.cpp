@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "grid_alignment.hpp"
+#include "board/grid_alignment.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -13,7 +13,8 @@ constexpr double skew_ppm = 40;  // of the host against the board
 constexpr Duration board_behind = seconds(3);
 
 HostTime host_of(BoardTime board) {
-    return HostTime{board.ns + std::llround(static_cast<double>(board.ns) * skew_ppm * 1e-6)} + board_behind;
+    return HostTime{board.ns + std::llround(static_cast<double>(board.ns) * skew_ppm * 1e-6)} +
+           board_behind;
 }
 
 /// A clock that was compared ten times a second until `end`, each way taking `way`.
@@ -38,7 +39,8 @@ struct Bench {
         return configuration;
     }
 
-    clock::Translator translator{*clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
+    clock::Translator translator{
+        *clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
     GridAlignment alignment;
 };
 
@@ -52,7 +54,8 @@ wire::Exposure exposure(std::uint64_t tick, std::uint16_t flags = wire::exposure
 
 }  // namespace
 
-TEST_CASE("grid_alignment: the board is told where the next whole second of the output clock lies") {
+TEST_CASE(
+    "grid_alignment: the board is told where the next whole second of the output clock lies") {
     Bench bench;
     compare(bench.translator, BoardTime{}, BoardTime{60'000'000'000}, microseconds(100));
     const HostTime now = host_of(BoardTime{60'000'000'000});
@@ -103,11 +106,13 @@ TEST_CASE("grid_alignment: where the grid truly lies is seen by the middles of e
     REQUIRE(bench.alignment.message(now, bench.translator));
     CHECK(bench.alignment.report(now).aligned);
     const auto see = [&](Duration error) {
-        for (const std::uint64_t tick : {1'000'000U, 1'000'001U, 1'000'002U, 1'000'003U, 1'000'004U}) {
+        for (const std::uint64_t tick :
+             {1'000'000U, 1'000'001U, 1'000'002U, 1'000'003U, 1'000'004U}) {
             const auto since = static_cast<std::int64_t>(static_cast<double>(tick) / 29.97 * 1e9);
-            const Duration odd =
-                tick == 1'000'002 ? milliseconds(20) : Duration{};  // an exposure that nobody foresaw
-            bench.alignment.exposure(exposure(tick), OutputTime{77'005'000'000 + since} + error + odd, now);
+            const Duration odd = tick == 1'000'002 ? milliseconds(20)
+                                                   : Duration{};  // an exposure that nobody foresaw
+            bench.alignment.exposure(exposure(tick),
+                                     OutputTime{77'005'000'000 + since} + error + odd, now);
         }
         bench.alignment.exposure(exposure(5, wire::exposure_no_end), OutputTime{1}, now);
     };

@@ -12,7 +12,9 @@ namespace {
 constexpr Nanoseconds second = 1'000'000'000;
 
 /// True time as this board has it.
-Nanoseconds board_time(Nanoseconds host, std::int64_t ppb) { return host + host / 1'000'000 * ppb / 1'000; }
+Nanoseconds board_time(Nanoseconds host, std::int64_t ppb) {
+    return host + host / 1'000'000 * ppb / 1'000;
+}
 }  // namespace
 
 TEST_CASE("grid_clock: what lies before a board time is found, whatever the pace") {
@@ -33,7 +35,8 @@ TEST_CASE("grid_clock: without pulses grid time passes as board time does") {
     CHECK_FALSE(clock.sync_pulse(6 * second));
 }
 
-TEST_CASE("grid_clock: it takes the pace of the pulses, over gaps, and refuses what is none of them") {
+TEST_CASE(
+    "grid_clock: it takes the pace of the pulses, over gaps, and refuses what is none of them") {
     GridClock clock;
     clock.begin(5 * second, second);
     CHECK(clock.sync_pulse(6 * second + 50'000));  // 50 ppm slower than here
@@ -45,8 +48,10 @@ TEST_CASE("grid_clock: it takes the pace of the pulses, over gaps, and refuses w
     CHECK(clock.board_time(5 * second) == 10 * second + 250'000);
 }
 
-TEST_CASE("grid_clock: placed, its nearest second is there at once, and the pace holds from there") {
-    for (const Nanoseconds wanted : {107'400'000'000, 107'600'000'000, 5'499'999'999, 4'200'000'000}) {
+TEST_CASE(
+    "grid_clock: placed, its nearest second is there at once, and the pace holds from there") {
+    for (const Nanoseconds wanted :
+         {107'400'000'000, 107'600'000'000, 5'499'999'999, 4'200'000'000}) {
         GridClock clock;
         clock.begin(5 * second, 0);
         const Nanoseconds before = clock.grid_time(wanted);
@@ -59,7 +64,8 @@ TEST_CASE("grid_clock: placed, its nearest second is there at once, and the pace
     }
 }
 
-TEST_CASE("grid_clock: aligned, it slews within its limit, never steps, and arrives to the nanosecond") {
+TEST_CASE(
+    "grid_clock: aligned, it slews within its limit, never steps, and arrives to the nanosecond") {
     const std::int64_t pace = GENERATE(-500'000, -40'017, 0, 25'123, 500'000);
     const std::uint32_t slew = GENERATE(100U, 20'000U, 1'000'000U);
     const Nanoseconds offset = GENERATE(-498'000'000, -3'000, 0, 1, 47'000'000, 498'000'000);
@@ -69,8 +75,8 @@ TEST_CASE("grid_clock: aligned, it slews within its limit, never steps, and arri
     const Nanoseconds wanted = 43 * second + offset;
     clock.align(wanted, static_cast<std::int32_t>(pace), slew, now);
     CHECK(std::abs(clock.board_time(clock.grid_time(now)) - now) < 20);
-    // Ticks of 10 ms: each is within the limit of the pace after the one before, which roundings may miss by
-    // 2 ns.
+    // Ticks of 10 ms: each is within the limit of the pace after the one before, which roundings
+    // may miss by 2 ns.
     const Nanoseconds step = 10'000'000;
     Nanoseconds grid = clock.grid_time(now);
     Nanoseconds before = clock.board_time(grid);
@@ -80,15 +86,16 @@ TEST_CASE("grid_clock: aligned, it slews within its limit, never steps, and arri
     for (std::int64_t i = 0; i < ticks; ++i) {
         grid += step;
         const Nanoseconds at = clock.board_time(grid);
-        const double beyond = static_cast<double>(at - before - step) - static_cast<double>(pace) * 1e-2;
+        const double beyond =
+            static_cast<double>(at - before - step) - static_cast<double>(pace) * 1e-2;
         REQUIRE(std::abs(beyond) <= static_cast<double>(slew) * 1e-2 + 2);
         REQUIRE(at > before);
         before = at;
     }
     if (ticks < arrives * 110) return;  // the limit keeps it from arriving soon
     const Nanoseconds later = 38 * second + (grid / second - 37) * second;
-    const double line = static_cast<double>(wanted) +
-                        static_cast<double>(later - 38 * second) * (1 + 1e-9 * static_cast<double>(pace));
+    const double line = static_cast<double>(wanted) + static_cast<double>(later - 38 * second) *
+                                                          (1 + 1e-9 * static_cast<double>(pace));
     CHECK(std::abs(static_cast<double>(clock.board_time(later)) - line) <= 1);
 }
 
@@ -105,8 +112,8 @@ TEST_CASE("grid_clock: messages once a second from a true clock keep it there to
         const Nanoseconds met_before = clock.board_time(meets);
         clock.align(board_time(host_s * second, ppb), static_cast<std::int32_t>(ppb), 500'000, now);
         REQUIRE(clock.board_time(meets) == met_before);
-        for (;
-             clock.board_time(static_cast<Nanoseconds>(tick) * 50'000'000) < board_time(host_s * second, ppb);
+        for (; clock.board_time(static_cast<Nanoseconds>(tick) * 50'000'000) <
+               board_time(host_s * second, ppb);
              ++tick) {
             const Nanoseconds at = clock.board_time(static_cast<Nanoseconds>(tick) * 50'000'000);
             REQUIRE(at > newest);

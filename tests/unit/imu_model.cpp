@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/imu/imu_model.hpp"
+#include "engine/imu/imu_model.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

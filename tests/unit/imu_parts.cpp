@@ -46,7 +46,9 @@ TEST_CASE("imu_parts: floats become fixed point without floating point") {
     CHECK_FALSE(fixed_point(0x7F800000U, 20, out));  // infinite
 }
 
-TEST_CASE("imu_parts: rates are those that the parts have, never slower than asked unless none is faster") {
+TEST_CASE(
+    "imu_parts: rates are those that the parts have, never slower than asked unless none is "
+    "faster") {
     const auto rate = [](wire::ImuKind kind, std::uint32_t millihertz) {
         return find_part(kind)->rate(millihertz);
     };
@@ -64,6 +66,7 @@ TEST_CASE("imu_parts: rates are those that the parts have, never slower than ask
     CHECK(Vn100::true_rate(800'000) == 800'000);
     // A rate that a part has is kept: the answer of a configuration can be sent again.
     for (std::uint32_t wanted = 1'000; wanted < 2'000'000; wanted += 777)
-        for (const auto kind : {wire::ImuKind::adis16445, wire::ImuKind::adis16460, wire::ImuKind::adis16470})
+        for (const auto kind :
+             {wire::ImuKind::adis16445, wire::ImuKind::adis16460, wire::ImuKind::adis16470})
             REQUIRE(rate(kind, rate(kind, wanted)) == rate(kind, wanted));
 }

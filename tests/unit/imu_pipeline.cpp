@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "imu_pipeline.hpp"
+#include "stream/imu_pipeline.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -21,11 +21,14 @@ wire::ImuSample sample(std::uint32_t number, BoardTime at, std::uint16_t flags =
 
 }  // namespace
 
-TEST_CASE("imu_pipeline: nothing before the clock is known, numbers go on over 32 bits, losses are counted") {
+TEST_CASE(
+    "imu_pipeline: nothing before the clock is known, numbers go on over 32 bits, losses are "
+    "counted") {
     test::Pipelines bench;
     ImuConfiguration configuration;
     configuration.model = imu::find_model("adis16448b");
-    ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}), bench.translator);
+    ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}),
+                         bench.translator);
     auto reader = bench.reader("imu0");
     const HostTime begin{50'000'000'000};
     const auto at = [&](int i) { return test::Pipelines::to_board(begin + milliseconds(5 * i)); };

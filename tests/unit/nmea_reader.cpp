@@ -29,7 +29,8 @@ std::optional<std::int64_t> utc(const std::string& text) {
 }
 
 std::string rmc(const std::string& time, const std::string& date, const std::string& status = "A") {
-    return sentence("GPRMC," + time + "," + status + ",4723.1,N,00832.4,E,0.02,31.6," + date + ",,,A");
+    return sentence("GPRMC," + time + "," + status + ",4723.1,N,00832.4,E,0.02,31.6," + date +
+                    ",,,A");
 }
 
 /// Sends the text so that its first byte begins at `begin`.
@@ -53,7 +54,8 @@ TEST_CASE("nmea_reader: seconds since 1970 of sentences as receivers send them")
     CHECK(utc(rmc("235959.000", "311299")) == 946'684'799);
     CHECK(utc(sentence("GNZDA,000000,01,01,1970,00,00")) == 0);
     CHECK(utc(sentence("GNZDA,000000.00,01,01,2100,,")) == 4'102'444'800);
-    CHECK(utc(rmc("120000", "010180")) == 315'576'000);  // two digits from 80 on are of the last century
+    CHECK(utc(rmc("120000", "010180")) ==
+          315'576'000);  // two digits from 80 on are of the last century
     CHECK(utc(rmc("120000", "010179")) == 3'439'800'000);
 }
 
@@ -108,7 +110,8 @@ TEST_CASE("nmea_reader: any bytes at all do no harm, and a sentence after them i
     CHECK(feed(reader, rmc("120000", "010120") + "\r\n", 100 * ms).size() == 1);
 }
 
-TEST_CASE("nmea_reader: a sentence names the pulse before it began, if that is young enough, and once") {
+TEST_CASE(
+    "nmea_reader: a sentence names the pulse before it began, if that is young enough, and once") {
     NmeaReader reader;
     reader.begin(9600);
     const std::string line = rmc("120000", "010120") + "\r\n";
@@ -120,7 +123,8 @@ TEST_CASE("nmea_reader: a sentence names the pulse before it began, if that is y
     CHECK(labels[0].utc_s == 1'577'880'000);
     // The other sentence of the same second says the same.
     CHECK(
-        feed(reader, sentence("GPZDA,120000.00,01,01,2020,00,00") + "\r\n", 20 * second + 950 * ms).empty());
+        feed(reader, sentence("GPZDA,120000.00,01,01,2020,00,00") + "\r\n", 20 * second + 950 * ms)
+            .empty());
     reader.pulse(30 * second);
     CHECK(feed(reader, line, 30 * second + 900 * ms).empty());
     // Its bytes are read after the next pulse came.

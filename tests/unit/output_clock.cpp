@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/output_clock.hpp"
+#include "engine/clock/output_clock.hpp"
 
 #include <catch2/catch.hpp>
 #include <ctime>
@@ -26,8 +26,10 @@ struct Machine {
 
     /// The true difference of the clocks at the host time of the reading, if it was read just now.
     Duration error(const OutputReading& reading) const {
-        const SystemClock clock = kind_ == OutputClockKind::tai ? SystemClock::tai : SystemClock::realtime;
-        const std::int64_t truth_ns = clocks->value_ns(clock) - clocks->value_ns(SystemClock::monotonic_raw);
+        const SystemClock clock =
+            kind_ == OutputClockKind::tai ? SystemClock::tai : SystemClock::realtime;
+        const std::int64_t truth_ns =
+            clocks->value_ns(clock) - clocks->value_ns(SystemClock::monotonic_raw);
         return {reading.minus_host.ns - truth_ns};
     }
 
@@ -49,7 +51,9 @@ TEST_CASE("output_clock: realtime is host time plus the offset") {
     clock_gettime(CLOCK_REALTIME, &before);
     const std::int64_t translated = host_now().ns + offset.ns;
     clock_gettime(CLOCK_REALTIME, &after);
-    const auto ns = [](const timespec& t) { return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec; };
+    const auto ns = [](const timespec& t) {
+        return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+    };
     CHECK(translated > ns(before) - 100'000);
     CHECK(translated < ns(after) + 100'000);
     CHECK(clock->steps() == 0);
@@ -86,7 +90,8 @@ TEST_CASE("output_clock: a preempted reading is made again") {
     CHECK(reading.steps == 0);
 }
 
-TEST_CASE("output_clock: preempted at each try, the best of them is taken and tells how bad it is") {
+TEST_CASE(
+    "output_clock: preempted at each try, the best of them is taken and tells how bad it is") {
     Machine machine(OutputClockKind::realtime);
     // In the third try the least.
     for (int attempt = 0; attempt < 8; ++attempt)
@@ -100,8 +105,8 @@ TEST_CASE("output_clock: preempted at each try, the best of them is taken and te
 
 TEST_CASE("output_clock: each step is seen by the next reading, and once") {
     Machine machine(OutputClockKind::realtime);
-    const auto by = GENERATE(seconds(1), -seconds(1), milliseconds(1), -milliseconds(1), microseconds(50),
-                             -microseconds(50), microseconds(2));
+    const auto by = GENERATE(seconds(1), -seconds(1), milliseconds(1), -milliseconds(1),
+                             microseconds(50), -microseconds(50), microseconds(2));
     const bool told = GENERATE(true, false);
     const Duration before = machine.output.offset();
     machine.clocks->step(by, told);
@@ -131,7 +136,8 @@ TEST_CASE("output_clock: a step is seen through a wide reading, too") {
     Machine machine(OutputClockKind::realtime);
     const auto preempt_all = [&] {
         for (int attempt = 0; attempt < 8; ++attempt)
-            machine.clocks->preempt(4 * attempt + 3, milliseconds(2));  // between the two that are compared
+            machine.clocks->preempt(4 * attempt + 3,
+                                    milliseconds(2));  // between the two that are compared
     };
     machine.clocks->step(microseconds(50));
     preempt_all();
@@ -194,11 +200,13 @@ TEST_CASE("output_clock: a leap second is a step of UTC, and none of TAI") {
     }
 }
 
-TEST_CASE("output_clock: TAI without an offset is refused, or forced and then stepped when it is set") {
+TEST_CASE(
+    "output_clock: TAI without an offset is refused, or forced and then stepped when it is set") {
     const auto clocks = std::make_shared<SimulatedClocks>();
     const auto refused = OutputClock::create(OutputClockKind::tai, false, clocks);
     REQUIRE_FALSE(refused);
-    CHECK_THAT(refused.error().message(), Catch::Contains("leapsectz") && Catch::Contains("force_tai"));
+    CHECK_THAT(refused.error().message(),
+               Catch::Contains("leapsectz") && Catch::Contains("force_tai"));
     clocks->kernel.tai_offset_s = 37;
     CHECK(OutputClock::create(OutputClockKind::tai, false, clocks));
 
@@ -212,7 +220,8 @@ TEST_CASE("output_clock: TAI without an offset is refused, or forced and then st
     CHECK(machine.output.kernel_state().tai_offset_s == 37);
 }
 
-TEST_CASE("output_clock: a set that falls between a reading and the look is one step, with its offset") {
+TEST_CASE(
+    "output_clock: a set that falls between a reading and the look is one step, with its offset") {
     Machine machine(OutputClockKind::realtime);
     struct SetLater final : SystemClocks {
         explicit SetLater(SimulatedClocks& on) : inner(on) {}

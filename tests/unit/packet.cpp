@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/wire/packet.hpp"
+#include "wire/packet.hpp"
 
 #include <rapidcheck.h>
 
@@ -23,7 +23,8 @@ Bytes encoded(const T& message, std::uint32_t nonce, std::uint32_t sequence) {
 
 std::vector<Header> decoded(Decoder& decoder, const Bytes& bytes) {
     std::vector<Header> headers;
-    decoder.feed(bytes.data(), bytes.size(), [&](const Packet& packet) { headers.push_back(packet.header); });
+    decoder.feed(bytes.data(), bytes.size(),
+                 [&](const Packet& packet) { headers.push_back(packet.header); });
     return headers;
 }
 
@@ -61,7 +62,7 @@ Configuration example_configuration() {
 
 /// The line "name: bytes" of the test vectors in the protocol document.
 std::string documented(const std::string& name) {
-    std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/wire-protocol.md");
+    std::ifstream document(VERSAVIS_SOURCE_DIR "/docs/contracts/wire-protocol.md");
     for (std::string line; std::getline(document, line);)
         if (line.rfind(name + ": ", 0) == 0) return line.substr(name.size() + 2);
     return "not in the document";
@@ -75,9 +76,11 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
           documented("clock-answer"));
-    CHECK(hex(encoded(ClockFollowUp{42, 0, 123469876}, 0xA1B2C3D4, 8)) == documented("clock-follow-up"));
+    CHECK(hex(encoded(ClockFollowUp{42, 0, 123469876}, 0xA1B2C3D4, 8)) ==
+          documented("clock-follow-up"));
     CHECK(hex(encoded(Start{0b0101, start_pattern, {}}, 0x11223344, 4)) == documented("start"));
-    CHECK(hex(encoded(AlignGrid{7'000'000'250, -25'000, 20'000}, 0x11223344, 5)) == documented("align-grid"));
+    CHECK(hex(encoded(AlignGrid{7'000'000'250, -25'000, 20'000}, 0x11223344, 5)) ==
+          documented("align-grid"));
     CHECK(hex(encoded(Event{EventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
           documented("event"));
     CHECK(hex(encoded(example_configuration(), 0x11223344, 1)) == documented("configuration"));

@@ -6,10 +6,10 @@
 #include <string>
 
 #include "../support/temporary_directory.hpp"
-#include "event_journal.hpp"
-#include "versavis/clock/translator.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/ring/writer.hpp"
+#include "stream/event_journal.hpp"
 #include "versavis/ring/reader.hpp"
-#include "versavis/ring/writer.hpp"
 
 namespace versavis::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/pps_map.hpp"
+#include "engine/clock/pps_map.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

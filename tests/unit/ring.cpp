@@ -5,8 +5,8 @@
 #include <thread>
 
 #include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
 #include "versavis/ring/reader.hpp"
-#include "versavis/ring/writer.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -17,7 +17,8 @@ struct Fixture {
     test::TemporaryDirectory directory{"/dev/shm"};
 
     Writer inline_writer(std::uint64_t first_item = 0) {
-        return *Writer::create(directory.path(), {"numbers", StreamKind::events, 8, 0, 0, first_item});
+        return *Writer::create(directory.path(),
+                               {"numbers", StreamKind::events, 8, 0, 0, first_item});
     }
     Writer frame_writer(std::uint32_t slots = 4) {
         return *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, slots, 5000});
@@ -57,7 +58,8 @@ TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
     CHECK(reader.next().found == Found::nothing);
 }
 
-TEST_CASE_METHOD(Fixture, "ring: a lapped reader is told how much it lost and goes on half a ring back") {
+TEST_CASE_METHOD(Fixture,
+                 "ring: a lapped reader is told how much it lost and goes on half a ring back") {
     const std::uint64_t start =
         GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
     Writer writer = inline_writer(start);
@@ -112,9 +114,9 @@ TEST_CASE_METHOD(Fixture, "ring: items whose slot is gone count as lost") {
     CHECK(static_cast<std::uint64_t>(item.payload[0]) == item.number + 1);
 }
 
-TEST_CASE_METHOD(
-    Fixture,
-    "ring: slots are handed out until none is left, the oldest goes first, abandoned ones before it") {
+TEST_CASE_METHOD(Fixture,
+                 "ring: slots are handed out until none is left, the oldest goes first, abandoned "
+                 "ones before it") {
     Writer writer = frame_writer(3);
     const auto a = writer.acquire();
     const auto b = writer.acquire();
@@ -129,7 +131,8 @@ TEST_CASE_METHOD(
     CHECK(*writer.acquire() == *a);
 }
 
-TEST_CASE_METHOD(Fixture, "ring: a reader sees the restart of its writer, and one that is gone for good") {
+TEST_CASE_METHOD(Fixture,
+                 "ring: a reader sees the restart of its writer, and one that is gone for good") {
     auto first = std::make_unique<Writer>(inline_writer());
     Reader reader = this->reader("numbers");
     publish(*first, 1);
@@ -168,7 +171,8 @@ TEST_CASE_METHOD(Fixture, "ring: a waiting reader is woken [threads]", "[threads
     CHECK(item.metadata[0] == 5);
 }
 
-TEST_CASE_METHOD(Fixture, "ring: a reader that races with the writer never takes torn data [threads]",
+TEST_CASE_METHOD(Fixture,
+                 "ring: a reader that races with the writer never takes torn data [threads]",
                  "[threads]") {
     Writer writer = *Writer::create(directory.path(), {"race", StreamKind::frames, 4, 3, 4096});
     Reader reader = this->reader("race");
@@ -215,14 +219,17 @@ TEST_CASE_METHOD(Fixture, "ring: what is no ring is refused with a reason") {
     CHECK_FALSE(Reader::open(directory.path() / "empty"));
     std::filesystem::copy_file(directory.path() / "numbers", directory.path() / "damaged");
     {
-        std::fstream file(directory.path() / "damaged", std::ios::in | std::ios::out | std::ios::binary);
+        std::fstream file(directory.path() / "damaged",
+                          std::ios::in | std::ios::out | std::ios::binary);
         const std::uint64_t far = 1ULL << 40U;
-        file.seekp(offsetof(Header, descriptors_at)).write(reinterpret_cast<const char*>(&far), sizeof far);
+        file.seekp(offsetof(Header, descriptors_at))
+            .write(reinterpret_cast<const char*>(&far), sizeof far);
     }
     CHECK_THAT(error("damaged"), Catch::Contains("damaged header"));
     std::filesystem::copy_file(directory.path() / "numbers", directory.path() / "newer");
     {
-        std::fstream file(directory.path() / "newer", std::ios::in | std::ios::out | std::ios::binary);
+        std::fstream file(directory.path() / "newer",
+                          std::ios::in | std::ios::out | std::ios::binary);
         const std::uint32_t version = 2;
         file.seekp(offsetof(Header, abi_major))
             .write(reinterpret_cast<const char*>(&version), sizeof version);
@@ -242,7 +249,8 @@ TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
     CHECK_FALSE(Writer::create(directory.path(), {"odd", StreamKind::events, 7}));
     CHECK_FALSE(Writer::create(directory.path(), {"", StreamKind::events, 8}));
     CHECK_FALSE(Writer::create(directory.path() / "absent", {"name", StreamKind::events, 8}));
-    const auto huge = Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
+    const auto huge =
+        Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
     REQUIRE_FALSE(huge);
     CHECK_THAT(huge.error().message(), Catch::Contains("/dev/shm"));
     CHECK(std::filesystem::is_empty(directory.path()));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A machine's clocks in virtual time: reads cost time, and whoever reads may be preempted; the clock may be
-// slewed and set, and the machine suspended.
+// A machine's clocks in virtual time: reads cost time, and whoever reads may be preempted; the
+// clock may be slewed and set, and the machine suspended.
 #pragma once
 
 #include <map>
 
-#include "versavis/clock/system_clocks.hpp"
+#include "engine/clock/system_clocks.hpp"
 
 namespace versavis::test {
 
@@ -35,7 +35,8 @@ class SimulatedClocks final : public clock::SystemClocks {
             case clock::SystemClock::boottime: return monotonic_ns_ + slept_ns_;
             case clock::SystemClock::realtime: return monotonic_ns_ + realtime_minus_monotonic_ns_;
             case clock::SystemClock::tai:
-                return value_ns(clock::SystemClock::realtime) + kernel.tai_offset_s * 1'000'000'000LL;
+                return value_ns(clock::SystemClock::realtime) +
+                       kernel.tai_offset_s * 1'000'000'000LL;
         }
         return 0;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stamp_guard.hpp"
+#include "stream/stamp_guard.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -89,7 +89,8 @@ TEST_CASE("stamp_guard: an estimate that goes back is held within its epoch") {
     StreamOfStamps stream;
     // The board's clock is the host's; the first exchange is lopsided by 2 ms.
     const auto exchange = [&](std::int64_t at_ns, std::int64_t up_ns) {
-        stream.translator.add({{at_ns}, {at_ns + 10'000}, {at_ns + 10'000}, {at_ns + 20'000 + up_ns}});
+        stream.translator.add(
+            {{at_ns}, {at_ns + 10'000}, {at_ns + 10'000}, {at_ns + 20'000 + up_ns}});
     };
     const auto publish = [&](BoardTime board) {
         const auto stamp = stream.translator.translate(board);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "status.hpp"
+#include "stream/status.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "status_view.hpp"
+#include "status/status_view.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;
@@ -88,14 +88,15 @@ TEST_CASE("status: what the kernel says of its clock, and whether its TAI is wor
 }
 
 TEST_CASE("status: every key of the document is in its manual") {
-    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/status.md");
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/contracts/status.md");
     REQUIRE(file);
     std::stringstream manual;
     manual << file.rdbuf();
     std::vector<std::string> keys;
     collect(nlohmann::json::parse(to_json(healthy())), "", keys);
     CHECK(keys.size() > 50);
-    for (const std::string& key : keys) CHECK_THAT(manual.str(), Catch::Contains("| `" + key + "` |"));
+    for (const std::string& key : keys)
+        CHECK_THAT(manual.str(), Catch::Contains("| `" + key + "` |"));
 }
 
 TEST_CASE("status: what a device says of itself cannot break the document") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/clock/translator.hpp"
+#include "engine/clock/translator.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -9,7 +9,8 @@
 using namespace versavis;
 using namespace versavis::clock;
 
-TEST_CASE("translator: nothing is translated before an exchange, and a board's new life is a new epoch") {
+TEST_CASE(
+    "translator: nothing is translated before an exchange, and a board's new life is a new epoch") {
     Translator translator(*OutputClock::create(OutputClockKind::monotonic_raw));
     CHECK_FALSE(translator.translate(BoardTime{5}));
     translator.board_restarted();
@@ -63,7 +64,8 @@ TEST_CASE("translator: how well the output clock could be read is part of sigma"
     SimulatedTranslator machine;
     const auto narrow = machine.translator.translate(HostTime{7}, microseconds(3));
     CHECK(narrow.sigma_ns == Approx(3'000).margin(5));
-    for (int attempt = 0; attempt < 8; ++attempt) machine.clocks->preempt(4 * attempt + 2, milliseconds(2));
+    for (int attempt = 0; attempt < 8; ++attempt)
+        machine.clocks->preempt(4 * attempt + 2, milliseconds(2));
     const auto wide = machine.translator.translate(HostTime{7}, microseconds(3));
     CHECK(wide.sigma_ns == Approx(1'000'000 / std::sqrt(3.0)).margin(1'000));
     CHECK(absolute(wide.output - narrow.output) <= milliseconds(1));
@@ -84,7 +86,8 @@ TEST_CASE("translator: what the kernel says of its clock is reported as it is") 
 
 namespace {
 
-/// A board whose link is longer to the host by twice `asymmetry`, with PPS; its clock equals the host's.
+/// A board whose link is longer to the host by twice `asymmetry`, with PPS; its clock equals the
+/// host's.
 struct PpsMachine {
     explicit PpsMachine(PpsLabels labels)
         : translator(*OutputClock::create(OutputClockKind::realtime, false, clocks), labels) {
@@ -108,7 +111,8 @@ struct PpsMachine {
     }
     Duration error() {
         const BoardTime now{clocks->value_ns(SystemClock::monotonic_raw)};
-        return translator.translate(now)->output - OutputTime{clocks->value_ns(SystemClock::realtime)};
+        return translator.translate(now)->output -
+               OutputTime{clocks->value_ns(SystemClock::realtime)};
     }
 
     static constexpr Duration asymmetry = microseconds(40);
@@ -146,7 +150,8 @@ TEST_CASE("translator: a host that nobody disciplines names no seconds") {
 }
 
 TEST_CASE(
-    "translator: seconds by a receiver hold whatever the host's clock shows, in an epoch of their own") {
+    "translator: seconds by a receiver hold whatever the host's clock shows, in an epoch of their "
+    "own") {
     PpsMachine machine(PpsLabels::nmea);
     for (int i = 0; i < 20; ++i) machine.pass_second(false);
     const std::uint32_t epoch = machine.translator.translate(BoardTime{})->epoch;

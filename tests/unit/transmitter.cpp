@@ -20,7 +20,8 @@ struct Link final : ByteLink {
         bytes.insert(bytes.end(), data, data + size);
         space -= size;
     }
-    std::size_t read(std::uint8_t* /*data*/, std::size_t /*capacity*/, Nanoseconds& /*received*/) override {
+    std::size_t read(std::uint8_t* /*data*/, std::size_t /*capacity*/,
+                     Nanoseconds& /*received*/) override {
         return 0;
     }
     void watch_departure() override { watched = bytes.size(); }
@@ -70,7 +71,8 @@ wire::Exposure exposure(std::uint64_t trigger) {
 }  // namespace
 
 TEST_CASE(
-    "transmitter: what matters most leaves first, numbered as it leaves, in pieces as small as the link "
+    "transmitter: what matters most leaves first, numbered as it leaves, in pieces as small as the "
+    "link "
     "takes") {
     Bench bench;
     bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
@@ -85,8 +87,8 @@ TEST_CASE(
     }
     const auto headers = bench.headers();
     REQUIRE(headers.size() == 4);
-    const wire::Type order[] = {wire::Type::clock_answer, wire::Type::exposure, wire::Type::imu_sample,
-                                wire::Type::log};
+    const wire::Type order[] = {wire::Type::clock_answer, wire::Type::exposure,
+                                wire::Type::imu_sample, wire::Type::log};
     for (std::uint32_t i = 0; i < 4; ++i) {
         CHECK(headers[i].type == order[i]);
         CHECK(headers[i].sequence == i);
@@ -95,7 +97,8 @@ TEST_CASE(
 
 TEST_CASE("transmitter: of a class that is full the newest stay, and the others are counted") {
     Bench bench;
-    for (std::uint64_t trigger = 1; trigger <= 300; ++trigger) bench.transmitter.send(exposure(trigger));
+    for (std::uint64_t trigger = 1; trigger <= 300; ++trigger)
+        bench.transmitter.send(exposure(trigger));
     bench.link.space = 1'000'000;
     bench.transmitter.pump();
     std::vector<std::uint64_t> triggers;
@@ -113,7 +116,9 @@ TEST_CASE("transmitter: of a class that is full the newest stay, and the others 
     CHECK(health.dropped_imu_samples == 0);
 }
 
-TEST_CASE("transmitter: a new connection hears nothing of the one before, not even the rest of a packet") {
+TEST_CASE(
+    "transmitter: a new connection hears nothing of the one before, not even the rest of a "
+    "packet") {
     Bench bench;
     bench.transmitter.send(exposure(1));
     bench.transmitter.send(exposure(2));
@@ -143,7 +148,8 @@ TEST_CASE("transmitter: the time of sending is that at which the answer leaves")
     CHECK(answer.sent_ns == 90'000);
 }
 
-TEST_CASE("transmitter: when an answer left follows as soon as the link tells, before all that waits") {
+TEST_CASE(
+    "transmitter: when an answer left follows as soon as the link tells, before all that waits") {
     Bench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 20;  // less than the answer
@@ -181,7 +187,8 @@ TEST_CASE("transmitter: a new connection hears nothing of the departures of the 
 
 TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody knows") {
     Bench bench;
-    for (const Nanoseconds taken : {Nanoseconds{90'000}, Nanoseconds{40'000}, Nanoseconds{-5'000'000'000}}) {
+    for (const Nanoseconds taken :
+         {Nanoseconds{90'000}, Nanoseconds{40'000}, Nanoseconds{-5'000'000'000}}) {
         wire::ImuSample sample{};
         sample.time_ns = taken;
         bench.transmitter.send(sample);

@@ -49,7 +49,8 @@ TEST_CASE("usb: no board, or the wrong one, is said with what to do") {
     const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
     Stack stack({"nousb", 31, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_service();
-    const auto status = stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
     CHECK(status["board"]["state"] == "absent");
     CHECK_THAT(status["board"]["hint"].get<std::string>(),
                Catch::Contains("1209:5653") && Catch::Contains("lsusb"));

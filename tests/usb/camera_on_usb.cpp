@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Board and USB3 Vision camera on one simulated bus: the unmodified service, through the real libusb and
-// Aravis. Run under umockdev-wrapper.
+// Board and USB3 Vision camera on one simulated bus: the unmodified service, through the real
+// libusb and Aravis. Run under umockdev-wrapper.
 #include <umockdev.h>
 
 #include <catch2/catch.hpp>
@@ -17,7 +17,8 @@ using namespace versavis::test;
 
 namespace {
 
-/// The testbed must live in the process that runs under the wrapper: board and camera do, too, here.
+/// The testbed must live in the process that runs under the wrapper: board and camera do, too,
+/// here.
 class UsbRig {
  public:
     explicit UsbRig(const Stack& stack)
@@ -27,8 +28,8 @@ class UsbRig {
           truth_(std::move(*rig::GroundTruth::create(stack.truth_path()))),
           camera(testbed_.get(), "1-2", stack.scenario().cameras[0], zero_, motion_, *truth_,
                  stack.scenario().seed),
-          board_(std::move(*rig::BoardHost::create(stack.scenario(), stack.socket_path(), zero_, motion_,
-                                                   *truth_, {&camera}))),
+          board_(std::move(*rig::BoardHost::create(stack.scenario(), stack.socket_path(), zero_,
+                                                   motion_, *truth_, {&camera}))),
           bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
 
  private:
@@ -75,8 +76,10 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
         judge(stack);
 
         rig.camera.device().unplug();
-        status = stack.wait_for_status([](const auto& s) { return s["cameras"][0]["state"] == "absent"; });
-        CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(), Catch::Contains("no such camera"));
+        status = stack.wait_for_status(
+            [](const auto& s) { return s["cameras"][0]["state"] == "absent"; });
+        CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
+                   Catch::Contains("no such camera"));
         rig.camera.device().plug();
         status = stack.wait_for_status(healthy);
         CHECK(status["cameras"][0]["connections"] == 3);

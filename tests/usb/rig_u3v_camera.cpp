@@ -3,12 +3,13 @@
 
 namespace versavis::test {
 
-std::optional<RigU3vCamera::Interval> RigU3vCamera::trigger_line(bool level, const rig::TriggerPulse& pulse) {
+std::optional<RigU3vCamera::Interval> RigU3vCamera::trigger_line(bool level,
+                                                                 const rig::TriggerPulse& pulse) {
     if (!level) return std::nullopt;
     std::optional<Interval> interval;
     if (camera_->listens(level)) interval = expose(pulse);
-    truth_.add(
-        rig::TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at, interval.has_value()});
+    truth_.add(rig::TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
+                                interval.has_value()});
     return interval;
 }
 
@@ -20,7 +21,8 @@ std::optional<RigU3vCamera::Interval> RigU3vCamera::expose(const rig::TriggerPul
     exposure.trigger = pulse.trigger;
     exposure.serial = exposures_ + 1;
     exposure.start = pulse.at + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
-    exposure.end = exposure.start + Duration{std::llround(static_cast<double>(camera_->exposure_us()) * 1e3)};
+    exposure.end =
+        exposure.start + Duration{std::llround(static_cast<double>(camera_->exposure_us()) * 1e3)};
     U3vCamera::Shot shot;
     shot.timestamp_ns = static_cast<std::uint64_t>(clock_.device_ns(exposure.start));
     const HostTime due = exposure.end + Duration{std::llround(settings_.readout_us * 1e3)};

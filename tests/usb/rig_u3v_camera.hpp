@@ -18,15 +18,16 @@ namespace versavis::test {
 
 class RigU3vCamera final : public rig::TriggeredCamera {
  public:
-    RigU3vCamera(UMockdevTestbed* testbed, const std::string& port, const rig::CameraScenario& settings,
-                 HostTime zero, const rig::Motion& motion, rig::GroundTruth& truth, std::uint64_t seed)
+    RigU3vCamera(UMockdevTestbed* testbed, const std::string& port,
+                 const rig::CameraScenario& settings, HostTime zero, const rig::Motion& motion,
+                 rig::GroundTruth& truth, std::uint64_t seed)
         : settings_(settings),
           motion_(motion),
           truth_(truth),
           clock_(zero, settings.clock),
           wall_(settings.width, settings.height, seed),
-          camera_(std::make_shared<U3vCamera>(U3vRegisters::Identity{"VersaVIS", "RigCamera", settings.serial,
-                                                                     settings.width, settings.height})),
+          camera_(std::make_shared<U3vCamera>(U3vRegisters::Identity{
+              "VersaVIS", "RigCamera", settings.serial, settings.width, settings.height})),
           device_(testbed, port, camera_) {}
 
     std::optional<Interval> trigger_line(bool level, const rig::TriggerPulse& pulse) override;

@@ -14,7 +14,8 @@ namespace {
 
 using NodePtr = std::shared_ptr<UsbfsNode>;
 
-void connect_signal(UMockdevIoctlBase* handler, const char* name, GCallback callback, const NodePtr& node) {
+void connect_signal(UMockdevIoctlBase* handler, const char* name, GCallback callback,
+                    const NodePtr& node) {
     // The handler outlives the device while a client has it open, so it shares the node.
     g_signal_connect_data(
         handler, name, callback, new NodePtr{node},
@@ -53,7 +54,8 @@ std::string word_at(const Bytes& bytes, std::size_t at) {
 }  // namespace
 
 SimulatedDevice::SimulatedDevice(UMockdevTestbed* testbed, const std::string& port,
-                                 std::shared_ptr<UsbFunction> function, std::chrono::milliseconds idle_hold)
+                                 std::shared_ptr<UsbFunction> function,
+                                 std::chrono::milliseconds idle_hold)
     : testbed_{static_cast<UMockdevTestbed*>(g_object_ref(testbed))},
       handler_{umockdev_ioctl_base_new()},
       function_{std::move(function)},
@@ -66,8 +68,8 @@ SimulatedDevice::SimulatedDevice(UMockdevTestbed* testbed, const std::string& po
 
 SimulatedDevice::~SimulatedDevice() { unplug(); }
 
-// Loading the description creates sysfs entries and the node first and sends the "add" uevent last, so a
-// client sees no half device.
+// Loading the description creates sysfs entries and the node first and sends the "add" uevent last,
+// so a client sees no half device.
 std::string SimulatedDevice::describe(const std::string& node, unsigned device_number) const {
     const UsbDescription& usb = function_->description();
     const std::string minor = std::to_string(device_number - 1);
@@ -75,12 +77,14 @@ std::string SimulatedDevice::describe(const std::string& node, unsigned device_n
     text += "\nE: SUBSYSTEM=usb\nE: DEVTYPE=usb_device\nE: DEVNAME=/dev/" + node;
     text += "\nE: MAJOR=189\nE: MINOR=" + minor +
             "\nE: BUSNUM=001\nE: DEVNUM=" + formatted("%03u", device_number);
-    // Like the kernel's, attributes end with a newline; not "dev", which umockdev uses verbatim as a file
-    // name.
+    // Like the kernel's, attributes end with a newline; not "dev", which umockdev uses verbatim as
+    // a file name.
     text += "\nA: dev=189:" + minor;
     text += attribute("busnum", "1") + attribute("devnum", std::to_string(device_number));
-    text += attribute("speed", std::to_string(usb.speed_mbit)) + attribute("bConfigurationValue", "1");
-    text += attribute("idVendor", word_at(usb.device, 8)) + attribute("idProduct", word_at(usb.device, 10));
+    text +=
+        attribute("speed", std::to_string(usb.speed_mbit)) + attribute("bConfigurationValue", "1");
+    text += attribute("idVendor", word_at(usb.device, 8)) +
+            attribute("idProduct", word_at(usb.device, 10));
     const std::array<const char*, 3> names{"manufacturer", "product", "serial"};
     for (std::size_t i = 0; i < names.size(); ++i) {
         const unsigned index = usb.device[14 + i];

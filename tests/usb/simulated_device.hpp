@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Any USB device that exists only inside a umockdev testbed: its place in sysfs, its node, plug and unplug.
+// Any USB device that exists only inside a umockdev testbed: its place in sysfs, its node, plug and
+// unplug.
 #pragma once
 
 #include <umockdev.h>
@@ -12,14 +13,15 @@
 
 namespace versavis::test {
 
-/// plug(), unplug() and the destructor belong to one thread. The testbed must outlive every client process: a
-/// client whose simulator goes away is aborted by umockdev.
+/// plug(), unplug() and the destructor belong to one thread. The testbed must outlive every client
+/// process: a client whose simulator goes away is aborted by umockdev.
 class SimulatedDevice {
  public:
-    /// `port` as in sysfs, such as "1-2"; each device of a testbed has its own. It is plugged in at once.
-    /// `idle_hold`: the fake node always polls as ready, so a repeated question of libusb is answered only
-    /// after this time; 0 disables the hold.
-    SimulatedDevice(UMockdevTestbed* testbed, const std::string& port, std::shared_ptr<UsbFunction> function,
+    /// `port` as in sysfs, such as "1-2"; each device of a testbed has its own. It is plugged in at
+    /// once. `idle_hold`: the fake node always polls as ready, so a repeated question of libusb is
+    /// answered only after this time; 0 disables the hold.
+    SimulatedDevice(UMockdevTestbed* testbed, const std::string& port,
+                    std::shared_ptr<UsbFunction> function,
                     std::chrono::milliseconds idle_hold = std::chrono::milliseconds{1});
     ~SimulatedDevice();
     SimulatedDevice(const SimulatedDevice&) = delete;

@@ -94,8 +94,8 @@ int CdcAcmFunction::control(std::span<const std::uint8_t> setup, std::span<const
     }
 }
 
-SimulatedUsbDevice::SimulatedUsbDevice(UMockdevTestbed* testbed, std::string serial, OnReceive on_receive,
-                                       std::chrono::milliseconds idle_hold)
+SimulatedUsbDevice::SimulatedUsbDevice(UMockdevTestbed* testbed, std::string serial,
+                                       OnReceive on_receive, std::chrono::milliseconds idle_hold)
     : function_{std::make_shared<CdcAcmFunction>(serial, std::move(on_receive))},
       device_{testbed, "1-1", function_, idle_hold} {}
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A USB CDC-ACM device (full speed, 1209:5653) that exists only inside a umockdev testbed. A program started
-// under umockdev-wrapper finds it with an unmodified libusb, as if it were plugged in.
+// A USB CDC-ACM device (full speed, 1209:5653) that exists only inside a umockdev testbed. A
+// program started under umockdev-wrapper finds it with an unmodified libusb, as if it were plugged
+// in.
 #pragma once
 
 #include <umockdev.h>
@@ -18,8 +19,8 @@ namespace versavis::test {
 
 class CdcAcmFunction;
 
-/// plug(), unplug() and the destructor belong to one thread; send() and line_state_set() may be called from
-/// any.
+/// plug(), unplug() and the destructor belong to one thread; send() and line_state_set() may be
+/// called from any.
 class SimulatedUsbDevice {
  public:
     /// Bytes the host wrote to the bulk OUT endpoint; called on the testbed's

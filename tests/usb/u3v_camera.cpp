@@ -41,7 +41,8 @@ constexpr std::size_t exposures_kept = 1000;
 
 std::uint64_t camera_now_ns() {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()) +
+    return static_cast<std::uint64_t>(
+               std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()) +
            clock_offset_ns;
 }
 
@@ -51,7 +52,8 @@ std::chrono::steady_clock::time_point host_time(std::uint64_t camera_ns) {
 }
 
 void put(Bytes& bytes, std::uint64_t value, std::size_t size) {
-    for (std::size_t i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+    for (std::size_t i = 0; i < size; ++i)
+        bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
 std::uint64_t get(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t size) {
@@ -60,7 +62,8 @@ std::uint64_t get(std::span<const std::uint8_t> bytes, std::size_t at, std::size
     return value;
 }
 
-Bytes acknowledgement(std::uint16_t status, std::uint16_t command, std::uint16_t id, const Bytes& body) {
+Bytes acknowledgement(std::uint16_t status, std::uint16_t command, std::uint16_t id,
+                      const Bytes& body) {
     Bytes packet;
     put(packet, control_magic, 4);
     put(packet, status, 2);
@@ -198,7 +201,9 @@ std::uint16_t U3vCamera::write_memory(std::span<const std::uint8_t> command, Byt
 
 void U3vCamera::written(std::uint32_t address) {
     switch (address) {
-        case abrm_timestamp_latch: registers_.set_bootstrap(abrm_timestamp, camera_now_ns(), 8); break;
+        case abrm_timestamp_latch:
+            registers_.set_bootstrap(abrm_timestamp, camera_now_ns(), 8);
+            break;
         case sirm_control:
             if (!stream_enabled()) node()->flush(data_in);
             break;
@@ -237,8 +242,8 @@ std::optional<std::uint64_t> U3vCamera::shoot(Shot shot) {
         const std::lock_guard lock(mutex_);
         if (!plugged_ || !acquiring_) return std::nullopt;
         block_id = block_id_++;
-        const auto due =
-            camera_now_ns() + static_cast<std::uint64_t>(std::max<std::int64_t>(0, shot.until_sent.count()));
+        const auto due = camera_now_ns() + static_cast<std::uint64_t>(
+                                               std::max<std::int64_t>(0, shot.until_sent.count()));
         frames_.push_back({due, shot.timestamp_ns, block_id, std::move(shot)});
     }
     changed_.notify_all();
@@ -345,7 +350,8 @@ void U3vCamera::send_payload(const Frame& frame, Defect defect) {
         if (defect == Defect::payload_like_leader)
             std::memcpy(part.data(), &leader_magic, sizeof leader_magic);
         node()->send(data_in, std::move(part));
-        const bool asked_for = length == most || size - at == registers_.value(reg_payload_size) % most;
+        const bool asked_for =
+            length == most || size - at == registers_.value(reg_payload_size) % most;
         if (!asked_for && length % packet_size == 0) node()->send(data_in, {});
     }
 }

@@ -53,8 +53,12 @@ class U3vCamera final : public UsbFunction {
 
     /// Faults.
     void stall_data();
-    void mute(bool muted) { muted_ = muted; }  ///< the control channel takes commands and never answers
-    void answer_late(unsigned pending_ms) { pending_ms_ = pending_ms; }  ///< next command, by a PENDING_ACK
+    void mute(bool muted) {
+        muted_ = muted;
+    }  ///< the control channel takes commands and never answers
+    void answer_late(unsigned pending_ms) {
+        pending_ms_ = pending_ms;
+    }  ///< next command, by a PENDING_ACK
     void drop_frames(unsigned count) { drop_ = count; }
     void spoil_frame(Defect defect) { defect_ = defect; }  ///< the next one
 
@@ -94,7 +98,7 @@ class U3vCamera final : public UsbFunction {
     UsbDescription description_;
     U3vRegisters registers_;
 
-    std::mutex sending_;        ///< held while a frame goes to the node: an unplug waits for its end
+    std::mutex sending_;  ///< held while a frame goes to the node: an unplug waits for its end
     mutable std::mutex mutex_;  ///< guards what follows, down to exposures_
     std::condition_variable changed_;
     bool plugged_ = false;

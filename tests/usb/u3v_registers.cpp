@@ -17,7 +17,9 @@ constexpr std::uint32_t largest_control_packet = 1024;
 
 }  // namespace
 
-U3vRegisters::U3vRegisters(const Identity& identity) : identity_(identity), memory_(memory_size) { reset(); }
+U3vRegisters::U3vRegisters(const Identity& identity) : identity_(identity), memory_(memory_size) {
+    reset();
+}
 
 void U3vRegisters::reset() {
     const std::lock_guard lock(mutex_);
@@ -64,7 +66,8 @@ void U3vRegisters::reset() {
 }
 
 void U3vRegisters::put(Register address, std::uint64_t value, std::size_t size) {
-    for (std::size_t i = 0; i < size; ++i) memory_[address + i] = static_cast<std::uint8_t>(value >> (8 * i));
+    for (std::size_t i = 0; i < size; ++i)
+        memory_[address + i] = static_cast<std::uint8_t>(value >> (8 * i));
 }
 
 void U3vRegisters::put_feature(Register address, std::uint32_t value) {
@@ -82,7 +85,8 @@ std::uint32_t U3vRegisters::feature(Register address) const {
 }
 
 void U3vRegisters::update_payload() {
-    const std::uint32_t bytes_per_pixel = feature(reg_pixel_format) == 0x01100007 ? 2 : 1;  // Mono16 or Mono8
+    const std::uint32_t bytes_per_pixel =
+        feature(reg_pixel_format) == 0x01100007 ? 2 : 1;  // Mono16 or Mono8
     const std::uint32_t size = feature(reg_width) * feature(reg_height) * bytes_per_pixel;
     put_feature(reg_payload_size, size);
     put(sirm_required_payload, size, 8);
@@ -98,9 +102,12 @@ bool U3vRegisters::read(std::uint64_t address, std::span<std::uint8_t> out) cons
 U3vRegisters::Written U3vRegisters::write(std::uint64_t address, std::span<const std::uint8_t> in) {
     const std::lock_guard lock(mutex_);
     if (address > memory_.size() || in.size() > memory_.size() - address) return Written::no_such;
-    const bool feature_space = address >= reg_width && address < reg_xml && address != reg_payload_size;
-    const bool stream_space = address == sirm_control || (address >= sirm_max_leader && address < manifest);
-    if (!feature_space && !stream_space && address != abrm_timestamp_latch) return Written::read_only;
+    const bool feature_space =
+        address >= reg_width && address < reg_xml && address != reg_payload_size;
+    const bool stream_space =
+        address == sirm_control || (address >= sirm_max_leader && address < manifest);
+    if (!feature_space && !stream_space && address != abrm_timestamp_latch)
+        return Written::read_only;
     std::copy(in.begin(), in.end(), memory_.begin() + static_cast<std::ptrdiff_t>(address));
     if (feature_space) update_payload();
     return Written::done;

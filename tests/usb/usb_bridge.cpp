@@ -12,7 +12,8 @@
 
 namespace versavis::test {
 
-UsbBridge::UsbBridge(UMockdevTestbed* testbed, const std::string& socket_path, const std::string& serial)
+UsbBridge::UsbBridge(UMockdevTestbed* testbed, const std::string& socket_path,
+                     const std::string& serial)
     : socket_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un peer{};
     peer.sun_family = AF_UNIX;
@@ -21,9 +22,11 @@ UsbBridge::UsbBridge(UMockdevTestbed* testbed, const std::string& socket_path, c
         ::close(socket_);
         throw std::runtime_error("the rig is not at " + socket_path);
     }
-    device_ = std::make_unique<SimulatedUsbDevice>(testbed, serial, [this](std::span<const std::byte> bytes) {
-        [[maybe_unused]] const auto sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    });
+    device_ = std::make_unique<SimulatedUsbDevice>(
+        testbed, serial, [this](std::span<const std::byte> bytes) {
+            [[maybe_unused]] const auto sent =
+                ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+        });
     thread_ = std::thread([this] { forward(); });
 }
 

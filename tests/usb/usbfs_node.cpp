@@ -70,8 +70,8 @@ std::span<std::uint8_t> UsbfsNode::Urb::payload() const {
     return {buffer->data, static_cast<std::size_t>(buffer->data_len)};
 }
 
-int UsbFunction::control(std::span<const std::uint8_t> /*setup*/, std::span<const std::uint8_t> /*out*/,
-                         Bytes& /*reply*/) {
+int UsbFunction::control(std::span<const std::uint8_t> /*setup*/,
+                         std::span<const std::uint8_t> /*out*/, Bytes& /*reply*/) {
     return -EPIPE;
 }
 
@@ -212,10 +212,12 @@ int UsbfsNode::execute(Client* client, unsigned long request) {
             return claim(client, read_argument<unsigned>(client, interface_count_));
         case USBDEVFS_RELEASEINTERFACE:
             return release(client, read_argument<unsigned>(client, interface_count_));
-        case USBDEVFS_SETCONFIGURATION: return read_argument<unsigned>(client, 0) == 1 ? 0 : -EINVAL;
+        case USBDEVFS_SETCONFIGURATION:
+            return read_argument<unsigned>(client, 0) == 1 ? 0 : -EINVAL;
         case USBDEVFS_SETINTERFACE:
             return read_argument(client, usbdevfs_setinterface{}).altsetting == 0 ? 0 : -EINVAL;
-        case USBDEVFS_CLEAR_HALT: return clear_halt(static_cast<std::uint8_t>(read_argument(client, 0U)));
+        case USBDEVFS_CLEAR_HALT:
+            return clear_halt(static_cast<std::uint8_t>(read_argument(client, 0U)));
         case USBDEVFS_RESET: return 0;
         case USBDEVFS_GETDRIVER:
         case USBDEVFS_IOCTL: return -ENODATA;  // no kernel driver is ever bound
@@ -227,9 +229,9 @@ int UsbfsNode::execute(Client* client, unsigned long request) {
 
 // No USBDEVFS_CAP_MMAP: the fake node is a regular file and cannot be mapped.
 int UsbfsNode::capabilities(Client* client) {
-    constexpr std::uint32_t usbfs_capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
-                                                 USBDEVFS_CAP_BULK_SCATTER_GATHER |
-                                                 USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+    constexpr std::uint32_t usbfs_capabilities =
+        USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
+        USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
     const DataPtr data = resolve_argument(client, sizeof usbfs_capabilities);
     if (!data) return -EFAULT;
     std::memcpy(data->data, &usbfs_capabilities, sizeof usbfs_capabilities);
@@ -318,8 +320,8 @@ void UsbfsNode::control(Urb& urb) {
     finish(std::move(urb), status);
 }
 
-int UsbfsNode::answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
-                              Bytes& reply) {
+int UsbfsNode::answer_control(std::span<const std::uint8_t> setup,
+                              std::span<const std::uint8_t> out, Bytes& reply) {
     constexpr int get_descriptor = 0x8006;
     constexpr int clear_endpoint_feature = 0x0201;
     constexpr int set_endpoint_feature = 0x0203;
@@ -455,8 +457,8 @@ void UsbfsNode::fill_in_urbs() {
     pending_ = std::move(kept);
 }
 
-// Packet by packet as on the wire: an urb ends when it is full or a short packet arrives. A packet that does
-// not fit is an overflow; the rest of its transfer is lost.
+// Packet by packet as on the wire: an urb ends when it is full or a short packet arrives. A packet
+// that does not fit is an overflow; the rest of its transfer is lost.
 UsbfsNode::Progress UsbfsNode::fill(const Urb& urb, Pipe& pipe) {
     const std::span<std::uint8_t> payload = urb.payload();
     while (!pipe.transfers.empty()) {

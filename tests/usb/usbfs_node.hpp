@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The kernel's side of a usbfs node, played by the simulator: it answers the ioctls of linux/usbdevice_fs.h
-// for any device that its descriptors describe.
+// The kernel's side of a usbfs node, played by the simulator: it answers the ioctls of
+// linux/usbdevice_fs.h for any device that its descriptors describe.
 #pragma once
 
 #include <linux/usbdevice_fs.h>
@@ -55,8 +55,10 @@ class UsbFunction {
     virtual ~UsbFunction() = default;
     /// Must not change while the device exists.
     virtual const UsbDescription& description() const = 0;
-    /// Answers a class or vendor request: 0, or -EPIPE for a stall. Standard requests never come here.
-    virtual int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out, Bytes& reply);
+    /// Answers a class or vendor request: 0, or -EPIPE for a stall. Standard requests never come
+    /// here.
+    virtual int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
+                        Bytes& reply);
     /// One transfer of the host to a bulk OUT endpoint. Must not block; may send.
     virtual void receive(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) = 0;
     /// The host has cleared a halt of this endpoint.
@@ -84,8 +86,9 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     void attach(std::string path);
     void detach();
 
-    /// Queues one transfer of the device to an IN endpoint. Its last packet is short, and so ends the host's
-    /// urb, unless its size is a multiple of the packet size; an empty one is a packet of length zero.
+    /// Queues one transfer of the device to an IN endpoint. Its last packet is short, and so ends
+    /// the host's urb, unless its size is a multiple of the packet size; an empty one is a packet
+    /// of length zero.
     void send(std::uint8_t endpoint, Bytes bytes);
     /// Bytes that the host has not fetched.
     std::size_t queued(std::uint8_t endpoint) const;
@@ -136,7 +139,8 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     int discard(Client* client);
     int clear_halt(std::uint8_t endpoint);
     void control(Urb& urb);
-    int answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out, Bytes& reply);
+    int answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
+                       Bytes& reply);
     int descriptor(unsigned type, unsigned index, Bytes& reply) const;
     void finish(Urb urb, int status);
     void reap(Client* client, bool wait);

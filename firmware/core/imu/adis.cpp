@@ -30,7 +30,8 @@ std::uint16_t adis16448_crc(const std::uint16_t* words) {
 /// 819.2 Hz / 2^D, or base / (D + 1).
 std::uint16_t Adis::rate_code(std::uint32_t millihertz) const {
     const std::uint32_t parts = facts_.fastest_millihertz / (millihertz == 0 ? 1 : millihertz);
-    if (!facts_.octaves) return static_cast<std::uint16_t>(parts <= 1 ? 0 : parts > 2000 ? 1999 : parts - 1);
+    if (!facts_.octaves)
+        return static_cast<std::uint16_t>(parts <= 1 ? 0 : parts > 2000 ? 1999 : parts - 1);
     std::uint16_t octaves = 0;
     while (octaves < 10 && parts >= 2U << octaves) ++octaves;
     return octaves;
@@ -38,13 +39,15 @@ std::uint16_t Adis::rate_code(std::uint32_t millihertz) const {
 
 std::uint32_t Adis::rate(std::uint32_t wanted_millihertz) const {
     const std::uint16_t code = rate_code(wanted_millihertz);
-    return facts_.octaves ? facts_.fastest_millihertz >> code : facts_.fastest_millihertz / (code + 1U);
+    return facts_.octaves ? facts_.fastest_millihertz >> code
+                          : facts_.fastest_millihertz / (code + 1U);
 }
 
 void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
     const std::uint16_t code = rate_code(rate_millihertz);
     // In octaves the rate stands in the high byte, beside the bit that chooses the internal clock.
-    const auto rate = static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
+    const auto rate =
+        static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
     const auto filters = static_cast<std::uint16_t>(facts_.filter_base | filter);
     constexpr std::uint32_t settle_us = 300;
     setup.write(0, facts_.command_register, reset_command, facts_.reset_us);
@@ -52,7 +55,8 @@ void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setu
     setup.write(0, facts_.control_register, facts_.control, settle_us);
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
-    setup.write(0, facts_.filter_register, filters, settle_us);  // choosing the range may alter the filter
+    setup.write(0, facts_.filter_register, filters,
+                settle_us);  // choosing the range may alter the filter
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }
@@ -98,7 +102,8 @@ void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
     if (facts_.magnetic) sample.pressure = words[10];
     std::uint16_t temperature = words[facts_.magnetic ? 11 : 7];
     // Twelve bits in the older parts; the others are not used.
-    if (facts_.octaves) temperature = static_cast<std::uint16_t>(((temperature & 0xFFFU) ^ 0x800U) - 0x800U);
+    if (facts_.octaves)
+        temperature = static_cast<std::uint16_t>(((temperature & 0xFFFU) ^ 0x800U) - 0x800U);
     sample.temperature = signed_word(temperature);
     if ((words[0] & facts_.failures) != 0) sample.flags |= wire::imu_self_test_failed;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Analog Devices' ADIS164xx family: 16-bit registers behind a pipelined SPI, samples in one burst; by the
-// data sheets of ADIS16448 (rev E) and ADIS16470 (rev A), and the register maps that the maker publishes for
-// the others.
+// Analog Devices' ADIS164xx family: 16-bit registers behind a pipelined SPI, samples in one burst;
+// by the data sheets of ADIS16448 (rev E) and ADIS16470 (rev A), and the register maps that the
+// maker publishes for the others.
 #pragma once
 
 #include "imu/imu_part.hpp"
@@ -9,8 +9,8 @@
 namespace versavis::firmware {
 
 /// CRC of an ADIS16448B's burst: over the 11 words from angular rate to temperature.
-/// A right-shifting register with the polynomial 0x1021 not reversed, low byte of each word first, inverted
-/// and its bytes swapped at the end.
+/// A right-shifting register with the polynomial 0x1021 not reversed, low byte of each word first,
+/// inverted and its bytes swapped at the end.
 std::uint16_t adis16448_crc(const std::uint16_t* words);
 
 /// How the members of the family differ.

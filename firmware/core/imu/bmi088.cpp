@@ -44,9 +44,10 @@ constexpr std::uint8_t active = 0x00;
 constexpr std::uint8_t on = 0x04;
 
 // The codes with the widest bandwidth of each rate.
-constexpr RateCode rates[] = {{2'000'000, 0}, {1'000'000, 2}, {400'000, 3}, {200'000, 6}, {100'000, 7}};
-// The accelerometer has a clock of its own: at its fastest rate its data is at most 625 us older than the
-// gyro's edge.
+constexpr RateCode rates[] = {
+    {2'000'000, 0}, {1'000'000, 2}, {400'000, 3}, {200'000, 6}, {100'000, 7}};
+// The accelerometer has a clock of its own: at its fastest rate its data is at most 625 us older
+// than the gyro's edge.
 constexpr std::uint8_t accel_rate = 0xC;
 
 }  // namespace
@@ -63,8 +64,10 @@ void Bmi088::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& se
     setup.expect(accel, accel_chip_id, accel_id);
     setup.write(accel, accel_pwr_conf, active, 5'000);
     setup.write(accel, accel_pwr_ctrl, on, 50'000);
-    const auto bandwidth = static_cast<std::uint16_t>(0xA - filter);  // normal, 2 or 4 times oversampled
-    setup.write(accel, accel_conf, static_cast<std::uint16_t>(bandwidth << 4U | accel_rate), write_pause_us);
+    const auto bandwidth =
+        static_cast<std::uint16_t>(0xA - filter);  // normal, 2 or 4 times oversampled
+    setup.write(accel, accel_conf, static_cast<std::uint16_t>(bandwidth << 4U | accel_rate),
+                write_pause_us);
     setup.write(accel, accel_range, 0x03, write_pause_us);  // 24 g
 
     setup.write(gyro, gyro_soft_reset, soft_reset, 50'000);

@@ -14,7 +14,8 @@ class ByteRegisterPart : public ImuPart {
         transfer.chip = step.chip;
         transfer.clock_hz = clock_hz();
         transfer.size = static_cast<std::uint8_t>(reads ? value_at + 1 : 2);
-        transfer.bytes[0] = static_cast<std::uint8_t>(reads ? step.address | read_bit : step.address);
+        transfer.bytes[0] =
+            static_cast<std::uint8_t>(reads ? step.address | read_bit : step.address);
         if (!reads) transfer.bytes[1] = static_cast<std::uint8_t>(step.value);
     }
 
@@ -33,7 +34,8 @@ class ByteRegisterPart : public ImuPart {
     /// Bytes without meaning between address and data of a read.
     virtual std::size_t dummies(std::uint8_t chip) const = 0;
 
-    void burst(std::uint8_t chip, std::uint8_t first, std::size_t registers, ImuTransfer& transfer) const {
+    void burst(std::uint8_t chip, std::uint8_t first, std::size_t registers,
+               ImuTransfer& transfer) const {
         transfer.chip = chip;
         transfer.clock_hz = clock_hz();
         transfer.size = static_cast<std::uint8_t>(1 + dummies(chip) + registers);

@@ -26,8 +26,9 @@ constexpr std::uint8_t data_ready = 0x08;
 constexpr std::uint8_t both_low_noise = 0x0F;
 constexpr std::uint32_t fast_millihertz = 4'000'000;
 
-constexpr RateCode rates[] = {{8'000'000, 3}, {4'000'000, 4}, {2'000'000, 5}, {1'000'000, 6}, {500'000, 15},
-                              {200'000, 7},   {100'000, 8},   {50'000, 9},    {25'000, 10},   {12'500, 11}};
+constexpr RateCode rates[] = {{8'000'000, 3}, {4'000'000, 4}, {2'000'000, 5}, {1'000'000, 6},
+                              {500'000, 15},  {200'000, 7},   {100'000, 8},   {50'000, 9},
+                              {25'000, 10},   {12'500, 11}};
 
 }  // namespace
 
@@ -50,8 +51,8 @@ void Icm42688p::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup&
     setup.expect(0, pwr_mgmt0, both_low_noise);
 }
 
-/// The second reading proves that the part is there and has not reset itself: ones or zeros of a dead bus
-/// look like data, and so does what a part shows that is switched off.
+/// The second reading proves that the part is there and has not reset itself: ones or zeros of a
+/// dead bus look like data, and so does what a part shows that is switched off.
 void Icm42688p::reading(unsigned index, ImuTransfer& transfer) const {
     if (index == 0)
         burst(0, temp_data1, burst_registers, transfer);
@@ -59,7 +60,8 @@ void Icm42688p::reading(unsigned index, ImuTransfer& transfer) const {
         burst(0, pwr_mgmt0, 1, transfer);
 }
 
-Verdict Icm42688p::parse(const ImuReply* replies, unsigned /*count*/, wire::ImuSample& sample) const {
+Verdict Icm42688p::parse(const ImuReply* replies, unsigned /*count*/,
+                         wire::ImuSample& sample) const {
     const std::uint8_t* data = replies[0].bytes + 1;
     sample.temperature = signed_word(big_endian(data, 0));
     for (std::size_t axis = 0; axis < 3; ++axis) {

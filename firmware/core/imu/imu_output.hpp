@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Samples of any IMU as an ADIS16448 would show them, for a flight controller on the second SPI port.
+// Samples of any IMU as an ADIS16448 would show them, for a flight controller on the second SPI
+// port.
 #pragma once
 
 #include "hal.hpp"
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a kind of IMU on the SPI bus needs: how it is set up, how a sample is read, and how it is checked.
+// What a kind of IMU on the SPI bus needs: how it is set up, how a sample is read, and how it is
+// checked.
 #pragma once
 
 #include "hal.hpp"
-#include "versavis/wire/messages.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 
@@ -22,10 +23,12 @@ class Setup {
  public:
     static constexpr std::size_t capacity = 20;
 
-    void write(std::uint8_t chip, std::uint8_t address, std::uint16_t value, std::uint32_t pause_us = 0) {
+    void write(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
+               std::uint32_t pause_us = 0) {
         add({SetupStep::Action::write, chip, address, value, pause_us});
     }
-    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value, std::uint32_t pause_us = 0) {
+    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
+                std::uint32_t pause_us = 0) {
         add({SetupStep::Action::expect, chip, address, value, pause_us});
     }
 
@@ -70,7 +73,8 @@ class ImuPart {
     virtual unsigned readings() const = 0;
     virtual void reading(unsigned index, ImuTransfer& transfer) const = 0;
     /// Fills the raw words and flags of `sample` from `count` replies.
-    virtual Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const = 0;
+    virtual Verdict parse(const ImuReply* replies, unsigned count,
+                          wire::ImuSample& sample) const = 0;
 
  protected:
     ~ImuPart() = default;

@@ -18,7 +18,8 @@ class ImuPort {
     ~ImuPort() = default;
 
     static constexpr Nanoseconds retry_interval = 1'000'000'000;
-    static constexpr unsigned max_failures = 20;  ///< failed checks in a row before it is set up again
+    static constexpr unsigned max_failures =
+        20;  ///< failed checks in a row before it is set up again
 
     /// Samples that were due but cannot be had: their numbers will be missing.
     void miss(std::uint32_t samples = 1) {
@@ -44,7 +45,8 @@ class ImuPort {
     void tell(wire::EventKind kind, Nanoseconds at, std::int64_t value, std::uint16_t detail = 0) {
         reports_.event(kind, port_, at, value, detail);
     }
-    void tell_failure(wire::EventKind kind, Nanoseconds at, std::int64_t value, std::uint16_t detail = 0) {
+    void tell_failure(wire::EventKind kind, Nanoseconds at, std::int64_t value,
+                      std::uint16_t detail = 0) {
         ++restarts_;
         failures_ = 0;
         miss();  // at least one, until it is running again

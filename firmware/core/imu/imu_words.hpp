@@ -22,7 +22,8 @@ struct RateCode {
     std::uint8_t code;
 };
 
-/// The slowest entry that is not below `wanted_millihertz`, or the first; entries from fast to slow.
+/// The slowest entry that is not below `wanted_millihertz`, or the first; entries from fast to
+/// slow.
 template <std::size_t N>
 const RateCode& slowest_not_below(const RateCode (&rates)[N], std::uint32_t wanted_millihertz) {
     std::size_t found = 0;

@@ -14,7 +14,8 @@ constexpr std::uint16_t while_running = 0xFFFF;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
-/// Read on a grid, the part shall be much faster than the grid: its newest sample is then never old.
+/// Read on a grid, the part shall be much faster than the grid: its newest sample is then never
+/// old.
 std::uint32_t part_rate(const ImuPart& part, const wire::ImuConfiguration& configuration) {
     const std::uint32_t wanted = configuration.rate_millihertz;
     return part.rate((configuration.options & wire::imu_data_ready) != 0 ? wanted : 4 * wanted);
@@ -25,7 +26,8 @@ std::uint32_t part_rate(const ImuPart& part, const wire::ImuConfiguration& confi
 std::uint32_t SpiImu::true_rate(const wire::ImuConfiguration& configuration) {
     const ImuPart* part = find_part(configuration.kind);
     const bool paced_by_part = (configuration.options & wire::imu_data_ready) != 0;
-    return part != nullptr && paced_by_part ? part_rate(*part, configuration) : configuration.rate_millihertz;
+    return part != nullptr && paced_by_part ? part_rate(*part, configuration)
+                                            : configuration.rate_millihertz;
 }
 
 void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds now) {
@@ -61,7 +63,8 @@ void SpiImu::next_step(Nanoseconds now) {
     if (step_ == setup_.size()) return run(now);
     transfer_ = {};
     part_->access(setup_[step_], transfer_);
-    if (!start(now, now)) fail(wire::EventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
+    if (!start(now, now))
+        fail(wire::EventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
 }
 
 void SpiImu::check_step(const ImuReply& reply, Nanoseconds now) {
@@ -69,7 +72,8 @@ void SpiImu::check_step(const ImuReply& reply, Nanoseconds now) {
     if (step.action == SetupStep::Action::expect) {
         const std::uint16_t answer = part_->answer(transfer_, reply);
         if (answer != step.value)
-            return fail(wire::EventKind::imu_failed, now, answer, static_cast<std::uint16_t>(step_));
+            return fail(wire::EventKind::imu_failed, now, answer,
+                        static_cast<std::uint16_t>(step_));
     }
     ++step_;
     resume_ = now + static_cast<Nanoseconds>(step.pause_us) * 1000;
@@ -116,12 +120,14 @@ void SpiImu::ready_edge(Nanoseconds at, Nanoseconds now) {
             edges.later[edges.later_count++] = at;
 }
 
-/// The data is that of the newest edge before it was read; samples of edges before that were never read.
+/// The data is that of the newest edge before it was read; samples of edges before that were never
+/// read.
 Nanoseconds SpiImu::stamp(unsigned reading) {
     const Edges& edges = edges_[reading];
     Nanoseconds stamp = edges.newest;
     std::uint32_t edge = edges.count;
-    for (std::size_t i = 0; i < edges.later_count && edges.later[i] <= replies_[reading].started; ++i) {
+    for (std::size_t i = 0; i < edges.later_count && edges.later[i] <= replies_[reading].started;
+         ++i) {
         stamp = edges.later[i];
         ++edge;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The IMU on the SPI bus: sets it up, reads it at its data-ready edges or on a grid, and begins anew when it
-// fails.
+// The IMU on the SPI bus: sets it up, reads it at its data-ready edges or on a grid, and begins
+// anew when it fails.
 #pragma once
 
 #include "imu/imu_part.hpp"
@@ -10,12 +10,14 @@ namespace versavis::firmware {
 
 class SpiImu final : public ImuPort {
  public:
-    SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports) : ImuPort(port, reports), bus_(bus) {}
+    SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports)
+        : ImuPort(port, reports), bus_(bus) {}
 
     /// A kind that is not on this bus: nothing is read.
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
 
-    /// The data-ready line rose. Hand over all edges before poll(): what is read belongs to the newest.
+    /// The data-ready line rose. Hand over all edges before poll(): what is read belongs to the
+    /// newest.
     void ready_edge(Nanoseconds at, Nanoseconds now);
 
     /// Does what is due. True: `sample` holds a new sample.
@@ -32,8 +34,8 @@ class SpiImu final : public ImuPort {
  private:
     enum class State : std::uint8_t { off, set_up, running };
 
-    /// Data-ready edges known when a reading was asked for, and the first that were seen later: they may have
-    /// come before it began.
+    /// Data-ready edges known when a reading was asked for, and the first that were seen later:
+    /// they may have come before it began.
     struct Edges {
         Nanoseconds newest = 0;
         std::uint32_t count = 0;

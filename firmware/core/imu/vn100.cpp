@@ -17,7 +17,8 @@ constexpr Nanoseconds silence_floor = 100'000'000;
 constexpr Nanoseconds settle = 20'000'000;  // after a change of baud rate
 
 constexpr std::uint8_t sync = 0xFA;
-constexpr std::uint8_t header[] = {sync, 0x01, 0x01, 0x06};  // common group: time, IMU, magnetic and pressure
+constexpr std::uint8_t header[] = {sync, 0x01, 0x01,
+                                   0x06};  // common group: time, IMU, magnetic and pressure
 constexpr std::size_t time_at = 4;
 constexpr std::size_t accel_at = 12;
 constexpr std::size_t gyro_at = 24;
@@ -41,8 +42,8 @@ std::uint8_t text_checksum(const char* text, std::size_t size) {
 }
 
 template <class Narrow>
-bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowest, std::int32_t highest,
-            Narrow& out) {
+bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowest,
+            std::int32_t highest, Narrow& out) {
     std::int32_t wide = 0;
     if (!fixed_point(float_bits, fraction_bits, wide)) return false;
     out = static_cast<Narrow>(wide < lowest ? lowest : wide > highest ? highest : wide);
@@ -55,7 +56,8 @@ std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size) {
     std::uint32_t crc = 0;
     for (std::size_t i = 0; i < size; ++i) {
         crc ^= std::uint32_t{data[i]} << 8U;
-        for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
+        for (int bit = 0; bit < 8; ++bit)
+            crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
     }
     return static_cast<std::uint16_t>(crc);
 }
@@ -77,12 +79,14 @@ bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t&
 }
 
 std::uint32_t Vn100::true_rate(std::uint32_t wanted_millihertz) {
-    const std::uint32_t parts = vn100::fastest_millihertz / (wanted_millihertz == 0 ? 1 : wanted_millihertz);
+    const std::uint32_t parts =
+        vn100::fastest_millihertz / (wanted_millihertz == 0 ? 1 : wanted_millihertz);
     return vn100::fastest_millihertz / (parts == 0 ? 1 : parts);
 }
 
 std::uint32_t Vn100::divider() const {
-    const std::uint32_t parts = vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
+    const std::uint32_t parts =
+        vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
     return parts == 0 ? 1 : parts;
 }
 
@@ -117,8 +121,8 @@ void Vn100::send_step(Nanoseconds now) {
         case Step::no_binary2: text << "VNWRG,76,0,8,01,0001"; break;
         case Step::no_binary3: text << "VNWRG,77,0,8,01,0001"; break;
         case Step::baud: text << "VNWRG,05," << wanted_baud(); break;
-        // A pulse at the start of each sample, sent or not, 100 us long, high: skipped pulses would not be
-        // those of skipped packets.
+        // A pulse at the start of each sample, sent or not, 100 us long, high: skipped pulses would
+        // not be those of skipped packets.
         case Step::pulses: text << "VNWRG,32,3,0,0,0,1,1,0,100000,0"; break;
         case Step::packets: text << "VNWRG,75,1," << divider() << ",01,0601"; break;
         case Step::go: text << "VNASY,1"; break;
@@ -157,8 +161,9 @@ void Vn100::next_step(Nanoseconds now) {
 }
 
 void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
-    tell_failure(kind, now, value,
-                 state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
+    tell_failure(
+        kind, now, value,
+        state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
     fast_first_ = !fast_first_;
     begin_setup(now + retry_interval);
 }
@@ -205,8 +210,8 @@ bool Vn100::take_line(Nanoseconds now) {
 bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     using namespace vn100;
     // The bytes behind it, and its own, went over the line at the baud rate, ten bits each.
-    const Nanoseconds first_byte =
-        received_ - static_cast<Nanoseconds>(filled_) * 10'000'000'000 / static_cast<Nanoseconds>(baud_);
+    const Nanoseconds first_byte = received_ - static_cast<Nanoseconds>(filled_) * 10'000'000'000 /
+                                                   static_cast<Nanoseconds>(baud_);
     const std::uint8_t* packet = bytes_;
     std::uint64_t startup = 0;
     std::memcpy(&startup, packet + time_at, sizeof startup);
@@ -214,16 +219,19 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     sample.kind = wire::ImuKind::vn100;
     bool good = true;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        good = fixed_point(word32(packet + gyro_at + 4 * axis), gyro_bits, sample.gyro[axis]) && good;
-        good = fixed_point(word32(packet + accel_at + 4 * axis), accel_bits, sample.accel[axis]) && good;
+        good =
+            fixed_point(word32(packet + gyro_at + 4 * axis), gyro_bits, sample.gyro[axis]) && good;
+        good = fixed_point(word32(packet + accel_at + 4 * axis), accel_bits, sample.accel[axis]) &&
+               good;
         good = narrow(word32(packet + magnetic_at + 4 * axis), magnetic_bits, INT16_MIN, INT16_MAX,
                       sample.magnetic[axis]) &&
                good;
     }
+    good = narrow(word32(packet + temperature_at), temperature_bits, INT16_MIN, INT16_MAX,
+                  sample.temperature) &&
+           good;
     good =
-        narrow(word32(packet + temperature_at), temperature_bits, INT16_MIN, INT16_MAX, sample.temperature) &&
-        good;
-    good = narrow(word32(packet + pressure_at), pressure_bits, 0, UINT16_MAX, sample.pressure) && good;
+        narrow(word32(packet + pressure_at), pressure_bits, 0, UINT16_MAX, sample.pressure) && good;
     drop(packet_size);
     if (state_ != State::running) return false;
     if (!good) sample.flags |= wire::imu_self_test_failed;
@@ -233,8 +241,8 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     return true;
 }
 
-/// The part's own clock tells how many samples were lost on the way. Returns the time since the sample
-/// before; 0: there was none.
+/// The part's own clock tells how many samples were lost on the way. Returns the time since the
+/// sample before; 0: there was none.
 Nanoseconds Vn100::count(std::uint64_t startup_ns) {
     const auto since = static_cast<Nanoseconds>(startup_ns - startup_ns_);
     const bool first = startup_ns_ == 0 || since <= 0;
@@ -245,8 +253,8 @@ Nanoseconds Vn100::count(std::uint64_t startup_ns) {
     return since;
 }
 
-/// A packet leaves within a base period of its sample: the newest edge before it is that sample's, if the
-/// part's clock agrees.
+/// A packet leaves within a base period of its sample: the newest edge before it is that sample's,
+/// if the part's clock agrees.
 void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSample& sample) {
     sample.time_ns = first_byte;
     if ((configuration_.options & wire::imu_data_ready) == 0) return;
@@ -288,7 +296,8 @@ bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (state_ == State::off) return false;
     // What was read is looked at before more is: `received_` belongs to the last byte.
     if (parse(now, sample)) return true;
-    while (const std::size_t size = uart_.read(bytes_ + filled_, sizeof bytes_ - filled_, received_)) {
+    while (const std::size_t size =
+               uart_.read(bytes_ + filled_, sizeof bytes_ - filled_, received_)) {
         filled_ += size;
         if (parse(now, sample)) return true;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// VectorNav VN-100 on the UART: set up by its text commands, read as binary packets, by the user manual UM001
-// v2.22.
+// VectorNav VN-100 on the UART: set up by its text commands, read as binary packets, by the user
+// manual UM001 v2.22.
 #pragma once
 
 #include "imu/imu_port.hpp"
@@ -10,8 +10,8 @@ namespace versavis::firmware {
 /// CRC-16 with the polynomial 0x1021, from zero; over a packet with its CRC it is zero.
 std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size);
 
-/// An IEEE float as a whole number of 2^-`fraction_bits`, without floating point; saturates. False: it is not
-/// a number.
+/// An IEEE float as a whole number of 2^-`fraction_bits`, without floating point; saturates. False:
+/// it is not a number.
 bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t& out);
 
 namespace vn100 {
@@ -27,7 +27,8 @@ inline constexpr std::size_t packet_size = 58;  ///< with time, IMU, magnetic an
 
 class Vn100 final : public ImuPort {
  public:
-    Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports) : ImuPort(port, reports), uart_(uart) {}
+    Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports)
+        : ImuPort(port, reports), uart_(uart) {}
 
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What went wrong, where, and what to do about it.
+// What went wrong, where, and what to do about it; and results that are a value or such an error.
 #pragma once
 
 #include <string>
-#include <tl/expected.hpp>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 namespace versavis {
 
@@ -13,17 +14,72 @@ struct Error {
     std::string what;   ///< what happened
     std::string cure;   ///< what the user can do next; empty when there is nothing to do
 
-    /// "where: what (cure)" on one line.
+    /// "where: what; cure" on one line.
     std::string message() const {
         return (where.empty() ? "" : where + ": ") + what + (cure.empty() ? "" : "; " + cure);
     }
 };
 
-template <class T = void>
-using Expected = tl::expected<T, Error>;
+/// An error on its way into an Expected.
+template <class E = Error>
+struct Unexpected {
+    explicit Unexpected(E why) : error(std::move(why)) {}
 
-inline tl::unexpected<Error> failure(std::string where, std::string what, std::string cure = {}) {
-    return tl::unexpected<Error>(Error{std::move(where), std::move(what), std::move(cure)});
+    E error;
+};
+
+/// A value, or the error that explains why there is none. Look before you take: `*` and `->` of an
+/// error, and error() of a value, are undefined. It has the names of C++23's std::expected.
+template <class T = void, class E = Error>
+class [[nodiscard]] Expected {
+ public:
+    template <class U = T, class = std::enable_if_t<std::is_constructible_v<T, U&&> &&
+                                                    !std::is_same_v<std::decay_t<U>, Expected>>>
+    Expected(U&& value) : content_(std::in_place_index<0>, std::forward<U>(value)) {}
+    template <class F>
+    Expected(Unexpected<F> failed) : content_(std::in_place_index<1>, std::move(failed.error)) {}
+
+    bool has_value() const { return content_.index() == 0; }
+    explicit operator bool() const { return has_value(); }
+
+    T& operator*() & { return *std::get_if<0>(&content_); }
+    const T& operator*() const& { return *std::get_if<0>(&content_); }
+    T&& operator*() && { return std::move(*std::get_if<0>(&content_)); }
+    T* operator->() { return std::get_if<0>(&content_); }
+    const T* operator->() const { return std::get_if<0>(&content_); }
+
+    E& error() { return *std::get_if<1>(&content_); }
+    const E& error() const { return *std::get_if<1>(&content_); }
+
+    template <class U>
+    T value_or(U&& otherwise) const& {
+        return has_value() ? **this : static_cast<T>(std::forward<U>(otherwise));
+    }
+
+ private:
+    std::variant<T, E> content_;
+};
+
+/// Nothing, or the error that explains why it was not done.
+template <class E>
+class [[nodiscard]] Expected<void, E> {
+ public:
+    Expected() = default;
+    template <class F>
+    Expected(Unexpected<F> failed) : error_(std::in_place_index<1>, std::move(failed.error)) {}
+
+    bool has_value() const { return error_.index() == 0; }
+    explicit operator bool() const { return has_value(); }
+
+    E& error() { return *std::get_if<1>(&error_); }
+    const E& error() const { return *std::get_if<1>(&error_); }
+
+ private:
+    std::variant<std::monostate, E> error_;
+};
+
+inline Unexpected<> failure(std::string where, std::string what, std::string cure = {}) {
+    return Unexpected<>(Error{std::move(where), std::move(what), std::move(cure)});
 }
 
 }  // namespace versavis

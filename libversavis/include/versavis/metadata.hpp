@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "versavis/export.hpp"
 #include "versavis/ring/layout.hpp"
 #include "versavis/time.hpp"
 
@@ -14,16 +15,17 @@ namespace versavis {
 enum class StampKind : std::uint32_t {
     measured_middle = 0,  ///< both edges of the exposure were stamped by hardware
     predicted_middle =
-        1,             ///< an edge is missing: start or end follow from the configured or expected exposure
+        1,  ///< an edge is missing: start or end follow from the configured or expected exposure
     trigger_edge = 2,  ///< only the trigger pulse is known: latency and exposure are as configured
     arrival = 3,       ///< no trigger: the moment the frame arrived on the host
 };
 
 enum ItemFlag : std::uint32_t {
-    stamp_kind_mask = 0x3,     ///< StampKind
-    flag_suspect = 1U << 2U,   ///< the pairing is not proved: trigger and stamp are a guess
-    flag_holdover = 1U << 3U,  ///< the clocks were without contact, or messages contradict them: sigma grows
-    flag_clamped = 1U << 4U,   ///< the stamp was held so that it did not go backwards
+    stamp_kind_mask = 0x3,    ///< StampKind
+    flag_suspect = 1U << 2U,  ///< the pairing is not proved: trigger and stamp are a guess
+    flag_holdover =
+        1U << 3U,  ///< the clocks were without contact, or messages contradict them: sigma grows
+    flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
 };
 
@@ -31,8 +33,8 @@ enum ItemFlag : std::uint32_t {
 inline constexpr std::uint32_t sigma_unknown = 0xFFFFFFFFU;
 
 struct FrameMetadata {
-    std::uint64_t
-        trigger;  ///< pulses the board had sent to this camera, this frame's included; 0: not triggered
+    std::uint64_t trigger;  ///< pulses the board had sent to this camera, this frame's included; 0:
+                            ///< not triggered
     std::uint64_t block_id;  ///< the camera's own frame number
     BoardTime board_time;    ///< middle of the exposure
     HostTime host_time;      ///< middle of the exposure
@@ -46,7 +48,8 @@ struct FrameMetadata {
     std::uint32_t pixel_format;  ///< PFNC code
     std::uint32_t epoch;         ///< trigger numbers and clocks are continuous within one
     std::uint32_t flags;         ///< ItemFlag
-    std::uint32_t tick;  ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
+    std::uint32_t
+        tick;  ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
     std::uint64_t reserved;
 
     StampKind stamp_kind() const { return static_cast<StampKind>(flags & stamp_kind_mask); }
@@ -77,18 +80,18 @@ enum class EventKind : std::uint32_t {
     board_lost = 7,
     camera_connected = 8,
     camera_lost = 9,
-    pairing_locked = 10,        ///< value: trigger number of the first proved frame
-    pairing_slipped = 11,       ///< value: block id of the frame that contradicted it
-    edge_overflow = 12,         ///< value: edges lost
-    pps = 13,                   ///< an edge of the PPS input; value: edges since the board's boot
-    aux_pulse = 14,             ///< an edge of an auxiliary input; source: 0 or 1; value: as for pps
-    sync_pulse = 15,            ///< an edge of the sync input; value: as for pps
-    input_noisy = 16,           ///< an input is not listened to for a second; source: input of the board
+    pairing_locked = 10,   ///< value: trigger number of the first proved frame
+    pairing_slipped = 11,  ///< value: block id of the frame that contradicted it
+    edge_overflow = 12,    ///< value: edges lost
+    pps = 13,              ///< an edge of the PPS input; value: edges since the board's boot
+    aux_pulse = 14,        ///< an edge of an auxiliary input; source: 0 or 1; value: as for pps
+    sync_pulse = 15,       ///< an edge of the sync input; value: as for pps
+    input_noisy = 16,      ///< an input is not listened to for a second; source: input of the board
     illumination_limited = 17,  ///< the light was cut, or stayed dark; value: ns that it was on
     imu_ready = 18,             ///< value: identity of the part
     imu_failed = 19,            ///< the part is not what it should be; value: what it said
     imu_silent = 20,            ///< no data-ready edge, no end of a transfer or no bytes came
-    utc_label = 21,             ///< a PPS pulse, of this time, was named; value: UTC seconds since 1970
+    utc_label = 21,  ///< a PPS pulse, of this time, was named; value: UTC seconds since 1970
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
@@ -145,8 +148,8 @@ T unpack(const ring::Metadata& words) {
     return metadata;
 }
 
-const char* to_string(StampKind kind);
-const char* to_string(EventKind kind);
-const char* to_string(EventReason reason);
+VERSAVIS_API const char* to_string(StampKind kind);
+VERSAVIS_API const char* to_string(EventKind kind);
+VERSAVIS_API const char* to_string(EventReason reason);
 
 }  // namespace versavis

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reading a stream by its name: frames, IMU samples, events, the status document or what was told to pairing
-// and clock.
+// Reading a stream by its name: frames, IMU samples, events or the status document.
 #pragma once
 
 #include <string>
 #include <utility>
 
-#include "versavis/clock/recording.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/pairing/recording.hpp"
 #include "versavis/ring/path.hpp"
 #include "versavis/ring/reader.hpp"
 
@@ -27,10 +24,11 @@ template <class Data, ring::StreamKind kind>
 class Stream {
  public:
     /// Errors: no such stream, no permission, a stream of another kind.
-    static Expected<Stream> open(const std::string& name, const std::string& instance = default_instance(),
+    static Expected<Stream> open(const std::string& name,
+                                 const std::string& instance = default_instance(),
                                  ring::Reader::From from = ring::Reader::From::newest) {
         auto reader = ring::Reader::open(stream_path(instance, name), from);
-        if (!reader) return tl::unexpected<Error>(reader.error());
+        if (!reader) return Unexpected(reader.error());
         if (reader->kind() != kind)
             return failure(name, "is a stream of another kind", "see 'versavis list'");
         return Stream(std::move(*reader));
@@ -42,11 +40,12 @@ class Stream {
     /// The next item, waiting for it up to `timeout`.
     Received<Data> wait(Duration timeout) { return typed(reader_.wait(timeout)); }
 
-    /// True while the payload of `item` is untouched: what was read of it in place before this call is good.
+    /// True while the payload of `item` is untouched: what was read of it in place before this call
+    /// is good.
     bool intact(const ring::Item& item) const { return reader_.intact(item); }
 
-    /// Copies the payload to `destination` of item.payload_size bytes; false when the writer overtook the
-    /// copy.
+    /// Copies the payload to `destination` of item.payload_size bytes; false when the writer
+    /// overtook the copy.
     bool copy(const ring::Item& item, std::byte* destination) const {
         return reader_.copy(item, destination);
     }
@@ -69,8 +68,7 @@ class Stream {
 using FrameStream = Stream<FrameMetadata, ring::StreamKind::frames>;
 using ImuStream = Stream<ImuMetadata, ring::StreamKind::imu>;
 using EventStream = Stream<EventMetadata, ring::StreamKind::events>;
-using EvidenceStream = Stream<pairing::EvidenceMetadata, ring::StreamKind::evidence>;
-using ClockStream = Stream<clock::ClockMetadata, ring::StreamKind::clock>;
-using StatusStream = Stream<ring::Metadata, ring::StreamKind::status>;  ///< the payload is the document
+using StatusStream =
+    Stream<ring::Metadata, ring::StreamKind::status>;  ///< the payload is the document
 
 }  // namespace versavis

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Instants and durations in integer nanoseconds, one type per clock, so that clocks cannot be mixed by
-// accident.
+// Instants and durations in integer nanoseconds, one type per clock, so that clocks cannot be mixed
+// by accident.
 #pragma once
 
 #include <cstdint>
+
+#include "versavis/export.hpp"
 
 namespace versavis {
 
@@ -21,7 +23,9 @@ struct Duration {
     constexpr friend Duration operator-(Duration a, Duration b) { return {a.ns - b.ns}; }
     constexpr friend Duration operator-(Duration a) { return {-a.ns}; }
     constexpr friend Duration operator*(Duration a, std::int64_t factor) { return {a.ns * factor}; }
-    constexpr friend Duration operator/(Duration a, std::int64_t divisor) { return {a.ns / divisor}; }
+    constexpr friend Duration operator/(Duration a, std::int64_t divisor) {
+        return {a.ns / divisor};
+    }
 };
 
 constexpr Duration nanoseconds(std::int64_t n) { return {n}; }
@@ -31,7 +35,7 @@ constexpr Duration seconds(std::int64_t n) { return {n * 1'000'000'000}; }
 constexpr Duration absolute(Duration d) { return d.ns < 0 ? -d : d; }
 
 /// The nearest whole number of nanoseconds, cut at 36 years either way.
-Duration rounded(double ns);
+VERSAVIS_API Duration rounded(double ns);
 
 /// An instant on the clock named by Clock, in nanoseconds since that clock's own zero.
 template <class Clock>
@@ -49,9 +53,10 @@ struct Time {
     constexpr friend Time operator-(Time t, Duration d) { return {t.ns - d.ns}; }
 };
 
-using BoardTime = Time<struct BoardClockTag>;    ///< the trigger board's clock, since its boot
-using HostTime = Time<struct HostClockTag>;      ///< CLOCK_MONOTONIC_RAW of this machine
-using OutputTime = Time<struct OutputClockTag>;  ///< the clock that the user chose for published stamps
+using BoardTime = Time<struct BoardClockTag>;  ///< the trigger board's clock, since its boot
+using HostTime = Time<struct HostClockTag>;    ///< CLOCK_MONOTONIC_RAW of this machine
+using OutputTime =
+    Time<struct OutputClockTag>;  ///< the clock that the user chose for published stamps
 using CameraTime = Time<struct CameraClockTag>;  ///< a camera's own clock
 
 /// Middle of an interval, without overflow; rounds towards `begin`.
@@ -61,6 +66,6 @@ constexpr Time<Clock> middle(Time<Clock> begin, Time<Clock> end) {
 }
 
 /// The host clock now.
-HostTime host_now();
+VERSAVIS_API HostTime host_now();
 
 }  // namespace versavis

@@ -2,9 +2,9 @@
 // A recording, smoothed: later messages tell of earlier instants.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/smoother.hpp"
 #include "score.hpp"
-#include "versavis/clock/envelope_filter.hpp"
-#include "versavis/clock/smoother.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;
@@ -56,7 +56,8 @@ TEST_CASE("clock 005: each life of a board is smoothed by itself") {
     const World world(settings);
     const clock::Smoother smoother(messages_of(world));
     CHECK(smoother.segments() == 2);
-    for (const TrueTime t : {TrueTime{seconds(30).ns}, TrueTime{seconds(59).ns}, TrueTime{seconds(62).ns}})
+    for (const TrueTime t :
+         {TrueTime{seconds(30).ns}, TrueTime{seconds(59).ns}, TrueTime{seconds(62).ns}})
         CHECK(absolute(smoother.translate(world.board(t)).time - world.host(t)) < microseconds(60));
 }
 

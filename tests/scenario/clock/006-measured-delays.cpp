@@ -2,8 +2,8 @@
 // Delays measured between two processes, on a quiet machine and on a loaded one.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "score.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

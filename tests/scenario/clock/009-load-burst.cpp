@@ -2,8 +2,8 @@
 // For 30 s the scheduler delays each wake-up by 6 ms in the mean.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "honest.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

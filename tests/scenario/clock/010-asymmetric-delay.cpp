@@ -2,17 +2,20 @@
 // One direction is slower, always: stamps cannot show it, so the bound must hold it.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "honest.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;
 
-TEST_CASE("clock 010: what stamps cannot show is within the bound, and what was measured is taken off") {
+TEST_CASE(
+    "clock 010: what stamps cannot show is within the bound, and what was measured is taken off") {
     constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
-    settings.link = [](Random& random) { return usb_full_speed({.longer_to_host = longer}, random); };
+    settings.link = [](Random& random) {
+        return usb_full_speed({.longer_to_host = longer}, random);
+    };
     Score as_it_is;
     Score corrected;
     for (settings.seed = 1; settings.seed <= 8; ++settings.seed) {

@@ -2,8 +2,8 @@
 // The host sleeps for a minute; its raw clock stands still meanwhile.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "score.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

@@ -2,9 +2,9 @@
 // Many seeds, mixed troubles: whatever happened, minutes later all is well.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "score.hpp"
 #include "troubles.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

@@ -2,9 +2,9 @@
 // PPS at the board, whose seconds a disciplined host names, over a link that is slower to the host.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/pps_reference.hpp"
 #include "honest.hpp"
-#include "versavis/clock/envelope_filter.hpp"
-#include "versavis/clock/pps_reference.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;
@@ -13,7 +13,9 @@ TEST_CASE("clock 018: PPS measures what the link does unequally, and stamps bett
     constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
-    settings.link = [](Random& random) { return usb_full_speed({.longer_to_host = longer}, random); };
+    settings.link = [](Random& random) {
+        return usb_full_speed({.longer_to_host = longer}, random);
+    };
     Score by_pulses;
     Score afterwards;
     for (settings.seed = 1; settings.seed <= 6; ++settings.seed) {
@@ -32,7 +34,8 @@ TEST_CASE("clock 018: PPS measures what the link does unequally, and stamps bett
                 clock::HostEstimate estimate;
                 estimate.sigma = stamp->sigma;
                 estimate.bound = seconds(1);
-                by_pulses.add(stamp->time - OutputTime{world.host(second + milliseconds(700)).ns}, estimate);
+                by_pulses.add(stamp->time - OutputTime{world.host(second + milliseconds(700)).ns},
+                              estimate);
             }
         }
         const auto measured = pps.left_in_link();

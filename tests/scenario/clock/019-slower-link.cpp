@@ -2,8 +2,8 @@
 // The link gets slower, both ways alike: another power state, a hub in between.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "score.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Requests that beat with the frames of the bus: shortest delays come and go, and surprise for ever.
+// Requests that beat with the frames of the bus: shortest delays come and go, and surprise for
+// ever.
 #include <catch2/catch.hpp>
 
+#include "engine/clock/envelope_filter.hpp"
 #include "score.hpp"
-#include "versavis/clock/envelope_filter.hpp"
 
 using namespace versavis;
 using namespace versavis::clock_world;

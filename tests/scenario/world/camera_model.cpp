@@ -4,7 +4,8 @@
 namespace versavis::scenario {
 
 void CameraModel::emit(Edges& edges, Nanoseconds at, bool exposing) const {
-    if (settings_.strobe) edges.push_back({at, settings_.input, exposing != settings_.strobe_inverted});
+    if (settings_.strobe)
+        edges.push_back({at, settings_.input, exposing != settings_.strobe_inverted});
 }
 
 CameraModel::Edges CameraModel::trigger_line(Nanoseconds at, bool level) {
@@ -34,8 +35,8 @@ CameraModel::Edges CameraModel::begin(Nanoseconds at) {
     if (pulse.taken) {
         Nanoseconds latency = settings_.latency;
         if (settings_.jitter > 0)
-            latency +=
-                std::uniform_int_distribution<Nanoseconds>(-settings_.jitter, settings_.jitter)(random_);
+            latency += std::uniform_int_distribution<Nanoseconds>(-settings_.jitter,
+                                                                  settings_.jitter)(random_);
         if (pulse.fault == Fault::late_start) latency += ms;
         pulse.start = at + latency;
         if (settings_.trigger_width) {

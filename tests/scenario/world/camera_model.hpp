@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A camera at the board's trigger output: exposes after a latency, ignores triggers while it is busy, and
-// remembers what it truly did.
+// A camera at the board's trigger output: exposes after a latency, ignores triggers while it is
+// busy, and remembers what it truly did.
 #pragma once
 
 #include <functional>

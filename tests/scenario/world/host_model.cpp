@@ -43,7 +43,8 @@ void HostModel::take(const wire::Packet& packet) {
     } else {
         keep(packet, inbox.events) || keep(packet, inbox.healths) || keep(packet, inbox.hellos) ||
             keep(packet, inbox.answers) || keep(packet, inbox.refusals) ||
-            keep(packet, inbox.clock_answers) || keep(packet, inbox.follow_ups) || keep(packet, inbox.logs);
+            keep(packet, inbox.clock_answers) || keep(packet, inbox.follow_ups) ||
+            keep(packet, inbox.logs);
     }
 }
 

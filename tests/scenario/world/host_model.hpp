@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "versavis/wire/packet.hpp"
+#include "wire/packet.hpp"
 
 namespace versavis::scenario {
 

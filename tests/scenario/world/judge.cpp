@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "versavis/imu/imu_model.hpp"
+#include "engine/imu/imu_model.hpp"
 #include "world.hpp"
 
 namespace versavis::scenario {
@@ -20,7 +20,9 @@ void complain(std::string& out, fmt::format_string<Args...> text, Args&&... args
     if (out.size() < longest_report) out += fmt::format(text, std::forward<Args>(args)...) + "\n";
 }
 
-bool has(const wire::Exposure& record, wire::ExposureFlag flag) { return (record.flags & flag) != 0; }
+bool has(const wire::Exposure& record, wire::ExposureFlag flag) {
+    return (record.flags & flag) != 0;
+}
 
 }  // namespace
 
@@ -54,26 +56,30 @@ void World::judge_camera(unsigned camera, std::string& out) {
             judge_record(record, pulses[record.trigger - 1], out);
     }
     if (last != pulses.size() && !drops_allowed)
-        complain(out, "camera {}: {} pulses, but the last record is {}", camera, pulses.size(), last);
+        complain(out, "camera {}: {} pulses, but the last record is {}", camera, pulses.size(),
+                 last);
     const wire::CameraConfiguration& settings = configuration.cameras[camera];
     for (std::size_t i = 0; i < pulses.size() && (settings.flags & wire::camera_slave) == 0; ++i)
         if (pulses[i].width < settings.pulse_ns || pulses[i].pause < 10 * us)
-            complain(out, "camera {}: pulse {} is {} ns wide, {} ns after the one before", camera, i + 1,
-                     pulses[i].width, pulses[i].pause);
+            complain(out, "camera {}: pulse {} is {} ns wide, {} ns after the one before", camera,
+                     i + 1, pulses[i].width, pulses[i].pause);
     for (std::size_t i = 0; i < pulses.size() && !busy_allowed; ++i)
         if (pulses[i].into_busy)
             complain(out, "camera {}: pulse {} was sent into a busy camera", camera, i + 1);
     judge_ticks(camera, out);
 }
 
-void World::judge_record(const wire::Exposure& record, const TruePulse& pulse, std::string& out) const {
+void World::judge_record(const wire::Exposure& record, const TruePulse& pulse,
+                         std::string& out) const {
     const wire::CameraConfiguration& camera = configuration.cameras[record.camera];
     const bool slave = (camera.flags & wire::camera_slave) != 0;
     const bool strobe = (camera.flags & wire::camera_no_strobe) == 0;
     const auto wrong = [&](const char* what) {
-        complain(out, "camera {} trigger {}: {} (flags {:#x}, trigger {}, start {}, end {}; true {}, {}, {})",
-                 record.camera, record.trigger, what, record.flags, record.trigger_ns, record.start_ns,
-                 record.end_ns, pulse.at, pulse.start, pulse.end);
+        complain(
+            out,
+            "camera {} trigger {}: {} (flags {:#x}, trigger {}, start {}, end {}; true {}, {}, {})",
+            record.camera, record.trigger, what, record.flags, record.trigger_ns, record.start_ns,
+            record.end_ns, pulse.at, pulse.start, pulse.end);
     };
     const Nanoseconds off = std::abs(record.trigger_ns - pulse.at);
     if (off > (slave ? firmware::routing_latency_limit : 0)) wrong("trigger time");
@@ -101,7 +107,8 @@ void World::judge_record(const wire::Exposure& record, const TruePulse& pulse, s
 
 /// Each grid point from the first to the last has a record or an event.
 void World::judge_ticks(unsigned camera, std::string& out) {
-    if (drops_allowed || gaps_allowed || (configuration.cameras[camera].flags & wire::camera_slave) != 0)
+    if (drops_allowed || gaps_allowed ||
+        (configuration.cameras[camera].flags & wire::camera_slave) != 0)
         return;
     std::multiset<std::uint64_t> ticks;
     for (const wire::Exposure& record : inbox().exposures[camera]) ticks.insert(record.tick);
@@ -116,7 +123,8 @@ void World::judge_ticks(unsigned camera, std::string& out) {
 void World::judge_imu(unsigned port, std::string& out) {
     const std::vector<wire::ImuSample>& samples = inbox().samples[port];
     if (samples.empty()) {
-        if (configuration.imus[port].kind != wire::ImuKind::none) complain(out, "IMU {}: no samples", port);
+        if (configuration.imus[port].kind != wire::ImuKind::none)
+            complain(out, "IMU {}: no samples", port);
         return;
     }
     const imu::ImuModel& model = *imu::find_model(samples[0].kind);
@@ -131,7 +139,8 @@ void World::judge_imu(unsigned port, std::string& out) {
         const wire::ImuSample& sample = samples[i];
         const std::uint32_t step = i == 0 ? 1 : sample.number - samples[i - 1].number;
         if (step != 1 && (sample.flags & wire::imu_overrun) == 0 && !drops_allowed)
-            complain(out, "IMU {}: {} numbers are missing before {}", port, step - 1, sample.number);
+            complain(out, "IMU {}: {} numbers are missing before {}", port, step - 1,
+                     sample.number);
         // The first of a VN-100 has nothing that its edge could be held against, and says so.
         if (port == 1 && (sample.flags & wire::imu_stamped) == 0) {
             last_index = -1;
@@ -141,13 +150,14 @@ void World::judge_imu(unsigned port, std::string& out) {
         if (paced) {
             const std::ptrdiff_t index = index_of(sample.time_ns);
             if (index < 0)
-                complain(out, "IMU {} sample {}: stamped {} without an edge", port, sample.number, taken);
+                complain(out, "IMU {} sample {}: stamped {} without an edge", port, sample.number,
+                         taken);
             if ((sample.flags & wire::imu_stamped) == 0)
                 complain(out, "IMU {} sample {}: not stamped by its edge", port, sample.number);
             const bool begins_anew = drops_allowed && (sample.flags & wire::imu_overrun) != 0;
             if (last_index >= 0 && index >= 0 && index - last_index != step && !begins_anew)
-                complain(out, "IMU {} sample {}: {} edges after the one before", port, sample.number,
-                         index - last_index);
+                complain(out, "IMU {} sample {}: {} edges after the one before", port,
+                         sample.number, index - last_index);
             last_index = index;
         } else if (spi_imu_ && port == 0) {
             const devices::UpdateTimes times = spi_imu_->updates();
@@ -163,11 +173,12 @@ void World::judge_imu(unsigned port, std::string& out) {
                 complain(out, "IMU {} sample {}: gyro {} is {}, not {}", port, sample.number, axis,
                          si.gyro[axis], rate);
             if (std::abs(si.accel[axis] - acceleration) > 0.7 * model.accel_m_s2 + 1e-5)
-                complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port, sample.number, axis,
-                         si.accel[axis], acceleration);
+                complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port,
+                         sample.number, axis, si.accel[axis], acceleration);
         }
         if (std::abs(si.temperature - felt.temperature_c) > 0.6 * model.temperature_c)
-            complain(out, "IMU {} sample {}: temperature is {}", port, sample.number, si.temperature);
+            complain(out, "IMU {} sample {}: temperature is {}", port, sample.number,
+                     si.temperature);
     }
 }
 
@@ -183,13 +194,15 @@ void World::judge_pulses(std::string& out) {
         });
         for (std::size_t i = 1; i < events.size(); ++i)
             if (events[i].value != events[i - 1].value + 1 && !drops_allowed)
-                complain(out, "input {}: pulse {} after {}", input, events[i].value, events[i - 1].value);
+                complain(out, "input {}: pulse {} after {}", input, events[i].value,
+                         events[i - 1].value);
         std::set<Nanoseconds> edges(source.fired.begin(), source.fired.end());
         for (const wire::Event& event : events)
             if (edges.erase(event.time_ns) == 0)
                 complain(out, "input {}: no edge at {}", input, event.time_ns);
         if (!drops_allowed && events.size() + 3 < source.fired.size())
-            complain(out, "input {}: {} events of {} pulses", input, events.size(), source.fired.size());
+            complain(out, "input {}: {} events of {} pulses", input, events.size(),
+                     source.fired.size());
     }
 }
 
@@ -205,8 +218,10 @@ void World::judge_light(std::string& out) {
             complain(out, "the light was left on at {}", interval.on);
             break;
         }
-        if (on > light.max_on_ns) complain(out, "the light was on for {} ns at {}", on, interval.on);
-        saved = std::min<double>(light.max_on_ns, saved + static_cast<double>(interval.on - before) * duty);
+        if (on > light.max_on_ns)
+            complain(out, "the light was on for {} ns at {}", on, interval.on);
+        saved = std::min<double>(light.max_on_ns,
+                                 saved + static_cast<double>(interval.on - before) * duty);
         saved += static_cast<double>(on) * (duty - 1);
         before = interval.off;
         // Code that hangs can cost one longest light, which is made up for later.
@@ -218,12 +233,15 @@ void World::judge_light(std::string& out) {
         if ((light.cameras >> output & 1U) == 0) continue;
         for (const TruePulse& pulse : model->pulses()) {
             if (!pulse.taken || pulse.end == 0 || pulse.fault == Fault::no_strobe) continue;
-            const bool lit = std::any_of(lights_.begin(), lights_.end(), [&](const Interval& interval) {
-                const Nanoseconds latest = pulse.start - light.lead_ns + model->settings().jitter;
-                return interval.on <= latest && interval.off >= pulse.end;
-            });
+            const bool lit =
+                std::any_of(lights_.begin(), lights_.end(), [&](const Interval& interval) {
+                    const Nanoseconds latest =
+                        pulse.start - light.lead_ns + model->settings().jitter;
+                    return interval.on <= latest && interval.off >= pulse.end;
+                });
             if (!lit)
-                complain(out, "camera {}: the exposure at {} was not lit throughout", output, pulse.start);
+                complain(out, "camera {}: the exposure at {} was not lit throughout", output,
+                         pulse.start);
         }
     }
 }

@@ -26,7 +26,8 @@ std::string Trace::vcd() const {
     std::vector<std::tuple<std::int64_t, std::size_t, bool>> changes;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
         out += fmt::format("$var wire 1 {} {} $end\n", symbol(i), lines_[i].name);
-        for (const Change& change : lines_[i].changes) changes.emplace_back(change.at_ns, i, change.level);
+        for (const Change& change : lines_[i].changes)
+            changes.emplace_back(change.at_ns, i, change.level);
     }
     out += "$upscope $end\n$enddefinitions $end\n#0\n";
     for (std::size_t i = 0; i < lines_.size(); ++i) out += fmt::format("0{}\n", symbol(i));
@@ -53,14 +54,16 @@ std::string Trace::svg(const Window& window) const {
                            static_cast<double>(window.to_ns - window.from_ns);
     };
     std::string out = fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" font-family=\"sans-serif\" "
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" "
+        "font-family=\"sans-serif\" "
         "font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
         "<text x=\"10\" y=\"18\" font-size=\"14\">{}</text>\n",
         label + width + 40, bottom + 30, window.title);
     for (std::int64_t at = window.from_ns; at <= window.to_ns; at += window.tick_ns)
         out += fmt::format(
             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" stroke=\"#ddd\"/>\n"
-            "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\" fill=\"#666\">{4:g} ms</text>\n",
+            "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\" fill=\"#666\">{4:g} "
+            "ms</text>\n",
             x(at), top - 10, bottom, bottom + 16, static_cast<double>(at - window.from_ns) / 1e6);
     for (const std::int64_t at : window.marks)
         if (at >= window.from_ns && at <= window.to_ns)
@@ -70,8 +73,8 @@ std::string Trace::svg(const Window& window) const {
                 x(at), top - 10, bottom);
     double base = top + swing;
     for (const std::string& name : window.lines) {
-        const auto found =
-            std::find_if(lines_.begin(), lines_.end(), [&](const Line& line) { return line.name == name; });
+        const auto found = std::find_if(lines_.begin(), lines_.end(),
+                                        [&](const Line& line) { return line.name == name; });
         bool level = false;
         std::string points;
         const auto point = [&](std::int64_t at) {

@@ -22,7 +22,8 @@ class Trace {
         std::int64_t to_ns;
         std::int64_t tick_ns;  ///< distance of the time marks
         std::vector<std::string> lines;
-        std::vector<std::int64_t> marks;  ///< instants with a dashed line through all, such as grid points
+        std::vector<std::int64_t>
+            marks;  ///< instants with a dashed line through all, such as grid points
     };
     std::string svg(const Window& window) const;
 

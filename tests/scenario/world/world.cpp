@@ -37,7 +37,8 @@ void World::make_board(wire::ResetCause cause) {
     surroundings.reboot = [this](bool) { ++reboots_; };
     surroundings.flash = &flash_;
     pins_ = 0;
-    const auto nonce = static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);
+    const auto nonce =
+        static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);
     board_ = std::make_unique<firmware::NativeBoard>(firmware::Identity{nonce, cause, "TEST"},
                                                      std::move(surroundings), now_);
     board_->set_link_capacity(link_capacity_);
@@ -65,10 +66,11 @@ CameraModel& World::add_camera(unsigned output, CameraSettings settings, std::ui
     return *cameras_[output];
 }
 
-void World::add_imu(std::unique_ptr<devices::SpiImuDevice> device, wire::ImuKind kind, double rate_hz,
-                    bool data_ready) {
+void World::add_imu(std::unique_ptr<devices::SpiImuDevice> device, wire::ImuKind kind,
+                    double rate_hz, bool data_ready) {
     spi_imu_ = std::move(device);
-    configuration.imus[0] = {kind, 0, data_ready ? std::uint8_t{wire::imu_data_ready} : std::uint8_t{0}, 0,
+    configuration.imus[0] = {kind, 0,
+                             data_ready ? std::uint8_t{wire::imu_data_ready} : std::uint8_t{0}, 0,
                              static_cast<std::uint32_t>(std::lround(rate_hz * 1e3))};
     if (data_ready) next_ready_ = now_ + ms;
 }
@@ -81,9 +83,10 @@ devices::Vn100Device& World::add_vn100(double rate_hz, bool data_ready) {
     return *uart_imu_;
 }
 
-void World::add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns, Nanoseconds width) {
-    pulses_.push_back(
-        {static_cast<std::uint8_t>(unsigned{firmware::input_pulse} + input), origin, period_ns, width});
+void World::add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns,
+                       Nanoseconds width) {
+    pulses_.push_back({static_cast<std::uint8_t>(unsigned{firmware::input_pulse} + input), origin,
+                       period_ns, width});
     configuration.ports.inputs |= static_cast<std::uint8_t>(1U << input);
 }
 
@@ -150,7 +153,9 @@ bool World::configure() {
            inbox().answers.back().status == wire::ConfigurationStatus::taken;
 }
 
-void World::start(std::uint8_t cameras, std::uint8_t flags) { send(wire::Start{cameras, flags, {}}); }
+void World::start(std::uint8_t cameras, std::uint8_t flags) {
+    send(wire::Start{cameras, flags, {}});
+}
 void World::stop(std::uint8_t cameras) { send(wire::Stop{cameras, {}}); }
 
 bool World::begin(std::uint8_t flags) {
@@ -268,7 +273,8 @@ Nanoseconds World::grid_time(unsigned camera, std::uint64_t tick) const {
 }
 
 Nanoseconds World::grid_error(const wire::Exposure& record) const {
-    return record.start_ns + (record.end_ns - record.start_ns) / 2 - grid_time(record.camera, record.tick);
+    return record.start_ns + (record.end_ns - record.start_ns) / 2 -
+           grid_time(record.camera, record.tick);
 }
 
 const wire::Exposure& World::record(unsigned camera, std::uint64_t trigger) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board in virtual time, wired to models of cameras, IMUs and pulse sources, and to a host; keeps what
-// truly happened, and judges what was reported by it.
+// The board in virtual time, wired to models of cameras, IMUs and pulse sources, and to a host;
+// keeps what truly happened, and judges what was reported by it.
 #pragma once
 
 #include <map>
@@ -105,7 +105,8 @@ class World {
     // What judge() puts up with.
     bool drops_allowed = false;  ///< records and events that the board had to drop
     bool busy_allowed = false;   ///< triggers into a busy camera that nobody could foresee
-    bool gaps_allowed = false;   ///< grid points without pulse or event: pattern, slow start, restarts
+    bool gaps_allowed =
+        false;  ///< grid points without pulse or event: pattern, slow start, restarts
 
     /// Everything that was reported against everything that happened; empty: all is right.
     std::string judge();

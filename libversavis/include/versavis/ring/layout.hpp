@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The byte layout of a shared-memory ring, as docs/shm-layout.md fixes it for every language.
+// The byte layout of a shared-memory ring, as docs/contracts/shm-layout.md fixes it for every
+// language.
 #pragma once
 
 #include <array>
@@ -50,16 +51,18 @@ struct Header {
     std::uint64_t slots_at;
     char name[64];  ///< zero-terminated
 
-    alignas(128) std::atomic<std::uint64_t> head;  ///< items published since creation
-    alignas(
-        128) std::atomic<std::uint32_t> wake;  ///< futex word: bumped at each publication and state change
-    alignas(128) std::atomic<std::uint32_t> state;        ///< WriterState
-    alignas(128) std::atomic<std::int64_t> heartbeat_ns;  ///< host time of the writer's last sign of life
+    alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation
+    alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped at each publication and
+                                                    ///< state change
+    alignas(128) std::atomic<std::uint32_t> state;  ///< WriterState
+    alignas(128)
+        std::atomic<std::int64_t> heartbeat_ns;  ///< host time of the writer's last sign of life
 };
 
 /// One published item. Item n lies in descriptor n % descriptor_count.
 struct alignas(128) Descriptor {
-    std::atomic<std::uint64_t> sequence;  ///< 2n + 2 once item n is complete, 2n + 1 while it is written
+    std::atomic<std::uint64_t>
+        sequence;  ///< 2n + 2 once item n is complete, 2n + 1 while it is written
     std::atomic<std::uint64_t> slot_generation;  ///< the slot's generation word when published
     std::atomic<std::uint64_t> length_and_slot;  ///< length << 32 | slot
     std::atomic<std::int64_t> output_time_ns;
@@ -68,7 +71,8 @@ struct alignas(128) Descriptor {
 
 static_assert(offsetof(Header, total_size) == 16 && offsetof(Header, boot_id) == 32);
 static_assert(offsetof(Header, writer_pid) == 48 && offsetof(Header, kind) == 52);
-static_assert(offsetof(Header, writer_start_ticks) == 56 && offsetof(Header, descriptor_count) == 64);
+static_assert(offsetof(Header, writer_start_ticks) == 56 &&
+              offsetof(Header, descriptor_count) == 64);
 static_assert(offsetof(Header, slot_size) == 72 && offsetof(Header, descriptors_at) == 80);
 static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104);
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);

@@ -5,15 +5,18 @@
 #include <filesystem>
 #include <string>
 
+#include "versavis/export.hpp"
+
 namespace versavis {
 
 /// Name of the instance meant when none is given: $VERSAVIS_INSTANCE, else "default".
-std::string default_instance();
+VERSAVIS_API std::string default_instance();
 
 /// /dev/shm/versavis/<instance>
-std::filesystem::path instance_directory(const std::string& instance);
+VERSAVIS_API std::filesystem::path instance_directory(const std::string& instance);
 
 /// /dev/shm/versavis/<instance>/<stream>
-std::filesystem::path stream_path(const std::string& instance, const std::string& stream);
+VERSAVIS_API std::filesystem::path stream_path(const std::string& instance,
+                                               const std::string& stream);
 
 }  // namespace versavis

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A reader of a shared-memory ring: read-only, independent of the writer's and of other readers' fate.
+// A reader of a shared-memory ring: read-only, independent of the writer's and of other readers'
+// fate.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +8,7 @@
 #include <memory>
 
 #include "versavis/error.hpp"
+#include "versavis/export.hpp"
 #include "versavis/ring/layout.hpp"
 #include "versavis/time.hpp"
 
@@ -18,7 +20,7 @@ enum class Found {
     nothing,    ///< nothing new (in the time given)
     lost,       ///< items were overwritten before they were read; reading goes on at newer ones
     restarted,  ///< the service was restarted; reading goes on with its first item
-    gone,       ///< the writer is closed or dead, and no new one is there yet; looking again is right
+    gone,  ///< the writer is closed or dead, and no new one is there yet; looking again is right
 };
 
 struct Item {
@@ -27,19 +29,20 @@ struct Item {
     std::uint64_t number = 0;  ///< item number since the segment was made
     OutputTime time;
     Metadata metadata{};
-    const std::byte* payload = nullptr;  ///< in the ring, until the next call; check intact() after reading
+    const std::byte* payload =
+        nullptr;  ///< in the ring, until the next call; check intact() after reading
     std::uint32_t payload_size = 0;
     std::uint32_t slot = no_slot;
     std::uint64_t slot_generation = 0;
 };
 
 /// Not thread-safe: one thread at a time may call it; any number of readers may exist.
-class Reader {
+class VERSAVIS_API Reader {
  public:
     enum class From { newest, oldest };
 
-    /// Maps `directory / name`. Errors: not there, not owned by the directory's owner, not a ring, unknown
-    /// layout.
+    /// Maps `directory / name`. Errors: not there, not owned by the directory's owner, not a ring,
+    /// unknown layout.
     static Expected<Reader> open(const std::filesystem::path& path, From from = From::newest);
 
     Reader(Reader&&) noexcept;
@@ -52,12 +55,12 @@ class Reader {
     /// The next item, waiting for it up to `timeout` in the kernel.
     Item wait(Duration timeout);
 
-    /// True while the payload of `item` has not been touched by the writer: what was read of it before is
-    /// good.
+    /// True while the payload of `item` has not been touched by the writer: what was read of it
+    /// before is good.
     bool intact(const Item& item) const;
 
-    /// Copies the payload (item.payload_size bytes) to `destination`; false when the writer overtook the
-    /// copy.
+    /// Copies the payload (item.payload_size bytes) to `destination`; false when the writer
+    /// overtook the copy.
     bool copy(const Item& item, std::byte* destination) const;
 
     StreamKind kind() const;
@@ -66,7 +69,8 @@ class Reader {
     std::uint64_t retained() const;  ///< items that can be read at a time
     HostTime last_heartbeat() const;
     std::uint32_t writer_pid() const;
-    bool writer_alive() const;  ///< its state is live and its heartbeat is younger than three seconds
+    bool writer_alive()
+        const;  ///< its state is live and its heartbeat is younger than three seconds
 
  private:
     struct Segment;

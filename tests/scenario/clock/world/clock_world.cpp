@@ -53,7 +53,8 @@ bool World::lost(TrueTime at) {
 }
 
 void World::exchange_all() {
-    std::uniform_real_distribution<> dither(1e9 * (1 - settings_.dither), 1e9 * (1 + settings_.dither));
+    std::uniform_real_distribution<> dither(1e9 * (1 - settings_.dither),
+                                            1e9 * (1 + settings_.dither));
     std::uniform_int_distribution<std::int64_t> answering(0, answer_spread_ns);
     const TrueTime end{settings_.length.ns};
     for (TrueTime next{1'000'000}; next < end;) {
@@ -63,11 +64,11 @@ void World::exchange_all() {
         const TrueTime arrived = answered + link_->to_host(answered, random_);
         next = sent + Duration{std::llround(dither(random_) / settings_.exchange_hz)};
         if (lost(sent)) continue;
-        const bool reset_between =
-            settings_.board_reset && sent < *settings_.board_reset && *settings_.board_reset < arrived;
+        const bool reset_between = settings_.board_reset && sent < *settings_.board_reset &&
+                                   *settings_.board_reset < arrived;
         if (reset_between) continue;
-        deliveries_.push_back(
-            {arrived, clock::Exchange{host(sent), board(received), board(answered), host(arrived)}});
+        deliveries_.push_back({arrived, clock::Exchange{host(sent), board(received),
+                                                        board(answered), host(arrived)}});
         next = std::max(next, arrived);  // one at a time
     }
 }
@@ -77,7 +78,8 @@ void World::send_imu_packets() {
     TrueTime newest;
     for (TrueTime sent{1'234'567}; sent.ns < settings_.length.ns; sent = sent + interval) {
         if (lost(sent)) continue;
-        newest = std::max(newest, sent + link_->to_host(sent, random_));  // a stream keeps its order
+        newest =
+            std::max(newest, sent + link_->to_host(sent, random_));  // a stream keeps its order
         deliveries_.push_back({newest, clock::OneWay{board(sent), host(newest)}});
     }
 }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "crystal.hpp"
+#include "engine/clock/messages.hpp"
 #include "link.hpp"
-#include "versavis/clock/messages.hpp"
 
 namespace versavis::clock_world {
 

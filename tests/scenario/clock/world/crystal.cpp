@@ -33,8 +33,8 @@ Crystal::Crystal(const CrystalSettings& settings, Duration length, std::mt19937_
 
 Duration Crystal::gained(TrueTime at) const {
     const double steps = static_cast<double>(at.ns) * 1e-9 / step_s;
-    const auto i =
-        static_cast<std::size_t>(std::clamp(std::floor(steps), 0.0, static_cast<double>(skew_.size() - 2)));
+    const auto i = static_cast<std::size_t>(
+        std::clamp(std::floor(steps), 0.0, static_cast<double>(skew_.size() - 2)));
     const double part = steps - static_cast<double>(i);
     const double slope = skew_[i + 1] - skew_[i];
     return {std::llround(gained_ns_[i] + step_s * part * (skew_[i] + slope * part / 2))};

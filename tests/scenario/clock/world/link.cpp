@@ -37,7 +37,8 @@ class Invisible final : public Link {
 class UsbFullSpeed final : public Link {
  public:
     UsbFullSpeed(const UsbSettings& settings, Random& random)
-        : settings_(settings), phase_{std::uniform_int_distribution<std::int64_t>(0, frame.ns)(random)} {}
+        : settings_(settings),
+          phase_{std::uniform_int_distribution<std::int64_t>(0, frame.ns)(random)} {}
 
     Duration to_board(TrueTime sent, Random& random) override {
         const Duration awake = wake_up(sent, random) / 3;
@@ -57,7 +58,9 @@ class UsbFullSpeed final : public Link {
     Duration until_next(Duration period, TrueTime at) const {
         return {period.ns - 1 - (at.ns + frame.ns - phase_.ns) % period.ns};
     }
-    Duration slowed(TrueTime at) const { return settings_.slow.holds(at) ? settings_.slower : Duration{}; }
+    Duration slowed(TrueTime at) const {
+        return settings_.slow.holds(at) ? settings_.slower : Duration{};
+    }
     Duration wake_up(TrueTime at, Random& random) const {
         double ns = std::lognormal_distribution<>(std::log(15e3), 0.5)(random);
         const double luck = std::uniform_real_distribution<>()(random);
@@ -82,7 +85,9 @@ class Measured final : public Link {
         if (rows_.empty()) throw std::runtime_error("no delays in " + file);
         next_ = std::uniform_int_distribution<std::size_t>(0, rows_.size() - 1)(random);
     }
-    Duration to_board(TrueTime /*sent*/, Random& /*random*/) override { return {rows_[next_].to_board_ns}; }
+    Duration to_board(TrueTime /*sent*/, Random& /*random*/) override {
+        return {rows_[next_].to_board_ns};
+    }
     Duration to_host(TrueTime /*sent*/, Random& /*random*/) override {
         const Row row = rows_[next_];
         next_ = (next_ + 1) % rows_.size();

@@ -38,11 +38,12 @@ struct UsbSettings {
     Duration slower{};  ///< by so much
 };
 
-/// USB full speed: to the board in the next frame of 1 ms, to the host at the next poll, every 125 us;
-/// wake-ups of the host are log-normal, a few are late by 0.15 ms, some by 2 ms.
+/// USB full speed: to the board in the next frame of 1 ms, to the host at the next poll, every 125
+/// us; wake-ups of the host are log-normal, a few are late by 0.15 ms, some by 2 ms.
 std::unique_ptr<Link> usb_full_speed(const UsbSettings& settings, Random& random);
 
-/// Delays in the order in which they were measured, from a random one on. File: to_board_ns,to_host_ns.
+/// Delays in the order in which they were measured, from a random one on. File:
+/// to_board_ns,to_host_ns.
 std::unique_ptr<Link> measured(const std::string& file, Random& random);
 
 }  // namespace versavis::clock_world

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "clock_world.hpp"
-#include "versavis/clock/estimate.hpp"
+#include "engine/clock/estimate.hpp"
 
 namespace versavis::clock_world {
 
@@ -28,7 +28,8 @@ class Score {
         if (errors_ns_.empty()) return 0;
         if (!sorted_) std::sort(errors_ns_.begin(), errors_ns_.end());
         sorted_ = true;
-        return errors_ns_[static_cast<std::size_t>(share * static_cast<double>(errors_ns_.size() - 1))] *
+        return errors_ns_[static_cast<std::size_t>(share *
+                                                   static_cast<double>(errors_ns_.size() - 1))] *
                1e-3;
     }
     double p99_us() { return quantile_us(0.99); }
@@ -61,7 +62,8 @@ class Observer {
     Estimator& at(TrueTime now) {
         const auto& deliveries = world_.deliveries();
         for (; next_ < deliveries.size() && deliveries[next_].at <= now; ++next_)
-            std::visit([&](const auto& message) { estimator_.add(message); }, deliveries[next_].message);
+            std::visit([&](const auto& message) { estimator_.add(message); },
+                       deliveries[next_].message);
         return estimator_;
     }
 

@@ -46,7 +46,8 @@ Settings troubled(std::uint64_t seed) {
     else if (one_in(3, random)) {
         const TrueTime begin = instant(random);
         const double ppm = std::uniform_real_distribution<>(-500, 500)(random);
-        settings.host_changes = {{begin, {}, ppm}, {begin + between(seconds(1), seconds(60), random), {}}};
+        settings.host_changes = {{begin, {}, ppm},
+                                 {begin + between(seconds(1), seconds(60), random), {}}};
     }
     return settings;
 }

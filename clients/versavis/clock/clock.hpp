@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The command `versavis clock`: state of the board's clock, recordings of its stamps, and its
+// estimation from them again.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <functional>
+#include <string>
+
+#include "clock/clock_plot.hpp"
+#include "clock/clock_record.hpp"
+#include "clock/clock_replay.hpp"
+
+namespace versavis::client {
+
+class ClockCommands {
+ public:
+    /// Adds the command and its subcommands to the options of the program; `stop` says that it
+    /// shall end.
+    ClockCommands(CLI::App& app, std::function<bool()> stop);
+    ClockCommands(const ClockCommands&) = delete;  // options write to the members
+    ClockCommands& operator=(const ClockCommands&) = delete;
+
+    /// After parsing: the user asked for one of them.
+    bool chosen() const;
+    bool records() const;  ///< that goes on until it is stopped
+
+    /// Does it and returns the program's exit code.
+    int run(const std::string& instance);
+
+ private:
+    void add_status();
+    void add_record();
+    void add_replay();
+    void add_plot();
+    int show_status(const std::string& instance) const;
+    int record(const std::string& instance);
+    int replay();
+    int plot();
+
+    CLI::App* clock_;
+    CLI::App* status_ = nullptr;
+    CLI::App* record_ = nullptr;
+    CLI::App* replay_ = nullptr;
+    bool json_ = false;
+    EstimatorKind estimator_ = EstimatorKind::envelope;
+    bool fair_start_ = false;
+    double recording_s_ = 0;
+    ClockRecordSettings record_settings_;
+    ClockReplaySettings replay_settings_;
+    ClockPlotSettings plot_settings_;
+};
+
+}  // namespace versavis::client

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Draws how an estimator of the board's clock behaves on recorded exchanges.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clock/clock_replay.hpp"
+
+namespace versavis::client {
+
+/// State of the estimator after one exchange.
+struct ClockPoint {
+    double time_s = 0;     ///< since the first exchange
+    double offset_ns = 0;  ///< host minus board clock, less the same at the first exchange
+    double sigma_ns = 0;   ///< of the offset
+    double skew_ppm = 0;   ///< host clock against board clock
+    double skew_sigma_ppm = 0;
+    double residual_ns = 0;    ///< measured midpoint minus estimate before this exchange
+    double innovation_ns = 0;  ///< what this exchange, and one-way messages since the last, changed
+};
+
+/// Replays the recording; one point per exchange, in order of time.
+std::vector<ClockPoint> clock_history(const ClockRecording& recording, ClockEstimator& estimator);
+
+struct ClockPlotTexts {
+    std::string title;
+    std::string estimator;
+};
+
+/// An SVG document: offset, skew, residual and innovation, after the start and in convergence.
+std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTexts& texts);
+
+struct ClockPlotSettings {
+    std::string exchanges;
+    std::string oneway;
+    std::string out;
+    std::string title;  ///< empty: the name of the file
+    EstimatorKind estimator = EstimatorKind::envelope;
+};
+
+/// Returns the number of exchanges drawn.
+Expected<std::size_t> plot_clock(const ClockPlotSettings& settings);
+
+}  // namespace versavis::client

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "clock/clock_record.hpp"
+
+#include <fmt/format.h>
+#include <sysexits.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <optional>
+
+#include "engine/clock/recording.hpp"
+#include "versavis/stream.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+constexpr Duration longest_wait = milliseconds(200);
+
+/// Sorts items into files.
+class Recording {
+ public:
+    Expected<> open(const ClockRecordSettings& settings) {
+        if (auto opened = open(exchange_file_, settings.exchanges, "h1_ns,m2_ns,m3_ns,h4_ns");
+            !opened)
+            return opened;
+        if (settings.one_way.empty()) return {};
+        return open(one_way_file_, settings.one_way, "m_ns,h_ns");
+    }
+
+    /// False: the board restarted, this item is of its new life.
+    bool add(const clock::ClockItem& item) {
+        return std::visit([this](const auto& told) { return take(told); }, item);
+    }
+
+    void service_restarted() { service_restarted_ = true; }
+
+    Expected<> close() {
+        exchange_file_.close();
+        if (one_way_file_.is_open()) one_way_file_.close();
+        if (!exchange_file_ || !one_way_file_)
+            return failure("recording", "could not be written in full",
+                           "is there space on the disk?");
+        return {};
+    }
+
+    std::uint64_t exchanges() const { return exchanges_; }
+    std::uint64_t one_way() const { return one_way_; }
+
+ private:
+    static Expected<> open(std::ofstream& file, const std::string& path, const char* header) {
+        file.open(path);
+        file << header << '\n';
+        if (!file.flush()) return failure(path, "cannot be written");
+        return {};
+    }
+
+    bool same_life(std::uint32_t nonce) {
+        if (!nonce_) nonce_ = nonce;
+        return nonce == *nonce_;
+    }
+
+    bool take(const clock::ExchangeTold& told) {
+        if (!same_life(told.nonce)) return false;
+        exchange_file_ << fmt::format("{},{},{},{}\n", told.sent.ns, told.received.ns,
+                                      told.answered.ns, told.arrived.ns);
+        ++exchanges_;
+        return true;
+    }
+
+    bool take(const clock::OneWayTold& told) {
+        if (!same_life(told.nonce)) return false;
+        if (one_way_file_.is_open())
+            one_way_file_ << fmt::format("{},{}\n", told.departed.ns, told.arrived.ns);
+        ++one_way_;
+        return true;
+    }
+
+    /// A new service meets the board for the first time, too.
+    bool take(const clock::RestartTold& told) {
+        const bool met_again = service_restarted_ && told.nonce == nonce_;
+        service_restarted_ = false;
+        if (exchanges_ + one_way_ == 0) nonce_ = told.nonce;
+        return met_again || exchanges_ + one_way_ == 0;
+    }
+
+    bool take(const clock::OutputTold& /*told*/) { return true; }
+
+    std::ofstream exchange_file_;
+    std::ofstream one_way_file_;
+    std::optional<std::uint32_t> nonce_;
+    bool service_restarted_ = false;
+    std::uint64_t exchanges_ = 0;
+    std::uint64_t one_way_ = 0;
+};
+
+/// False: the board restarted.
+bool take(const Received<clock::ClockMetadata>& item, Recording& recording) {
+    if (item.found == Found::lost)
+        fmt::print(stderr, "versavis: {} items were overwritten before they were read\n",
+                   item.lost);
+    if (item.found == Found::restarted) recording.service_restarted();
+    if (item.found != Found::item) return true;
+    const auto told = clock::from_metadata(item.data);
+    return !told || recording.add(*told);
+}
+
+/// Reads on until it is time. False: the board restarted before.
+bool run(clock::ClockStream& stream, Recording& recording, const ClockRecordSettings& settings) {
+    const bool limited = settings.duration.ns > 0;
+    const HostTime end = host_now() + settings.duration;
+    while (!settings.stop() && !(limited && host_now() >= end)) {
+        const Duration left = end - host_now();
+        const bool short_wait = limited && left < longest_wait;
+        if (!take(stream.wait(short_wait ? std::max(left, Duration{}) : longest_wait), recording))
+            return false;
+    }
+    // What was there by then is part of it.
+    const std::uint64_t head = stream.reader().head();
+    for (auto item = stream.next(); item.found == Found::item || item.found == Found::lost;
+         item = stream.next()) {
+        if (!take(item, recording)) return false;
+        if (item.found == Found::item && item.number + 1 >= head) break;
+    }
+    return true;
+}
+
+int fail(const Error& error) {
+    fmt::print(stderr, "versavis: {}\n", error.message());
+    return EX_UNAVAILABLE;
+}
+
+}  // namespace
+
+int record_clock(const ClockRecordSettings& settings) {
+    auto stream = clock::ClockStream::open("clock", settings.instance);
+    if (!stream) return fail(stream.error());
+    Recording recording;
+    if (const auto opened = recording.open(settings); !opened) return fail(opened.error());
+    fmt::print("recording to {}\n", settings.exchanges);
+    std::fflush(stdout);
+    const bool to_its_end = run(*stream, recording, settings);
+    if (const auto closed = recording.close(); !closed) return fail(closed.error());
+    fmt::print("{} exchanges, {} one-way messages\n", recording.exchanges(), recording.one_way());
+    if (!to_its_end)
+        return fail({"board", "was restarted, its clock began anew",
+                     "the recording ends there; record again for its new life"});
+    if (recording.exchanges() == 0)
+        return fail({"clock", "no exchange came", "see 'versavis status' for the board"});
+    return EX_OK;
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "status/status_view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+namespace versavis::client {
+
+namespace {
+
+using nlohmann::json;
+
+std::string text(const json& object, const char* key) { return object.value(key, std::string()); }
+std::uint64_t count(const json& object, const char* key) {
+    return object.value(key, std::uint64_t{0});
+}
+
+std::string hint(const json& part) {
+    return text(part, "hint").empty() ? "" : fmt::format("\n         {}", text(part, "hint"));
+}
+
+std::string board_line(const json& board) {
+    return fmt::format("board    {:<10} {} {}  lost packets {}, late outputs {}, IMU errors {}{}\n",
+                       text(board, "state"), text(board, "serial"), text(board, "firmware"),
+                       count(board, "lost_packets"), count(board, "late_outputs"),
+                       count(board, "imu_errors"), hint(board));
+}
+
+std::string clock_line(const json& clock) {
+    return fmt::format(
+        "clock    {:<10} {}  sigma {:.1f} us, bound {:.1f} us, skew {:+.3f} ppm, round trip {:.0f} "
+        "us\n",
+        text(clock, "state"), text(clock, "output"), clock.value("sigma_ns", 0.0) / 1e3,
+        clock.value("bound_ns", 0.0) / 1e3, clock.value("skew_ppm", 0.0),
+        clock.value("round_trip_ns", 0.0) / 1e3);
+}
+
+std::string camera_line(const json& camera) {
+    return fmt::format(
+        "{:<8} {:<10} {}  pairing {}, published {}, incomplete {}, without trigger {}, triggers "
+        "without "
+        "frame {}, slips {}{}\n",
+        text(camera, "name"), text(camera, "state"), text(camera, "model"), text(camera, "pairing"),
+        count(camera, "frames_published"), count(camera, "frames_incomplete"),
+        count(camera, "frames_without_trigger"), count(camera, "triggers_without_frame"),
+        count(camera, "slips"), hint(camera));
+}
+
+struct ClockFact {
+    std::string_view key;
+    std::string_view name;
+    std::string_view meaning;
+};
+
+constexpr std::array clock_facts{
+    ClockFact{"state", "state", ""},
+    ClockFact{"output", "stamps are of", "clock of the published stamps"},
+    ClockFact{"sigma_ns", "sigma", "one standard deviation of a stamp made now"},
+    ClockFact{"bound_ns", "bound",
+              "its error is not larger, however unequal the link's directions are"},
+    ClockFact{"since_contact_ns", "last message", "ago"},
+    ClockFact{"round_trip_ns", "round trip", "the last one"},
+    ClockFact{"smallest_round_trip_ns", "smallest round trip", "of the last ten minutes"},
+    ClockFact{"residual_ns", "residual", "midpoint of the newest exchange less the estimate"},
+    ClockFact{"innovation_ns", "innovation", "by which the newest slot moved the estimate"},
+    ClockFact{"skew_ppm", "skew", "host clock against board clock"},
+    ClockFact{"skew_sigma_ppm", "sigma of the skew", ""},
+    ClockFact{"exchanges", "exchanges", "used since the service started"},
+    ClockFact{"one_way_messages", "other messages", "used as well"},
+    ClockFact{"slots", "slots", "since the estimate was begun"},
+    ClockFact{"surprises", "surprises", "delays below what was held to be the shortest"},
+    ClockFact{"restarts", "restarts", "estimate begun anew, because measurements contradicted it"},
+    ClockFact{"epoch", "epoch", "stamps of different epochs do not compare"},
+    ClockFact{"output_minus_host_ns", "output minus host",
+              "output clock against CLOCK_MONOTONIC_RAW"},
+    ClockFact{"output_steps", "output steps", "steps of the output clock that were seen"},
+    ClockFact{"host_suspends", "suspends", "of the host"},
+    ClockFact{"host_synchronised", "host synchronised", "says the kernel"},
+    ClockFact{"host_max_error_ns", "largest host error", "says the kernel; 16 s: nobody tells it"},
+    ClockFact{"tai_offset_s", "TAI minus UTC", "0: nobody told the kernel"},
+    ClockFact{"tai_valid", "TAI valid", ""},
+    ClockFact{"asymmetry_ns", "asymmetry", "taken off, because the link is slower to the host"},
+    ClockFact{"asymmetry_sigma_ns", "asymmetry, sigma", ""},
+    ClockFact{"asymmetry_source", "asymmetry from", ""},
+    ClockFact{"pps", "stamps by PPS", ""},
+    ClockFact{"pps_residual_ns", "PPS residual",
+              "newest pulse by messages and host, less its second"},
+    ClockFact{"pps_pulses", "PPS pulses", "with a known second"},
+    ClockFact{"pps_rejected", "PPS rejected", "that did not fit the others"},
+    ClockFact{"grid_aligned", "grid aligned", "to whole seconds of the output clock"},
+    ClockFact{"grid_error_ns", "grid error", "by the exposures measured"},
+};
+
+bool ends_with(std::string_view key, std::string_view end) {
+    return key.size() > end.size() && key.substr(key.size() - end.size()) == end;
+}
+
+/// The unit is the end of the key's name.
+std::string with_unit(std::string_view key, const json& value) {
+    if (value.is_string()) return value.get<std::string>();
+    if (!value.is_number()) return value.dump();
+    const auto number = value.get<double>();
+    if (ends_with(key, "_ns") && std::abs(number) < 1e9)
+        return fmt::format("{:.1f} us", number * 1e-3);
+    if (ends_with(key, "_ns")) return fmt::format("{:.6f} s", number * 1e-9);
+    if (ends_with(key, "_ppm")) return fmt::format("{:.4f} ppm", number);
+    if (ends_with(key, "_ppb")) return fmt::format("{} ppb", value.dump());
+    if (ends_with(key, "_s")) return fmt::format("{:.1f} s", number);
+    return value.dump();
+}
+
+std::string fact_line(std::string_view name, const std::string& value, std::string_view meaning) {
+    const std::string line = fmt::format("{:<20} {:<22} {}", name, value, meaning);
+    return line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+}
+
+/// Facts that are not in the table, those of nested objects as parent.child.
+std::string other_facts(const json& object, const std::string& parent) {
+    std::string out;
+    for (const auto& [key, value] : object.items()) {
+        const auto known = [&key = key](const ClockFact& fact) { return fact.key == key; };
+        if (parent.empty() && std::any_of(clock_facts.begin(), clock_facts.end(), known)) continue;
+        const std::string name = parent + key;
+        out += value.is_object() ? other_facts(value, name + ".")
+                                 : fact_line(name, with_unit(key, value), "");
+    }
+    return out;
+}
+
+}  // namespace
+
+std::string clock_text(const json& status) {
+    const json clock = status.value("clock", json::object());
+    std::string out;
+    for (const ClockFact& fact : clock_facts)
+        if (clock.contains(fact.key))
+            out += fact_line(fact.name, with_unit(fact.key, clock[std::string(fact.key)]),
+                             fact.meaning);
+    out += other_facts(clock, "");
+    const json board = status.value("board", json::object());
+    if (board.contains("pps"))
+        out += fact_line("PPS at the board", with_unit("pps", board["pps"]), "");
+    if (board.value("pps", "") == "good" && board.contains("pps_error_ppb"))
+        out += fact_line("board against PPS", with_unit("pps_error_ppb", board["pps_error_ppb"]),
+                         "positive: the board's clock runs fast");
+    return out;
+}
+
+std::string status_text(const json& status) {
+    const double up_s =
+        (status.value("host_time_ns", 0.0) - status.value("started_ns", 0.0)) * 1e-9;
+    std::string out = fmt::format("versavisd '{}': {}, up {:.0f} s\n", text(status, "instance"),
+                                  text(status, "health"), up_s);
+    if (status.contains("board")) out += board_line(status["board"]);
+    if (status.contains("clock")) out += clock_line(status["clock"]);
+    for (const json& camera : status.value("cameras", json::array())) out += camera_line(camera);
+    for (const json& imu : status.value("imus", json::array()))
+        out += fmt::format("{:<8} {:<10} published {}, lost {}, faulty {}\n", text(imu, "name"),
+                           text(imu, "model"), count(imu, "published"), count(imu, "lost"),
+                           count(imu, "faulty"));
+    for (const json& stream : status.value("streams", json::array()))
+        out +=
+            fmt::format("stream   {:<10} {:<7} {:>10} items {:>8.1f} Hz\n", text(stream, "name"),
+                        text(stream, "kind"), count(stream, "items"), stream.value("rate_hz", 0.0));
+    return out;
+}
+
+}  // namespace versavis::client

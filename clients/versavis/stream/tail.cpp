@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/tail.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "clock/clock_json.hpp"
+#include "engine/clock/recording.hpp"
+#include "engine/pairing/recording.hpp"
+#include "pairing/evidence_json.hpp"
+#include "versavis/stream.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+using nlohmann::json;
+
+json describe(const ring::Item& item) {
+    return {{"number", item.number}, {"time_ns", item.time.ns}};
+}
+
+/// JSON numbers have no NaN: what a part does not measure is null.
+json vector(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
+
+json describe(const Received<FrameMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const FrameMetadata& d = item.data;
+    line.update({{"kind", to_string(d.stamp_kind())},
+                 {"sigma_ns", d.sigma_ns == sigma_unknown ? json(nullptr) : json(d.sigma_ns)},
+                 {"trigger", d.trigger},
+                 {"block_id", d.block_id},
+                 {"exposure_ns", d.exposure.ns},
+                 {"board_time_ns", d.board_time.ns},
+                 {"host_time_ns", d.host_time.ns},
+                 {"arrival_ns", d.arrival.ns},
+                 {"camera_time_ns", d.camera_time.ns},
+                 {"tick", d.tick},
+                 {"width", d.width},
+                 {"height", d.height},
+                 {"pixel_format", d.pixel_format},
+                 {"epoch", d.epoch},
+                 {"flags", d.flags},
+                 {"bytes", item.payload_size}});
+    return line;
+}
+
+json describe(const Received<ImuMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const ImuMetadata& d = item.data;
+    line.update({{"sample", d.number},
+                 {"sigma_ns", d.sigma_ns},
+                 {"gyro_rad_s", vector(d.gyro)},
+                 {"accel_m_s2", vector(d.accel)},
+                 {"magnetic_t", vector(d.magnetic)},
+                 {"temperature_c", d.temperature},
+                 {"pressure_pa", d.pressure},
+                 {"board_time_ns", d.board_time.ns},
+                 {"host_time_ns", d.host_time.ns},
+                 {"epoch", d.epoch},
+                 {"flags", d.flags}});
+    return line;
+}
+
+json describe(const Received<EventMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const EventMetadata& d = item.data;
+    line.update({{"event", to_string(d.kind)},
+                 {"source", d.source_name},
+                 {"reason", to_string(d.reason)},
+                 {"value", d.value},
+                 {"board_time_ns", d.board_time.ns},
+                 {"host_time_ns", d.host_time.ns},
+                 {"epoch", d.epoch}});
+    return line;
+}
+
+json describe(const Received<pairing::EvidenceMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const auto evidence = pairing::from_metadata(item.data);
+    line.update(evidence ? to_json(*evidence) : json{{"evidence", "unknown"}});
+    return line;
+}
+
+json describe(const Received<clock::ClockMetadata>& item) {
+    json line = describe(static_cast<const ring::Item&>(item));
+    const auto told = clock::from_metadata(item.data);
+    line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
+    return line;
+}
+
+/// The document itself, so that a script sees what the status command sees.
+json describe(const StatusStream& stream, const Received<ring::Metadata>& item) {
+    std::string text(item.payload_size, '\0');
+    json line = describe(static_cast<const ring::Item&>(item));
+    if (stream.copy(item, reinterpret_cast<std::byte*>(text.data())))
+        line["status"] = json::parse(text, nullptr, false);
+    return line;
+}
+
+template <class S, class D>
+json describe(const S& /*stream*/, const D& item) {
+    return describe(item);
+}
+
+std::string one_line(const json& line, bool as_json) {
+    if (as_json) return line.dump();
+    std::string text;
+    for (const auto& [key, value] : line.items())
+        text += fmt::format("{}{}={}", text.empty() ? "" : " ", key, value.dump());
+    return text;
+}
+
+const char* remark(Found found) {
+    switch (found) {
+        case Found::restarted: return "the service was restarted";
+        case Found::gone: return "the service is gone; waiting for it";
+        default: return "";
+    }
+}
+
+template <class S>
+Expected<> print_stream(const TailSettings& settings) {
+    auto stream =
+        S::open(settings.stream, settings.instance,
+                settings.oldest ? ring::Reader::From::oldest : ring::Reader::From::newest);
+    if (!stream) return Unexpected(stream.error());
+    Found last = Found::item;
+    for (std::uint64_t printed = 0;
+         (settings.count == 0 || printed < settings.count) && !settings.stop();) {
+        const auto item = stream->wait(milliseconds(200));
+        if (item.found == Found::item) {
+            fmt::print("{}\n", one_line(describe(*stream, item), settings.json));
+            std::fflush(stdout);
+            ++printed;
+        } else if (item.found == Found::lost) {
+            fmt::print(stderr, "versavis: {} items were overwritten before they were read\n",
+                       item.lost);
+        } else if (item.found != last && item.found != Found::nothing) {
+            fmt::print(stderr, "versavis: {}\n", remark(item.found));
+        }
+        if (item.found != Found::nothing) last = item.found;
+    }
+    return {};
+}
+
+}  // namespace
+
+Expected<> tail(const TailSettings& settings) {
+    auto reader = ring::Reader::open(stream_path(settings.instance, settings.stream));
+    if (!reader) return Unexpected(reader.error());
+    switch (reader->kind()) {
+        case ring::StreamKind::frames: return print_stream<FrameStream>(settings);
+        case ring::StreamKind::imu: return print_stream<ImuStream>(settings);
+        case ring::StreamKind::events: return print_stream<EventStream>(settings);
+        case ring::StreamKind::status: return print_stream<StatusStream>(settings);
+        case ring::StreamKind::evidence: return print_stream<pairing::EvidenceStream>(settings);
+        case ring::StreamKind::clock: return print_stream<clock::ClockStream>(settings);
+    }
+    return failure(settings.stream, "is of a kind that this program does not know");
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/asymmetry_store.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr const char* default_directory = "/var/lib/versavis";
+constexpr Duration another_day = microseconds(3);
+constexpr std::int64_t largest_ns = 1'000'000'000;
+
+std::filesystem::path file_below(const std::string& directory) {
+    const char* by_systemd = std::getenv("STATE_DIRECTORY");
+    const std::string chosen = !directory.empty()      ? directory
+                               : by_systemd != nullptr ? by_systemd
+                                                       : default_directory;
+    return std::filesystem::path(chosen) / "asymmetry.json";
+}
+
+/// An object, empty when there is no file; null when it is not understood.
+nlohmann::json read(const std::filesystem::path& path) {
+    std::ifstream file(path);
+    if (!file) return nlohmann::json::object();
+    nlohmann::json document = nlohmann::json::parse(file, nullptr, false);
+    return document.is_object() ? document : nlohmann::json(nullptr);
+}
+
+bool plausible(const nlohmann::json& entry) {
+    const auto number = [&](const char* key) {
+        const auto value = entry.find(key);
+        return value != entry.end() && value->is_number_integer() &&
+               std::abs(value->get<double>()) < static_cast<double>(largest_ns);
+    };
+    return entry.is_object() && number("offset_ns") && number("sigma_ns");
+}
+
+}  // namespace
+
+AsymmetryStore::AsymmetryStore(const std::string& directory) : path_(file_below(directory)) {}
+
+Expected<std::optional<clock::Asymmetry>> AsymmetryStore::load(const std::string& port) const {
+    const nlohmann::json document = read(path_);
+    const auto entry = document.find(port);
+    if (document.is_object() && entry == document.end()) return std::nullopt;
+    if (document.is_null() || !plausible(*entry))
+        return failure(path_.string(), "is no file of asymmetries",
+                       "remove it: PPS measures them anew");
+    return clock::Asymmetry{{(*entry)["offset_ns"]},
+                            Duration{(*entry)["sigma_ns"]} * 2 + another_day};
+}
+
+Expected<> AsymmetryStore::save(const std::string& port, const clock::Asymmetry& asymmetry) const {
+    nlohmann::json document = read(path_);
+    if (document.is_null()) document = nlohmann::json::object();
+    document[port] = {{"offset_ns", asymmetry.offset.ns}, {"sigma_ns", asymmetry.sigma.ns}};
+    const std::filesystem::path part = path_.string() + ".part";
+    std::ofstream file(part);
+    file << document.dump(2) << '\n';
+    file.close();
+    std::error_code error;
+    if (file) std::filesystem::rename(part, path_, error);
+    if (!file || error)
+        return failure(path_.string(), "cannot be written",
+                       "make its directory, or set 'state_directory'");
+    return {};
+}
+
+}  // namespace versavis::daemon

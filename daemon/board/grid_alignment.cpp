@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/grid_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr Duration interval = seconds(1);
+constexpr Duration largest_sigma = milliseconds(1);
+constexpr std::size_t offsets_kept =
+    8;  // a reading of the output clock is good to some ten nanoseconds
+constexpr std::size_t errors_kept = 9;
+constexpr Duration memory = seconds(3);  // what is older says nothing of now
+constexpr Duration aligned_within = microseconds(100);
+constexpr std::int64_t second_ns = 1'000'000'000;
+
+/// From the nearest whole second.
+std::int64_t off_whole_second(std::int64_t ns) {
+    const std::int64_t past = (ns % second_ns + second_ns) % second_ns;
+    return past > second_ns / 2 ? past - second_ns : past;
+}
+
+}  // namespace
+
+GridAlignment::GridAlignment(const ClockConfiguration& clock, const wire::Configuration& board)
+    : wanted_(clock.align),
+      max_slew_ppb_(static_cast<std::uint32_t>(std::llround(clock.max_slew_ppm * 1e3))),
+      board_(board) {}
+
+void GridAlignment::begin() {
+    const std::lock_guard lock(mutex_);
+    next_ = {};
+    told_.reset();
+    errors_.clear();
+}
+
+std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Translator& translator) {
+    const std::lock_guard lock(mutex_);
+    if (!wanted_ || now < next_) return std::nullopt;
+    const auto second = translator.next_second(now);
+    const bool known = second && second->sigma < largest_sigma &&
+                       (second->state == clock::ClockState::locked ||
+                        second->state == clock::ClockState::converging);
+    if (!known) return std::nullopt;
+    const double pace_ppb = std::round(pace(*second) * 1e9);
+    if (std::abs(pace_ppb) > wire::align_largest_pace_ppb) return std::nullopt;
+    next_ = now + interval;
+    told_ = now;
+    return wire::AlignGrid{second->board.ns, static_cast<std::int32_t>(pace_ppb), max_slew_ppb_};
+}
+
+/// Board time passes by this part faster than the output clock, which may itself be slewed against
+/// the host's.
+double GridAlignment::pace(const clock::BoardSecond& second) {
+    if (epoch_ != second.epoch) offsets_.clear();
+    epoch_ = second.epoch;
+    offsets_.push_back({second.host, Duration{second.output.ns - second.host.ns}});
+    if (offsets_.size() > offsets_kept) offsets_.pop_front();
+    const Duration span = offsets_.back().host - offsets_.front().host;
+    const Duration gained = offsets_.back().output_minus_host - offsets_.front().output_minus_host;
+    const double slewed =
+        span.ns == 0 ? 0 : static_cast<double>(gained.ns) / static_cast<double>(span.ns);
+    return 1 / ((1 + second.skew_ppm * 1e-6) * (1 + slewed)) - 1;
+}
+
+void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, HostTime now) {
+    const bool own = (record.flags & wire::exposure_measured) != 0 &&
+                     (record.flags & wire::exposure_from_master) == 0;
+    if (!wanted_ || !own || record.camera >= wire::camera_count) return;
+    const wire::CameraConfiguration& camera = board_.cameras[record.camera];
+    if (camera.rate_uhz == 0) return;
+    const auto since_first = static_cast<std::int64_t>(static_cast<__int128>(record.tick) *
+                                                       1'000'000'000'000'000 / camera.rate_uhz);
+    const std::int64_t first_tick = middle.ns - camera.phase_ns - since_first;
+    const std::lock_guard lock(mutex_);
+    errors_.push_back({now, {off_whole_second(first_tick)}});
+    if (errors_.size() > errors_kept) errors_.pop_front();
+}
+
+GridReport GridAlignment::report(HostTime now) const {
+    const std::lock_guard lock(mutex_);
+    GridReport report;
+    std::vector<Duration> recent;
+    for (const Error& error : errors_)
+        if (now - error.at < memory) recent.push_back(error.error);
+    if (!recent.empty()) {
+        const auto middle = recent.begin() + static_cast<std::ptrdiff_t>(recent.size() / 2);
+        std::nth_element(recent.begin(), middle, recent.end());
+        report.error = *middle;
+    }
+    report.aligned = told_ && now - *told_ < memory && absolute(report.error) < aligned_within;
+    return report;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Keeps the grid of the board's triggers on the whole seconds of the output clock.
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <optional>
+
+#include "configuration/configuration.hpp"
+#include "engine/clock/translator.hpp"
+
+namespace versavis::daemon {
+
+struct GridReport {
+    bool aligned =
+        false;       ///< the board is told once a second, and its exposures lie where they should
+    Duration error;  ///< of the grid, by the middles of recent exposures; 0: there were none
+};
+
+/// Thread-safe.
+class GridAlignment {
+ public:
+    GridAlignment(const ClockConfiguration& clock, const wire::Configuration& board);
+
+    bool wanted() const { return wanted_; }
+
+    /// A new connection: the board is to be told at once.
+    void begin();
+
+    /// What the board is to be told now. None: it was told within the last second, or the clock is
+    /// not known well enough.
+    std::optional<wire::AlignGrid> message(HostTime now, clock::Translator& translator);
+
+    /// An exposure, and when its middle was.
+    void exposure(const wire::Exposure& record, OutputTime middle, HostTime now);
+
+    GridReport report(HostTime now) const;
+
+ private:
+    struct Offset {
+        HostTime host;
+        Duration output_minus_host;
+    };
+    struct Error {
+        HostTime at;
+        Duration error;
+    };
+
+    double pace(const clock::BoardSecond& second);
+
+    bool wanted_;
+    std::uint32_t max_slew_ppb_;
+    wire::Configuration board_;
+    mutable std::mutex mutex_;
+    HostTime next_;
+    std::optional<HostTime> told_;
+    std::optional<std::uint32_t> epoch_;
+    std::deque<Offset> offsets_;  ///< of the last seconds, in one epoch
+    std::deque<Error> errors_;
+};
+
+}  // namespace versavis::daemon

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/unix_stream.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr int write_timeout_ms = 500;
+
+class UnixStream final : public ByteStream {
+ public:
+    UnixStream(std::string path, int socket) : path_(std::move(path)), socket_(socket) {}
+    ~UnixStream() override { ::close(socket_); }
+    UnixStream(const UnixStream&) = delete;
+    UnixStream& operator=(const UnixStream&) = delete;
+
+    std::string port() const override { return "unix:" + path_; }
+
+    Expected<Chunk> read(Duration timeout) override {
+        Chunk chunk;
+        const std::int64_t wait_ns = std::max<std::int64_t>(timeout.ns, 0);
+        const timespec limit{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
+        pollfd readable{socket_, POLLIN, 0};
+        if (::ppoll(&readable, 1, &limit, nullptr) <= 0) return chunk;
+        chunk.bytes.resize(4096);
+        const ssize_t size = ::recv(socket_, chunk.bytes.data(), chunk.bytes.size(), MSG_DONTWAIT);
+        chunk.received = host_now();
+        if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR))
+            return failure(path_, "the board closed the link");
+        chunk.bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+        return chunk;
+    }
+
+    Expected<> write(std::span<const std::uint8_t> bytes) override {
+        while (!bytes.empty()) {
+            const ssize_t size =
+                ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+            if (size > 0) {
+                bytes = bytes.subspan(static_cast<std::size_t>(size));
+                continue;
+            }
+            pollfd writable{socket_, POLLOUT, 0};
+            if (errno != EAGAIN || ::poll(&writable, 1, write_timeout_ms) <= 0)
+                return failure(path_, "the board does not take data");
+        }
+        return {};
+    }
+
+ private:
+    std::string path_;
+    int socket_;
+};
+
+}  // namespace
+
+Expected<std::unique_ptr<ByteStream>> open_unix_stream(const std::string& path) {
+    sockaddr_un peer{};
+    peer.sun_family = AF_UNIX;
+    if (path.size() >= sizeof peer.sun_path)
+        return failure("board.link", "the path of the socket is too long");
+    std::memcpy(peer.sun_path, path.c_str(), path.size() + 1);
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (::connect(socket, reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0) {
+        const std::string reason = std::generic_category().message(errno);
+        ::close(socket);
+        return failure(path, fmt::format("cannot connect: {}", reason),
+                       "is the board's process (versavis-rig) running?");
+    }
+    return std::make_unique<UnixStream>(path, socket);
+}
+
+}  // namespace versavis::daemon

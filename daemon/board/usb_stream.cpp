@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/usb_stream.hpp"
+
+#include <fmt/format.h>
+#include <libusb.h>
+
+#include <array>
+#include <atomic>
+#include <deque>
+#include <mutex>
+#include <optional>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr std::size_t transfer_count = 4;
+constexpr std::size_t transfer_size = 4096;
+constexpr unsigned write_timeout_ms = 500;
+constexpr unsigned control_timeout_ms = 500;
+constexpr std::uint8_t class_interface_out =
+    0x21;  // request type: class, interface, host to device
+constexpr std::uint8_t set_control_line_state = 0x22;
+constexpr std::uint16_t dtr_rts = 0x03;
+
+struct ContextDeleter {
+    void operator()(libusb_context* context) const { libusb_exit(context); }
+};
+struct HandleDeleter {
+    void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
+};
+struct TransferDeleter {
+    void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
+};
+using Context = std::unique_ptr<libusb_context, ContextDeleter>;
+using Handle = std::unique_ptr<libusb_device_handle, HandleDeleter>;
+
+/// Where the CDC function lies.
+struct CdcFunction {
+    int control_interface = -1;
+    int data_interface = -1;
+    std::uint8_t endpoint_in = 0;
+    std::uint8_t endpoint_out = 0;
+};
+
+Unexpected<> usb_failure(const std::string& what, int code) {
+    return failure("USB board", fmt::format("{}: {}", what, libusb_error_name(code)),
+                   code == LIBUSB_ERROR_ACCESS
+                       ? "install the udev rule and join the group 'versavis'"
+                   : code == LIBUSB_ERROR_BUSY ? "another program has the board open: close it"
+                                               : "");
+}
+
+class UsbStream final : public ByteStream {
+ public:
+    UsbStream(Context context, Handle handle, const CdcFunction& function)
+        : context_(std::move(context)), handle_(std::move(handle)), function_(function) {}
+
+    ~UsbStream() override {
+        for (Slot& slot : slots_)
+            if (slot.pending) libusb_cancel_transfer(slot.transfer.get());
+        timeval limit{0, 100'000};
+        for (int tries = 0; tries < 20 && pending() > 0; ++tries)
+            libusb_handle_events_timeout_completed(context_.get(), &limit, nullptr);
+        // A transfer that never came back still points here: leaking it is safer than freeing it.
+        for (Slot& slot : slots_)
+            if (slot.pending) static_cast<void>(slot.transfer.release());
+        libusb_release_interface(handle_.get(), function_.data_interface);
+        libusb_release_interface(handle_.get(), function_.control_interface);
+    }
+    UsbStream(const UsbStream&) = delete;
+    UsbStream& operator=(const UsbStream&) = delete;
+
+    Expected<> start() {
+        for (Slot& slot : slots_) {
+            slot.owner = this;
+            slot.transfer.reset(libusb_alloc_transfer(0));
+            libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), function_.endpoint_in,
+                                      slot.buffer.data(), static_cast<int>(slot.buffer.size()),
+                                      &UsbStream::completed, &slot, 0);
+            if (const int code = libusb_submit_transfer(slot.transfer.get()); code != 0)
+                return usb_failure("cannot read", code);
+            slot.pending = true;
+        }
+        return {};
+    }
+
+    /// As the kernel names it: bus, then the ports of the hubs on the way.
+    std::string port() const override {
+        libusb_device* device = libusb_get_device(handle_.get());
+        std::array<std::uint8_t, 7> ports{};
+        const int depth =
+            libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
+        std::string name = fmt::format("usb:{}", libusb_get_bus_number(device));
+        for (int i = 0; i < depth; ++i)
+            name += fmt::format("{}{}", i == 0 ? '-' : '.', ports[static_cast<std::size_t>(i)]);
+        return name;
+    }
+
+    Expected<Chunk> read(Duration timeout) override {
+        if (auto chunk = pop()) return std::move(*chunk);
+        if (gone_) return failure("USB board", "the board was unplugged or reset");
+        timeval limit{timeout.ns / 1'000'000'000, timeout.ns % 1'000'000'000 / 1000};
+        libusb_handle_events_timeout_completed(context_.get(), &limit, nullptr);
+        return pop().value_or(Chunk{});
+    }
+
+    Expected<> write(std::span<const std::uint8_t> bytes) override {
+        int done = 0;
+        const int code = libusb_bulk_transfer(
+            handle_.get(), function_.endpoint_out, const_cast<std::uint8_t*>(bytes.data()),
+            static_cast<int>(bytes.size()), &done, write_timeout_ms);
+        if (code != 0 || done != static_cast<int>(bytes.size()))
+            return usb_failure("the board does not take data", code);
+        return {};
+    }
+
+ private:
+    struct Slot {
+        UsbStream* owner = nullptr;
+        std::unique_ptr<libusb_transfer, TransferDeleter> transfer;
+        std::array<std::uint8_t, transfer_size> buffer{};
+        std::atomic<bool> pending{false};
+    };
+
+    /// May run on a writing thread, too: libusb lets whichever thread waits handle events, under
+    /// its own lock.
+    static void LIBUSB_CALL completed(libusb_transfer* transfer) {
+        auto& slot = *static_cast<Slot*>(transfer->user_data);
+        slot.owner->take(slot, *transfer);
+    }
+
+    void take(Slot& slot, libusb_transfer& transfer) {
+        const HostTime received = host_now();
+        if (transfer.status == LIBUSB_TRANSFER_COMPLETED && transfer.actual_length > 0) {
+            const std::lock_guard lock(chunks_mutex_);
+            chunks_.push_back(
+                {received, {transfer.buffer, transfer.buffer + transfer.actual_length}});
+        }
+        const bool usable = transfer.status == LIBUSB_TRANSFER_COMPLETED ||
+                            transfer.status == LIBUSB_TRANSFER_TIMED_OUT;
+        slot.pending = usable && libusb_submit_transfer(&transfer) == 0;
+        if (!slot.pending) gone_ = true;
+    }
+
+    std::optional<Chunk> pop() {
+        const std::lock_guard lock(chunks_mutex_);
+        if (chunks_.empty()) return std::nullopt;
+        Chunk chunk = std::move(chunks_.front());
+        chunks_.pop_front();
+        return chunk;
+    }
+
+    int pending() const {
+        int count = 0;
+        for (const Slot& slot : slots_) count += slot.pending ? 1 : 0;
+        return count;
+    }
+
+    Context context_;
+    Handle handle_;
+    CdcFunction function_;
+    std::array<Slot, transfer_count> slots_;
+    std::mutex chunks_mutex_;  ///< never held while libusb is called
+    std::deque<Chunk> chunks_;
+    std::atomic<bool> gone_{false};
+};
+
+std::string text_descriptor(libusb_device_handle* handle, std::uint8_t index) {
+    std::array<unsigned char, 256> text{};
+    const int size = libusb_get_string_descriptor_ascii(handle, index, text.data(),
+                                                        static_cast<int>(text.size()));
+    return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()),
+                                  static_cast<std::size_t>(size))
+                    : "";
+}
+
+CdcFunction find_function(libusb_device* device) {
+    CdcFunction function;
+    libusb_config_descriptor* configuration = nullptr;
+    if (libusb_get_active_config_descriptor(device, &configuration) != 0) return function;
+    for (int i = 0; i < configuration->bNumInterfaces; ++i) {
+        const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
+        if (setting.bInterfaceClass == LIBUSB_CLASS_COMM)
+            function.control_interface = setting.bInterfaceNumber;
+        if (setting.bInterfaceClass != LIBUSB_CLASS_DATA) continue;
+        function.data_interface = setting.bInterfaceNumber;
+        for (int e = 0; e < setting.bNumEndpoints; ++e) {
+            const std::uint8_t address = setting.endpoint[e].bEndpointAddress;
+            ((address & LIBUSB_ENDPOINT_IN) != 0 ? function.endpoint_in : function.endpoint_out) =
+                address;
+        }
+    }
+    libusb_free_config_descriptor(configuration);
+    return function;
+}
+
+/// The first device of the vendor and product whose serial number fits.
+Expected<Handle> find_board(libusb_context* context, const BoardConfiguration& wanted) {
+    libusb_device** devices = nullptr;
+    const ssize_t count = libusb_get_device_list(context, &devices);
+    Handle found;
+    std::optional<int> refused;
+    for (ssize_t i = 0; i < count && !found; ++i) {
+        libusb_device_descriptor descriptor{};
+        libusb_get_device_descriptor(devices[i], &descriptor);
+        if (descriptor.idVendor != wanted.usb_vendor || descriptor.idProduct != wanted.usb_product)
+            continue;
+        libusb_device_handle* handle = nullptr;
+        if (const int code = libusb_open(devices[i], &handle); code != 0) {
+            refused = code;
+            continue;
+        }
+        Handle candidate(handle);
+        if (wanted.serial.empty() ||
+            text_descriptor(handle, descriptor.iSerialNumber) == wanted.serial)
+            found = std::move(candidate);
+    }
+    if (count >= 0) libusb_free_device_list(devices, 1);
+    if (found) return found;
+    if (refused) return usb_failure("cannot be opened", *refused);
+    return failure("USB board",
+                   fmt::format("no device {:04x}:{:04x}{}", wanted.usb_vendor, wanted.usb_product,
+                               wanted.serial.empty() ? "" : " with serial " + wanted.serial),
+                   "plug it in; 'lsusb' lists what is there");
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<ByteStream>> open_usb_stream(const BoardConfiguration& configuration) {
+    libusb_context* raw_context = nullptr;
+    if (const int code = libusb_init(&raw_context); code != 0)
+        return usb_failure("libusb cannot start", code);
+    Context context(raw_context);
+    auto handle = find_board(context.get(), configuration);
+    if (!handle) return Unexpected(handle.error());
+    const CdcFunction function = find_function(libusb_get_device(handle->get()));
+    if (function.control_interface < 0 || function.endpoint_in == 0 || function.endpoint_out == 0)
+        return failure("USB board", "has no CDC-ACM function", "update its firmware");
+    libusb_set_auto_detach_kernel_driver(handle->get(), 1);
+    for (const int interface : {function.control_interface, function.data_interface})
+        if (const int code = libusb_claim_interface(handle->get(), interface); code != 0)
+            return usb_failure("cannot be claimed", code);
+    libusb_control_transfer(handle->get(), class_interface_out, set_control_line_state, dtr_rts,
+                            static_cast<std::uint16_t>(function.control_interface), nullptr, 0,
+                            control_timeout_ms);
+    auto stream = std::make_unique<UsbStream>(std::move(context), std::move(*handle), function);
+    if (auto started = stream->start(); !started) return Unexpected(started.error());
+    return stream;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera/aravis_stream.hpp"
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr int receive_buffer = 32 << 20;
+constexpr unsigned shortest_retention_us = 100'000;
+constexpr double readout_us = 50'000;
+
+/// A frame is kept open until its trailer may have come, even where the leader leaves when the
+/// exposure begins. No longer: complete frames wait behind one that lost packets.
+unsigned frame_retention_us(const CameraConfiguration& configuration) {
+    const double longest = configuration.max_exposure_us + readout_us;
+    return std::max(shortest_retention_us, static_cast<unsigned>(std::lround(longest)));
+}
+
+Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configuration) {
+    GlibError error;
+    arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
+    arv_camera_gv_set_stream_options(camera, configuration.receive == ReceiveMode::socket
+                                                 ? ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED
+                                                 : ARV_GV_STREAM_OPTION_NONE);
+    if (configuration.packet_size != 0)
+        arv_camera_gv_set_packet_size(camera, static_cast<gint>(configuration.packet_size),
+                                      error.out());
+    else
+        arv_camera_gv_auto_packet_size(camera, error.out());
+    if (!error.set()) return {};
+    return failure("packet size", error.text(), "set 'packet_size' to what the network passes");
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<AravisStream>> AravisStream::create(
+    ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
+    CameraPipeline& pipeline, FrameMeter* meter) {
+    std::unique_ptr<AravisStream> self(new AravisStream(configuration, setup, pipeline, meter));
+    self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
+    if (self->calls_back_)
+        if (auto done = set_packet_size(camera, configuration); !done)
+            return Unexpected(done.error());
+    if (setup.chunks) self->chunk_parser_.reset(arv_camera_create_chunk_parser(camera));
+    GlibError error;
+    self->stream_.reset(arv_camera_create_stream(
+        camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
+    if (!self->stream_) return failure("stream", error.text());
+    if (ARV_IS_GV_STREAM(self->stream_.get())) {
+        g_object_set(self->stream_.get(), "frame-retention", frame_retention_us(configuration),
+                     nullptr);
+        self->enlarge_receive_buffer();
+    }
+    self->refill();
+    return self;
+}
+
+AravisStream::~AravisStream() {
+    closing_ = true;  // buffers that Aravis flushes are not frames
+    // Waits for the stream's thread, which may still read stream_: then nobody writes into the
+    // slots any more.
+    if (stream_) g_object_unref(stream_.get());
+    static_cast<void>(stream_.release());
+    for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
+}
+
+/// The default of 208 KiB does not hold one frame. Aravis sets its own property only when the first
+/// frame opens, and loses that frame: so the socket is found by its port and enlarged here.
+void AravisStream::enlarge_receive_buffer() const {
+    const std::uint16_t port = arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get()));
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
+        const int descriptor =
+            static_cast<int>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
+        sockaddr_in self{};
+        socklen_t size = sizeof self;
+        if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&self), &size) != 0) continue;
+        if (self.sin_family != AF_INET || ntohs(self.sin_port) != port) continue;
+        if (::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer,
+                         sizeof receive_buffer) == 0)
+            continue;
+        ::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+        int got = 0;
+        size = sizeof got;
+        ::getsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &got, &size);
+        if (static_cast<std::uint64_t>(got) < setup_.payload)
+            log(LogLevel::warning, configuration_.name,
+                "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max "
+                "or give the "
+                "service "
+                "CAP_NET_ADMIN",
+                got >> 10);
+    }
+}
+
+void AravisStream::on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
+    if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
+    auto& stream = *static_cast<AravisStream*>(self);
+    if (stream.closing_) return;
+    if (ArvBuffer* done = arv_stream_try_pop_buffer(stream.stream_.get())) stream.take(done);
+}
+
+void AravisStream::poll(Duration timeout) {
+    if (ArvBuffer* done =
+            arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(timeout.ns / 1000)))
+        take(done);
+}
+
+/// Bytes from row to row, by the pixel format; by the size for formats that do not tell.
+std::uint32_t AravisStream::stride(ArvBuffer* buffer) const {
+    const auto width = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
+    const auto height = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));
+    const unsigned bits =
+        static_cast<unsigned>(arv_buffer_get_image_pixel_format(buffer)) >> 16U & 0xFFU;
+    if (bits == 0) return height == 0 ? 0 : static_cast<std::uint32_t>(setup_.payload / height);
+    gint padding_x = 0;
+    gint padding_y = 0;
+    arv_buffer_get_image_padding(buffer, &padding_x, &padding_y);
+    return (width * bits + 7) / 8 + static_cast<std::uint32_t>(padding_x);
+}
+
+/// Success is no proof of size: a frame may be cut, or fill only half of the buffer.
+EventReason AravisStream::refusal(ArvBuffer* buffer) const {
+    if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS)
+        return EventReason::frame_incomplete;
+    std::size_t size = 0;
+    arv_buffer_get_data(buffer, &size);
+    const auto width = static_cast<std::uint32_t>(std::max(arv_buffer_get_image_width(buffer), 0));
+    const auto height =
+        static_cast<std::uint32_t>(std::max(arv_buffer_get_image_height(buffer), 0));
+    const bool like_the_first = width_ == 0 || (width == width_ && height == height_);
+    const bool whole = size == setup_.payload && width > 0 && height > 0 && like_the_first &&
+                       std::uint64_t{stride(buffer)} * height <= size;
+    return whole ? EventReason::none : EventReason::wrong_size;
+}
+
+/// Zero: the camera's number did not arrive. USB3 Vision counts from 0: one is added.
+std::uint64_t AravisStream::block_id(ArvBuffer* buffer) {
+    const std::uint64_t id = arv_buffer_get_frame_id(buffer);
+    if (!calls_back_)
+        return arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS ? id + 1 : 0;
+    return id == 0 ? 0 : block_ids_.unwrap(id);
+}
+
+Duration AravisStream::chunk_exposure(ArvBuffer* buffer) const {
+    if (!chunk_parser_ || arv_buffer_has_chunks(buffer) == FALSE) return {};
+    GlibError error;
+    const double us = arv_chunk_parser_get_float_value(chunk_parser_.get(), buffer,
+                                                       "ChunkExposureTime", error.out());
+    return error.set() ? Duration{} : Duration{std::llround(us * 1e3)};
+}
+
+/// Aravis counts packets that find no buffer, and drops their frame without a word.
+void AravisStream::note_starvation() {
+    guint64 completed = 0;
+    guint64 failures = 0;
+    guint64 underruns = 0;
+    arv_stream_get_statistics(stream_.get(), &completed, &failures, &underruns);
+    if (underruns > underruns_) pipeline_.starved(1);
+    underruns_ = underruns;
+}
+
+void AravisStream::take(ArvBuffer* buffer) {
+    pairing::Arrival arrival;
+    arrival.arrived = host_now();
+    arrival.slot = static_cast<std::uint32_t>(GPOINTER_TO_UINT(arv_buffer_get_user_data(buffer)));
+    queued_.erase(std::remove(queued_.begin(), queued_.end(), arrival.slot), queued_.end());
+    arrival.block_id = block_id(buffer);
+    const EventReason refused = refusal(buffer);
+    if (refused == EventReason::none) {
+        if (setup_.has_clock)
+            arrival.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
+        arrival.exposure = chunk_exposure(buffer);
+        arrival.width = width_ = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
+        arrival.height = height_ = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));
+        arrival.pixel_format = arv_buffer_get_image_pixel_format(buffer);
+        arrival.stride = stride(buffer);
+        arrival.size = arrival.stride * arrival.height;  // without what follows the image
+        std::size_t size = 0;
+        const auto* pixels = static_cast<const std::byte*>(arv_buffer_get_data(buffer, &size));
+        if (meter_ != nullptr)
+            meter_->take({{pixels, size}, arrival.width, arrival.height, arrival.pixel_format},
+                         arrival.arrived);
+    }
+    g_object_unref(buffer);
+    note_starvation();
+    if (refused == EventReason::none)
+        pipeline_.add(arrival);
+    else
+        pipeline_.abandon(arrival.slot, refused, arrival.block_id);
+    refill();
+}
+
+void AravisStream::refill() {
+    while (queued_.size() < configuration_.buffers) {
+        const auto slot = pipeline_.acquire();
+        if (!slot) return;
+        ArvBuffer* buffer = arv_buffer_new_full(setup_.payload, pipeline_.slot_data(*slot),
+                                                GUINT_TO_POINTER(*slot), nullptr);
+        // What a lost leader leaves untouched reads as zero, not as the frame before.
+        arv_buffer_set_frame_id(buffer, 0);
+        arv_buffer_set_timestamp(buffer, 0);
+        queued_.push_back(*slot);
+        arv_stream_push_buffer(stream_.get(), buffer);
+    }
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The service's configuration: one TOML file, every key documented in docs/user/configuration.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/clock/output_clock.hpp"
+#include "engine/clock/pps_reference.hpp"
+#include "engine/imu/imu_model.hpp"
+#include "log.hpp"
+#include "versavis/error.hpp"
+#include "versavis/time.hpp"
+#include "wire/messages.hpp"
+
+namespace versavis::daemon {
+
+/// The ring of what the pairing of a camera was told is named after the camera.
+inline const std::string evidence_suffix = "-evidence";
+
+struct BoardConfiguration {
+    std::string link = "usb";  ///< "usb" or "unix:PATH"
+    std::string serial;        ///< empty: any
+    std::uint16_t usb_vendor = 0x1209;
+    std::uint16_t usb_product = 0x5653;
+    bool keep_configuration = false;  ///< it also holds after the board's next power-up
+};
+
+struct ClockConfiguration {
+    clock::OutputClockKind output = clock::OutputClockKind::realtime;
+    bool force_tai = false;  ///< take CLOCK_TAI although the kernel does not know its offset
+    double exchange_rate_hz = 10;
+    bool align = false;        ///< the board's grid lies on whole seconds of the output clock
+    double max_slew_ppm = 20;  ///< it is moved there no faster
+    clock::PpsLabels pps = clock::PpsLabels::off;
+};
+
+enum class TriggerSource { board, free_run };
+enum class Strobe { active_high, active_low, none };
+enum class ReceiveMode { socket, packet };
+enum class OnUnproved { withhold, flag };
+
+struct AutoExposureConfiguration {
+    bool enabled = false;
+    double target = 0.4;    ///< brightness, 0 black to 1 saturated
+    double percentile = 0;  ///< of the pixels whose brightness counts; 0: the mean of all
+    double min_us = 50;
+    double max_us = 0;          ///< 0: max_exposure_us
+    double largest_step = 1.5;  ///< factor from one exposure to the next
+    unsigned delay_frames = 1;  ///< frames between setting an exposure and the first that has it
+};
+
+struct CameraConfiguration {
+    std::string name;
+    std::string device;  ///< what Aravis finds it by: address, serial number or full name
+    TriggerSource trigger = TriggerSource::board;
+    unsigned output = 0;
+    std::string master;  ///< name of the camera whose exposure line triggers this one; empty: none
+    double rate_hz = 20;
+    double phase_us = 0;
+    double exposure_us = 3000;
+    double max_exposure_us = 0;  ///< 0: the period
+    double latency_us = 0;
+    double gap_us = 0;
+    double pulse_us = 100;
+    bool trigger_inverted = false;
+    Strobe strobe = Strobe::active_high;
+    std::string preset = "auto";
+    std::string trigger_line;  ///< empty: as in the preset
+    std::string strobe_line;   ///< empty: as in the preset
+    bool exposure_by_pulse =
+        false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
+    bool chunks = false;
+    bool ptp = false;
+    AutoExposureConfiguration auto_exposure;
+    double max_temperature_c = 75;
+    double link_mbps = 0;  ///< of the network link; 0: as the interface says
+    unsigned slots = 17;
+    unsigned buffers = 6;
+    unsigned packet_size = 0;  ///< 0: the largest that passes
+    ReceiveMode receive = ReceiveMode::socket;
+    double latest_arrival_ms = 500;
+    OnUnproved on_unproved = OnUnproved::withhold;
+    bool camera_clock = true;    ///< its time stamps are evidence; false: they are worthless
+    bool check_exposure = true;  ///< the camera's exposure time against the measured one
+    std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
+};
+
+struct ImuConfiguration {
+    std::string name = "imu0";
+    const imu::ImuModel* model = nullptr;
+    double rate_hz = 200;
+    unsigned filter = 0;
+    bool data_ready = false;
+
+    /// IMU port of the board: 0 SPI, 1 UART.
+    std::uint8_t port() const { return model->kind == wire::ImuKind::vn100 ? 1 : 0; }
+};
+
+struct IlluminationConfiguration {
+    std::vector<std::string> cameras;  ///< names; empty: no light
+    double lead_us = 100;
+    double max_on_us = 10000;
+    double duty_percent = 20;
+    bool inverted = false;
+};
+
+struct PortConfiguration {
+    std::vector<std::string> inputs;   ///< of pulse_input_names
+    std::vector<std::string> falling;  ///< those whose falling edge counts
+    bool imu_output = false;
+    bool nmea = false;  ///< a GNSS receiver at the UART names the PPS pulses
+    unsigned nmea_baud = 9600;
+    std::string test;         ///< name of a camera or an IMU; empty: none
+    double sync_rate_hz = 0;  ///< 0: none
+    double pulse_us = 100;
+};
+
+struct Configuration {
+    std::string instance = "default";
+    LogLevel log_level = LogLevel::info;
+    std::string preset_directory;
+    std::string state_directory;  ///< what is measured once and used later; empty: systemd's  ///<
+                                  ///< empty: that of the installation
+    BoardConfiguration board;
+    ClockConfiguration clock;
+    std::vector<CameraConfiguration> cameras;
+    std::vector<ImuConfiguration> imus;
+    IlluminationConfiguration illumination;
+    PortConfiguration ports;
+};
+
+/// Errors name file, line and column, and the cure.
+Expected<Configuration> load_configuration(const std::string& path);
+
+/// What the board is told.
+wire::Configuration board_configuration(const Configuration& configuration);
+
+}  // namespace versavis::daemon

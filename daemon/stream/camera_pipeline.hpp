@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// From arrivals and exposures of one camera to stamped frames in its ring.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "configuration/configuration.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/pairing/recording.hpp"
+#include "engine/ring/writer.hpp"
+#include "stream/event_journal.hpp"
+#include "stream/stamp_guard.hpp"
+
+namespace versavis::daemon {
+
+struct PipelineReport {
+    pairing::State pairing = pairing::State::searching;
+    std::uint64_t received = 0;    ///< complete frames
+    std::uint64_t incomplete = 0;  ///< frames that lost packets on the way
+    std::uint64_t no_buffer = 0;   ///< frames that found no slot to go to
+    std::uint64_t published = 0;
+    std::uint64_t frames_without_trigger = 0;
+    std::uint64_t triggers = 0;
+    std::uint64_t triggers_without_frame = 0;
+    std::uint64_t unmeasured =
+        0;                 ///< triggers whose exposure was not measured although its line is wired
+    bool measured = true;  ///< the newest one was
+    std::uint64_t suspect = 0;  ///< published although not proved
+    std::uint64_t locks = 0;
+    std::uint64_t slips = 0;
+    HostTime last_frame;
+    HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
+    Duration exposure;                   ///< measured, of the newest trigger; 0: unknown
+    Duration camera_exposure;            ///< by the camera's account; 0: unknown
+    bool exposure_contradicted = false;  ///< the two differ
+};
+
+/// Thread-safe. Whoever completes a pair publishes it.
+class CameraPipeline final : private pairing::Outcome {
+ public:
+    CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
+                   clock::Translator& translator, EventJournal& events);
+
+    /// Makes the rings, or one with larger slots: called by the camera once it knows its payload.
+    /// Slots are void then. `has_clock`: its stamps are its own.
+    Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size,
+                       bool has_clock);
+
+    std::optional<std::uint32_t> acquire();
+    std::byte* slot_data(std::uint32_t slot);
+    void abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id);
+
+    /// Frames that found no slot to go to.
+    void starved(std::uint64_t frames);
+
+    /// What the camera says that it exposes from now on, about; 0: it changes by itself.
+    void set_camera_exposure(Duration exposure, HostTime since);
+
+    /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
+    void add(const pairing::Arrival& arrival);
+    void add(const wire::Exposure& record);
+
+    /// Camera or board began a new life.
+    void reset();
+
+    /// Gives up what waited too long. A start: the board should be asked for it, because nothing
+    /// else can prove the pairing, or because no trigger came although it was asked to.
+    std::optional<pairing::Start> advance(HostTime now);
+    pairing::Start first_start();
+    void start_requested(pairing::Start start, HostTime now);
+
+    bool triggered() const { return configuration_.trigger == TriggerSource::board; }
+    std::uint8_t board_mask() const {
+        return static_cast<std::uint8_t>(1U << configuration_.output);
+    }
+
+    /// Number of the newest trigger that the board recorded.
+    std::uint64_t newest_trigger();
+
+    /// Triggers since the last frame.
+    std::uint64_t unanswered_triggers();
+    PipelineReport report();
+    std::uint64_t items();
+
+ private:
+    void paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) override;
+    void frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
+                        const pairing::Exposure* guess) override;
+    void exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) override;
+    void locked(const pairing::Exposure& first) override;
+    void slipped(const pairing::Arrival& at) override;
+
+    void tell(const pairing::Evidence& evidence);
+    pairing::Exposure complete(const wire::Exposure& record);
+    bool contradicted(const pairing::Arrival& arrival, const pairing::Exposure& exposure);
+    void publish_paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
+                        const clock::Stamp& stamp, std::uint32_t flags);
+    static Duration kind_sigma(const pairing::Exposure& exposure, Duration to_arrival);
+    void publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+                 FrameMetadata metadata);
+    void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
+    void publish_free_run(const pairing::Arrival& arrival);
+    void journal(EventKind kind, EventReason reason, std::int64_t value,
+                 std::optional<BoardTime> at = {});
+
+    CameraConfiguration configuration_;
+    std::uint32_t index_;
+    clock::Translator& translator_;
+    EventJournal& events_;
+
+    std::mutex mutex_;
+    std::optional<ring::Writer> ring_;
+    std::optional<ring::Writer> evidence_;
+    pairing::Limits limits_;
+    pairing::Pairing pairing_;
+    StampGuard guard_;
+    Duration start_patience_;
+    Duration last_exposure_;
+    Duration camera_exposure_;
+    HostTime camera_exposure_since_;
+    std::uint64_t newest_trigger_ = 0;
+    std::uint64_t unanswered_ = 0;
+    HostTime last_trigger_;  ///< its record came, or it was asked for
+    PipelineReport report_;
+};
+
+}  // namespace versavis::daemon

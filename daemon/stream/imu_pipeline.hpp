@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Samples of one IMU: from raw words to SI units with a stamp, into the ring.
+#pragma once
+
+#include <mutex>
+#include <string>
+
+#include "configuration/configuration.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/ring/writer.hpp"
+#include "stream/stamp_guard.hpp"
+
+namespace versavis::daemon {
+
+struct ImuReport {
+    std::string name;
+    std::string model;
+    std::uint64_t published = 0;
+    std::uint64_t lost = 0;      ///< numbers that never arrived
+    std::uint64_t no_clock = 0;  ///< withheld: board time could not be translated yet
+    std::uint64_t faulty = 0;    ///< published with a sensor error
+    HostTime last_sample;        ///< without an error
+};
+
+/// Thread-safe.
+class ImuPipeline {
+ public:
+    ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
+                clock::Translator& translator);
+
+    void add(const wire::ImuSample& sample);
+    void board_restarted();
+    void heartbeat(HostTime now);
+    ImuReport report();
+    /// IMU port of the board.
+    std::uint8_t port() const { return port_; }
+
+ private:
+    std::mutex mutex_;
+    const imu::ImuModel& model_;
+    std::uint8_t port_;
+    ring::Writer ring_;
+    clock::Translator& translator_;
+    StampGuard guard_;
+    std::optional<std::uint64_t> last_number_;
+    ImuReport report_;
+};
+
+}  // namespace versavis::daemon

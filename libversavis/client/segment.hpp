@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A mapped ring: typed views of its parts, for writer and reader.
+#pragma once
+
+#include <boost/interprocess/file_mapping.hpp>
+#include <boost/interprocess/mapped_region.hpp>
+#include <filesystem>
+
+#include "versavis/error.hpp"
+#include "versavis/ring/layout.hpp"
+
+namespace versavis::ring {
+
+/// Owns a mapping of a complete segment. The views stay valid as long as it lives.
+class Mapping {
+ public:
+    enum class Access { read_only, read_write };
+
+    /// Maps and checks `path`; every offset is proved to lie inside the file.
+    static Expected<Mapping> open(const std::filesystem::path& path, Access access);
+
+    /// Maps a file that is being made: nothing is checked.
+    static Expected<Mapping> open_unchecked(const std::filesystem::path& path, Access access);
+
+    Header& header() const { return *static_cast<Header*>(region_.get_address()); }
+    Descriptor& descriptor(std::uint64_t number) const {
+        return reinterpret_cast<Descriptor*>(
+            bytes() + header().descriptors_at)[number & (header().descriptor_count - 1)];
+    }
+    std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
+        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + header().generations_at +
+                                                              slot * generation_stride);
+    }
+    std::byte* slot(std::uint32_t slot) const {
+        return bytes() + header().slots_at + slot * header().slot_size;
+    }
+    std::size_t size() const { return region_.get_size(); }
+
+ private:
+    std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
+
+    boost::interprocess::mapped_region region_;
+};
+
+/// Field 22 of /proc/self/stat: with the process id, tells this process from all before it.
+std::uint64_t start_ticks_of_this_process();
+
+/// True when this process made the segment.
+bool is_own(const Header& header);
+
+/// Marks a segment that some writer left behind as `state` and wakes its readers.
+void retire(Header& header, WriterState state);
+
+/// Wakes every process that waits on the futex `word`. std::atomic::notify would reach this process
+/// only.
+void futex_wake(const std::atomic<std::uint32_t>& word);
+
+/// Waits until `word` is no longer `value`, or `timeout_ns` has passed, or for no reason.
+void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
+                std::int64_t timeout_ns);
+
+}  // namespace versavis::ring

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/clock/belief.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::clock {
+
+namespace {
+
+constexpr double start_skew_sigma = 50e3;  // ns/s: two crystals of 50 ppm, nearly always
+constexpr double skew_walk = 12.0;         // ns/s per sqrt(s)
+constexpr double drift_walk = 0.15;  // ns/s^2 per sqrt(s): 2 ppm in ten minutes are no surprise
+constexpr double drift_memory_s = 600.0;  // a drift fades: temperature settles
+constexpr double delay_walk = 20.0;       // ns per sqrt(s)
+
+double to_seconds(Duration span) { return static_cast<double>(span.ns) * 1e-9; }
+
+}  // namespace
+
+Belief Belief::after_exchange(double round_trip_ns) {
+    Belief belief;
+    belief.mean[3] = round_trip_ns / 4;
+    const double delay_sigma = round_trip_ns / 4;
+    belief.covariance.diagonal() << round_trip_ns * round_trip_ns / 24,
+        start_skew_sigma * start_skew_sigma, drift_walk * drift_walk * drift_memory_s / 2,
+        delay_sigma * delay_sigma;
+    return belief;
+}
+
+Belief::Matrix transition(Duration span) {
+    const double seconds = to_seconds(span);
+    Belief::Matrix result = Belief::Matrix::Identity();
+    result(0, 1) = seconds;
+    result(0, 2) = 0.5 * seconds * seconds;
+    result(1, 2) = seconds;
+    result(2, 2) = std::exp(-seconds / drift_memory_s);
+    return result;
+}
+
+Belief::Matrix process_noise(Duration span) {
+    const double t = std::abs(to_seconds(span));
+    const double t2 = t * t;
+    const double skew = skew_walk * skew_walk;
+    const double drift = drift_walk * drift_walk;
+    Belief::Matrix noise = Belief::Matrix::Zero();
+    noise(0, 0) = skew * t2 * t / 3 + drift * t2 * t2 * t / 20;
+    noise(0, 1) = noise(1, 0) = skew * t2 / 2 + drift * t2 * t2 / 8;
+    noise(0, 2) = noise(2, 0) = drift * t2 * t / 6;
+    noise(1, 1) = skew * t + drift * t2 * t / 3;
+    noise(1, 2) = noise(2, 1) = drift * t2 / 2;
+    noise(2, 2) = drift * t;
+    noise(3, 3) = delay_walk * delay_walk * t;
+    return noise;
+}
+
+Belief Belief::after(Duration span) const {
+    const Matrix change = transition(span);
+    return {change * mean, change * covariance * change.transpose() + process_noise(span)};
+}
+
+double Belief::offset_after(Duration span) const {
+    const double seconds = to_seconds(span);
+    return mean[0] + seconds * (mean[1] + 0.5 * seconds * mean[2]);
+}
+
+Belief::Vector Belief::level_by_component(double sign, Duration span) {
+    const double seconds = to_seconds(span);
+    return {sign, sign * seconds, sign * 0.5 * seconds * seconds, 1};
+}
+
+double Belief::offset_variance_after(Duration span) const {
+    const double seconds = to_seconds(span);
+    const double half_square = 0.5 * seconds * seconds;
+    const Matrix& c = covariance;
+    const double t = std::abs(seconds);
+    const double aged =
+        skew_walk * skew_walk * t * t * t / 3 + drift_walk * drift_walk * t * t * t * t * t / 20;
+    return std::max(0.0, c(0, 0) + seconds * seconds * c(1, 1) +
+                             half_square * half_square * c(2, 2) +
+                             2 * (seconds * c(0, 1) + half_square * c(0, 2) +
+                                  seconds * half_square * c(1, 2))) +
+           aged;
+}
+
+}  // namespace versavis::clock

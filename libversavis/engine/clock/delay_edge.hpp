@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The lower edge of one direction's delays: what a message says of the clocks, given how delays
+// spread above their minimum.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "versavis/time.hpp"
+
+namespace versavis::clock {
+
+enum class Direction { to_host = 1, to_board = -1 };
+
+/// One message: when it passed the board, and the host's stamp minus the board's.
+struct Passage {
+    BoardTime at;
+    Duration host_minus_board;
+};
+
+/// What one delay says of the edge: derivatives of its log-likelihood by the level of the edge, in
+/// 1/ns.
+struct Influence {
+    double score = 0;
+    double curvature = 0;  ///< minus the second one; not negative
+};
+
+/// `excess`: the delay less the expected edge; `deviation`: by which that edge is uncertain;
+/// `scale`: one over the density of delays above the edge; all in ns. A delay is taken to be the
+/// edge plus an exponential of this scale, now and then of a much larger one, blurred by
+/// `deviation`: far above the edge it says next to nothing, and below it it cannot be.
+Influence influence_of(double excess, double deviation, double scale);
+
+/// The scale of delays, in ns, by how dense the shortest quarter of them is; reorders them. None:
+/// there are too few.
+std::optional<double> delay_scale(std::vector<double>& delays_ns);
+
+/// By so much the edge of delays of this scale is uncertain in itself, in ns.
+double edge_blur(double scale_ns);
+
+/// The delays of one direction: the shortest of the present slot, and how those of the last slots
+/// spread.
+class DelayEdge {
+ public:
+    explicit DelayEdge(Direction direction) : direction_(direction) {}
+
+    /// `delay_ns` as the present estimate has it.
+    void offer(const Passage& passage, double delay_ns);
+
+    /// The shortest since the last call; none: no message passed.
+    std::optional<Passage> take();
+
+    /// Adds to the last slots' shortest; `delay_of(passage)` says how long they took, in ns.
+    template <class DelayOf>
+    void remember(const Passage& passage, const DelayOf& delay_of) {
+        passages_.push_back(passage);
+        if (passages_.size() > remembered) passages_.pop_front();
+        delays_.clear();
+        for (const Passage& p : passages_) delays_.push_back(delay_of(p));
+        rescale();
+    }
+
+    /// Forgets them all; until there are new ones, delays spread by `scale_ns`.
+    void begin(double scale_ns);
+
+    Direction direction() const { return direction_; }
+    double sign() const { return static_cast<double>(direction_); }
+    double scale_ns() const { return scale_ns_; }
+
+    /// The least delay of the newest slots; none: there are too few.
+    std::optional<double> newest_least_ns() const { return newest_least_ns_; }
+
+ private:
+    static constexpr std::size_t remembered = 64;  ///< slots
+
+    void rescale();
+
+    Direction direction_;
+    std::optional<Passage> shortest_;
+    double shortest_ns_ = 0;
+    std::deque<Passage> passages_;
+    std::vector<double> delays_;  ///< of the passages
+    std::vector<double> newest_;
+    double scale_ns_ = 0;
+    std::optional<double> newest_least_ns_;
+};
+
+}  // namespace versavis::clock

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/clock/envelope_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::clock {
+
+namespace {
+
+constexpr std::int64_t longest_slot_ns = 2'000'000'000;
+constexpr std::int64_t slots_per_age = 16;
+constexpr std::int64_t window_ns = 300'000'000'000;
+constexpr std::int64_t longest_disorder_ns = 5'000'000'000;
+constexpr std::int64_t furthest_ns = std::int64_t{1}
+                                     << 61;  // 73 years: what is summed cannot overflow
+constexpr double surprising = 3.0;           // deviations below the edge
+constexpr double shift_deviations = 4.0;     // of the shortest delay, that is no chance
+constexpr double most_inflation = 100.0;
+constexpr double surprise_memory = 0.9;  // per message that is used
+constexpr double surprises_of_skew = 2.0;
+constexpr double surprise_span_s = 2.0;  // a slot
+constexpr double contradicting =
+    6.0;  // deviations that a message seems to arrive before it was sent
+constexpr int contradictions_to_restart = 3;
+constexpr double largest_skew = 1e6;      // ns/s: no two clocks differ by 1000 ppm
+constexpr double kept_skew_sigma = 10e3;  // ns/s: the crystal is the one it was
+constexpr std::uint64_t slots_to_lock = 10;
+constexpr double locked_sigma_ns = 250e3;
+constexpr std::int64_t holdover_after_ns = 3'000'000'000;
+
+template <class Clock>
+bool sane(Time<Clock> t) {
+    return t.ns > -furthest_ns && t.ns < furthest_ns;
+}
+
+Passage to_host(const BoardTime sent, const HostTime arrived) {
+    return {sent, {arrived.ns - sent.ns}};
+}
+Passage to_board(const HostTime sent, const BoardTime arrived) {
+    return {arrived, {sent.ns - arrived.ns}};
+}
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
+const char* to_string(ClockState state) {
+    switch (state) {
+        case ClockState::init: return "init";
+        case ClockState::converging: return "converging";
+        case ClockState::locked: return "locked";
+        case ClockState::holdover: return "holdover";
+        case ClockState::step: return "step";
+        case ClockState::reset: return "reset";
+    }
+    return "unknown";
+}
+
+void EnvelopeFilter::add(const Exchange& exchange) {
+    if (!sane(exchange.sent) || !sane(exchange.received) || !sane(exchange.answered) ||
+        !sane(exchange.arrived))
+        return;
+    const Duration round_trip =
+        (exchange.arrived - exchange.sent) - (exchange.answered - exchange.received);
+    if (round_trip.ns <= 0) return;
+    last_round_trip_ = round_trip;
+    ++exchanges_;
+    if (!begun_) return begin(exchange, round_trip);
+    const Passage down = to_board(exchange.sent, exchange.received);
+    const Passage up = to_host(exchange.answered, exchange.arrived);
+    const BoardTime now = std::max(exchange.received, exchange.answered);
+    last_residual_ = rounded((delay_ns(up, up_) - delay_ns(down, down_)) / 2);
+    const bool old = goes_back(std::min(exchange.received, exchange.answered));
+    if (contradicts(up, up_) || contradicts(down, down_)) {
+        if (old || ++contradictions_ >= contradictions_to_restart) restart(exchange, round_trip);
+        return;
+    }
+    if (old) return;  // it was held up on its way
+    contradictions_ = 0;
+    contradiction_ = {};
+    remember_round_trip(now, round_trip);
+    down_.offer(down, delay_ns(down, down_));
+    up_.offer(up, delay_ns(up, up_));
+    down_in_slot_ = true;
+    last_contact_ = std::max(last_contact_, now);
+    close_slot_if_due(now);
+}
+
+void EnvelopeFilter::add(const OneWay& message) {
+    if (!begun_ || !sane(message.sent) || !sane(message.arrived)) return;
+    const Passage up = to_host(message.sent, message.arrived);
+    if (goes_back(message.sent) || contradicts(up, up_)) return;
+    ++one_way_messages_;
+    up_.offer(up, delay_ns(up, up_));
+    last_contact_ = std::max(last_contact_, message.sent);
+    close_slot_if_due(message.sent);
+}
+
+void EnvelopeFilter::board_restarted() {
+    reset_ = reset_ || begun_;
+    begun_ = false;
+}
+
+void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
+    const double kept_skew = std::abs(belief_.mean[1]) < largest_skew ? belief_.mean[1] : 0;
+    reference_ = middle(exchange.received, exchange.answered);
+    base_ = {middle(exchange.sent, exchange.arrived).ns - reference_.ns};
+    belief_ = Belief::after_exchange(static_cast<double>(round_trip.ns));
+    if (reset_) {
+        belief_.mean[1] = kept_skew;
+        belief_.covariance(1, 1) = square(kept_skew_sigma);
+    }
+    begun_ = true;
+    reset_ = false;
+    contradictions_ = 0;
+    contradiction_ = {};
+    up_.begin(static_cast<double>(round_trip.ns) / 2);
+    down_.begin(static_cast<double>(round_trip.ns) / 2);
+    down_in_slot_ = false;
+    last_contact_ = started_ = slot_begin_ = std::max(exchange.received, exchange.answered);
+    slots_ = 0;
+    smallest_in_window_ = smallest_before_ = {INT64_MAX};
+    remember_round_trip(started_, round_trip);
+    if (sites_ == nullptr) return;
+    const double scale = static_cast<double>(round_trip.ns) / 2;
+    sites_->push_back(
+        {to_board(exchange.sent, exchange.received), Direction::to_board, scale, restarts_});
+    sites_->push_back(
+        {to_host(exchange.answered, exchange.arrived), Direction::to_host, scale, restarts_});
+}
+
+void EnvelopeFilter::restart(const Exchange& exchange, Duration round_trip) {
+    ++restarts_;
+    reset_ = true;
+    begin(exchange, round_trip);
+}
+
+bool EnvelopeFilter::goes_back(BoardTime board) const {
+    return (last_contact_ - board).ns > longest_disorder_ns;
+}
+
+/// True when a message would have arrived before it was sent, by more than the estimate's own error
+/// explains.
+bool EnvelopeFilter::contradicts(const Passage& passage, const DelayEdge& edge) {
+    const double delay = delay_ns(passage, edge);
+    const Duration since = passage.at - reference_;
+    if (delay >= -contradicting * std::sqrt(belief_.offset_variance_after(since))) return false;
+    contradiction_ = rounded(-delay) + last_round_trip_;  // it took some time, too
+    return true;
+}
+
+double EnvelopeFilter::relative_ns(const Passage& passage) const {
+    return static_cast<double>((passage.host_minus_board - base_).ns);
+}
+
+double EnvelopeFilter::delay_ns(const Passage& passage, const DelayEdge& edge) const {
+    return edge.sign() * (relative_ns(passage) - belief_.offset_after(passage.at - reference_));
+}
+
+void EnvelopeFilter::close_slot_if_due(BoardTime now) {
+    const std::int64_t length = (now - slot_begin_).ns;
+    const bool due = length >= std::min((now - started_).ns / slots_per_age, longest_slot_ns);
+    if (due && (down_in_slot_ || length >= longest_slot_ns)) close_slot(now);
+}
+
+void EnvelopeFilter::close_slot(BoardTime now) {
+    slot_begin_ = now;
+    down_in_slot_ = false;
+    ++slots_;
+    const auto up = up_.take();
+    const auto down = down_.take();
+    const BoardTime newest = std::max(up ? up->at : reference_, down ? down->at : reference_);
+    const double expected = belief_.offset_after(newest - reference_);
+    if (up && down && slots_ > slots_to_lock) follow_fall(*up, *down);
+    const bool down_first = down && up && down->at < up->at;
+    if (down && down_first) use(*down, down_);
+    if (up) use(*up, up_);
+    if (down && !down_first) use(*down, down_);
+    follow_rise();
+    last_innovation_ = rounded(belief_.offset_after(newest - reference_) - expected);
+}
+
+/// Both directions take longer than they did, by more than they spread, or both are shorter than
+/// they can be: so is the link, and no clock has anything to do with it. Left alone, the offset
+/// would slide until one of the two edges fits.
+void EnvelopeFilter::follow_rise() {
+    const auto up = up_.newest_least_ns();
+    const auto down = down_.newest_least_ns();
+    if (!up || !down) return;
+    const double up_more = *up - belief_.mean[3];
+    const double down_more = *down - belief_.mean[3];
+    if (up_more > up_.scale_ns() && down_more > down_.scale_ns())
+        shift_level(std::min(up_more, down_more));
+}
+
+void EnvelopeFilter::follow_fall(const Passage& up, const Passage& down) {
+    const double up_less = belief_.mean[3] - delay_ns(up, up_);
+    const double down_less = belief_.mean[3] - delay_ns(down, down_);
+    const double blur = edge_blur(std::max(up_.scale_ns(), down_.scale_ns()));
+    if (std::min(up_less, down_less) > surprising * blur)
+        shift_level(-std::min(up_less, down_less));
+}
+
+void EnvelopeFilter::shift_level(double by_ns) {
+    if (square(by_ns) < square(shift_deviations) * belief_.covariance(3, 3)) return;
+    belief_.mean[3] += by_ns;
+    belief_.covariance(3, 3) += square(by_ns);
+}
+
+void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
+    if (passage.at > reference_) {
+        belief_ = belief_.after(passage.at - reference_);
+        reference_ = passage.at;
+    }
+    edge.remember(passage, [&](const Passage& p) { return delay_ns(p, edge); });
+    if (sites_ != nullptr)
+        sites_->push_back({passage, edge.direction(), edge.scale_ns(), restarts_});
+    move(passage, edge);
+}
+
+/// Moments of the belief given this delay.
+void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
+    const Duration since = passage.at - reference_;
+    const Belief::Vector direction = Belief::level_by_component(edge.sign(), since);
+    const double blur = edge_blur(edge.scale_ns());
+    const double excess = edge.sign() * relative_ns(passage) - direction.dot(belief_.mean);
+    const auto deviation = [&] {
+        return std::sqrt(direction.dot(belief_.covariance * direction) + square(blur));
+    };
+    recent_surprises_ *= surprise_memory;
+    if (excess < -surprising * deviation()) {
+        ++surprises_;
+        if (++recent_surprises_ > surprises_of_skew) {
+            // One may be anything; several in a row say that a clock runs at another pace than it
+            // did.
+            belief_.covariance(1, 1) += square(excess / surprise_span_s);
+            recent_surprises_ = 0;
+        }
+        belief_.covariance *= std::min(square(excess / (surprising * deviation())), most_inflation);
+        // Without an end to them no component may grow beyond all that a first exchange leaves
+        // open.
+        if (belief_.covariance(1, 1) > square(largest_skew))
+            belief_.covariance =
+                Belief::after_exchange(static_cast<double>(last_round_trip_.ns)).covariance;
+    }
+    const Influence influence =
+        influence_of(excess, std::max(deviation(), -excess / surprising), edge.scale_ns());
+    const Belief::Vector gain = belief_.covariance * direction;
+    belief_.mean += gain * influence.score;
+    belief_.covariance -= influence.curvature * gain * gain.transpose();
+    // No delay is negative; left alone, both edges could slide below what they bound.
+    if (belief_.mean[3] < 0)
+        belief_.mean -= belief_.covariance.col(3) * (belief_.mean[3] / belief_.covariance(3, 3));
+    // What rounding makes unequal is never measured away, but surprises would inflate it.
+    belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
+}
+
+void EnvelopeFilter::remember_round_trip(BoardTime now, Duration round_trip) {
+    if ((now - window_begin_).ns > window_ns || now < window_begin_) {
+        smallest_before_ = smallest_in_window_;
+        smallest_in_window_ = {INT64_MAX};
+        window_begin_ = now;
+    }
+    smallest_in_window_ = std::min(smallest_in_window_, round_trip);
+}
+
+Duration EnvelopeFilter::smallest_round_trip() const {
+    return std::min(smallest_in_window_, smallest_before_);
+}
+
+double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(belief_.covariance(1, 1)) * 1e-3; }
+
+HostEstimate EnvelopeFilter::translate(BoardTime board) const {
+    HostEstimate estimate;
+    if (reset_) estimate.state = ClockState::reset;
+    if (!begun_ || !sane(board)) return estimate;
+    const Duration since = board - reference_;
+    const double variance = belief_.offset_variance_after(since);
+    const double offset = belief_.offset_after(since);
+    const double doubt = static_cast<double>(contradiction_.ns);
+    const Duration asymmetry = asymmetry_ ? asymmetry_->offset : Duration{};
+    estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
+    estimate.sigma = rounded(
+        std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)));
+    estimate.bound = smallest_round_trip() / 2 + absolute(asymmetry) +
+                     rounded(bound_sigmas * std::sqrt(variance) + doubt);
+    if (doubt > 0)
+        estimate.state = ClockState::step;
+    else if ((board - last_contact_).ns > holdover_after_ns)
+        estimate.state = ClockState::holdover;
+    else
+        estimate.state = slots_ < slots_to_lock || variance > square(locked_sigma_ns)
+                             ? ClockState::converging
+                             : ClockState::locked;
+    return estimate;
+}
+
+}  // namespace versavis::clock

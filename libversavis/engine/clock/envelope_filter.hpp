@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Board time to host time from stamped messages: a Bayesian filter on the lower edges of the
+// delays.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/clock/asymmetry.hpp"
+#include "engine/clock/belief.hpp"
+#include "engine/clock/delay_edge.hpp"
+#include "engine/clock/estimate.hpp"
+#include "engine/clock/messages.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::clock {
+
+/// A message that was used, as the smoother wants it.
+struct EdgeSite {
+    Passage passage;
+    Direction direction = Direction::to_host;
+    double scale_ns = 0;
+    std::uint64_t restarts = 0;  ///< of the filter until then
+};
+
+/// Method: within a slot that grows from one message to 2 s, the shortest delay of each direction
+/// is kept. Neither can be below its edge, the shortest delay that the link has; so each pushes the
+/// estimate when it comes close to the edge, by as much as the spread of the last slots' delays
+/// justifies (moment matching of a Gaussian with an exponentially modified one; T. Minka,
+/// Expectation propagation for approximate Bayesian inference, 2001). Delays far above the edge
+/// count for nothing, in whatever direction and however many. Nothing is gated out: what surprises
+/// widens the belief before it is used, and messages that arrived before they were sent begin it
+/// anew. A pure function of the stamps it was given.
+class EnvelopeFilter {
+ public:
+    /// In the order in which they became available. Before the first exchange one-way messages are
+    /// ignored, and so is an exchange whose round trip is not positive.
+    void add(const Exchange& exchange);
+    void add(const OneWay& message);
+
+    /// The board began a new life: its clock starts anew, with the crystal and the link it had.
+    void board_restarted();
+
+    /// A measured asymmetry takes the place of the allowance for an unknown one.
+    void set_asymmetry(const std::optional<Asymmetry>& asymmetry) { asymmetry_ = asymmetry; }
+
+    /// Host time of `board`, for instants near the newest message or later.
+    HostEstimate translate(BoardTime board) const;
+
+    bool initialised() const { return begun_; }
+    std::uint64_t exchanges() const { return exchanges_; }
+    std::uint64_t one_way_messages() const { return one_way_messages_; }
+    std::uint64_t restarts() const { return restarts_; }
+    std::uint64_t surprises() const { return surprises_; }  ///< delays well below the edge
+    std::uint64_t slots() const { return slots_; }
+    double skew_ppm() const { return belief_.mean[1] * 1e-3; }  ///< host clock against board clock
+    double skew_sigma_ppm() const;
+    Duration last_residual() const {
+        return last_residual_;
+    }  ///< newest midpoint less the estimate
+    Duration last_innovation() const {
+        return last_innovation_;
+    }  ///< by which the newest slot moved it
+    Duration last_round_trip() const { return last_round_trip_; }
+    Duration smallest_round_trip() const;  ///< of the last five to ten minutes
+    BoardTime last_contact() const { return last_contact_; }
+
+    /// From now on all that is used is appended there, too; it must outlive the filter.
+    void record(std::vector<EdgeSite>& sites) { sites_ = &sites; }
+
+ private:
+    void begin(const Exchange& exchange, Duration round_trip);
+    void restart(const Exchange& exchange, Duration round_trip);
+    bool contradicts(const Passage& passage, const DelayEdge& edge);
+    bool goes_back(BoardTime board) const;
+    double relative_ns(const Passage& passage) const;
+    double delay_ns(const Passage& passage, const DelayEdge& edge) const;
+    void close_slot_if_due(BoardTime now);
+    void close_slot(BoardTime now);
+    void follow_rise();
+    void follow_fall(const Passage& up, const Passage& down);
+    void shift_level(double by_ns);
+    void use(const Passage& passage, DelayEdge& edge);
+    void move(const Passage& passage, const DelayEdge& edge);
+    void remember_round_trip(BoardTime now, Duration round_trip);
+
+    bool begun_ = false;
+    bool reset_ = false;  ///< what was known before is void but for the skew
+    Duration base_;       ///< host minus board time that the belief's offset counts from
+    BoardTime reference_;
+    Belief belief_;
+    DelayEdge up_{Direction::to_host};
+    DelayEdge down_{Direction::to_board};
+    std::optional<Asymmetry> asymmetry_;
+
+    BoardTime started_;
+    BoardTime slot_begin_;
+    BoardTime last_contact_;
+    BoardTime window_begin_;
+    Duration smallest_in_window_{INT64_MAX};
+    Duration smallest_before_{INT64_MAX};
+    bool down_in_slot_ = false;
+    double recent_surprises_ = 0;  ///< fading
+    int contradictions_ = 0;       ///< exchanges in a row
+    Duration contradiction_;       ///< by which the newest was impossible
+    std::uint64_t slots_ = 0;
+    std::uint64_t exchanges_ = 0;
+    std::uint64_t one_way_messages_ = 0;
+    std::uint64_t restarts_ = 0;
+    std::uint64_t surprises_ = 0;
+    Duration last_residual_;
+    Duration last_innovation_;
+    Duration last_round_trip_;
+    std::vector<EdgeSite>* sites_ = nullptr;
+};
+
+}  // namespace versavis::clock

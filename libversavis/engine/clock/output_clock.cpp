@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/clock/output_clock.hpp"
+
+#include <utility>
+
+namespace versavis::clock {
+
+namespace {
+
+constexpr Duration wide_sandwich = microseconds(2);
+constexpr int most_tries = 8;
+constexpr Duration smallest_step = microseconds(1);
+constexpr Duration smallest_suspend = milliseconds(1);
+constexpr Duration look_interval = milliseconds(100);
+constexpr Duration longest_report = seconds(1);  // of a step by the kernel, after it could be seen
+constexpr int largest_slew = 8;  // the kernel slews by a tenth at most, less than 1/8
+
+SystemClock system_clock(OutputClockKind kind) {
+    return kind == OutputClockKind::tai ? SystemClock::tai : SystemClock::realtime;
+}
+
+}  // namespace
+
+const char* to_string(OutputClockKind kind) {
+    switch (kind) {
+        case OutputClockKind::realtime: return "realtime";
+        case OutputClockKind::tai: return "tai";
+        case OutputClockKind::monotonic_raw: return "monotonic_raw";
+    }
+    return "unknown";
+}
+
+Expected<OutputClock> OutputClock::create(OutputClockKind kind, bool force_tai,
+                                          std::shared_ptr<SystemClocks> clocks) {
+    if (kind == OutputClockKind::tai && !force_tai && clocks->kernel_state().tai_offset_s == 0)
+        return failure("clock.output", "the kernel does not know the offset of TAI from UTC",
+                       "let chrony (leapsectz right/UTC) or ptp4l and phc2sys set it, choose "
+                       "'realtime', or set "
+                       "force_tai = true to take UTC for TAI");
+    return OutputClock(kind, std::move(clocks));
+}
+
+OutputClock::OutputClock(OutputClockKind kind, std::shared_ptr<SystemClocks> clocks)
+    : kind_(kind), clocks_(std::move(clocks)), slept_(slept()), times_set_(clocks_->times_set()) {
+    if (kind_ != OutputClockKind::monotonic_raw) parted(best_sandwich());
+    next_look_ = read_host() + look_interval;
+}
+
+OutputReading OutputClock::read() {
+    if (kind_ == OutputClockKind::monotonic_raw) {
+        const HostTime now = read_host();
+        if (now >= next_look_) look_for_steps(now, false);
+        return {now, {}, {}, steps_};
+    }
+    Sandwich sandwich = best_sandwich();
+    const bool seen_parted = parted(sandwich);
+    if (seen_parted || sandwich.width() > wide_sandwich || sandwich.after >= next_look_) {
+        const std::uint32_t before = steps_;
+        look_for_steps(sandwich.after, seen_parted);
+        if (steps_ != before && !seen_parted) {  // it may have come after the sandwich
+            sandwich = best_sandwich();
+            parted(sandwich);
+        }
+    }
+    const HostTime at = middle(sandwich.before, sandwich.after);
+    return {at, {sandwich.output_ns - at.ns}, (sandwich.width() + nanoseconds(1)) / 2, steps_};
+}
+
+OutputClock::Sandwich OutputClock::read_sandwich() {
+    Sandwich sandwich{};
+    sandwich.before = read_host();
+    sandwich.output_ns = clocks_->read_ns(system_clock(kind_));
+    sandwich.monotonic_ns = clocks_->read_ns(SystemClock::monotonic);
+    sandwich.after = read_host();
+    return sandwich;
+}
+
+OutputClock::Sandwich OutputClock::best_sandwich() {
+    Sandwich best = read_sandwich();
+    for (int attempt = 1; attempt < most_tries && best.width() > wide_sandwich; ++attempt) {
+        const Sandwich next = read_sandwich();
+        if (next.width() < best.width()) best = next;
+    }
+    return best;
+}
+
+/// Output clock minus CLOCK_MONOTONIC is a constant of the kernel between two steps, however it is
+/// slewed.
+bool OutputClock::parted(const Sandwich& sandwich) {
+    const std::int64_t read_later_ns = sandwich.output_ns - sandwich.monotonic_ns;
+    const Bounds now{read_later_ns,
+                     read_later_ns + sandwich.width().ns + sandwich.width().ns / largest_slew};
+    const bool stepped = now.low_ns > against_monotonic_.high_ns + smallest_step.ns ||
+                         now.high_ns < against_monotonic_.low_ns - smallest_step.ns;
+    const bool narrower =
+        now.high_ns - now.low_ns <= against_monotonic_.high_ns - against_monotonic_.low_ns;
+    // A wide one that contradicts nothing would hide a step that follows.
+    if (stepped || narrower || sandwich.width() <= wide_sandwich) against_monotonic_ = now;
+    return stepped;
+}
+
+/// CLOCK_BOOTTIME counts suspends, the others do not.
+OutputClock::Bounds OutputClock::slept() {
+    const std::int64_t before_ns = clocks_->read_ns(SystemClock::monotonic);
+    const std::int64_t boottime_ns = clocks_->read_ns(SystemClock::boottime);
+    const std::int64_t after_ns = clocks_->read_ns(SystemClock::monotonic);
+    return {boottime_ns - after_ns, boottime_ns - before_ns};
+}
+
+bool OutputClock::was_suspended() {
+    const Bounds now = slept();
+    const bool suspended = now.low_ns > slept_.high_ns + smallest_suspend.ns;
+    if (suspended || now.high_ns < slept_.high_ns) slept_ = now;
+    return suspended;
+}
+
+/// The kernel tells of each time that CLOCK_REALTIME is set, once, and some time after it can be
+/// read.
+bool OutputClock::was_set(HostTime now, bool seen_parted) {
+    const std::uint32_t times = clocks_->times_set();
+    const bool told = times != std::exchange(times_set_, times);
+    const bool known = seen_parted || now < set_is_known_until_;
+    if (seen_parted && !told) set_is_known_until_ = now + longest_report;
+    if (told && !seen_parted) set_is_known_until_ = {};
+    // TAI goes on when UTC alone is stepped, as by a leap second: the comparison says all of it.
+    return told && !known && kind_ == OutputClockKind::realtime;
+}
+
+void OutputClock::look_for_steps(HostTime now, bool seen_parted) {
+    next_look_ = now + look_interval;
+    const bool suspended = was_suspended();
+    const bool set = was_set(now, seen_parted);
+    if (suspended) ++suspends_;
+    if (suspended || set || seen_parted) ++steps_;
+}
+
+}  // namespace versavis::clock

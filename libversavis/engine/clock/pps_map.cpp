@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/clock/pps_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::clock {
+
+namespace {
+
+constexpr double pulse_sigma_ns = 100;   // receiver, input and its sampling
+constexpr double crystal_sigma = 100e3;  // ns/s
+constexpr double misfit_sigmas = 8;
+constexpr double smallest_misfit_ns = 2000;
+constexpr int misfits_to_restart = 3;
+constexpr std::uint64_t pulses_to_trust = 4;
+constexpr Duration pulse_overdue = milliseconds(2500);
+
+}  // namespace
+
+void PpsMap::begin(BoardTime at, OutputTime second) {
+    reference_ = at;
+    base_ = {second.ns - at.ns};
+    belief_ = Belief::after_exchange(0);
+    belief_.covariance(0, 0) = pulse_sigma_ns * pulse_sigma_ns;
+    belief_.covariance(1, 1) = crystal_sigma * crystal_sigma;
+    in_row_ = 1;
+    misfits_in_row_ = 0;
+    last_residual_ = {};
+}
+
+bool PpsMap::agrees(double residual_ns, double variance) const {
+    return std::abs(residual_ns) <
+           std::max(smallest_misfit_ns, misfit_sigmas * std::sqrt(variance));
+}
+
+void PpsMap::add(BoardTime at, OutputTime second) {
+    ++pulses_;
+    if (in_row_ == 0 || at <= reference_ || at - reference_ > longest_holdover)
+        return begin(at, second);
+    const Belief now = belief_.after(at - reference_);
+    const double residual = static_cast<double>(second.ns - at.ns - base_.ns) - now.mean[0];
+    const double variance = now.covariance(0, 0) + pulse_sigma_ns * pulse_sigma_ns;
+    last_residual_ = rounded(residual);
+    if (!agrees(residual, variance)) {
+        ++rejected_;
+        if (++misfits_in_row_ >= misfits_to_restart) begin(at, second);
+        return;
+    }
+    misfits_in_row_ = 0;
+    ++in_row_;
+    reference_ = at;
+    const Belief::Vector gain = now.covariance.col(0) / variance;
+    belief_.mean = now.mean + gain * residual;
+    belief_.covariance = now.covariance - gain * now.covariance.row(0);
+}
+
+bool PpsMap::healthy(BoardTime now) const {
+    return in_row_ >= pulses_to_trust && misfits_in_row_ == 0 && now - reference_ < pulse_overdue;
+}
+
+std::optional<OutputEstimate> PpsMap::translate(BoardTime board) const {
+    if (in_row_ < pulses_to_trust || board - reference_ > longest_holdover) return std::nullopt;
+    const Duration since = board - reference_;
+    return OutputEstimate{OutputTime{board.ns} + base_ + rounded(belief_.offset_after(since)),
+                          rounded(std::sqrt(belief_.offset_variance_after(since)))};
+}
+
+}  // namespace versavis::clock

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/clock/pps_reference.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace versavis::clock {
+
+namespace {
+
+constexpr std::int64_t second_ns = 1'000'000'000;
+constexpr Duration largest_doubt =
+    milliseconds(100);                              // beyond that the second could be the next one
+constexpr Duration host_named_memory = seconds(3);  // the link takes over
+constexpr unsigned pulses_to_measure = 32;
+constexpr double slowest_gain = 1.0 / 64;
+constexpr Duration measurement_floor = microseconds(3);  // what the estimate wanders by, slowly
+
+/// The whole second nearest to an instant, on the output clock.
+OutputTime nearest_second(OutputTime at) {
+    const std::int64_t past = ((at.ns % second_ns) + second_ns) % second_ns;
+    return {at.ns - past + (past < second_ns / 2 ? 0 : second_ns)};
+}
+
+}  // namespace
+
+const char* to_string(PpsState state) {
+    switch (state) {
+        case PpsState::off: return "off";
+        case PpsState::waiting: return "waiting";
+        case PpsState::used: return "used";
+        case PpsState::lost: return "lost";
+    }
+    return "unknown";
+}
+
+void PpsReference::pulse(BoardTime at, const HostEstimate& by_link, const OutputReading& output,
+                         bool disciplined) {
+    if (labels_ != PpsLabels::host || !disciplined) return;
+    const OutputTime instant{by_link.time.ns + output.minus_host.ns};
+    const OutputTime second = nearest_second(instant);
+    const Duration residual = instant - second;
+    if (by_link.sigma * 3 + absolute(residual) > largest_doubt) return;
+    add(at, second, residual);
+    if (map_.healthy(at)) measure(residual);
+}
+
+void PpsReference::label(BoardTime at, OutputTime second, const HostEstimate& by_link,
+                         const OutputReading& output) {
+    if (labels_ != PpsLabels::nmea) return;
+    add(at, second, OutputTime{by_link.time.ns + output.minus_host.ns} - second);
+}
+
+void PpsReference::add(BoardTime at, OutputTime second, Duration residual) {
+    residual_ = residual;
+    map_.add(at, second);
+    if (map_.healthy(at)) trusted_at_ = at;
+}
+
+void PpsReference::measure(Duration residual) {
+    const auto ns = static_cast<double>(residual.ns);
+    const double gain = std::max(slowest_gain, 1.0 / ++measured_);
+    mean_ns_ += gain * (ns - mean_ns_);
+    spread_ns_ += gain * (std::abs(ns - mean_ns_) - spread_ns_);
+}
+
+std::optional<Asymmetry> PpsReference::left_in_link() const {
+    if (measured_ < pulses_to_measure) return std::nullopt;
+    return Asymmetry{{std::llround(mean_ns_)},
+                     measurement_floor + Duration{std::llround(spread_ns_)}};
+}
+
+void PpsReference::link_corrected() {
+    measured_ = 0;
+    mean_ns_ = spread_ns_ = 0;
+}
+
+std::optional<OutputEstimate> PpsReference::translate(BoardTime board, BoardTime newest) const {
+    const Duration memory =
+        labels_ == PpsLabels::host ? host_named_memory : PpsMap::longest_holdover;
+    if (!trusted_at_ || newest - *trusted_at_ > memory) return std::nullopt;
+    return map_.translate(board);
+}
+
+void PpsReference::board_restarted() {
+    map_ = {};
+    trusted_at_.reset();
+}
+
+PpsReport PpsReference::report(BoardTime now) const {
+    PpsReport report;
+    report.residual = residual_;
+    report.pulses = map_.pulses();
+    report.rejected = map_.rejected();
+    if (labels_ == PpsLabels::off)
+        report.state = PpsState::off;
+    else if (translate(now, now))
+        report.state = PpsState::used;
+    else
+        report.state = trusted_at_ ? PpsState::lost : PpsState::waiting;
+    return report;
+}
+
+}  // namespace versavis::clock

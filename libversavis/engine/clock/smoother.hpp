@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Board time to host time of a recording: what all of its messages, earlier and later ones, say
+// together.
+#pragma once
+
+#include <vector>
+
+#include "engine/clock/belief.hpp"
+#include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/messages.hpp"
+
+namespace versavis::clock {
+
+/// The model of EnvelopeFilter, solved forth and back (H. Rauch, F. Tung, C. Striebel, Maximum
+/// likelihood estimates of linear dynamic systems, 1965) several times, as each pass tells better
+/// what each message was worth (expectation propagation). Where the filter began anew, at a step or
+/// a reset, a new segment begins.
+class Smoother {
+ public:
+    /// In the order in which they became available.
+    explicit Smoother(const std::vector<Message>& messages);
+
+    /// Of the segment that holds `board`, or else the one that begins last before it. State: locked
+    /// within 3 s of the messages of the segment, holdover beyond, init when there were none.
+    HostEstimate translate(BoardTime board) const;
+
+    std::size_t segments() const { return segments_.size(); }
+
+ private:
+    struct Knot {
+        EdgeSite site;
+        double precision =
+            0;  ///< what the message says of the level of its edge, in natural parameters
+        double precision_mean = 0;
+        Belief filtered;
+        Belief smoothed;
+    };
+    struct Segment {
+        Duration base;
+        Duration first_round_trip;
+        BoardTime begin;
+        BoardTime end;
+        std::vector<Knot> knots;
+    };
+
+    static Segment begin(const std::vector<EdgeSite>& sites, std::size_t first, std::size_t last);
+    static void pass_forth(Segment& segment, bool first);
+    static void pass_back(Segment& segment);
+    static bool earlier(const Knot& a, const Knot& b);
+    static void thin(Segment& segment);
+    static void rescale(Segment& segment, Direction direction);
+    static void weigh(Segment& segment);
+    static void judge(Knot& knot, double level_ns, double mean, double variance, double share);
+    static double level_ns(const Segment& segment, const Knot& knot);
+
+    const Segment* segment_of(BoardTime board) const;
+
+    std::vector<Segment> segments_;
+};
+
+}  // namespace versavis::clock

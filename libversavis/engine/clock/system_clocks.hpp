@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The clocks of this machine, and what its kernel says of them; tests put simulated ones in their
+// place.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "versavis/time.hpp"
+
+namespace versavis::clock {
+
+enum class SystemClock { monotonic_raw, monotonic, boottime, realtime, tai };
+
+/// How well CLOCK_REALTIME is disciplined, by whoever does it: NTP, PTP or GNSS.
+struct KernelState {
+    bool synchronised = false;
+    Duration max_error;             ///< of CLOCK_REALTIME
+    std::int32_t tai_offset_s = 0;  ///< TAI minus UTC; 0: nobody told the kernel
+};
+
+/// Thread-safe.
+class SystemClocks {
+ public:
+    virtual ~SystemClocks() = default;
+
+    virtual std::int64_t read_ns(SystemClock clock) = 0;
+    virtual KernelState kernel_state() = 0;
+
+    /// How often CLOCK_REALTIME was set (by a person, a daemon, a leap second or the end of a
+    /// suspend) since this object was made, as far as this call can tell. A system call: some ten
+    /// times dearer than read_ns().
+    virtual std::uint32_t times_set() = 0;
+};
+
+/// Those of the kernel.
+std::shared_ptr<SystemClocks> kernel_clocks();
+
+}  // namespace versavis::clock

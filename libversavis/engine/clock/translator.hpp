@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Board time to published stamps, for all threads: envelope filter, output clock and epoch in one
+// place.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/output_clock.hpp"
+#include "engine/clock/pps_reference.hpp"
+
+namespace versavis::clock {
+
+/// An instant in all the clocks that are published, and how good it is.
+struct Stamp {
+    OutputTime output;
+    HostTime host;
+    std::uint32_t sigma_ns = 0;
+    std::uint32_t epoch = 0;
+    ClockState state = ClockState::init;
+};
+
+/// Where a whole second of the output clock lies on the board's.
+struct BoardSecond {
+    BoardTime board;
+    HostTime host;
+    OutputTime output;
+    double skew_ppm = 0;  ///< host clock against board clock
+    Duration sigma;
+    std::uint32_t epoch = 0;
+    ClockState state = ClockState::init;
+};
+
+/// Where an asymmetry that is taken off comes from.
+enum class AsymmetrySource { none, stored, pps };
+const char* to_string(AsymmetrySource source);
+
+/// What the status document says of the clock.
+struct ClockReport {
+    ClockState state = ClockState::init;
+    OutputClockKind output = OutputClockKind::realtime;
+    Duration sigma;
+    Duration bound;  ///< what the error cannot exceed, however unequal the link's directions are
+    Duration residual;
+    Duration innovation;  ///< by which the newest slot moved the estimate
+    Duration since_contact;
+    Duration round_trip;
+    Duration smallest_round_trip;
+    Duration output_minus_host;
+    double skew_ppm = 0;
+    double skew_sigma_ppm = 0;
+    std::uint64_t exchanges = 0;
+    std::uint64_t one_way_messages = 0;
+    std::uint64_t slots = 0;
+    std::uint64_t surprises = 0;
+    std::uint64_t restarts = 0;
+    std::uint32_t epoch = 0;
+    std::uint32_t output_steps = 0;
+    std::uint32_t host_suspends = 0;
+    KernelState kernel;
+    PpsReport pps;
+    AsymmetrySource asymmetry_source = AsymmetrySource::none;
+    Asymmetry asymmetry;
+};
+
+/// Output clock against host clock at one moment, and the epoch of stamps that are made by it.
+struct OutputRelation {
+    HostTime host;
+    Duration minus_host;
+    Duration uncertainty;
+    std::uint32_t epoch = 0;
+};
+
+/// Thread-safe.
+class Translator {
+ public:
+    explicit Translator(OutputClock output, PpsLabels labels = PpsLabels::off)
+        : output_(std::move(output)), pps_(labels) {}
+
+    /// The board began a new life: what was known of its clock is void, and a new epoch begins.
+    void board_restarted();
+
+    void add(const Exchange& exchange);
+    void add(const OneWay& message);
+
+    /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse
+    /// began.
+    void pps_pulse(BoardTime at);
+    void pps_label(BoardTime at, std::int64_t utc_ns);
+
+    /// What an earlier measurement at this port said; none: nothing is known of this port.
+    void use_asymmetry(const std::optional<Asymmetry>& stored);
+
+    /// None before the first exchange.
+    std::optional<Stamp> translate(BoardTime board);
+
+    /// The first whole second of the output clock after `now`. None before the first exchange.
+    std::optional<BoardSecond> next_second(HostTime now);
+
+    /// Host time alone, without reading the output clock.
+    std::optional<HostEstimate> to_host(BoardTime board) const;
+
+    /// Stamp of an instant that was seen on the host clock, not by the board.
+    Stamp translate(HostTime host, Duration sigma);
+
+    OutputRelation output_now();
+
+    ClockReport report();
+
+ private:
+    /// Epoch of stamps that are made by `output`.
+    std::uint32_t epoch(const OutputReading& output) const {
+        return board_lives_ + source_jumps_ + output.steps +
+               static_cast<std::uint32_t>(filter_.restarts());
+    }
+    void correct_link();
+    std::optional<OutputEstimate> by_pps(BoardTime board, OutputTime by_link);
+
+    mutable std::mutex mutex_;
+    EnvelopeFilter filter_;
+    OutputClock output_;
+    PpsReference pps_;
+    bool pps_used_ = false;
+    Duration pps_minus_link_;  ///< when it was used last
+    BoardTime newest_;         ///< instant that was asked for in this life of the board
+    AsymmetrySource asymmetry_source_ = AsymmetrySource::none;
+    Asymmetry asymmetry_;
+    std::uint32_t board_lives_ = 0;
+    std::uint32_t source_jumps_ =
+        0;  ///< PPS took over from the link, or the other way, and they disagreed
+};
+
+}  // namespace versavis::clock

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/pairing/alignment.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+
+namespace versavis::pairing {
+
+namespace {
+
+constexpr double lateness_spread = 0.6;  // of the smallest gap
+constexpr Duration length_tolerance = microseconds(200);
+constexpr int length_tolerance_part = 20;
+
+struct Alignment {
+    std::vector<std::uint64_t> triggers;
+    unsigned faults = 0;   ///< ignored triggers that nobody saw, which it takes
+    bool unknown = false;  ///< a frame falls where a record was lost: neither proved nor refuted
+};
+
+std::int64_t time_ns(const Arrival& frame, Timeline timeline) {
+    return timeline == Timeline::camera ? frame.camera_time.ns : frame.arrived.ns;
+}
+
+class Search {
+ public:
+    Search(const std::vector<Arrival>& frames, const ExposureLog& exposures, Timeline timeline,
+           const Limits& limits)
+        : frames_(frames),
+          exposures_(exposures),
+          timeline_(timeline),
+          limits_(limits),
+          gap_ns_(exposures.smallest_gap_ns()) {}
+
+    /// Differences of the clocks that bring some frame and some exposure together.
+    std::vector<std::int64_t> candidates() const {
+        std::vector<std::int64_t> differences;
+        for (const Arrival& frame : frames_)
+            for (std::size_t i = 0; i < exposures_.size(); ++i)
+                if (arrival_possible(limits_, frame, exposures_[i].exposure))
+                    differences.push_back(time_ns(frame, timeline_) -
+                                          exposures_[i].instant_ns(timeline_));
+        std::sort(differences.begin(), differences.end());
+        const auto same = [this](std::int64_t a, std::int64_t b) {
+            return b - a < tolerance_ns() / 2;
+        };
+        differences.erase(std::unique(differences.begin(), differences.end(), same),
+                          differences.end());
+        return differences;
+    }
+
+    /// What must have gone wrong if the frames' clock differs from the board's by so much. None: it
+    /// cannot be.
+    std::optional<Alignment> explain(std::int64_t difference_ns) const {
+        Alignment alignment;
+        const Record* last = nullptr;
+        const Arrival* last_frame = nullptr;
+        for (const Arrival& frame : frames_) {
+            const std::int64_t instant = time_ns(frame, timeline_) - difference_ns;
+            const Record* record = exposures_.near(timeline_, instant, tolerance_ns());
+            if (record == nullptr) {
+                if (!exposures_.lost_near(timeline_, instant, 0))
+                    return std::nullopt;  // no pulse then
+                alignment.unknown = true;
+                continue;
+            }
+            if (!possible(frame, *record) ||
+                (last != nullptr && record->exposure.trigger <= last->exposure.trigger))
+                return std::nullopt;
+            if (last != nullptr)
+                alignment.faults +=
+                    step_faults(frame.block_id - last_frame->block_id, *last, *record);
+            last = record;
+            last_frame = &frame;
+            alignment.triggers.push_back(record->exposure.trigger);
+        }
+        if (alignment.triggers.empty()) return std::nullopt;
+        return alignment;
+    }
+
+    /// Regular triggers prove nothing: the true exposures may be those whose records are missing at
+    /// either end.
+    bool irregular(const std::vector<std::uint64_t>& triggers) const {
+        std::int64_t shortest = INT64_MAX;
+        std::int64_t longest = 0;
+        for (std::size_t i = 1; i < exposures_.size(); ++i) {
+            const Exposure& before = exposures_[i - 1].exposure;
+            const Exposure& after = exposures_[i].exposure;
+            if (before.trigger < triggers.front() || after.trigger > triggers.back() ||
+                after.trigger != before.trigger + 1)
+                continue;
+            shortest = std::min(shortest, (after.start - before.start).ns);
+            longest = std::max(longest, (after.start - before.start).ns);
+        }
+        return longest > shortest + 2 * tolerance_ns();
+    }
+
+    /// A frame of another exposure than these could not have arrived when it did.
+    bool separated(const std::vector<std::uint64_t>& triggers) const {
+        const Duration window = limits_.latest_arrival - limits_.earliest_arrival;
+        for (std::size_t i = 0; i < exposures_.size(); ++i) {
+            const Exposure& exposure = exposures_[i].exposure;
+            const bool inside =
+                exposure.trigger >= triggers.front() && exposure.trigger <= triggers.back();
+            if (i == 0 || (!inside && exposures_[i - 1].exposure.trigger != triggers.back()))
+                continue;
+            const Exposure& before = exposures_[i - 1].exposure;
+            if (exposure.trigger != before.trigger + 1 || exposure.start - before.start <= window)
+                return false;
+        }
+        return true;
+    }
+
+    /// The alignment with a zero for each frame that is later than others: such a frame may be slow
+    /// to come, or the camera's clock may have stepped among them by a period, and it is of another
+    /// exposure. Empty when what is left proves nothing.
+    std::vector<std::uint64_t> proved(std::vector<std::uint64_t> triggers) const {
+        std::vector<std::int64_t> late;
+        for (std::size_t i = 0; late.size() < triggers.size();) {
+            const Exposure& exposure = exposures_[i].exposure;
+            if (exposure.trigger != triggers[late.size()]) {
+                ++i;
+                continue;
+            }
+            late.push_back((frames_[late.size()].arrived - exposure.end_on_host).ns);
+        }
+        const std::int64_t least = *std::min_element(late.begin(), late.end());
+        std::vector<std::uint64_t> kept;
+        for (std::size_t i = 0; i < triggers.size(); ++i) {
+            if (static_cast<double>(late[i] - least) >
+                lateness_spread * static_cast<double>(gap_ns_))
+                triggers[i] = 0;
+            else
+                kept.push_back(triggers[i]);
+        }
+        const bool proof = kept.size() >= frames_for_proof(timeline_) &&
+                           (timeline_ == Timeline::camera ? irregular(kept) : separated(kept));
+        return proof ? triggers : std::vector<std::uint64_t>{};
+    }
+
+ private:
+    std::int64_t tolerance_ns() const { return gap_ns_ / 4; }
+
+    bool possible(const Arrival& frame, const Record& record) const {
+        return !record.used && record.exposure.exposed &&
+               arrival_possible(limits_, frame, record.exposure) &&
+               !length_contradicts(frame, record.exposure);
+    }
+
+    const std::vector<Arrival>& frames_;
+    const ExposureLog& exposures_;
+    Timeline timeline_;
+    const Limits& limits_;
+    std::int64_t gap_ns_;
+};
+
+}  // namespace
+
+bool arrival_possible(const Limits& limits, const Arrival& arrival, const Exposure& exposure) {
+    const Duration after_end = arrival.arrived - exposure.earliest_on_host;
+    return after_end >= limits.earliest_arrival && after_end <= limits.latest_arrival;
+}
+
+std::uint64_t perhaps_not_taken(const Record& from, const Record& to) {
+    const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
+    const std::uint64_t unrecorded = sent - std::min(sent, to.recorded - from.recorded);
+    const std::uint64_t silent = to.silent - from.silent - (to.exposure.exposed ? 0 : 1);
+    return std::min(sent - 1, unrecorded + silent);
+}
+
+unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to) {
+    if (to.exposure.trigger <= from.exposure.trigger) return faults_to_refute;
+    const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
+    if (id_step == 0 || id_step > sent) return faults_to_refute;
+    const std::uint64_t taken = sent - perhaps_not_taken(from, to);
+    return taken > id_step
+               ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute))
+               : 0;
+}
+
+bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {
+    if (arrival.exposure.ns == 0 || exposure.kind != StampKind::measured_middle) return false;
+    const Duration measured = exposure.end - exposure.start;
+    const Duration tolerance = std::max(length_tolerance, measured / length_tolerance_part);
+    return absolute(arrival.exposure - measured) > tolerance;
+}
+
+std::size_t frames_for_proof(Timeline timeline) { return timeline == Timeline::camera ? 5 : 3; }
+
+std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
+                                 Timeline timeline, const Limits& limits) {
+    if (frames.size() < frames_for_proof(timeline) || exposures.size() < frames.size()) return {};
+    const Search search(frames, exposures, timeline, limits);
+    std::optional<Alignment> found;
+    for (const std::int64_t difference : search.candidates()) {
+        auto alignment = search.explain(difference);
+        if (!alignment || alignment->faults >= faults_to_refute) continue;
+        if (alignment->faults > 0 || alignment->unknown) return {};
+        // Neighbouring differences may lead to the same.
+        if (found && found->triggers != alignment->triggers) return {};
+        found = std::move(alignment);
+    }
+    return found ? search.proved(found->triggers) : std::vector<std::uint64_t>{};
+}
+
+}  // namespace versavis::pairing

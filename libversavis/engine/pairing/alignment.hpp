@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Finds which exposures a sequence of frames belongs to when nothing is known of camera clock and
+// numbers.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+#include "engine/pairing/exposure_log.hpp"
+
+namespace versavis::pairing {
+
+struct Limits {
+    Duration period = milliseconds(50);  ///< of the triggers, when none is left out
+    Duration earliest_arrival =
+        milliseconds(-5);  ///< after the end of exposure; negative: error of translation
+    Duration latest_arrival = milliseconds(500);  ///< after the end of exposure
+    Duration exposure_wait =
+        milliseconds(250);                   ///< how long a frame waits for its exposure's record
+    Duration pattern_duration = seconds(1);  ///< how long the board's start pattern takes
+    std::uint32_t frames_held = 8;           ///< most frames that wait for proof
+    bool camera_clock = true;                ///< false: pair by arrival, whatever the frames say
+};
+
+inline constexpr unsigned faults_to_refute = 2;
+
+bool arrival_possible(const Limits& limits, const Arrival& arrival, const Exposure& exposure);
+
+/// Triggers after `from`, down to `to`, that the camera may not have taken: their exposure line
+/// stayed silent, or their record is missing.
+std::uint64_t perhaps_not_taken(const Record& from, const Record& to);
+
+/// How many faults it takes that block ids step by `id_step` between these triggers. Cameras count
+/// either every trigger or only those that they took: both counts are right. A trigger without
+/// record may have been taken or not.
+unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to);
+
+/// True when the camera's own account of the exposure cannot be of this one.
+bool length_contradicts(const Arrival& arrival, const Exposure& exposure);
+
+/// The triggers of the frames, one each, if there is proof, else nothing: one alignment of the two
+/// sequences takes no fault to explain it, and each other one at least two. By the camera's clock
+/// the triggers must be irregular within them; by arrival alone they must be further apart than a
+/// frame may be late. A zero stands for a frame that is not proved with the others, because it came
+/// late.
+std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
+                                 Timeline timeline, const Limits& limits);
+
+/// Least number of frames that can prove anything on this timeline.
+std::size_t frames_for_proof(Timeline timeline);
+
+}  // namespace versavis::pairing

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The last exposures of one camera, found by number or by time.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+
+#include "engine/pairing/evidence.hpp"
+
+namespace versavis::pairing {
+
+/// Which instant of an exposure a frame's time is held against: by the camera's clock its start, by
+/// the arrival its end on the host.
+enum class Timeline { camera, arrival };
+
+struct Record {
+    Exposure exposure;
+    bool used = false;           ///< a frame of it was published
+    std::uint64_t recorded = 0;  ///< records until this one, itself included
+    std::uint64_t silent = 0;    ///< those of them without an exposure
+
+    std::int64_t instant_ns(Timeline timeline) const {
+        return timeline == Timeline::camera ? exposure.start.ns : exposure.end_on_host.ns;
+    }
+};
+
+class ExposureLog {
+ public:
+    explicit ExposureLog(Duration period) : period_(period) {}
+
+    /// False when it does not come after the one before: it is of another life of the board.
+    bool add(const Exposure& exposure);
+
+    bool empty() const { return records_.empty(); }
+    std::size_t size() const { return records_.size(); }
+    const Record& operator[](std::size_t i) const { return records_[i]; }
+    const Record& front() const { return records_.front(); }
+    const Record& back() const { return records_.back(); }
+    Record pop_front();
+
+    Record* find(std::uint64_t trigger);
+
+    /// The exposure closest to `instant_ns`, if it is within the tolerance; else null.
+    const Record* near(Timeline timeline, std::int64_t instant_ns, std::int64_t tolerance_ns) const;
+
+    /// True when an exposure whose record never came may lie about there. `before_first`: the
+    /// newest trigger that is known from before the log begins.
+    bool lost_near(Timeline timeline, std::int64_t instant_ns, std::uint64_t before_first) const;
+
+    /// Smallest distance of neighbouring exposures, at most the period. Always above zero.
+    std::int64_t smallest_gap_ns() const;
+
+ private:
+    std::size_t first_after(Timeline timeline, std::int64_t instant_ns) const;
+
+    Duration period_;
+    std::deque<Record> records_;
+    std::uint64_t recorded_ = 0;
+    std::uint64_t silent_ = 0;
+};
+
+}  // namespace versavis::pairing

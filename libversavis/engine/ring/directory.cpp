@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/ring/directory.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "client/segment.hpp"
+
+namespace versavis::ring {
+
+namespace {
+
+// A reader could lock a segment through its read-only descriptor; this file only the owner can
+// open.
+constexpr auto lock_name = ".lock";
+
+}  // namespace
+
+Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto parent = path.parent_path();
+    if (std::filesystem::create_directories(parent, error)) ::chmod(parent.c_str(), 0755);
+    if (!error && ::mkdir(path.c_str(), 0750) != 0 && errno != EEXIST)
+        error = {errno, std::generic_category()};
+    if (error)
+        return failure(path.string(), fmt::format("cannot be made: {}", error.message()),
+                       "run the service as the user that owns it");
+    const int lock = ::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
+    if (lock < 0)
+        return failure(path.string(),
+                       fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
+                       "run the service as the user that owns it");
+    if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
+        ::close(lock);
+        return failure(path.string(), "another versavisd serves this instance",
+                       "stop it, or choose another name for 'instance'");
+    }
+    return OwnedDirectory(path, lock);
+}
+
+OwnedDirectory::OwnedDirectory(OwnedDirectory&& other) noexcept
+    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
+
+OwnedDirectory::~OwnedDirectory() {
+    if (lock_ >= 0) ::close(lock_);
+}
+
+void OwnedDirectory::remove_strangers(const std::vector<std::string>& keep) const {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
+        const std::string name = entry.path().filename();
+        if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
+        auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
+        if (segment && is_own(segment->header())) continue;
+        std::filesystem::remove(entry.path(), error);
+        if (segment) retire(segment->header(), WriterState::closed);
+    }
+}
+
+}  // namespace versavis::ring

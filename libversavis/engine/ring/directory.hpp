@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Ownership of an instance's directory of rings: one service at a time.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "versavis/error.hpp"
+
+namespace versavis::ring {
+
+class OwnedDirectory {
+ public:
+    /// Makes `path` (0750) if needed and locks it for this process. Segments that a dead owner left
+    /// are kept until remove_strangers(), so that their readers can be handed over. Errors: no
+    /// permission, another service owns it.
+    static Expected<OwnedDirectory> claim(const std::filesystem::path& path);
+
+    OwnedDirectory(OwnedDirectory&& other) noexcept;
+    OwnedDirectory& operator=(OwnedDirectory&&) = delete;
+    ~OwnedDirectory();  ///< releases the lock
+
+    /// Retires and removes the segments that were not made by this process, but for those of the
+    /// names in `keep`: their readers are handed over when the segment is made anew.
+    void remove_strangers(const std::vector<std::string>& keep) const;
+
+    const std::filesystem::path& path() const { return path_; }
+
+ private:
+    OwnedDirectory(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
+
+    std::filesystem::path path_;
+    int lock_;
+};
+
+}  // namespace versavis::ring

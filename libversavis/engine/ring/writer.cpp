@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/ring/writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <system_error>
+
+#include "client/segment.hpp"
+
+namespace versavis::ring {
+
+struct Writer::Segment {
+    std::filesystem::path path;
+    Mapping mapping;
+    std::uint64_t head;
+
+    Segment(std::filesystem::path file, Mapping mapped, std::uint64_t first)
+        : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
+    ~Segment() {
+        const auto live = static_cast<std::uint32_t>(WriterState::live);
+        if (mapping.header().state.load(std::memory_order_relaxed) == live)
+            retire(mapping.header(), WriterState::closed);
+        // The name may belong to a newer writer by now: remove it only while it is this segment's.
+        auto current = Mapping::open(path, Mapping::Access::read_only);
+        if (current && current->header().generation == mapping.header().generation)
+            ::unlink(path.c_str());
+    }
+};
+
+namespace {
+
+std::uint64_t round_up(std::uint64_t value, std::uint64_t multiple) {
+    return (value + multiple - 1) / multiple * multiple;
+}
+
+std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
+
+void read_boot_id(std::uint8_t (&boot_id)[16]) {
+    std::ifstream file("/proc/sys/kernel/random/boot_id");
+    std::string text;
+    file >> text;
+    text.erase(std::remove(text.begin(), text.end(), '-'), text.end());
+    for (std::size_t i = 0; i < 16 && 2 * i + 2 <= text.size(); ++i)
+        boot_id[i] =
+            static_cast<std::uint8_t>(std::strtoul(text.substr(2 * i, 2).c_str(), nullptr, 16));
+}
+
+Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
+    const int file = ::open(path.c_str(), O_CREAT | O_TRUNC | O_RDWR | O_CLOEXEC, 0640);
+    if (file < 0) return failure(path.string(), fmt::format("cannot be made: {}", reason(errno)));
+    const int error = ::posix_fallocate(file, 0, static_cast<off_t>(size));
+    ::close(file);
+    if (error == 0) return {};
+    ::unlink(path.c_str());
+    return failure(path.string(),
+                   fmt::format("no memory for {} MiB: {}", size >> 20U, reason(error)),
+                   "configure fewer slots or enlarge /dev/shm");
+}
+
+void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
+    header.abi_major = abi_major;
+    header.abi_minor = abi_minor;
+    header.total_size = total;
+    std::random_device random;
+    header.generation = (std::uint64_t{random()} << 32U) | random();
+    read_boot_id(header.boot_id);
+    header.writer_pid = static_cast<std::uint32_t>(::getpid());
+    header.kind = shape.kind;
+    header.writer_start_ticks = start_ticks_of_this_process();
+    header.descriptor_count = shape.descriptor_count;
+    header.slot_count = shape.slot_count;
+    header.slot_size = round_up(shape.slot_size, page_size);
+    header.descriptors_at = page_size;
+    header.generations_at = header.descriptors_at + shape.descriptor_count * sizeof(Descriptor);
+    header.slots_at =
+        round_up(header.generations_at + shape.slot_count * generation_stride, page_size);
+    shape.name.copy(header.name, sizeof header.name - 1);
+    header.head.store(shape.first_item, std::memory_order_relaxed);
+    header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
+    header.heartbeat_ns.store(host_now().ns, std::memory_order_relaxed);
+    header.magic.store(magic, std::memory_order_release);
+}
+
+std::uint64_t total_size(const Shape& shape) {
+    const std::uint64_t words = page_size + shape.descriptor_count * sizeof(Descriptor) +
+                                shape.slot_count * generation_stride;
+    return round_up(words, page_size) + shape.slot_count * round_up(shape.slot_size, page_size);
+}
+
+}  // namespace
+
+Expected<Writer> Writer::create(const std::filesystem::path& directory, const Shape& shape) {
+    const bool power_of_two =
+        shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
+    if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
+        return failure(shape.name,
+                       "a ring needs a name below 64 characters and a power of two of descriptors");
+    const auto path = directory / shape.name;
+    const auto temporary = directory / ("." + shape.name + ".new");
+    const std::uint64_t size = total_size(shape);
+    if (auto allocated = allocate(temporary, size); !allocated)
+        return Unexpected(allocated.error());
+    auto mapping = Mapping::open_unchecked(temporary, Mapping::Access::read_write);
+    if (!mapping) return Unexpected(mapping.error());
+    fill_header(mapping->header(), shape, size);
+    // The name points to the new segment before readers of the old one wake up and look for it.
+    auto old = Mapping::open(path, Mapping::Access::read_write);
+    if (::rename(temporary.c_str(), path.c_str()) != 0)
+        return failure(path.string(), fmt::format("cannot be named: {}", reason(errno)));
+    if (old) retire(old->header(), WriterState::superseded);
+    return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
+}
+
+Writer::Writer(std::unique_ptr<Segment> segment) : segment_(std::move(segment)) {
+    for (std::uint32_t slot = 0; slot < slot_count(); ++slot) free_.push_back(slot);
+}
+Writer::Writer(Writer&&) noexcept = default;
+Writer& Writer::operator=(Writer&&) noexcept = default;
+Writer::~Writer() = default;
+
+std::byte* Writer::slot_data(std::uint32_t slot) const { return segment_->mapping.slot(slot); }
+std::uint64_t Writer::slot_size() const { return segment_->mapping.header().slot_size; }
+std::uint32_t Writer::slot_count() const { return segment_->mapping.header().slot_count; }
+std::uint64_t Writer::head() const { return segment_->head; }
+
+void Writer::heartbeat(HostTime now) {
+    segment_->mapping.header().heartbeat_ns.store(now.ns, std::memory_order_relaxed);
+}
+
+std::optional<std::uint32_t> Writer::acquire() {
+    if (free_.empty()) return std::nullopt;
+    const std::uint32_t slot = free_.front();
+    free_.pop_front();
+    segment_->mapping.generation(slot).fetch_add(1,
+                                                 std::memory_order_relaxed);  // odd: being written
+    std::atomic_thread_fence(std::memory_order_release);
+    return slot;
+}
+
+void Writer::abandon(std::uint32_t slot) {
+    segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release);
+    free_.push_front(slot);  // it holds nothing that a reader could want
+}
+
+void Writer::publish(std::uint32_t slot, std::uint32_t length, OutputTime time,
+                     const Metadata& metadata) {
+    const std::uint64_t generation =
+        segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release) + 1;
+    free_.push_back(slot);
+    write_descriptor(generation, (std::uint64_t{length} << 32U) | slot, time, metadata);
+}
+
+void Writer::publish(OutputTime time, const Metadata& metadata) {
+    write_descriptor(0, no_slot, time, metadata);
+}
+
+void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t length_and_slot,
+                              OutputTime time, const Metadata& metadata) {
+    Header& header = segment_->mapping.header();
+    const std::uint64_t number = segment_->head++;
+    Descriptor& descriptor = segment_->mapping.descriptor(number);
+    descriptor.sequence.store(2 * number + 1, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_release);
+    descriptor.slot_generation.store(slot_generation, std::memory_order_relaxed);
+    descriptor.length_and_slot.store(length_and_slot, std::memory_order_relaxed);
+    descriptor.output_time_ns.store(time.ns, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < metadata_words; ++i)
+        descriptor.metadata[i].store(metadata[i], std::memory_order_relaxed);
+    descriptor.sequence.store(2 * number + 2, std::memory_order_release);
+    header.head.store(number + 1, std::memory_order_release);
+    header.wake.fetch_add(1, std::memory_order_release);
+    futex_wake(header.wake);
+}
+
+}  // namespace versavis::ring

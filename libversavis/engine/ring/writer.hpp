@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The one writer of a shared-memory ring: it never waits for a reader.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "versavis/error.hpp"
+#include "versavis/ring/layout.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::ring {
+
+/// What a ring holds. Rings of inline items (IMU samples, events) have no slots.
+struct Shape {
+    std::string name;
+    StreamKind kind = StreamKind::events;
+    std::uint32_t descriptor_count = 1024;  ///< a power of two
+    std::uint32_t slot_count = 0;
+    std::uint64_t slot_size = 0;   ///< bytes of payload that one slot holds; rounded up to pages
+    std::uint64_t first_item = 0;  ///< number of the first item; tests start it near a wrap
+};
+
+/// Not thread-safe: one thread at a time may call it. Readers never block it.
+class Writer {
+ public:
+    /// Makes the segment `directory / shape.name`, its memory allocated and populated; one that a
+    /// writer before left there is marked superseded and its readers are woken. Errors: the
+    /// directory or the memory cannot be had.
+    static Expected<Writer> create(const std::filesystem::path& directory, const Shape& shape);
+
+    Writer(Writer&&) noexcept;
+    Writer& operator=(Writer&&) noexcept;
+    ~Writer();  ///< closes the stream, wakes its readers and removes the segment's name
+
+    /// Takes the slot whose item is oldest, whose readers lose it from here on; none when all are
+    /// taken.
+    std::optional<std::uint32_t> acquire();
+    std::byte* slot_data(std::uint32_t slot) const;
+    std::uint64_t slot_size() const;
+    std::uint32_t slot_count() const;
+
+    /// Gives an acquired slot back without publishing it.
+    void abandon(std::uint32_t slot);
+
+    /// Publishes an acquired slot with `length` bytes of payload. Cost does not depend on the
+    /// length.
+    void publish(std::uint32_t slot, std::uint32_t length, OutputTime time,
+                 const Metadata& metadata);
+
+    /// Publishes an item without payload.
+    void publish(OutputTime time, const Metadata& metadata);
+
+    /// Items published so far, the number of the next one.
+    std::uint64_t head() const;
+
+    /// Tells readers that the writer lives; call it at least once a second.
+    void heartbeat(HostTime now);
+
+ private:
+    struct Segment;
+    explicit Writer(std::unique_ptr<Segment> segment);
+    void write_descriptor(std::uint64_t slot_generation, std::uint64_t length_and_slot,
+                          OutputTime time, const Metadata& metadata);
+
+    std::unique_ptr<Segment> segment_;
+    std::deque<std::uint32_t> free_;  ///< slots to hand out, the one longest untouched first
+};
+
+}  // namespace versavis::ring

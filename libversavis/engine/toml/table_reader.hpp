@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reads the keys of TOML tables with types, ranges and choices; errors name line, column and the
+// nearest key.
+#pragma once
+
+#include <toml++/toml.h>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "versavis/error.hpp"
+
+namespace versavis {
+
+/// What is known of the file that is being read; the first error wins.
+struct TomlFile {
+    std::string path;
+    std::string manual;  ///< where the keys are documented
+    Expected<> result{};
+
+    void fail(const toml::node& node, const std::string& what, const std::string& cure = {});
+};
+
+/// Parses `path`. Error: it cannot be read, or is no TOML.
+Expected<toml::table> parse_toml(const std::string& path);
+
+/// A key that is absent leaves its value as it is. finish() refuses keys that nobody asked for.
+class TableReader {
+ public:
+    TableReader(TomlFile& file, const toml::table& table) : file_(file), table_(table) {}
+
+    void read(std::string_view key, std::string& value);
+    void read(std::string_view key, bool& value);
+    void read(std::string_view key, std::vector<std::string>& values);
+
+    /// Whole numbers are taken for real ones, too.
+    void read(std::string_view key, double& value, double minimum, double maximum);
+
+    template <class Integer>
+    void read(std::string_view key, Integer& value, std::int64_t minimum, std::int64_t maximum) {
+        std::int64_t wide = static_cast<std::int64_t>(value);
+        read_integer(key, wide, minimum, maximum);
+        value = static_cast<Integer>(wide);
+    }
+
+    /// One of the names given.
+    template <class Enum>
+    void choose(std::string_view key, Enum& value,
+                const std::vector<std::pair<std::string, Enum>>& choices) {
+        std::vector<std::string> names;
+        for (const auto& choice : choices) names.push_back(choice.first);
+        if (const auto chosen = find_choice(key, names)) value = choices[*chosen].second;
+    }
+
+    /// The table below `key`, if there is one.
+    const toml::table* table(std::string_view key);
+
+    /// The tables of the array below `key`.
+    std::vector<const toml::table*> tables(std::string_view key);
+
+    bool has(std::string_view key) const { return table_.contains(key); }
+    void fail(std::string_view key, const std::string& what, const std::string& cure = {});
+    void finish();
+
+ private:
+    const toml::node* find(std::string_view key);
+    void read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
+                      std::int64_t maximum);
+    std::optional<std::size_t> find_choice(std::string_view key,
+                                           const std::vector<std::string>& names);
+    std::string nearest(std::string_view key) const;
+
+    TomlFile& file_;
+    const toml::table& table_;
+    std::vector<std::string> known_;
+};
+
+}  // namespace versavis

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Consistent Overhead Byte Stuffing: packets without zero bytes, so that zero delimits them;
+// freestanding. Source: Cheshire and Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM
+// Transactions on Networking 7(2), 1999.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace versavis::wire {
+
+/// Largest encoded size of `size` bytes, delimiter not included.
+constexpr std::size_t cobs_bound(std::size_t size) { return size + size / 254 + 1; }
+
+/// Encodes `size` bytes of `data` to `out`, which has room for cobs_bound(size); returns the
+/// encoded size.
+constexpr std::size_t cobs_encode(const std::uint8_t* data, std::size_t size, std::uint8_t* out) {
+    std::size_t code_at = 0;
+    std::size_t written = 1;
+    std::uint8_t code = 1;
+    for (std::size_t i = 0; i < size; ++i) {
+        if (data[i] != 0) {
+            out[written++] = data[i];
+            ++code;
+        }
+        const bool block_full = code == 0xFF && i + 1 < size;
+        if (data[i] == 0 || block_full) {
+            out[code_at] = code;
+            code_at = written++;
+            code = 1;
+        }
+    }
+    out[code_at] = code;
+    return written;
+}
+
+/// Decodes `size` encoded bytes (no delimiter) to `out` of `capacity` bytes; returns the decoded
+/// size, or `cobs_invalid` when the input is malformed or does not fit.
+inline constexpr std::size_t cobs_invalid = ~std::size_t{0};
+
+constexpr std::size_t cobs_decode(const std::uint8_t* data, std::size_t size, std::uint8_t* out,
+                                  std::size_t capacity) {
+    std::size_t written = 0;
+    std::size_t i = 0;
+    while (i < size) {
+        const std::uint8_t code = data[i++];
+        if (code == 0 || i + code - 1 > size) return cobs_invalid;
+        for (std::uint8_t k = 1; k < code; ++k, ++i) {
+            if (data[i] == 0 || written == capacity) return cobs_invalid;
+            out[written++] = data[i];
+        }
+        if (code != 0xFF && i < size) {
+            if (written == capacity) return cobs_invalid;
+            out[written++] = 0;
+        }
+    }
+    return written;
+}
+
+}  // namespace versavis::wire

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the host tells the board to be: the configuration and its answer
+// (docs/contracts/wire-protocol.md); freestanding C++17.
+#pragma once
+
+#include "wire/type.hpp"
+
+namespace versavis::wire {
+
+enum CameraFlag : std::uint32_t {
+    camera_enabled = 1U << 0U,
+    camera_trigger_inverted = 1U << 1U,  ///< pulses are low
+    camera_strobe_inverted = 1U << 2U,   ///< the exposure line is low while exposing
+    camera_no_strobe = 1U << 3U,         ///< no exposure line is wired
+    camera_slave = 1U << 4U,  ///< triggered by the exposure line of `master`, in hardware
+};
+
+struct CameraConfiguration {
+    std::uint32_t flags;           ///< bits of CameraFlag
+    std::uint32_t rate_uhz;        ///< grid rate, micro-hertz: 100'000 to 1'000'000'000
+    std::uint32_t phase_ns;        ///< grid points are at start + phase + k / rate
+    std::uint32_t pulse_ns;        ///< trigger pulse width: 1'000 to 10'000'000
+    std::uint32_t latency_ns;      ///< trigger to start of exposure: up to 100'000'000
+    std::uint32_t gap_ns;          ///< least time from end of exposure to the next trigger
+    std::int64_t exposure_ns;      ///< expected until one was measured or announced
+    std::int64_t max_exposure_ns;  ///< an exposure that lasts longer is given up
+    std::uint8_t master;           ///< of a slave: the camera whose exposure line triggers it
+    std::uint8_t reserved[7];
+};
+
+enum class ImuKind : std::uint8_t {
+    none = 0,
+    adis16448b = 1,
+    adis16448a = 2,
+    adis16445 = 3,
+    adis16460 = 4,
+    adis16470 = 5,
+    icm42688p = 6,
+    bmi088 = 7,
+    vn100 = 8,
+};
+
+inline constexpr std::size_t imu_count = 2;  ///< port 0: SPI; port 1: UART
+
+enum ImuOption : std::uint8_t {
+    imu_data_ready =
+        1U << 0U,  ///< the part's data-ready line is wired: it paces and stamps the samples
+};
+
+struct ImuConfiguration {
+    ImuKind kind;
+    std::uint8_t filter;   ///< strength of the part's own filter; 0: the weakest
+    std::uint8_t options;  ///< bits of ImuOption
+    std::uint8_t reserved;
+    std::uint32_t rate_millihertz;  ///< sample rate; with data-ready one that the part has
+};
+
+enum IlluminationFlag : std::uint8_t { illumination_inverted = 1U << 0U };  ///< low is on
+
+/// Light while any camera of the mask exposes.
+struct IlluminationConfiguration {
+    std::uint8_t cameras;  ///< bit mask; 0: no light
+    std::uint8_t flags;    ///< bits of IlluminationFlag
+    std::uint16_t reserved;
+    std::uint32_t lead_ns;    ///< on so long before the exposure: up to 1'000'000
+    std::uint32_t max_on_ns;  ///< never on for longer at a time: 10'000 to 1'000'000'000
+    std::uint32_t duty_ppm;   ///< never on for a larger part of the time: 1 to 1'000'000
+};
+
+enum PulseInput : std::uint8_t { pulse_pps = 0, pulse_aux0 = 1, pulse_aux1 = 2, pulse_sync = 3 };
+inline constexpr std::size_t pulse_input_count = 4;
+
+enum PortOption : std::uint8_t {
+    port_imu_output = 1U << 0U,  ///< the second SPI port serves the samples of IMU 0
+    port_nmea = 1U << 1U,  ///< a GNSS receiver's NMEA sentences come at the UART, instead of an IMU
+};
+
+/// What the test output shows: a grid point of a camera, where the middle of its exposure should
+/// be, or the ticks of an IMU.
+enum TestSource : std::uint8_t { test_none = 0, test_camera0 = 1, test_imu0 = 5 };
+
+struct PortConfiguration {
+    std::uint8_t inputs;   ///< bit mask of PulseInput that are listened to
+    std::uint8_t falling;  ///< bit mask of those whose falling edge counts
+    std::uint8_t options;  ///< bits of PortOption
+    std::uint8_t test;     ///< TestSource: test_camera0 + camera, or test_imu0 + port
+    std::uint32_t
+        sync_rate_uhz;  ///< pulses at the sync output, micro-hertz: 0 (none), 100'000 to 10'000'000
+    std::uint32_t pulse_ns;   ///< width of pulses at sync and test outputs: 1'000 to 10'000'000
+    std::uint32_t nmea_baud;  ///< 1'200 to 921'600; 0: 9'600
+};
+
+enum ConfigurationFlag : std::uint32_t {
+    configuration_store =
+        1U << 0U,  ///< also in force after the next power-up, before any host says so
+};
+
+/// The whole configuration; taken as a whole or not at all, and only while stopped.
+struct Configuration {
+    static constexpr Type type = Type::configuration;
+    std::uint32_t id;     ///< repeated in the answer
+    std::uint32_t flags;  ///< bits of ConfigurationFlag
+    CameraConfiguration cameras[camera_count];
+    ImuConfiguration imus[imu_count];
+    IlluminationConfiguration illumination;
+    PortConfiguration ports;
+};
+
+enum class ConfigurationPart : std::uint8_t { camera = 0, imu = 1, illumination = 2, ports = 3 };
+
+enum class ConfigurationField : std::uint8_t {
+    rate = 1,
+    pulse = 2,
+    latency = 3,
+    gap = 4,
+    exposure = 5,
+    max_exposure = 6,
+    phase = 7,
+    imu_kind = 8,
+    imu_rate = 9,
+    master = 10,
+    imu_filter = 11,
+    imu_options = 12,
+    cameras = 13,
+    lead = 14,
+    max_on = 15,
+    duty = 16,
+    inputs = 17,
+    test = 18,
+    sync_rate = 19,
+    port_options = 20,
+    nmea_baud = 21,
+};
+
+/// One field that the board does not take; one packet for each, before the answer.
+struct Refusal {
+    static constexpr Type type = Type::refusal;
+    std::uint32_t id;  ///< of the configuration
+    ConfigurationPart part;
+    std::uint8_t index;  ///< camera or IMU
+    ConfigurationField field;
+    std::uint8_t reserved;
+    std::int64_t value;
+    std::int64_t minimum;
+    std::int64_t maximum;
+};
+
+enum class ConfigurationStatus : std::uint8_t { taken = 0, refused = 1, running = 2 };
+
+struct ConfigurationAnswer {
+    static constexpr Type type = Type::configuration_answer;
+    std::uint32_t id;
+    ConfigurationStatus status;
+    std::uint8_t refused;  ///< number of refusals
+    std::uint8_t reserved[2];
+    Configuration
+        taken;  ///< what is in force after this answer, with the IMU rates that the parts have
+};
+
+static_assert(sizeof(CameraConfiguration) == 48 && sizeof(ImuConfiguration) == 8);
+static_assert(sizeof(IlluminationConfiguration) == 16 && sizeof(PortConfiguration) == 16);
+static_assert(sizeof(Configuration) == 248 && sizeof(Refusal) == 32 &&
+              sizeof(ConfigurationAnswer) == 256);
+
+}  // namespace versavis::wire

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The packets between board and host as fixed little-endian structs
+// (docs/contracts/wire-protocol.md); freestanding C++17.
+#pragma once
+
+#include <type_traits>
+
+#include "wire/configuration.hpp"
+#include "wire/type.hpp"
+
+namespace versavis::wire {
+
+inline constexpr std::size_t max_packet_size = 512;  ///< header + payload + CRC, before COBS
+inline constexpr std::size_t max_log_text = 96;
+
+/// First bytes of every packet.
+struct Header {
+    Type type;
+    std::uint8_t reserved[3];
+    std::uint32_t nonce;     ///< board: drawn at each boot; host: drawn at each connection
+    std::uint32_t sequence;  ///< counts the sender's packets since its nonce was drawn, modulo 2^32
+};
+
+struct HostHello {
+    static constexpr Type type = Type::host_hello;
+    std::uint8_t major;
+    std::uint8_t minor;
+    std::uint8_t reserved[2];
+};
+
+enum class ResetCause : std::uint8_t {
+    power_on = 0,
+    pin = 1,
+    watchdog = 2,
+    brown_out = 3,
+    software = 4
+};
+
+enum Capability : std::uint32_t {
+    capability_exposure_compensation = 1U << 0U,
+    capability_imu = 1U << 1U,
+    capability_start_pattern = 1U << 2U,
+    capability_slaves = 1U << 3U,
+    capability_illumination = 1U << 4U,
+    capability_pulse_inputs = 1U << 5U,
+    capability_sync = 1U << 6U,
+    capability_imu_output = 1U << 7U,
+    capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
+    capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART name the pulses of the PPS input
+};
+
+struct BoardHello {
+    static constexpr Type type = Type::board_hello;
+    std::uint8_t major;
+    std::uint8_t minor;
+    std::uint8_t cameras;  ///< trigger outputs that exist
+    ResetCause reset_cause;
+    std::uint32_t capabilities;  ///< bits of Capability
+    std::int64_t board_time_ns;
+    char serial[16];    ///< zero-padded text
+    char firmware[16];  ///< zero-padded text
+};
+
+enum ExposureFlag : std::uint16_t {
+    exposure_measured = 1U << 0U,   ///< both edges were stamped
+    exposure_no_start = 1U << 1U,   ///< the start edge did not come in time
+    exposure_no_end = 1U << 2U,     ///< the end edge did not come in time
+    exposure_late = 1U << 3U,       ///< the trigger left later than the grid asked
+    exposure_pattern = 1U << 4U,    ///< part of the start pattern
+    exposure_announced = 1U << 5U,  ///< trigger placed by an exposure that the host announced
+    exposure_predicted =
+        1U << 6U,  ///< no exposure line is wired: start and end follow from the trigger
+    exposure_overlong =
+        1U << 7U,  ///< longer than the maximum exposure (no end), or than the period
+    exposure_clipped =
+        1U << 8U,  ///< more was announced than the maximum exposure, which was expected then
+    exposure_from_master =
+        1U << 9U,               ///< a slave without exposure line: start and end are the master's
+    exposure_slow = 1U << 10U,  ///< part of the slow start
+    exposure_uncounted =
+        1U << 11U,  ///< of a slave: edges were lost, and its number may be too small since
+};
+
+/// One record for each trigger pulse that was sent, whatever the camera did.
+struct Exposure {
+    static constexpr Type type = Type::exposure;
+    std::uint8_t camera;
+    std::uint8_t reserved;
+    std::uint16_t flags;  ///< bits of ExposureFlag
+    std::uint32_t reserved2;
+    std::uint64_t trigger;  ///< pulses sent to this camera since boot, this one included
+    std::uint64_t tick;     ///< grid point of this camera since start
+    std::int64_t trigger_ns;
+    std::int64_t start_ns;  ///< or no_time
+    std::int64_t end_ns;    ///< or no_time
+};
+
+enum ImuFlag : std::uint16_t {
+    imu_check_failed =
+        1U << 0U,  ///< CRC, checksum, second reading or identity of the part was wrong
+    imu_self_test_failed = 1U << 1U,  ///< the sensor's own diagnosis
+    imu_overrun = 1U << 2U,   ///< samples before were not read in time: their numbers are missing
+    imu_stamped = 1U << 3U,   ///< the time is that of the part's data-ready edge
+    imu_repeated = 1U << 4U,  ///< the part says that it had no new data since the sample before
+};
+
+/// Raw sensor words, sign-extended; the host scales them.
+struct ImuSample {
+    static constexpr Type type = Type::imu_sample;
+    ImuKind kind;
+    std::uint8_t imu;      ///< port
+    std::uint16_t flags;   ///< bits of ImuFlag
+    std::uint32_t number;  ///< samples that were due since boot, modulo 2^32
+    std::int64_t time_ns;
+    std::int32_t gyro[3];
+    std::int32_t accel[3];
+    std::int16_t magnetic[3];
+    std::int16_t temperature;
+    std::uint16_t pressure;
+    std::uint16_t reserved;
+    std::uint32_t
+        departure_ns;  ///< from time_ns to when this packet began to leave the board; 0: unknown
+};
+
+enum class EventKind : std::uint8_t {
+    trigger_skipped = 1,  ///< detail: SkipReason; value: the grid tick that got no pulse
+    stray_edge = 2,       ///< an exposure edge that belongs to no trigger; value: level
+    output_late = 3,      ///< an output word left too late; value: ns late
+    edge_overflow = 4,    ///< edges came faster than they were read; value: edges lost
+    pps = 5,              ///< value: pulses of this input since boot
+    aux_pulse = 6,        ///< source: 0 or 1; value: pulses of this input since boot
+    sync_pulse = 7,       ///< value: pulses of this input since boot
+    input_noisy = 8,      ///< an input is not listened to for a second; source: input of the board
+    illumination_limited =
+        9,            ///< the light would have been on for too long; value: ns that it stays dark
+    imu_ready = 10,   ///< the part answers and is set up; value: what identifies it
+    imu_failed = 11,  ///< the part is not what it should be; detail: step; value: what it said
+    imu_silent = 12,  ///< no data-ready edge, no end of a transfer or no bytes came
+    utc_label = 13,  ///< a sentence named the PPS pulse of this time; value: UTC seconds since 1970
+};
+
+enum class SkipReason : std::uint16_t {
+    busy = 0,  ///< the camera was, or would have been, exposing
+    late = 1,  ///< the instant had gone by
+    full = 2,  ///< too many pulses wait already
+};
+
+struct Event {
+    static constexpr Type type = Type::event;
+    EventKind kind;
+    std::uint8_t source;     ///< camera, IMU or input number
+    std::uint16_t detail;    ///< see EventKind
+    std::uint32_t sequence;  ///< events since boot
+    std::int64_t time_ns;
+    std::int64_t value;
+};
+
+struct ClockRequest {
+    static constexpr Type type = Type::clock_request;
+    std::uint32_t id;
+    std::uint32_t reserved;
+};
+
+struct ClockAnswer {
+    static constexpr Type type = Type::clock_answer;
+    std::uint32_t id;
+    std::uint32_t reserved;
+    std::int64_t received_ns;  ///< the request, stamped where it entered the board
+    std::int64_t sent_ns;      ///< this answer, stamped as it was handed to the link
+};
+
+/// After the answer, from boards whose link can tell: when it truly left.
+struct ClockFollowUp {
+    static constexpr Type type = Type::clock_follow_up;
+    std::uint32_t id;  ///< of the request
+    std::uint32_t reserved;
+    std::int64_t sent_ns;  ///< the last byte of the answer left
+};
+
+enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
+
+/// Once a second; counters since boot, high-water marks since the report before.
+struct Health {
+    static constexpr Type type = Type::health;
+    std::int64_t board_time_ns;
+    std::uint32_t
+        dropped_exposures;  ///< records that were replaced by newer ones: the host did not read
+    std::uint32_t dropped_clock_answers;
+    std::uint32_t dropped_events;
+    std::uint32_t dropped_imu_samples;
+    std::uint32_t dropped_logs;
+    std::uint32_t receive_errors;         ///< packets from the host that were malformed
+    std::uint32_t imu_errors[imu_count];  ///< samples with a failed check
+    std::uint32_t imu_restarts;           ///< times that an IMU had to be set up again
+    std::uint32_t late_outputs;
+    std::uint32_t lost_edges;
+    std::uint32_t stray_edges;
+    std::uint32_t skipped_triggers;
+    std::uint32_t noisy_inputs;      ///< times that an input was not listened to for a second
+    std::uint32_t output_queue_max;  ///< edges that waited
+    std::uint32_t link_queue_max;    ///< packets that waited
+    std::uint32_t loop_max_ns;   ///< longest time from when something was due to when it was done
+    std::int32_t pps_error_ppb;  ///< board clock against PPS: positive runs fast
+    PpsState pps_state;
+    ResetCause reset_cause;
+    std::uint16_t ignored;  ///< messages of the host that were out of range, modulo 2^16
+};
+
+enum class LogLevel : std::uint8_t { error = 3, warning = 4, info = 6, debug = 7 };
+
+struct Log {
+    static constexpr Type type = Type::log;
+    LogLevel level;
+    char text[max_log_text - 1];  ///< zero-padded
+};
+
+enum StartFlag : std::uint8_t {
+    start_pattern = 1U << 0U,  ///< begin with the pattern of irregular gaps
+    start_slow = 1U << 1U,     ///< one pulse a second at most, until started again without it
+    start_on_sync =
+        1U << 2U,  ///< begin the grid at the next pulse of the sync input, and follow them
+};
+
+/// Starts the cameras of the mask; one that runs already begins its pattern anew.
+struct Start {
+    static constexpr Type type = Type::start;
+    std::uint8_t cameras;  ///< bit mask
+    std::uint8_t flags;    ///< bits of StartFlag
+    std::uint8_t reserved[2];
+};
+
+struct Stop {
+    static constexpr Type type = Type::stop;
+    std::uint8_t cameras;  ///< bit mask
+    std::uint8_t reserved[3];
+};
+
+struct ExpectedExposure {
+    static constexpr Type type = Type::expected_exposure;
+    std::uint8_t camera;
+    std::uint8_t reserved[7];
+    std::uint64_t trigger;  ///< holds from this trigger on
+    std::int64_t exposure_ns;
+};
+
+struct Reboot {
+    static constexpr Type type = Type::reboot;
+    std::uint32_t magic;  ///< 0x544F4F42
+    std::uint32_t to_boot_loader;
+};
+inline constexpr std::uint32_t reboot_magic = 0x544F4F42U;
+
+/// The nearest whole second of the grid belongs at `board_ns`; from there on the grid keeps this
+/// pace.
+struct AlignGrid {
+    static constexpr Type type = Type::align_grid;
+    std::int64_t board_ns;  ///< at most 100 s from now
+    std::int32_t pace_ppb;  ///< board time passes so much faster than grid time: up to 500 ppm
+    std::uint32_t
+        max_slew_ppb;  ///< the grid goes there by no more than so much beyond its pace: 1 to 10^6
+};
+inline constexpr std::int64_t align_reach_ns = 100'000'000'000;
+inline constexpr std::int32_t align_largest_pace_ppb = 500'000;
+inline constexpr std::uint32_t align_largest_slew_ppb = 1'000'000;
+
+/// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first;
+/// afterwards all do. Four neighbouring gaps that are not all equal stand nowhere else in any of
+/// them, so that five frames name their triggers, and show it when the cables of two cameras are
+/// swapped. A slave has its master's.
+inline constexpr std::uint32_t start_pattern_bits[camera_count] = {0xE4A9B, 0xA3A73, 0xE2765,
+                                                                   0xE1AE3};
+inline constexpr unsigned start_pattern_length = 20;
+
+/// Slow start: every so many grid points get a pulse. Each camera has an interval of its own, of 1
+/// s at least.
+constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera) {
+    return (rate_uhz * (4 + camera) + 3'999'999) / 4'000'000;
+}
+
+static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
+static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
+static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 &&
+              sizeof(ClockFollowUp) == 16 && sizeof(Health) == 88 && sizeof(Log) == 96);
+static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
+              sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16);
+
+/// Size of the payload of `type`, or 0 when the type is unknown.
+constexpr std::size_t payload_size(Type type) {
+    switch (type) {
+        case Type::board_hello: return sizeof(BoardHello);
+        case Type::exposure: return sizeof(Exposure);
+        case Type::imu_sample: return sizeof(ImuSample);
+        case Type::event: return sizeof(Event);
+        case Type::clock_answer: return sizeof(ClockAnswer);
+        case Type::clock_follow_up: return sizeof(ClockFollowUp);
+        case Type::health: return sizeof(Health);
+        case Type::log: return sizeof(Log);
+        case Type::configuration_answer: return sizeof(ConfigurationAnswer);
+        case Type::refusal: return sizeof(Refusal);
+        case Type::host_hello: return sizeof(HostHello);
+        case Type::configuration: return sizeof(Configuration);
+        case Type::start: return sizeof(Start);
+        case Type::stop: return sizeof(Stop);
+        case Type::clock_request: return sizeof(ClockRequest);
+        case Type::expected_exposure: return sizeof(ExpectedExposure);
+        case Type::reboot: return sizeof(Reboot);
+        case Type::align_grid: return sizeof(AlignGrid);
+    }
+    return 0;
+}
+
+}  // namespace versavis::wire

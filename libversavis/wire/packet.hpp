@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Packs structs of messages.hpp into COBS frames with CRC and finds them again in a byte stream;
+// freestanding.
+#pragma once
+
+#include <cstring>
+
+#include "wire/cobs.hpp"
+#include "wire/crc32.hpp"
+#include "wire/messages.hpp"
+
+namespace versavis::wire {
+
+inline constexpr std::size_t crc_size = sizeof(std::uint32_t);
+/// Largest number of bytes that one packet takes in the stream, delimiter included.
+inline constexpr std::size_t max_frame_size = cobs_bound(max_packet_size) + 1;
+static_assert(sizeof(Header) + sizeof(ConfigurationAnswer) + crc_size <= max_packet_size);
+
+/// Bytes of one encoded packet, delimiter included.
+struct Frame {
+    std::uint8_t bytes[max_frame_size];
+    std::size_t size;
+};
+
+/// A packet whose CRC was right, and whose size was if its type is known: receivers ignore unknown
+/// types. `payload` lives until the decoder's next call.
+struct Packet {
+    Header header;
+    const std::uint8_t* payload;
+    std::size_t payload_size;
+
+    /// The payload as T when the packet is one; false otherwise.
+    template <class T>
+    bool read(T& out) const {
+        if (header.type != T::type) return false;
+        std::memcpy(&out, payload, sizeof(T));
+        return true;
+    }
+};
+
+/// Encodes `message` with the sender's nonce and sequence number.
+template <class T>
+void encode(const T& message, std::uint32_t nonce, std::uint32_t sequence, Frame& frame) {
+    static_assert(std::is_trivially_copyable<T>::value && sizeof(T) == payload_size(T::type),
+                  "a wire struct");
+    constexpr std::size_t body = sizeof(Header) + sizeof(T);
+    std::uint8_t raw[body + crc_size];
+    const Header header{T::type, {}, nonce, sequence};
+    std::memcpy(raw, &header, sizeof header);
+    std::memcpy(raw + sizeof header, &message, sizeof message);
+    const std::uint32_t crc = crc32(raw, body);
+    std::memcpy(raw + body, &crc, crc_size);
+    frame.size = cobs_encode(raw, sizeof raw, frame.bytes);
+    frame.bytes[frame.size++] = 0;
+}
+
+/// Cuts a byte stream into packets. Malformed input is counted and skipped up to the next
+/// delimiter.
+class Decoder {
+ public:
+    /// Takes `size` bytes and calls on_packet(const Packet&) for each that completes a valid
+    /// packet.
+    template <class OnPacket>
+    void feed(const std::uint8_t* data, std::size_t size, OnPacket&& on_packet) {
+        for (std::size_t i = 0; i < size; ++i) {
+            if (data[i] != 0) {
+                if (filled_ < sizeof encoded_)
+                    encoded_[filled_++] = data[i];
+                else
+                    overflow_ = true;
+                continue;
+            }
+            Packet packet{};
+            if (filled_ == 0 && !overflow_) continue;  // delimiters may be repeated
+            if (!overflow_ && open(packet))
+                on_packet(static_cast<const Packet&>(packet));
+            else
+                ++errors_;
+            filled_ = 0;
+            overflow_ = false;
+        }
+    }
+
+    /// Runs of bytes between delimiters that were no valid packet.
+    std::uint32_t errors() const { return errors_; }
+
+ private:
+    bool open(Packet& packet) {
+        const std::size_t size = cobs_decode(encoded_, filled_, decoded_, sizeof decoded_);
+        if (size == cobs_invalid || size < sizeof(Header) + crc_size) return false;
+        std::uint32_t crc = 0;
+        std::memcpy(&crc, decoded_ + size - crc_size, crc_size);
+        if (crc != crc32(decoded_, size - crc_size)) return false;
+        std::memcpy(&packet.header, decoded_, sizeof packet.header);
+        packet.payload = decoded_ + sizeof packet.header;
+        packet.payload_size = size - sizeof packet.header - crc_size;
+        const std::size_t known = payload_size(packet.header.type);
+        return known == 0 || known == packet.payload_size;
+    }
+
+    std::uint8_t encoded_[max_frame_size - 1] = {};
+    std::uint8_t decoded_[max_packet_size] = {};
+    std::size_t filled_ = 0;
+    bool overflow_ = false;
+    std::uint32_t errors_ = 0;
+};
+
+}  // namespace versavis::wire
