@@ -4,69 +4,56 @@
 #include <fmt/ranges.h>
 
 #include <cstring>
+#include <random>
+
+#include "configuration/board_configuration.hpp"
 
 namespace versavis::daemon {
 
 namespace {
 
+/// Between looks for a board that is not there. At half, an idle service scans the bus twice as
+/// often; at twice, frames come a third of a second later after the board is plugged in.
 constexpr Duration retry_interval = milliseconds(300);
-constexpr Duration retry_refused = seconds(5);  // only the user can change that
+
+/// For a board that only the user can make fit. At half, the log fills twice as fast; at twice,
+/// the user waits longer after mending it.
+constexpr Duration retry_refused = seconds(5);
+
+/// Time for one answer; the board takes milliseconds. At half, a loaded host gives up on a healthy
+/// board; at twice, a dead one is noticed later.
 constexpr Duration answer_timeout = milliseconds(1000);
-constexpr Duration silence_limit = seconds(3);  // the board reports its health every second
-constexpr Duration request_timeout = milliseconds(500);
+
+/// Hellos until the board is given up; each has its part of answer_timeout. At half, a board that
+/// boots is missed at first; at twice, a foreign device on the port holds the link up longer.
+constexpr int hello_attempts = 5;
+
+/// The board reports its health every second: so long without a packet, it is gone. At half, two
+/// lost packets end the connection; at twice, a dead board is noticed later.
+constexpr Duration silence_limit = seconds(3);
+
+/// Exchanges before cameras may start, so that the first frame can be stamped. At half, the first
+/// stamps are worse; at twice, the first frame comes 0.1 s later.
 constexpr unsigned exchanges_to_start = 4;
-constexpr Duration follow_up_patience =
-    milliseconds(50);  // of the first exchanges, which nothing else paces
-constexpr std::uint8_t first_minor_with_follow_up = 2;
+
+/// For the follow-ups of the first exchanges, which nothing else paces. At half, those of a slow
+/// link are lost; at twice, a link without any starts 0.2 s later.
+constexpr Duration follow_up_patience = milliseconds(50);
+
+/// Longest wait for bytes, and so for the end of the thread. At half, it wakes up twice as often
+/// for nothing; at twice, it ends later.
 constexpr Duration longest_read = milliseconds(100);
+
+/// Shortest wait for bytes: a request that is due may be late by so much. At half, it hardly wakes
+/// more often; at twice, neither.
+constexpr Duration shortest_read = microseconds(100);
+
+/// A board whose clock is off by more than this is in another life, whatever its nonce says. At
+/// half, a stalled link begins a new epoch for nothing; at twice, a restart with an equal nonce
+/// within a second of the last one is missed.
 constexpr Duration largest_clock_surprise = milliseconds(500);
 
-/// Key of the configuration file, and the unit in which the board has it.
-std::pair<const char*, const char*> field_name(wire::ConfigurationField field) {
-    using Field = wire::ConfigurationField;
-    switch (field) {
-        case Field::rate: return {"rate_hz", "micro-hertz"};
-        case Field::pulse: return {"pulse_us", "ns"};
-        case Field::latency: return {"latency_us", "ns"};
-        case Field::gap: return {"gap_us", "ns"};
-        case Field::exposure: return {"exposure_us", "ns"};
-        case Field::max_exposure: return {"max_exposure_us", "ns"};
-        case Field::phase: return {"phase_us", "ns"};
-        case Field::imu_kind: return {"model", "by number"};
-        case Field::imu_rate: return {"rate_hz", "milli-hertz"};
-        case Field::master: return {"master", "output of a camera"};
-        case Field::imu_filter: return {"filter", "strength"};
-        case Field::imu_options: return {"data_ready", "bits"};
-        case Field::cameras: return {"cameras", "bits"};
-        case Field::lead: return {"lead_us", "ns"};
-        case Field::max_on: return {"max_on_us", "ns"};
-        case Field::duty: return {"duty_percent", "ppm"};
-        case Field::inputs: return {"inputs", "bits"};
-        case Field::test: return {"test", "source"};
-        case Field::sync_rate: return {"sync_rate_hz", "micro-hertz"};
-        case Field::port_options:
-            return {"imu_output' or 'nmea",
-                    "bits; the one needs an IMU on the SPI port, the other none on the UART"};
-        case Field::nmea_baud: return {"nmea_baud", "baud"};
-    }
-    return {"an unknown field", "?"};
-}
-
-std::string describe(const wire::Refusal& refusal) {
-    const char* table = "[ports]";
-    switch (refusal.part) {
-        case wire::ConfigurationPart::camera: table = "the camera at output"; break;
-        case wire::ConfigurationPart::imu: table = "the IMU at port"; break;
-        case wire::ConfigurationPart::illumination: table = "[illumination]"; break;
-        case wire::ConfigurationPart::ports: break;
-    }
-    const bool numbered = refusal.part == wire::ConfigurationPart::camera ||
-                          refusal.part == wire::ConfigurationPart::imu;
-    const auto [key, unit] = field_name(refusal.field);
-    return fmt::format("'{}' of {}{} is {}: allowed are {} to {} ({})", key, table,
-                       numbered ? fmt::format(" {}", refusal.index) : "", refusal.value,
-                       refusal.minimum, refusal.maximum, unit);
-}
+constexpr std::uint8_t all_cameras = 0xFF;
 
 std::string text(const char* padded, std::size_t capacity) {
     return {padded, strnlen(padded, capacity)};
@@ -90,10 +77,9 @@ BoardLink::BoardLink(OpenStream open, const wire::Configuration& configuration,
                      ClockRecorder& recorder, BoardListener& listener)
     : open_(std::move(open)),
       configuration_(configuration),
-      exchange_interval_{static_cast<std::int64_t>(1e9 / exchange_rate_hz)},
       translator_(translator),
-      recorder_(recorder),
-      listener_(listener) {}
+      listener_(listener),
+      clock_(exchange_rate_hz, translator, recorder) {}
 
 BoardLink::~BoardLink() { stop(); }
 
@@ -143,16 +129,14 @@ void BoardLink::run() {
         {
             const std::lock_guard lock(send_mutex_);
             stream_ = std::move(*stream);
-            host_nonce_ = random_();
+            host_nonce_ = std::random_device{}();
             host_sequence_ = 0;
         }
         const auto ended = serve();
         accepting_ = false;
         if (connected_) listener_.board_lost();
         connected_ = false;
-        if (ended)
-            static_cast<void>(
-                send(wire::Stop{0xFF, {}}));  // asked to stop: leave no camera triggered
+        if (ended) stop_cameras(all_cameras);
         {
             const std::lock_guard lock(send_mutex_);
             stream_.reset();
@@ -182,10 +166,10 @@ Expected<> BoardLink::serve() {
         const HostTime now = host_now();
         if (now - last_packet_ > silence_limit)
             return failure("board", "it fell silent", "check cable and power");
-        if (now >= next_request_)
-            if (auto sent = request_clock(); !sent) return sent;
-        if (auto done = read(
-                std::min(longest_read, std::max(next_request_ - host_now(), microseconds(100))));
+        if (now >= clock_.next_request())
+            if (auto sent = send(clock_.request()); !sent) return sent;
+        if (auto done = read(std::min(longest_read,
+                                      std::max(clock_.next_request() - host_now(), shortest_read)));
             !done)
             return done;
         if (!greeted_) return failure("board", "it was reset");
@@ -199,12 +183,13 @@ Expected<> BoardLink::handshake() {
     // A delimiter first: whatever an earlier connection left unfinished ends here.
     const std::uint8_t delimiter = 0;
     if (auto sent = stream_->write({&delimiter, 1}); !sent) return sent;
-    for (int attempt = 0; attempt < 5 && !greeted_; ++attempt) {
+    for (int attempt = 0; attempt < hello_attempts && !greeted_; ++attempt) {
         if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}});
             !sent)
             return sent;
-        auto done = read_until([this] { return greeted_; }, answer_timeout / 4, "does not answer");
-        if (!done && attempt == 4) return done;
+        auto done = read_until([this] { return greeted_; }, answer_timeout / (hello_attempts - 1),
+                               "does not answer");
+        if (!done && attempt == hello_attempts - 1) return done;
     }
     if (hello_.major != wire::protocol_major) {
         set_state(
@@ -242,22 +227,19 @@ Expected<> BoardLink::configure() {
 
 /// A few exchanges in a row, so that the first frame can be stamped.
 Expected<> BoardLink::synchronise() {
-    answers_ = 0;
-    request_open_ = false;
-    exchange_.reset();
-    while (answers_ < exchanges_to_start) {
-        const unsigned before = answers_;
-        if (auto sent = request_clock(); !sent) return sent;
-        if (auto done = read_until([&] { return answers_ > before; }, answer_timeout,
+    clock_.begin(hello_.minor);
+    while (clock_.answers() < exchanges_to_start) {
+        const unsigned before = clock_.answers();
+        if (auto sent = send(clock_.request()); !sent) return sent;
+        if (auto done = read_until([&] { return clock_.answers() > before; }, answer_timeout,
                                    "does not answer clock requests");
             !done)
             return done;
         // A link that cannot tell when the answer left is no failure.
-        static_cast<void>(
-            read_until([&] { return !exchange_; }, follow_up_patience, "sends no follow-up"));
+        static_cast<void>(read_until([&] { return !clock_.expects_follow_up(); },
+                                     follow_up_patience, "sends no follow-up"));
     }
-    hand_on_exchange();
-    plan_next_request();
+    clock_.settle();
     return {};
 }
 
@@ -287,13 +269,12 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     last_packet_ = received;
     if (packet.read(hello_)) {
         greeted_ = true;
-        exchange_.reset();
+        clock_.begin(hello_.minor);
         nonce_ = packet.header.nonce;
         next_sequence_ = packet.header.sequence + 1;
         if (!same_life(packet.header, received)) {
             listener_.board_restarted();
-            translator_.board_restarted();
-            recorder_.board_restarted(nonce_);
+            clock_.board_restarted(nonce_);
         }
         last_life_ = nonce_;
         return;
@@ -313,10 +294,13 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::Log line{};
     wire::Refusal refusal{};
     if (packet.read(exposure)) return listener_.exposure(exposure);
-    if (packet.read(sample)) return take_sample(sample, received);
+    if (packet.read(sample)) {
+        clock_.take(sample, received);
+        return listener_.imu_sample(sample);
+    }
     if (packet.read(event)) return listener_.board_event(event);
-    if (packet.read(answer)) return take_answer(answer, received);
-    if (packet.read(follow_up)) return take_follow_up(follow_up);
+    if (packet.read(answer)) return clock_.take(answer, received);
+    if (packet.read(follow_up)) return clock_.take(follow_up);
     if (packet.read(line))
         return log(static_cast<LogLevel>(line.level), "board", "{}",
                    text(line.text, sizeof line.text));
@@ -347,58 +331,6 @@ void BoardLink::count_losses(const wire::Header& header) {
     const std::lock_guard lock(report_mutex_);
     ++report_.packets;
     report_.lost_packets += lost;
-}
-
-Expected<> BoardLink::request_clock() {
-    hand_on_exchange();
-    request_open_ = true;
-    wire::ClockRequest request{};
-    request.id = ++request_id_;
-    plan_next_request();
-    request_sent_ = host_now();
-    return send(request);
-}
-
-/// Dithered, so that the requests do not beat with the schedule of the bus.
-void BoardLink::plan_next_request() {
-    std::uniform_real_distribution<> dither(0.75, 1.25);
-    next_request_ = host_now() + Duration{static_cast<std::int64_t>(
-                                     dither(random_) * static_cast<double>(exchange_interval_.ns))};
-}
-
-/// Its departure tells of the clock, too; that of a board before 2.2 is unknown.
-void BoardLink::take_sample(const wire::ImuSample& sample, HostTime received) {
-    if (sample.departure_ns != 0) {
-        const clock::OneWay message{BoardTime{sample.time_ns} + Duration{sample.departure_ns},
-                                    received};
-        recorder_.one_way(message);
-        translator_.add(message);
-    }
-    listener_.imu_sample(sample);
-}
-
-void BoardLink::take_answer(const wire::ClockAnswer& answer, HostTime received) {
-    if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout)
-        return;
-    request_open_ = false;
-    exchange_ = clock::Exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
-    ++answers_;
-    if (hello_.minor < first_minor_with_follow_up) hand_on_exchange();
-}
-
-/// One that says that the answer left before it was written is not believed.
-void BoardLink::take_follow_up(const wire::ClockFollowUp& follow_up) {
-    if (!exchange_ || follow_up.id != request_id_ || follow_up.sent_ns < exchange_->answered.ns)
-        return;
-    exchange_->answered.ns = follow_up.sent_ns;
-    hand_on_exchange();
-}
-
-void BoardLink::hand_on_exchange() {
-    if (!exchange_) return;
-    recorder_.exchange(request_id_, *exchange_);
-    translator_.add(*exchange_);
-    exchange_.reset();
 }
 
 template <class T>

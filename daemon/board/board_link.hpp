@@ -9,17 +9,15 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "board/byte_stream.hpp"
+#include "board/clock_exchange.hpp"
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/pairing.hpp"
-#include "stream/clock_recorder.hpp"
 #include "wire/packet.hpp"
 
 namespace versavis::daemon {
@@ -94,13 +92,7 @@ class BoardLink {
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
     bool same_life(const wire::Header& header, HostTime received) const;
-    void take_sample(const wire::ImuSample& sample, HostTime received);
-    void take_answer(const wire::ClockAnswer& answer, HostTime received);
-    void take_follow_up(const wire::ClockFollowUp& follow_up);
-    void hand_on_exchange();
     void count_losses(const wire::Header& header);
-    Expected<> request_clock();
-    void plan_next_request();
     template <class T>
     Expected<> send(const T& message);
     void set_state(BoardState state, const std::string& hint);
@@ -108,9 +100,7 @@ class BoardLink {
 
     OpenStream open_;
     wire::Configuration configuration_;
-    Duration exchange_interval_;
     clock::Translator& translator_;
-    ClockRecorder& recorder_;
     BoardListener& listener_;
 
     std::mutex send_mutex_;  ///< guards stream_ against senders, and the sequence
@@ -119,8 +109,8 @@ class BoardLink {
     std::uint32_t host_sequence_ = 0;
 
     // Of the link's thread.
+    ClockExchange clock_;
     wire::Decoder decoder_;
-    std::mt19937 random_{std::random_device{}()};
     bool greeted_ = false;
     bool connected_ = false;
     wire::BoardHello hello_{};
@@ -130,12 +120,6 @@ class BoardLink {
     bool answered_ = false;
     wire::ConfigurationAnswer answer_{};
     std::vector<std::string> refusals_;
-    std::uint32_t request_id_ = 0;
-    HostTime request_sent_;
-    bool request_open_ = false;
-    std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still be told
-    unsigned answers_ = 0;
-    HostTime next_request_;
     HostTime last_packet_;
 
     mutable std::mutex report_mutex_;

@@ -212,16 +212,6 @@ void read_illumination(TableReader& reader, IlluminationConfiguration& light) {
     reader.read("inverted", light.inverted);
 }
 
-const std::vector<std::string> pulse_input_names{"pps", "aux0", "aux1", "sync"};
-
-std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
-    unsigned mask = 0;
-    for (const std::string& name : names)
-        mask |= 1U << (std::find(pulse_input_names.begin(), pulse_input_names.end(), name) -
-                       pulse_input_names.begin());
-    return static_cast<std::uint8_t>(mask);
-}
-
 void read_ports(TableReader& reader, PortConfiguration& ports) {
     reader.read("inputs", ports.inputs);
     reader.read("falling", ports.falling);
@@ -267,18 +257,11 @@ void check_outputs(TableReader& top, const std::vector<CameraConfiguration>& cam
                      "give each triggered camera an 'output' of its own, 0 to 3");
 }
 
-const CameraConfiguration* find_camera(const Configuration& configuration,
-                                       const std::string& name) {
-    for (const CameraConfiguration& camera : configuration.cameras)
-        if (camera.name == name && camera.trigger == TriggerSource::board) return &camera;
-    return nullptr;
-}
-
 /// A slave takes rate and phase of its master; masters have an exposure line and no master.
 void check_masters(TableReader& top, Configuration& configuration) {
     for (CameraConfiguration& camera : configuration.cameras) {
         if (camera.master.empty()) continue;
-        const CameraConfiguration* master = find_camera(configuration, camera.master);
+        const CameraConfiguration* master = find_triggered_camera(configuration, camera.master);
         if (master == nullptr || master == &camera || !master->master.empty() ||
             master->strobe == Strobe::none) {
             top.fail("camera",
@@ -306,51 +289,14 @@ void check_imus(TableReader& top, const std::vector<ImuConfiguration>& imus, boo
         top.fail("ports", "'nmea' needs the UART, which the vn100 has", "remove one of them");
 }
 
-/// What `test` names, as the board has it; none: there is nothing of that name.
-std::optional<std::uint8_t> test_source(const Configuration& configuration) {
-    if (configuration.ports.test.empty()) return std::uint8_t{wire::test_none};
-    if (const CameraConfiguration* camera = find_camera(configuration, configuration.ports.test))
-        return static_cast<std::uint8_t>(wire::test_camera0 + camera->output);
-    for (const ImuConfiguration& imu : configuration.imus)
-        if (imu.name == configuration.ports.test)
-            return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
-    return std::nullopt;
-}
-
 void check_names(TableReader& top, const Configuration& configuration) {
     for (const std::string& name : configuration.illumination.cameras)
-        if (find_camera(configuration, name) == nullptr)
+        if (find_triggered_camera(configuration, name) == nullptr)
             top.fail("illumination",
                      fmt::format("'{}' is no camera that the board triggers", name));
     if (!test_source(configuration))
         top.fail("ports", fmt::format("'test' names '{}', which is no triggered camera and no IMU",
                                       configuration.ports.test));
-}
-
-std::uint32_t micro_hertz(double hertz) {
-    return static_cast<std::uint32_t>(std::llround(hertz * 1e6));
-}
-/// The wire has 32 bits for it: 4 s at most.
-std::uint32_t short_ns(double us) {
-    return static_cast<std::uint32_t>(std::llround(std::min(us * 1e3, 4e9)));
-}
-
-wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
-    wire::CameraConfiguration out{};
-    out.flags = wire::camera_enabled;
-    if (camera.trigger_inverted) out.flags |= wire::camera_trigger_inverted;
-    if (camera.strobe == Strobe::active_low) out.flags |= wire::camera_strobe_inverted;
-    if (camera.strobe == Strobe::none) out.flags |= wire::camera_no_strobe;
-    out.rate_uhz = micro_hertz(camera.rate_hz);
-    // Rounded to whole nanoseconds, the phase must still be below the period.
-    out.phase_ns = std::min(short_ns(camera.phase_us),
-                            static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
-    out.pulse_ns = short_ns(camera.pulse_us);
-    out.latency_ns = short_ns(camera.latency_us);
-    out.gap_ns = short_ns(camera.gap_us);
-    out.exposure_ns = std::llround(camera.exposure_us * 1e3);
-    out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);
-    return out;
 }
 
 }  // namespace
@@ -414,44 +360,26 @@ Expected<Configuration> load_configuration(const std::string& path) {
     return configuration;
 }
 
-wire::Configuration board_configuration(const Configuration& configuration) {
-    wire::Configuration out{};
+const CameraConfiguration* find_triggered_camera(const Configuration& configuration,
+                                                 const std::string& name) {
     for (const CameraConfiguration& camera : configuration.cameras)
-        if (camera.trigger == TriggerSource::board)
-            out.cameras[camera.output] = board_camera(camera);
-    for (const CameraConfiguration& camera : configuration.cameras) {
-        if (camera.master.empty()) continue;
-        wire::CameraConfiguration& slave = out.cameras[camera.output];
-        slave.flags |= wire::camera_slave;
-        slave.master = static_cast<std::uint8_t>(find_camera(configuration, camera.master)->output);
-    }
-    for (const ImuConfiguration& imu : configuration.imus) {
-        wire::ImuConfiguration& port = out.imus[imu.port()];
-        port.kind = imu.model->kind;
-        port.rate_millihertz = static_cast<std::uint32_t>(std::llround(imu.rate_hz * 1e3));
-        port.filter = static_cast<std::uint8_t>(imu.filter);
-        if (imu.data_ready) port.options |= wire::imu_data_ready;
-    }
-    for (const std::string& name : configuration.illumination.cameras)
-        out.illumination.cameras |=
-            static_cast<std::uint8_t>(1U << find_camera(configuration, name)->output);
-    if (configuration.illumination.inverted) out.illumination.flags |= wire::illumination_inverted;
-    out.illumination.lead_ns = short_ns(configuration.illumination.lead_us);
-    out.illumination.max_on_ns = short_ns(configuration.illumination.max_on_us);
-    out.illumination.duty_ppm =
-        static_cast<std::uint32_t>(std::llround(configuration.illumination.duty_percent * 1e4));
-    out.ports.inputs = pulse_inputs(configuration.ports.inputs);
-    out.ports.falling = pulse_inputs(configuration.ports.falling);
-    if (configuration.ports.imu_output) out.ports.options |= wire::port_imu_output;
-    if (configuration.ports.nmea) {
-        out.ports.options |= wire::port_nmea;
-        out.ports.nmea_baud = configuration.ports.nmea_baud;
-    }
-    out.ports.test = test_source(configuration).value_or(wire::test_none);
-    out.ports.sync_rate_uhz = micro_hertz(configuration.ports.sync_rate_hz);
-    out.ports.pulse_ns = short_ns(configuration.ports.pulse_us);
-    if (configuration.board.keep_configuration) out.flags |= wire::configuration_store;
-    return out;
+        if (camera.name == name && camera.trigger == TriggerSource::board) return &camera;
+    return nullptr;
 }
+
+std::optional<std::uint8_t> test_source(const Configuration& configuration) {
+    if (configuration.ports.test.empty()) return std::uint8_t{wire::test_none};
+    if (const CameraConfiguration* camera =
+            find_triggered_camera(configuration, configuration.ports.test))
+        return static_cast<std::uint8_t>(wire::test_camera0 + camera->output);
+    for (const ImuConfiguration& imu : configuration.imus)
+        if (imu.name == configuration.ports.test)
+            return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
+    return std::nullopt;
+}
+
+Duration from_us(double us) { return {std::llround(us * 1e3)}; }
+
+Duration period_of(const CameraConfiguration& camera) { return from_us(1e6 / camera.rate_hz); }
 
 }  // namespace versavis::daemon

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -88,6 +89,12 @@ struct CameraConfiguration {
     std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
 };
 
+/// A time in microseconds, as the file has it.
+Duration from_us(double us);
+
+/// From one trigger of the camera to the next.
+Duration period_of(const CameraConfiguration& camera);
+
 struct ImuConfiguration {
     std::string name = "imu0";
     const imu::ImuModel* model = nullptr;
@@ -107,6 +114,9 @@ struct IlluminationConfiguration {
     bool inverted = false;
 };
 
+/// Inputs whose edges become events, in the order of the board's bits.
+inline const std::vector<std::string> pulse_input_names{"pps", "aux0", "aux1", "sync"};
+
 struct PortConfiguration {
     std::vector<std::string> inputs;   ///< of pulse_input_names
     std::vector<std::string> falling;  ///< those whose falling edge counts
@@ -121,9 +131,8 @@ struct PortConfiguration {
 struct Configuration {
     std::string instance = "default";
     LogLevel log_level = LogLevel::info;
-    std::string preset_directory;
-    std::string state_directory;  ///< what is measured once and used later; empty: systemd's  ///<
-                                  ///< empty: that of the installation
+    std::string preset_directory;  ///< empty: that of the installation
+    std::string state_directory;   ///< what is measured once and used later; empty: systemd's
     BoardConfiguration board;
     ClockConfiguration clock;
     std::vector<CameraConfiguration> cameras;
@@ -135,7 +144,11 @@ struct Configuration {
 /// Errors name file, line and column, and the cure.
 Expected<Configuration> load_configuration(const std::string& path);
 
-/// What the board is told.
-wire::Configuration board_configuration(const Configuration& configuration);
+/// The camera of this name, if the board triggers it; else null.
+const CameraConfiguration* find_triggered_camera(const Configuration& configuration,
+                                                 const std::string& name);
+
+/// What `test` names, as the board has it; none: there is nothing of that name.
+std::optional<std::uint8_t> test_source(const Configuration& configuration);
 
 }  // namespace versavis::daemon

@@ -1,41 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace versavis::daemon {
 
 namespace {
 
-constexpr std::uint32_t descriptor_floor = 64;
-constexpr std::uint32_t evidence_items = 16384;
+/// Slots that hold published frames while all others wait for proof or are being received. At half,
+/// a reader loses a frame while it copies it; at twice, fewer frames can wait for proof.
 constexpr std::uint32_t slots_for_readers = 2;
-constexpr Duration exposure_tolerance = microseconds(200);
-constexpr int exposure_tolerance_part = 20;
-constexpr Duration exposure_settling = milliseconds(500);  // a new one takes a few frames to hold
 
-std::uint32_t power_of_two(std::uint32_t at_least) {
-    std::uint32_t value = descriptor_floor;
-    while (value < at_least) value *= 2;
-    return value;
-}
-
-Duration from_us(double us) { return {std::llround(us * 1e3)}; }
+/// Pulses by which the board's start pattern may last longer than its length says. At half, a
+/// pattern could be asked for again before it ended; at twice, a lost start costs two pulses more.
+constexpr int pattern_margin = 2;
 
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
     limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
-    limits.period = from_us(1e6 / configuration.rate_hz);
-    limits.pattern_duration = limits.period * (wire::start_pattern_length + 2);
+    limits.period = period_of(configuration);
+    limits.pattern_duration = limits.period * (wire::start_pattern_length + pattern_margin);
     limits.frames_held = configuration.slots - configuration.buffers - slots_for_readers;
     limits.camera_clock = configuration.camera_clock;
     return limits;
-}
-
-/// False: start and end follow from the trigger, or from the exposure line of the master.
-bool own_strobe(const wire::Exposure& record) {
-    return (record.flags & (wire::exposure_predicted | wire::exposure_from_master)) == 0;
 }
 
 }  // namespace
@@ -46,62 +31,49 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       index_(index),
       translator_(translator),
       events_(events),
+      frames_(configuration),
+      evidence_(translator),
+      completion_(configuration),
+      check_(configuration),
+      triggers_(configuration),
       limits_(limits_of(configuration)),
-      pairing_(limits_, *this),
-      start_patience_(seconds(2) + from_us(5e6 / configuration.rate_hz)),
-      last_exposure_(from_us(configuration.exposure_us)) {}
+      pairing_(limits_, *this) {}
 
 /// What pairing is told goes through here, so that the recording is complete.
 void CameraPipeline::tell(const pairing::Evidence& evidence) {
-    const clock::Stamp stamp = translator_.translate(host_now(), {});
-    if (evidence_) evidence_->publish(stamp.output, pack(pairing::to_metadata(evidence)));
+    evidence_.record(evidence);
     pairing::tell(pairing_, evidence);
 }
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
                                    std::uint64_t payload_size, bool has_clock) {
     const std::lock_guard lock(mutex_);
-    if (triggered() && !evidence_) {
-        auto evidence = ring::Writer::create(
-            directory,
-            {configuration_.name + evidence_suffix, ring::StreamKind::evidence, evidence_items});
-        if (!evidence) return Unexpected(evidence.error());
-        evidence_.emplace(std::move(*evidence));
-    }
+    if (triggered())
+        if (auto opened = evidence_.open(directory, configuration_.name); !opened) return opened;
     tell(pairing::Reset{});
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     pairing_.set_limits(limits_);
     tell(limits_);
     report_.last_proof = host_now();
-    if (ring_ && ring_->slot_size() >= payload_size) return {};
-    ring::Shape shape;
-    shape.name = configuration_.name;
-    shape.kind = ring::StreamKind::frames;
-    shape.slot_count = configuration_.slots;
-    shape.slot_size = payload_size;
-    shape.descriptor_count = power_of_two(2 * configuration_.slots);
-    auto ring = ring::Writer::create(directory, shape);
-    if (!ring) return Unexpected(ring.error());
-    ring_.emplace(std::move(*ring));
-    return {};
+    return frames_.prepare(directory, payload_size);
 }
 
 std::optional<std::uint32_t> CameraPipeline::acquire() {
     const std::lock_guard lock(mutex_);
-    return ring_->acquire();
+    return frames_.acquire();
 }
 
 std::byte* CameraPipeline::slot_data(std::uint32_t slot) {
     const std::lock_guard lock(mutex_);
-    return ring_->slot_data(slot);
+    return frames_.slot_data(slot);
 }
 
 void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id) {
     const std::lock_guard lock(mutex_);
-    ring_->abandon(slot);
+    frames_.abandon(slot);
     if (reason == EventReason::none) return;
     ++report_.incomplete;
-    unanswered_ = 0;  // it does answer
+    triggers_.answered();
     if (triggered()) tell(pairing::Shortfall{block_id, reason});
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
 }
@@ -110,129 +82,39 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     ++report_.received;
     report_.last_frame = arrival.arrived;
-    unanswered_ = 0;
-    if (triggered())
-        tell(arrival);
-    else
-        publish_free_run(arrival);
+    triggers_.answered();
+    if (triggered()) return tell(arrival);
+    ++report_.published;
+    frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), false);
 }
 
-void CameraPipeline::add(const wire::Exposure& record) {
+std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record) {
     const std::lock_guard lock(mutex_);
     ++report_.triggers;
-    ++unanswered_;
-    newest_trigger_ = record.trigger;
-    last_trigger_ = host_now();
-    pairing::Exposure exposure = complete(record);
-    const bool end_seen = record.end_ns != wire::no_time && own_strobe(record);
-    const auto earliest = translator_.to_host(end_seen ? exposure.end : exposure.start);
-    if (!earliest) return exposure_unpaired(exposure, EventReason::no_clock);
-    exposure.earliest_on_host = earliest->time;
-    exposure.end_on_host =
-        end_seen ? earliest->time : earliest->time + (exposure.end - exposure.start);
-    tell(exposure);
-}
-
-/// Fills in what the board did not see, and says so by the kind of the stamp.
-pairing::Exposure CameraPipeline::complete(const wire::Exposure& record) {
-    pairing::Exposure exposure;
-    exposure.trigger = record.trigger;
-    exposure.tick = record.tick;
-    const bool started = record.start_ns != wire::no_time;
-    const bool ended = record.end_ns != wire::no_time;
-    const bool strobe = own_strobe(record);
-    exposure.exposed = started || !strobe;
-    exposure.start = started ? BoardTime{record.start_ns}
-                             : BoardTime{record.trigger_ns} + from_us(configuration_.latency_us);
-    exposure.end = ended ? BoardTime{record.end_ns} : exposure.start + last_exposure_;
-    report_.measured = started && ended;
+    triggers_.recorded(record.trigger, host_now());
+    report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
-    if (started && ended && strobe) {
-        exposure.kind = StampKind::measured_middle;
-        last_exposure_ = exposure.end - exposure.start;
-    } else if (started && strobe) {
-        // It lasted longer than the board was willing to wait: the middle is at least here.
-        exposure.kind = StampKind::predicted_middle;
-        exposure.end =
-            exposure.start + std::max(last_exposure_, from_us(configuration_.max_exposure_us));
-    } else {
-        exposure.kind = StampKind::trigger_edge;
+    pairing::Exposure exposure = completion_.complete(record);
+    const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
+    // A number that pairing holds already is a repeat: the record that came first counts.
+    if (!stamp || !middles_.try_emplace(exposure.trigger, *stamp).second) {
+        announce_unpaired(exposure, stamp ? EventReason::mismatch : EventReason::no_clock);
+        return std::nullopt;
     }
-    return exposure;
-}
-
-/// What the kind of stamp adds to the clock's error. An end that was not seen lies before the
-/// arrival; no more is known.
-Duration CameraPipeline::kind_sigma(const pairing::Exposure& exposure, Duration to_arrival) {
-    if (exposure.kind == StampKind::measured_middle) return {};
-    const Duration half = (exposure.end - exposure.start) / 2 + microseconds(100);
-    return exposure.kind == StampKind::predicted_middle ? std::max(half, to_arrival) : half;
-}
-
-/// True when the exposure line shows something else than what the camera says that it exposes.
-bool CameraPipeline::contradicted(const pairing::Arrival& arrival,
-                                  const pairing::Exposure& exposure) {
-    if (!configuration_.check_exposure || exposure.kind != StampKind::measured_middle) return false;
-    const bool settled =
-        exposure.earliest_on_host > camera_exposure_since_ + exposure_settling + limits_.period * 5;
-    const Duration told = settled ? camera_exposure_ : Duration{};
-    const Duration said = arrival.exposure.ns != 0 ? arrival.exposure : told;
-    report_.exposure = exposure.end - exposure.start;
-    report_.camera_exposure = said;
-    const Duration tolerance = std::max(exposure_tolerance, said / exposure_tolerance_part);
-    report_.exposure_contradicted = said.ns != 0 && absolute(said - report_.exposure) > tolerance;
-    return report_.exposure_contradicted;
+    ExposureCompletion::place_on_host(exposure, record, stamp->host);
+    tell(exposure);
+    return stamp;
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
-    if (contradicted(arrival, exposure))
-        return frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
-    const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
-    if (!stamp) return frame_unpaired(arrival, EventReason::no_clock, nullptr);
-    report_.last_proof = arrival.arrived;
-    publish_paired(arrival, exposure, *stamp, 0);
-}
-
-void CameraPipeline::publish_paired(const pairing::Arrival& arrival,
-                                    const pairing::Exposure& exposure, const clock::Stamp& stamp,
-                                    std::uint32_t flags) {
-    const Duration kind = kind_sigma(exposure, arrival.arrived - stamp.host);
-    const double sigma =
-        std::hypot(static_cast<double>(stamp.sigma_ns), static_cast<double>(kind.ns));
-    clock::Stamp widened = stamp;
-    widened.sigma_ns = static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
-    if ((flags & flag_suspect) != 0) widened.sigma_ns = sigma_unknown;
-    FrameMetadata metadata{};
-    metadata.trigger = exposure.trigger;
-    metadata.tick = static_cast<std::uint32_t>(exposure.tick);
-    metadata.board_time = middle(exposure.start, exposure.end);
-    if (exposure.kind == StampKind::measured_middle)
-        metadata.exposure = exposure.end - exposure.start;
-    metadata.flags = static_cast<std::uint32_t>(exposure.kind) | flags;
-    publish(arrival, widened, metadata);
-}
-
-void CameraPipeline::publish_free_run(const pairing::Arrival& arrival) {
-    FrameMetadata metadata{};
-    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival);
-    publish(arrival, translator_.translate(arrival.arrived, {}), metadata);
-}
-
-void CameraPipeline::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
-                             FrameMetadata metadata) {
-    metadata.block_id = arrival.block_id;
-    metadata.host_time = stamp.host;
-    metadata.arrival = arrival.arrived;
-    metadata.camera_time = arrival.camera_time;
-    metadata.sigma_ns = triggered() ? stamp.sigma_ns : sigma_unknown;
-    metadata.width = arrival.width;
-    metadata.height = arrival.height;
-    metadata.stride = arrival.stride;
-    metadata.pixel_format = arrival.pixel_format;
-    metadata.epoch = stamp.epoch;
-    ++report_.published;
-    const OutputTime time = guard_.guard(stamp, metadata.flags);
-    ring_->publish(arrival.slot, arrival.size, time, pack(metadata));
+    if (check_.contradicts(arrival, exposure)) {
+        frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
+    } else {
+        report_.last_proof = arrival.arrived;
+        ++report_.published;
+        frames_.publish_proved(arrival, exposure, middles_.at(exposure.trigger));
+    }
+    middles_.erase(exposure.trigger);
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -240,7 +122,7 @@ void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason
     ++report_.frames_without_trigger;
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(arrival.block_id));
     if (configuration_.on_unproved == OnUnproved::withhold || reason == EventReason::out_of_order)
-        return ring_->abandon(arrival.slot);
+        return frames_.abandon(arrival.slot);
     publish_suspect(arrival, guess);
 }
 
@@ -248,17 +130,18 @@ void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason
 void CameraPipeline::publish_suspect(const pairing::Arrival& arrival,
                                      const pairing::Exposure* guess) {
     ++report_.suspect;
-    const auto stamp =
-        guess != nullptr ? translator_.translate(middle(guess->start, guess->end)) : std::nullopt;
-    if (stamp) return publish_paired(arrival, *guess, *stamp, flag_suspect);
-    FrameMetadata metadata{};
-    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival) | flag_suspect;
-    clock::Stamp arrived = translator_.translate(arrival.arrived, {});
-    arrived.sigma_ns = sigma_unknown;
-    publish(arrival, arrived, metadata);
+    ++report_.published;
+    const auto middle = guess != nullptr ? middles_.find(guess->trigger) : middles_.end();
+    if (middle != middles_.end()) return frames_.publish_guessed(arrival, *guess, middle->second);
+    frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), true);
 }
 
 void CameraPipeline::exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) {
+    middles_.erase(exposure.trigger);
+    announce_unpaired(exposure, reason);
+}
+
+void CameraPipeline::announce_unpaired(const pairing::Exposure& exposure, EventReason reason) {
     ++report_.triggers_without_frame;
     journal(EventKind::trigger_without_frame, reason, static_cast<std::int64_t>(exposure.trigger),
             exposure.start);
@@ -288,16 +171,16 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
     tell(pairing::Reset{});
-    unanswered_ = 0;
+    triggers_.answered();
 }
 
 std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
     const std::lock_guard lock(mutex_);
-    if (ring_) ring_->heartbeat(now);
+    frames_.heartbeat(now);
     if (!triggered()) return std::nullopt;
-    if (evidence_) evidence_->heartbeat(now);
+    evidence_.heartbeat(now);
     if (pairing_.due(now)) tell(pairing::Advance{now});
-    if (now - last_trigger_ > start_patience_) return pairing_.first_start();
+    if (triggers_.overdue(now)) return pairing_.first_start();
     return pairing_.wanted_start(now);
 }
 
@@ -309,7 +192,7 @@ pairing::Start CameraPipeline::first_start() {
 void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
     const std::lock_guard lock(mutex_);
     tell(pairing::StartRequest{start, now});
-    last_trigger_ = now;
+    triggers_.asked(now);
 }
 
 void CameraPipeline::starved(std::uint64_t frames) {
@@ -321,29 +204,31 @@ void CameraPipeline::starved(std::uint64_t frames) {
 
 void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     const std::lock_guard lock(mutex_);
-    camera_exposure_ = exposure;
-    camera_exposure_since_ = since;
+    check_.set_camera_exposure(exposure, since);
 }
 
 std::uint64_t CameraPipeline::newest_trigger() {
     const std::lock_guard lock(mutex_);
-    return newest_trigger_;
+    return triggers_.newest();
 }
 
 std::uint64_t CameraPipeline::unanswered_triggers() {
     const std::lock_guard lock(mutex_);
-    return unanswered_;
+    return triggers_.unanswered();
 }
 
 PipelineReport CameraPipeline::report() {
     const std::lock_guard lock(mutex_);
     report_.pairing = pairing_.state();
+    report_.exposure = check_.measured();
+    report_.camera_exposure = check_.told();
+    report_.exposure_contradicted = check_.contradicted();
     return report_;
 }
 
 std::uint64_t CameraPipeline::items() {
     const std::lock_guard lock(mutex_);
-    return ring_ ? ring_->head() : 0;
+    return frames_.items();
 }
 
 }  // namespace versavis::daemon

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From arrivals and exposures of one camera to stamped frames in its ring.
+// From arrivals and exposures of one camera to stamped frames: pairing, told by both sides.
 #pragma once
 
+#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -9,9 +10,12 @@
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
-#include "engine/ring/writer.hpp"
 #include "stream/event_journal.hpp"
-#include "stream/stamp_guard.hpp"
+#include "stream/evidence_recorder.hpp"
+#include "stream/exposure_check.hpp"
+#include "stream/exposure_completion.hpp"
+#include "stream/frame_publisher.hpp"
+#include "stream/trigger_watch.hpp"
 
 namespace versavis::daemon {
 
@@ -24,15 +28,15 @@ struct PipelineReport {
     std::uint64_t frames_without_trigger = 0;
     std::uint64_t triggers = 0;
     std::uint64_t triggers_without_frame = 0;
-    std::uint64_t unmeasured =
-        0;                 ///< triggers whose exposure was not measured although its line is wired
-    bool measured = true;  ///< the newest one was
+    /// Triggers whose exposure was not measured although its line is wired.
+    std::uint64_t unmeasured = 0;
+    bool measured = true;       ///< the newest one was
     std::uint64_t suspect = 0;  ///< published although not proved
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
     HostTime last_frame;
     HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
-    Duration exposure;                   ///< measured, of the newest trigger; 0: unknown
+    Duration exposure;                   ///< measured, of the newest frame; 0: unknown
     Duration camera_exposure;            ///< by the camera's account; 0: unknown
     bool exposure_contradicted = false;  ///< the two differ
 };
@@ -60,7 +64,9 @@ class CameraPipeline final : private pairing::Outcome {
 
     /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
     void add(const pairing::Arrival& arrival);
-    void add(const wire::Exposure& record);
+
+    /// The stamp of the exposure's middle; none: board time cannot be translated yet.
+    std::optional<clock::Stamp> add(const wire::Exposure& record);
 
     /// Camera or board began a new life.
     void reset();
@@ -93,15 +99,8 @@ class CameraPipeline final : private pairing::Outcome {
     void slipped(const pairing::Arrival& at) override;
 
     void tell(const pairing::Evidence& evidence);
-    pairing::Exposure complete(const wire::Exposure& record);
-    bool contradicted(const pairing::Arrival& arrival, const pairing::Exposure& exposure);
-    void publish_paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
-                        const clock::Stamp& stamp, std::uint32_t flags);
-    static Duration kind_sigma(const pairing::Exposure& exposure, Duration to_arrival);
-    void publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
-                 FrameMetadata metadata);
+    void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
-    void publish_free_run(const pairing::Arrival& arrival);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
                  std::optional<BoardTime> at = {});
 
@@ -111,18 +110,15 @@ class CameraPipeline final : private pairing::Outcome {
     EventJournal& events_;
 
     std::mutex mutex_;
-    std::optional<ring::Writer> ring_;
-    std::optional<ring::Writer> evidence_;
+    FramePublisher frames_;
+    EvidenceRecorder evidence_;
+    ExposureCompletion completion_;
+    ExposureCheck check_;
+    TriggerWatch triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;
-    StampGuard guard_;
-    Duration start_patience_;
-    Duration last_exposure_;
-    Duration camera_exposure_;
-    HostTime camera_exposure_since_;
-    std::uint64_t newest_trigger_ = 0;
-    std::uint64_t unanswered_ = 0;
-    HostTime last_trigger_;  ///< its record came, or it was asked for
+    /// By trigger: the middle of each exposure that pairing holds, translated once as it came.
+    std::map<std::uint64_t, clock::Stamp> middles_;
     PipelineReport report_;
 };
 

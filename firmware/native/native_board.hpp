@@ -48,7 +48,7 @@ class NativeBoard final : Clock64,
                           Rebooter,
                           Watchdog {
  public:
-    NativeBoard(const Identity& identity, Surroundings surroundings, Nanoseconds boot = 0);
+    NativeBoard(const Identity& identity, Surroundings environment, Nanoseconds boot = 0);
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
 
@@ -147,7 +147,7 @@ class NativeBoard final : Clock64,
     void drive_pins(Nanoseconds at);
     bool exposing(unsigned camera) const;
 
-    Surroundings surroundings_;
+    Surroundings environment_;
     Uart uart_{*this};
     Nanoseconds now_;
     Nanoseconds fed_;

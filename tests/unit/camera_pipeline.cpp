@@ -31,7 +31,8 @@ class Bench : public test::Pipelines {
     }
 
     /// The board's record of the trigger at grid point `tick`, measured unless flags say otherwise.
-    void trigger(std::uint64_t tick, std::uint16_t flags = wire::exposure_measured) {
+    std::optional<clock::Stamp> trigger(std::uint64_t tick,
+                                        std::uint16_t flags = wire::exposure_measured) {
         const BoardTime at = to_board(begin + period * static_cast<std::int64_t>(tick));
         wire::Exposure record{};
         record.trigger = ++triggers;
@@ -40,7 +41,7 @@ class Bench : public test::Pipelines {
         record.trigger_ns = at.ns;
         record.start_ns = (flags & wire::exposure_no_start) != 0 ? wire::no_time : at.ns + 20'000;
         record.end_ns = (flags & wire::exposure_measured) != 0 ? at.ns + 4'020'000 : wire::no_time;
-        pipeline.add(record);
+        return pipeline.add(record);
     }
 
     void frame(std::uint64_t tick) {
@@ -171,4 +172,36 @@ TEST_CASE(
     CHECK(frame.sigma_ns == sigma_unknown);
     CHECK(frame.trigger == 0);
     CHECK(frame.host_time == frame.arrival);
+}
+
+TEST_CASE("camera_pipeline: an exposure is translated once, when its record comes") {
+    Bench bench(camera(20));
+    auto reader = bench.reader("cam0");
+    std::vector<clock::Stamp> stamps;
+    for (const std::uint64_t tick : pattern) {
+        const auto stamp = bench.trigger(tick);
+        REQUIRE(stamp);
+        stamps.push_back(*stamp);
+        // The estimate moves on before the frame is there.
+        bench.exchange(bench.begin + bench.period * static_cast<std::int64_t>(tick));
+        bench.frame(tick);
+    }
+    for (const clock::Stamp& stamp : stamps) {
+        const ring::Item item = reader.next();
+        REQUIRE(item.found == ring::Found::item);
+        CHECK(item.time == stamp.output);
+        CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns == stamp.sigma_ns);
+    }
+}
+
+TEST_CASE("camera_pipeline: of a record that comes twice the first counts") {
+    Bench bench(camera(20));
+    for (const std::uint64_t tick : pattern) {
+        CHECK(bench.trigger(tick));
+        --bench.triggers;
+        CHECK_FALSE(bench.trigger(tick));
+        bench.frame(tick);
+    }
+    CHECK(bench.pipeline.report().published == std::size(pattern));
+    CHECK(bench.pipeline.report().triggers_without_frame == std::size(pattern));
 }

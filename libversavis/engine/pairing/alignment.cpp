@@ -179,11 +179,13 @@ unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to
                : 0;
 }
 
+bool lengths_differ(Duration told, Duration measured) {
+    return absolute(told - measured) > std::max(length_tolerance, measured / length_tolerance_part);
+}
+
 bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {
     if (arrival.exposure.ns == 0 || exposure.kind != StampKind::measured_middle) return false;
-    const Duration measured = exposure.end - exposure.start;
-    const Duration tolerance = std::max(length_tolerance, measured / length_tolerance_part);
-    return absolute(arrival.exposure - measured) > tolerance;
+    return lengths_differ(arrival.exposure, exposure.end - exposure.start);
 }
 
 std::size_t frames_for_proof(Timeline timeline) { return timeline == Timeline::camera ? 5 : 3; }

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/board_event.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+std::optional<EventKind> event_kind(wire::EventKind kind) {
+    switch (kind) {
+        case wire::EventKind::trigger_skipped: return EventKind::trigger_skipped;
+        case wire::EventKind::stray_edge: return EventKind::stray_edge;
+        case wire::EventKind::output_late: return EventKind::output_late;
+        case wire::EventKind::edge_overflow: return EventKind::edge_overflow;
+        case wire::EventKind::pps: return EventKind::pps;
+        case wire::EventKind::aux_pulse: return EventKind::aux_pulse;
+        case wire::EventKind::sync_pulse: return EventKind::sync_pulse;
+        case wire::EventKind::input_noisy: return EventKind::input_noisy;
+        case wire::EventKind::illumination_limited: return EventKind::illumination_limited;
+        case wire::EventKind::imu_ready: return EventKind::imu_ready;
+        case wire::EventKind::imu_failed: return EventKind::imu_failed;
+        case wire::EventKind::imu_silent: return EventKind::imu_silent;
+        case wire::EventKind::utc_label: return EventKind::utc_label;
+    }
+    return std::nullopt;
+}
+
+EventReason skip_reason(std::uint16_t detail) {
+    switch (static_cast<wire::SkipReason>(detail)) {
+        case wire::SkipReason::busy: return EventReason::camera_busy;
+        case wire::SkipReason::late: return EventReason::too_late;
+        case wire::SkipReason::full: return EventReason::queue_full;
+    }
+    return EventReason::none;
+}
+
+}  // namespace
+
+EventSource source_of(wire::EventKind kind) {
+    switch (kind) {
+        case wire::EventKind::trigger_skipped:
+        case wire::EventKind::stray_edge: return EventSource::camera;
+        case wire::EventKind::imu_ready:
+        case wire::EventKind::imu_failed:
+        case wire::EventKind::imu_silent: return EventSource::imu;
+        default: return EventSource::board;
+    }
+}
+
+std::optional<JournalEntry> journal_entry(const wire::Event& event) {
+    const auto kind = event_kind(event.kind);
+    if (!kind) return std::nullopt;
+    JournalEntry entry;
+    entry.kind = *kind;
+    entry.source = event.source;
+    entry.source_name = "board";
+    entry.value = event.value;
+    entry.board_time = BoardTime{event.time_ns};
+    if (event.kind == wire::EventKind::trigger_skipped) entry.reason = skip_reason(event.detail);
+    return entry;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/clock_exchange.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// An answer that takes longer tells little and may be of another request. At half, a loaded host
+/// loses some of them; at twice, the worst of them still say next to nothing.
+constexpr Duration request_timeout = milliseconds(500);
+
+/// Requests come between these parts of the interval, so that they do not beat with the schedule of
+/// the bus. At half the spread they drift through it more slowly; at twice they come in bursts.
+constexpr double earliest_part = 0.75;
+constexpr double latest_part = 1.25;
+
+constexpr std::uint8_t first_minor_with_follow_up = 2;
+
+}  // namespace
+
+ClockExchange::ClockExchange(double rate_hz, clock::Translator& translator, ClockRecorder& recorder)
+    : interval_{static_cast<std::int64_t>(1e9 / rate_hz)},
+      translator_(translator),
+      recorder_(recorder) {}
+
+void ClockExchange::begin(std::uint8_t board_minor) {
+    follow_ups_ = board_minor >= first_minor_with_follow_up;
+    answers_ = 0;
+    request_open_ = false;
+    exchange_.reset();
+}
+
+void ClockExchange::board_restarted(std::uint32_t nonce) {
+    translator_.board_restarted();
+    recorder_.board_restarted(nonce);
+}
+
+wire::ClockRequest ClockExchange::request() {
+    settle();
+    request_open_ = true;
+    wire::ClockRequest request{};
+    request.id = ++request_id_;
+    plan_next_request();
+    request_sent_ = host_now();
+    return request;
+}
+
+void ClockExchange::plan_next_request() {
+    std::uniform_real_distribution<> dither(earliest_part, latest_part);
+    const double ns = dither(random_) * static_cast<double>(interval_.ns);
+    next_request_ = host_now() + Duration{static_cast<std::int64_t>(ns)};
+}
+
+void ClockExchange::take(const wire::ClockAnswer& answer, HostTime received) {
+    if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout)
+        return;
+    request_open_ = false;
+    exchange_ = clock::Exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
+    ++answers_;
+    if (!follow_ups_) settle();
+}
+
+/// One that says that the answer left before it was written is not believed.
+void ClockExchange::take(const wire::ClockFollowUp& follow_up) {
+    if (!exchange_ || follow_up.id != request_id_ || follow_up.sent_ns < exchange_->answered.ns)
+        return;
+    exchange_->answered.ns = follow_up.sent_ns;
+    settle();
+}
+
+/// The departure from a board before 2.2 is unknown.
+void ClockExchange::take(const wire::ImuSample& sample, HostTime received) {
+    if (sample.departure_ns == 0) return;
+    const clock::OneWay message{BoardTime{sample.time_ns} + Duration{sample.departure_ns},
+                                received};
+    recorder_.one_way(message);
+    translator_.add(message);
+}
+
+void ClockExchange::settle() {
+    if (!exchange_) return;
+    recorder_.exchange(request_id_, *exchange_);
+    translator_.add(*exchange_);
+    exchange_.reset();
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Compares the board's clock with the host's: requests, answers, and when those truly left.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <random>
+
+#include "engine/clock/translator.hpp"
+#include "stream/clock_recorder.hpp"
+#include "wire/messages.hpp"
+
+namespace versavis::daemon {
+
+/// Belongs to the link's thread.
+class ClockExchange {
+ public:
+    ClockExchange(double rate_hz, clock::Translator& translator, ClockRecorder& recorder);
+
+    /// A board of this minor version of the protocol said hello: nothing that was asked before
+    /// counts.
+    void begin(std::uint8_t board_minor);
+
+    /// The board's clock began anew, and with it the nonce of its life.
+    void board_restarted(std::uint32_t nonce);
+
+    /// Stamps the request: it must be sent at once.
+    wire::ClockRequest request();
+    HostTime next_request() const { return next_request_; }
+
+    void take(const wire::ClockAnswer& answer, HostTime received);
+    void take(const wire::ClockFollowUp& follow_up);
+
+    /// When a sample left tells of the clock, too.
+    void take(const wire::ImuSample& sample, HostTime received);
+
+    unsigned answers() const { return answers_; }  ///< since begin()
+    bool expects_follow_up() const { return exchange_.has_value(); }
+
+    /// Hands on an answer whose follow-up did not come.
+    void settle();
+
+ private:
+    void plan_next_request();
+
+    Duration interval_;
+    clock::Translator& translator_;
+    ClockRecorder& recorder_;
+    std::mt19937 random_{std::random_device{}()};
+    bool follow_ups_ = false;
+    std::uint32_t request_id_ = 0;
+    HostTime request_sent_;
+    bool request_open_ = false;
+    std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still be told
+    unsigned answers_ = 0;
+    HostTime next_request_;
+};
+
+}  // namespace versavis::daemon

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_group.hpp"
+
+#include <algorithm>
+
+namespace versavis::daemon {
+
+namespace {
+
+/// A camera is stalled when no frame came for so long, and three periods on top. At half, a reboot
+/// of the network switch shows as a stall; at twice, a pulled cable shows a second later.
+constexpr Duration stall_patience = seconds(1);
+constexpr int stall_periods = 3;
+
+/// On top of that, time for a start and its proof. At half, a slow start shows as unproved; at
+/// twice, a swapped cable is named five seconds later.
+constexpr Duration proof_patience = seconds(5);
+
+CameraStatus describe(const CameraConfiguration& configuration, bool triggered,
+                      const CameraReport& camera, const PipelineReport& pipeline, HostTime now) {
+    const Duration patience = stall_patience + period_of(configuration) * stall_periods;
+    const bool stalled = triggered && now - pipeline.last_frame > patience;
+    const bool unproved =
+        triggered && !stalled && now - pipeline.last_proof > patience + proof_patience;
+    return {configuration.name, triggered, stalled, unproved, camera, pipeline};
+}
+
+}  // namespace
+
+CameraGroup::CameraGroup(const std::filesystem::path& ring_directory,
+                         std::vector<CameraPreset> presets, clock::Translator& translator,
+                         EventJournal& events, BoardLink& board)
+    : translator_(translator), events_(events), board_(board) {
+    environment_.ring_directory = ring_directory;
+    environment_.presets = std::move(presets);
+}
+
+void CameraGroup::add(const CameraConfiguration& configuration) {
+    const auto index = static_cast<std::uint32_t>(units_.size());
+    Unit unit;
+    unit.configuration = configuration;
+    unit.pipeline = std::make_unique<CameraPipeline>(configuration, index, translator_, events_);
+    unit.camera = std::make_unique<Camera>(configuration, environment_, *unit.pipeline,
+                                           hooks(configuration, *unit.pipeline, index));
+    units_.push_back(std::move(unit));
+}
+
+Camera::Hooks CameraGroup::hooks(const CameraConfiguration& configuration, CameraPipeline& pipeline,
+                                 std::uint32_t index) {
+    Camera::Hooks hooks;
+    hooks.streaming = [this, &pipeline, index, name = configuration.name] {
+        events_.add({EventKind::camera_connected, EventReason::none, index, name});
+        if (pipeline.triggered()) start(pipeline, pipeline.first_start());
+    };
+    hooks.lost = [this, &pipeline, index, name = configuration.name,
+                  master_name = configuration.master] {
+        if (pipeline.triggered()) board_.stop_cameras(pipeline.board_mask());
+        // A slave's start may have slowed its master down.
+        const Unit* master = find(master_name);
+        if (master != nullptr && master->camera->streaming())
+            board_.start_cameras(master->pipeline->board_mask(), pairing::Start::steady);
+        events_.add({EventKind::camera_lost, EventReason::none, index, name});
+    };
+    hooks.exposure = [this, &pipeline, output = configuration.output,
+                      delay = configuration.auto_exposure.delay_frames](Duration exposure) {
+        if (pipeline.triggered())
+            board_.announce_exposure(output, pipeline.newest_trigger() + 1 + delay, exposure);
+    };
+    return hooks;
+}
+
+void CameraGroup::start() {
+    for (const Unit& unit : units_) unit.camera->start();
+}
+
+void CameraGroup::stop() {
+    for (const Unit& unit : units_) unit.camera->request_stop();  // each may take its time
+    for (const Unit& unit : units_) unit.camera->stop();
+}
+
+void CameraGroup::start(CameraPipeline& pipeline, pairing::Start how) {
+    pipeline.start_requested(how, host_now());
+    board_.start_cameras(pipeline.board_mask(), how);
+}
+
+void CameraGroup::start_streaming(const Unit& unit, pairing::Start how) {
+    start(*unit.pipeline, how);
+    // Lost meanwhile: its own stop may have overtaken this start.
+    if (!unit.camera->streaming()) board_.stop_cameras(unit.pipeline->board_mask());
+}
+
+void CameraGroup::tick(HostTime now) {
+    for (const Unit& unit : units_) {
+        const auto how = unit.pipeline->advance(now);
+        if (how && unit.camera->streaming() && board_.running()) start_streaming(unit, *how);
+    }
+}
+
+void CameraGroup::board_restarted() {
+    for (const Unit& unit : units_)
+        if (unit.pipeline->triggered()) unit.pipeline->reset();
+}
+
+void CameraGroup::board_connected() {
+    for (const Unit& unit : units_) {
+        if (!unit.pipeline->triggered()) continue;
+        unit.pipeline->reset();
+        if (unit.camera->streaming()) start_streaming(unit, unit.pipeline->first_start());
+    }
+}
+
+std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record) {
+    const Unit* unit = at_output(record.camera);
+    return unit != nullptr ? unit->pipeline->add(record) : std::nullopt;
+}
+
+void CameraGroup::name_source(JournalEntry& entry) const {
+    const Unit* unit = at_output(entry.source);
+    entry.source = unit != nullptr ? static_cast<std::uint32_t>(unit - units_.data()) : 0U;
+    if (unit != nullptr) entry.source_name = unit->configuration.name;
+}
+
+const CameraGroup::Unit* CameraGroup::find(const std::string& name) const {
+    for (const Unit& unit : units_)
+        if (unit.configuration.name == name) return &unit;
+    return nullptr;
+}
+
+const CameraGroup::Unit* CameraGroup::at_output(unsigned output) const {
+    for (const Unit& unit : units_)
+        if (unit.pipeline->triggered() && unit.configuration.output == output) return &unit;
+    return nullptr;
+}
+
+bool CameraGroup::any_triggered() const {
+    return std::any_of(units_.begin(), units_.end(),
+                       [](const Unit& unit) { return unit.pipeline->triggered(); });
+}
+
+std::vector<std::string> CameraGroup::ring_names() const {
+    std::vector<std::string> names;
+    for (const Unit& unit : units_) {
+        names.push_back(unit.configuration.name);
+        names.push_back(unit.configuration.name + evidence_suffix);
+    }
+    return names;
+}
+
+std::vector<CameraStatus> CameraGroup::status(HostTime now) const {
+    std::vector<CameraStatus> cameras;
+    for (const Unit& unit : units_)
+        cameras.push_back(describe(unit.configuration, unit.pipeline->triggered(),
+                                   unit.camera->report(), unit.pipeline->report(), now));
+    return cameras;
+}
+
+std::vector<StreamStatus> CameraGroup::streams() const {
+    std::vector<StreamStatus> streams;
+    for (const Unit& unit : units_)
+        streams.push_back({unit.configuration.name, "frames", unit.pipeline->items()});
+    return streams;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The cameras of the service, and when the board triggers each of them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "board/board_link.hpp"
+#include "camera/camera.hpp"
+#include "stream/camera_pipeline.hpp"
+#include "stream/status.hpp"
+
+namespace versavis::daemon {
+
+/// All cameras are added before the first is started; after that it is thread-safe.
+class CameraGroup {
+ public:
+    CameraGroup(const std::filesystem::path& ring_directory, std::vector<CameraPreset> presets,
+                clock::Translator& translator, EventJournal& events, BoardLink& board);
+
+    void add(const CameraConfiguration& configuration);
+    void start();
+    void stop();  ///< waits for the end of all
+
+    /// Bounded waits, heartbeats, and starts that the pairing asks for.
+    void tick(HostTime now);
+
+    /// The board's clock and numbers begin anew: what pairing holds is void.
+    void board_restarted();
+
+    /// The board can trigger: whatever streams is started.
+    void board_connected();
+
+    /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
+    std::optional<clock::Stamp> add(const wire::Exposure& record);
+
+    /// Names an event of the camera at output `entry.source`, which becomes the camera's number.
+    void name_source(JournalEntry& entry) const;
+
+    bool any_triggered() const;
+    std::vector<std::string> ring_names() const;
+    std::vector<CameraStatus> status(HostTime now) const;
+    std::vector<StreamStatus> streams() const;
+
+ private:
+    struct Unit {
+        CameraConfiguration configuration;
+        std::unique_ptr<CameraPipeline> pipeline;
+        std::unique_ptr<Camera> camera;
+    };
+
+    Camera::Hooks hooks(const CameraConfiguration& configuration, CameraPipeline& pipeline,
+                        std::uint32_t index);
+    const Unit* find(const std::string& name) const;
+    const Unit* at_output(unsigned output) const;
+    void start(CameraPipeline& pipeline, pairing::Start how);
+    void start_streaming(const Unit& unit, pairing::Start how);
+
+    CameraEnvironment environment_;
+    clock::Translator& translator_;
+    EventJournal& events_;
+    BoardLink& board_;
+    std::vector<Unit> units_;
+};
+
+}  // namespace versavis::daemon

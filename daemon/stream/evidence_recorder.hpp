@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The ring of all that a camera's pairing is told, so that the pairing can be done again elsewhere.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "engine/clock/translator.hpp"
+#include "engine/pairing/recording.hpp"
+#include "engine/ring/writer.hpp"
+
+namespace versavis::daemon {
+
+/// Not thread-safe.
+class EvidenceRecorder {
+ public:
+    explicit EvidenceRecorder(clock::Translator& translator) : translator_(translator) {}
+
+    /// Makes the ring, once. Error: it cannot be made.
+    Expected<> open(const std::filesystem::path& directory, const std::string& camera);
+
+    /// Nothing is recorded before open().
+    void record(const pairing::Evidence& evidence);
+    void heartbeat(HostTime now);
+
+ private:
+    clock::Translator& translator_;
+    std::optional<ring::Writer> ring_;
+};
+
+}  // namespace versavis::daemon

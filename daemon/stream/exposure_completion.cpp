@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/exposure_completion.hpp"
+
+#include <algorithm>
+
+namespace versavis::daemon {
+
+namespace {
+
+/// How far a trigger's own delay is off when nobody measured it. At half, sigma of such stamps
+/// could be too small for a slow input line; at twice, it hides how good short exposures are.
+constexpr Duration unmeasured_delay = microseconds(100);
+
+/// False: start and end follow from the trigger, or from the exposure line of the master.
+bool own_line(const wire::Exposure& record) {
+    return (record.flags & (wire::exposure_predicted | wire::exposure_from_master)) == 0;
+}
+
+bool started(const wire::Exposure& record) { return record.start_ns != wire::no_time; }
+bool ended(const wire::Exposure& record) { return record.end_ns != wire::no_time; }
+
+}  // namespace
+
+bool measured(const wire::Exposure& record) { return started(record) && ended(record); }
+
+ExposureCompletion::ExposureCompletion(const CameraConfiguration& configuration)
+    : latency_(from_us(configuration.latency_us)),
+      max_exposure_(from_us(configuration.max_exposure_us)),
+      last_exposure_(from_us(configuration.exposure_us)) {}
+
+pairing::Exposure ExposureCompletion::complete(const wire::Exposure& record) {
+    pairing::Exposure exposure;
+    exposure.trigger = record.trigger;
+    exposure.tick = record.tick;
+    exposure.exposed = started(record) || !own_line(record);
+    exposure.start =
+        started(record) ? BoardTime{record.start_ns} : BoardTime{record.trigger_ns} + latency_;
+    exposure.end = ended(record) ? BoardTime{record.end_ns} : exposure.start + last_exposure_;
+    if (measured(record) && own_line(record)) {
+        exposure.kind = StampKind::measured_middle;
+        last_exposure_ = exposure.end - exposure.start;
+    } else if (started(record) && own_line(record)) {
+        // It lasted longer than the board was willing to wait: the middle is at least here.
+        exposure.kind = StampKind::predicted_middle;
+        exposure.end = exposure.start + std::max(last_exposure_, max_exposure_);
+    } else {
+        exposure.kind = StampKind::trigger_edge;
+    }
+    return exposure;
+}
+
+void ExposureCompletion::place_on_host(pairing::Exposure& exposure, const wire::Exposure& record,
+                                       HostTime middle_on_host) {
+    const BoardTime middle_on_board = middle(exposure.start, exposure.end);
+    exposure.end_on_host = middle_on_host + (exposure.end - middle_on_board);
+    // No frame of it can arrive before its end; of an end that nobody saw, before its start.
+    const bool end_seen = ended(record) && own_line(record);
+    exposure.earliest_on_host =
+        end_seen ? exposure.end_on_host : middle_on_host - (middle_on_board - exposure.start);
+}
+
+Duration kind_sigma(const pairing::Exposure& exposure, Duration middle_to_arrival) {
+    if (exposure.kind == StampKind::measured_middle) return {};
+    const Duration half = (exposure.end - exposure.start) / 2 + unmeasured_delay;
+    // An end that was not seen lies before the arrival; no more is known.
+    return exposure.kind == StampKind::predicted_middle ? std::max(half, middle_to_arrival) : half;
+}
+
+}  // namespace versavis::daemon

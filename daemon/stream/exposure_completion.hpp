@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the board saw of an exposure, completed: the rest follows from configuration and history.
+#pragma once
+
+#include "configuration/configuration.hpp"
+#include "engine/pairing/evidence.hpp"
+#include "wire/messages.hpp"
+
+namespace versavis::daemon {
+
+/// True when the board has both edges, be it from the camera's own line or from its master's.
+bool measured(const wire::Exposure& record);
+
+/// Not thread-safe.
+class ExposureCompletion {
+ public:
+    explicit ExposureCompletion(const CameraConfiguration& configuration);
+
+    /// Start and end on the board's clock; the kind says which of them were seen.
+    pairing::Exposure complete(const wire::Exposure& record);
+
+    /// Puts the exposure on the host's clock, given its middle there.
+    static void place_on_host(pairing::Exposure& exposure, const wire::Exposure& record,
+                              HostTime middle);
+
+ private:
+    Duration latency_;
+    Duration max_exposure_;
+    Duration last_exposure_;  ///< as measured last, or as configured
+};
+
+/// What the kind of an exposure's stamp adds to the error of the clock: one standard deviation.
+Duration kind_sigma(const pairing::Exposure& exposure, Duration middle_to_arrival);
+
+}  // namespace versavis::daemon

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/frame_publisher.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stream/exposure_completion.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// Least descriptors of a ring: a reader that sleeps still learns how many frames it lost. At half
+/// it would learn of 32; at twice each ring takes 8 KiB more.
+constexpr std::uint32_t descriptor_floor = 64;
+
+std::uint32_t power_of_two(std::uint32_t at_least) {
+    std::uint32_t value = descriptor_floor;
+    while (value < at_least) value *= 2;
+    return value;
+}
+
+FrameMetadata describe(const pairing::Exposure& exposure) {
+    FrameMetadata metadata{};
+    metadata.trigger = exposure.trigger;
+    metadata.tick = static_cast<std::uint32_t>(exposure.tick);
+    metadata.board_time = middle(exposure.start, exposure.end);
+    if (exposure.kind == StampKind::measured_middle)
+        metadata.exposure = exposure.end - exposure.start;
+    metadata.flags = static_cast<std::uint32_t>(exposure.kind);
+    return metadata;
+}
+
+std::uint32_t total_sigma_ns(std::uint32_t clock_ns, Duration kind) {
+    const double sigma = std::hypot(static_cast<double>(clock_ns), static_cast<double>(kind.ns));
+    return static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
+}
+
+}  // namespace
+
+FramePublisher::FramePublisher(const CameraConfiguration& configuration)
+    : name_(configuration.name), slots_(configuration.slots) {}
+
+Expected<> FramePublisher::prepare(const std::filesystem::path& directory,
+                                   std::uint64_t payload_size) {
+    if (ring_ && ring_->slot_size() >= payload_size) return {};
+    ring::Shape shape;
+    shape.name = name_;
+    shape.kind = ring::StreamKind::frames;
+    shape.slot_count = slots_;
+    shape.slot_size = payload_size;
+    shape.descriptor_count = power_of_two(2 * slots_);
+    auto ring = ring::Writer::create(directory, shape);
+    if (!ring) return Unexpected(ring.error());
+    ring_.emplace(std::move(*ring));
+    return {};
+}
+
+void FramePublisher::publish_proved(const pairing::Arrival& arrival,
+                                    const pairing::Exposure& exposure, const clock::Stamp& middle) {
+    FrameMetadata metadata = describe(exposure);
+    metadata.sigma_ns =
+        total_sigma_ns(middle.sigma_ns, kind_sigma(exposure, arrival.arrived - middle.host));
+    publish(arrival, middle, metadata);
+}
+
+void FramePublisher::publish_guessed(const pairing::Arrival& arrival,
+                                     const pairing::Exposure& exposure,
+                                     const clock::Stamp& middle) {
+    FrameMetadata metadata = describe(exposure);
+    metadata.flags |= flag_suspect;
+    metadata.sigma_ns = sigma_unknown;
+    publish(arrival, middle, metadata);
+}
+
+void FramePublisher::publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,
+                                     bool suspect) {
+    FrameMetadata metadata{};
+    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival) | (suspect ? flag_suspect : 0U);
+    metadata.sigma_ns = sigma_unknown;
+    publish(arrival, arrived, metadata);
+}
+
+void FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+                             FrameMetadata metadata) {
+    metadata.block_id = arrival.block_id;
+    metadata.host_time = stamp.host;
+    metadata.arrival = arrival.arrived;
+    metadata.camera_time = arrival.camera_time;
+    metadata.width = arrival.width;
+    metadata.height = arrival.height;
+    metadata.stride = arrival.stride;
+    metadata.pixel_format = arrival.pixel_format;
+    metadata.epoch = stamp.epoch;
+    const OutputTime time = guard_.guard(stamp, metadata.flags);
+    ring_->publish(arrival.slot, arrival.size, time, pack(metadata));
+}
+
+void FramePublisher::heartbeat(HostTime now) {
+    if (ring_) ring_->heartbeat(now);
+}
+
+}  // namespace versavis::daemon

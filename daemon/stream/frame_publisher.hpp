@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The ring of one camera's frames, and the metadata that each frame is published with.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "configuration/configuration.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/pairing/evidence.hpp"
+#include "engine/ring/writer.hpp"
+#include "stream/stamp_guard.hpp"
+
+namespace versavis::daemon {
+
+/// Not thread-safe. Slots are those of Writer; none can be had before prepare().
+class FramePublisher {
+ public:
+    explicit FramePublisher(const CameraConfiguration& configuration);
+
+    /// Makes the ring, or one with larger slots when `payload_size` bytes do not fit: slots that
+    /// were acquired are void then. Error: the ring cannot be made.
+    Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size);
+
+    std::optional<std::uint32_t> acquire() { return ring_->acquire(); }
+    std::byte* slot_data(std::uint32_t slot) { return ring_->slot_data(slot); }
+    void abandon(std::uint32_t slot) { ring_->abandon(slot); }
+
+    /// A frame and its exposure; `middle` is the stamp of the middle of that exposure.
+    void publish_proved(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
+                        const clock::Stamp& middle);
+
+    /// The same, but that the frame is of this exposure is a guess: its sigma is unknown.
+    void publish_guessed(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
+                         const clock::Stamp& middle);
+
+    /// A frame of which nothing but its arrival is known. `suspect`: it was triggered all the same.
+    void publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,
+                         bool suspect);
+
+    void heartbeat(HostTime now);
+    std::uint64_t items() const { return ring_ ? ring_->head() : 0; }
+
+ private:
+    void publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+                 FrameMetadata metadata);
+
+    std::string name_;
+    std::uint32_t slots_;
+    std::optional<ring::Writer> ring_;
+    StampGuard guard_;
+};
+
+}  // namespace versavis::daemon

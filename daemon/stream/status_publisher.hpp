@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The ring of status documents: one twice a second, with rates and health.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "engine/clock/translator.hpp"
+#include "engine/ring/writer.hpp"
+#include "stream/status.hpp"
+
+namespace versavis::daemon {
+
+/// Not thread-safe.
+class StatusPublisher {
+ public:
+    /// Error: the ring cannot be made.
+    static Expected<StatusPublisher> create(const std::filesystem::path& directory);
+
+    bool due(HostTime now) const { return now >= next_; }
+
+    /// Adds the status stream itself and the rates of all streams, and publishes.
+    void publish(Status status, clock::Translator& translator);
+    void heartbeat(HostTime now) { ring_.heartbeat(now); }
+
+    /// "ok", "starting" or "degraded", as of the last document.
+    const std::string& health() const { return health_; }
+
+ private:
+    explicit StatusPublisher(ring::Writer ring) : ring_(std::move(ring)) {}
+
+    double rate_hz(const StreamStatus& stream, HostTime now);
+
+    ring::Writer ring_;
+    HostTime next_;
+    std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
+    std::string health_ = "starting";
+};
+
+}  // namespace versavis::daemon

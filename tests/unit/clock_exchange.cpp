@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/clock_exchange.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "pipelines.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+struct Bench : test::Pipelines {
+    explicit Bench(std::uint8_t minor) { exchange.begin(minor); }
+
+    /// An answer to `request` that took `trip` there and back, of which nothing on the board.
+    void answer(const wire::ClockRequest& request, Duration trip) {
+        const HostTime now = host_now();
+        exchange.take(wire::ClockAnswer{request.id, 0, now.ns, now.ns}, now + trip);
+    }
+    std::uint64_t exchanges() { return translator.report().exchanges; }
+
+    ClockRecorder recorder{writer({"clock", ring::StreamKind::clock, 64}), translator};
+    ClockExchange exchange{10, translator, recorder};
+};
+
+}  // namespace
+
+TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the next request") {
+    Bench bench(2);
+    bench.answer(bench.exchange.request(), milliseconds(1));
+    CHECK(bench.exchange.answers() == 1);
+    CHECK(bench.exchange.expects_follow_up());
+    CHECK(bench.exchanges() == 0);
+    const auto second = bench.exchange.request();
+    CHECK(bench.exchanges() == 1);
+    bench.answer(second, milliseconds(1));
+    bench.exchange.take(wire::ClockFollowUp{second.id, 0, host_now().ns});
+    CHECK_FALSE(bench.exchange.expects_follow_up());
+    CHECK(bench.exchanges() == 2);
+}
+
+TEST_CASE("clock_exchange: a board that cannot follow up is not waited for") {
+    Bench bench(1);
+    bench.answer(bench.exchange.request(), milliseconds(1));
+    CHECK_FALSE(bench.exchange.expects_follow_up());
+    CHECK(bench.exchanges() == 1);
+}
+
+TEST_CASE("clock_exchange: answers that are late, of another request or repeated are ignored") {
+    Bench bench(1);
+    const auto first = bench.exchange.request();
+    const auto second = bench.exchange.request();
+    bench.answer(first, milliseconds(1));
+    bench.answer(second, milliseconds(501));
+    CHECK(bench.exchange.answers() == 0);
+    const auto third = bench.exchange.request();
+    bench.answer(third, milliseconds(1));
+    bench.answer(third, milliseconds(1));
+    CHECK(bench.exchange.answers() == 1);
+    CHECK(bench.exchanges() == 1);
+}
+
+TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
+    Bench bench(2);
+    const auto request = bench.exchange.request();
+    bench.answer(request, milliseconds(1));
+    bench.exchange.take(wire::ClockFollowUp{request.id, 0, 1});
+    CHECK(bench.exchange.expects_follow_up());
+    CHECK(bench.exchanges() == 0);
+}
+
+TEST_CASE("clock_exchange: a sample tells of the clock only if it says when it left") {
+    Bench bench(2);
+    wire::ImuSample sample{};
+    sample.time_ns = Bench::to_board(host_now()).ns;
+    bench.exchange.take(sample, host_now());
+    auto reader = bench.reader("clock");
+    CHECK(reader.head() == 0);
+    sample.departure_ns = 1000;
+    bench.exchange.take(sample, host_now());
+    CHECK(reader.head() > 0);
+}
+
+TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less") {
+    Bench bench(2);
+    for (int i = 0; i < 100; ++i) {
+        const HostTime before = host_now();
+        static_cast<void>(bench.exchange.request());
+        CHECK(bench.exchange.next_request() >= before + milliseconds(75));
+        CHECK(bench.exchange.next_request() <= host_now() + milliseconds(125));
+    }
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/evidence_recorder.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "pipelines.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+TEST_CASE("evidence_recorder: what was recorded is read back, in order, from open() on") {
+    test::Pipelines bench;
+    EvidenceRecorder recorder(bench.translator);
+    recorder.record(pairing::Reset{});  // no ring yet
+    REQUIRE(recorder.open(bench.directory.path(), "cam0"));
+    REQUIRE(recorder.open(bench.directory.path(), "cam0"));  // once is enough
+    recorder.record(pairing::Shortfall{42, EventReason::frame_incomplete});
+    recorder.record(pairing::Advance{HostTime{7}});
+    auto reader = bench.reader("cam0-evidence");
+    const auto evidence = [&] {
+        return *pairing::from_metadata(unpack<pairing::EvidenceMetadata>(reader.next().metadata));
+    };
+    CHECK(std::get<pairing::Shortfall>(evidence()).block_id == 42);
+    CHECK(std::get<pairing::Advance>(evidence()).now.ns == 7);
+    CHECK(reader.next().found == ring::Found::nothing);
+}

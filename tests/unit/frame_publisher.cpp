@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/frame_publisher.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "pipelines.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+struct Bench : test::Pipelines {
+    Bench() {
+        CameraConfiguration configuration;
+        configuration.name = "cam0";
+        configuration.slots = 9;
+        frames.emplace(configuration);
+        REQUIRE(frames->prepare(directory.path(), 4096));
+    }
+
+    pairing::Arrival arrival() {
+        pairing::Arrival made;
+        made.slot = frames->acquire().value();
+        made.block_id = 12;
+        made.arrived = HostTime{100'030'000'000};
+        made.width = 64;
+        made.height = 48;
+        made.size = 3072;
+        return made;
+    }
+
+    std::optional<FramePublisher> frames;
+};
+
+pairing::Exposure exposure(StampKind kind) {
+    pairing::Exposure made;
+    made.trigger = 5;
+    made.tick = (std::uint64_t{1} << 32U) + 6;
+    made.start = {99'000'000'000};
+    made.end = made.start + milliseconds(4);
+    made.kind = kind;
+    return made;
+}
+
+const clock::Stamp middle_stamp{
+    {200'002'000'000}, {100'002'000'000}, 3'000, 8, clock::ClockState::locked};
+
+}  // namespace
+
+TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both sigmas") {
+    Bench bench;
+    auto reader = bench.reader("cam0");
+    bench.frames->publish_proved(bench.arrival(), exposure(StampKind::measured_middle),
+                                 middle_stamp);
+    bench.frames->publish_proved(bench.arrival(), exposure(StampKind::trigger_edge), middle_stamp);
+    const auto first = reader.next();
+    const auto measured = unpack<FrameMetadata>(first.metadata);
+    CHECK(first.time == middle_stamp.output);
+    CHECK(measured.board_time.ns == 99'002'000'000);
+    CHECK(measured.host_time == middle_stamp.host);
+    CHECK(measured.exposure == milliseconds(4));
+    CHECK(measured.sigma_ns == 3'000);
+    CHECK(measured.epoch == 8);
+    CHECK(measured.trigger == 5);
+    CHECK(measured.tick == 6);
+    CHECK(measured.block_id == 12);
+    const auto by_edge = unpack<FrameMetadata>(reader.next().metadata);
+    CHECK(by_edge.stamp_kind() == StampKind::trigger_edge);
+    CHECK(by_edge.exposure.ns == 0);
+    CHECK(by_edge.sigma_ns > 2'000'000);
+}
+
+TEST_CASE("frame_publisher: what is not proved has no sigma, and says so") {
+    Bench bench;
+    auto reader = bench.reader("cam0");
+    bench.frames->publish_guessed(bench.arrival(), exposure(StampKind::measured_middle),
+                                  middle_stamp);
+    bench.frames->publish_arrived(bench.arrival(), middle_stamp, true);
+    bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
+    for (const std::uint32_t suspect : {flag_suspect, flag_suspect, ItemFlag{}}) {
+        const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+        CHECK(frame.sigma_ns == sigma_unknown);
+        CHECK((frame.flags & flag_suspect) == suspect);
+    }
+}
+
+TEST_CASE("frame_publisher: larger frames get a new ring, smaller ones do not") {
+    Bench bench;
+    auto reader = bench.reader("cam0");
+    REQUIRE(bench.frames->prepare(bench.directory.path(), 100));
+    bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
+    CHECK(reader.next().found == ring::Found::item);
+    REQUIRE(bench.frames->prepare(bench.directory.path(), 5000));
+    CHECK(reader.next().found == ring::Found::restarted);
+    CHECK(bench.frames->items() == 0);
+}
