@@ -175,6 +175,7 @@ Item Reader::idle() {
     const Header& header = segment_->mapping.header();
     // A writer that was killed never marked its segment: its silence counts, too.
     if (writer_alive()) return item;
+    if (next_ < head()) return item;  // published since the last look: the next look finds it
     item.found = Found::gone;
     if (file_id(path_) == segment_->file) return item;
     auto successor = map(path_);
