@@ -268,28 +268,26 @@ void Service::board_event(const wire::Event& event) {
     if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
     if (event.kind == wire::EventKind::utc_label)
         translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
-    Happening happening;
-    happening.kind = event_kind(event.kind);
-    if (happening.kind == EventKind{}) return;  // of a newer board
-    happening.source = event.source;
-    happening.source_name = "board";
-    happening.value = event.value;
-    happening.board_time = BoardTime{event.time_ns};
-    if (event.kind == wire::EventKind::trigger_skipped)
-        happening.reason = skip_reason(event.detail);
+    JournalEntry entry;
+    entry.kind = event_kind(event.kind);
+    if (entry.kind == EventKind{}) return;  // of a newer board
+    entry.source = event.source;
+    entry.source_name = "board";
+    entry.value = event.value;
+    entry.board_time = BoardTime{event.time_ns};
+    if (event.kind == wire::EventKind::trigger_skipped) entry.reason = skip_reason(event.detail);
     if (of_camera(event.kind)) {
         const CameraUnit* unit = camera_at(event.source);
-        happening.source =
-            unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
-        if (unit != nullptr) happening.source_name = unit->configuration.name;
+        entry.source = unit != nullptr ? static_cast<std::uint32_t>(unit - cameras_.data()) : 0U;
+        if (unit != nullptr) entry.source_name = unit->configuration.name;
     } else if (of_imu(event.kind)) {
         for (auto& imu : imus_)
-            if (imu->port() == event.source) happening.source_name = imu->report().name;
+            if (imu->port() == event.source) entry.source_name = imu->report().name;
         const bool ready = event.kind == wire::EventKind::imu_ready;
-        log(ready ? LogLevel::info : LogLevel::warning, happening.source_name,
-            "{}: step {}, value {}", to_string(happening.kind), event.detail, event.value);
+        log(ready ? LogLevel::info : LogLevel::warning, entry.source_name, "{}: step {}, value {}",
+            to_string(entry.kind), event.detail, event.value);
     }
-    events_->add(happening);
+    events_->add(entry);
 }
 
 void Service::tick() {

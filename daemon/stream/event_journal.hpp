@@ -11,7 +11,7 @@
 
 namespace versavis::daemon {
 
-struct Happening {
+struct JournalEntry {
     EventKind kind{};
     EventReason reason = EventReason::none;
     std::uint32_t source = 0;
@@ -26,7 +26,7 @@ class EventJournal {
     EventJournal(ring::Writer ring, clock::Translator& translator)
         : ring_(std::move(ring)), translator_(translator) {}
 
-    void add(const Happening& happening);
+    void add(const JournalEntry& entry);
     void heartbeat(HostTime now);
     std::uint64_t items();
 
