@@ -162,7 +162,7 @@ void Service::start() {
         configured.push_back(unit.configuration.name);
         configured.push_back(unit.configuration.name + evidence_suffix);
     }
-    directory_.remove_strangers(configured);
+    directory_.remove_stale(configured);
     if (board_needed) board_->start();
     for (CameraUnit& unit : cameras_) unit.camera->start();
 }

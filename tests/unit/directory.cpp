@@ -45,7 +45,7 @@ TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     auto reader = Reader::open(stranger);
     REQUIRE(reader);
     std::filesystem::copy_file(stranger, directory->path() / "kept");
-    directory->remove_strangers({"kept"});
+    directory->remove_stale({"kept"});
     CHECK(std::filesystem::exists(directory->path() / "kept"));
     CHECK(std::filesystem::exists(directory->path() / "own"));
     CHECK_FALSE(std::filesystem::exists(stranger));

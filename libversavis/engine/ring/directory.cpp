@@ -53,7 +53,7 @@ OwnedDirectory::~OwnedDirectory() {
     if (lock_ >= 0) ::close(lock_);
 }
 
-void OwnedDirectory::remove_strangers(const std::vector<std::string>& keep) const {
+void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
         const std::string name = entry.path().filename();

@@ -13,7 +13,7 @@ namespace versavis::ring {
 class OwnedDirectory {
  public:
     /// Makes `path` (0750) if needed and locks it for this process. Segments that a dead owner left
-    /// are kept until remove_strangers(), so that their readers can be handed over. Errors: no
+    /// are kept until remove_stale(), so that their readers can be handed over. Errors: no
     /// permission, another service owns it.
     static Expected<OwnedDirectory> claim(const std::filesystem::path& path);
 
@@ -23,7 +23,7 @@ class OwnedDirectory {
 
     /// Retires and removes the segments that were not made by this process, but for those of the
     /// names in `keep`: their readers are handed over when the segment is made anew.
-    void remove_strangers(const std::vector<std::string>& keep) const;
+    void remove_stale(const std::vector<std::string>& keep) const;
 
     const std::filesystem::path& path() const { return path_; }
 
