@@ -179,7 +179,7 @@ void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
         const std::lock_guard lock(mutex_);
         report_.packet_size = packet_size;
     }
-    look_after(camera);
+    do_housekeeping(camera);
 }
 
 bool Camera::silent(HostTime began) const {
@@ -206,13 +206,13 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
         if (exposure_) control_exposure(arv_camera_get_device(camera));
         if (host_now() < housekeeping) continue;
         housekeeping = host_now() + housekeeping_interval;
-        look_after(camera);
+        do_housekeeping(camera);
     }
     return {};
 }
 
 /// What changes slowly: temperature, and the share of the link as other cameras come and go.
-void Camera::look_after(ArvCamera* camera) {
+void Camera::do_housekeeping(ArvCamera* camera) {
     const bool network = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
     const BandwidthShare share = surroundings_.bandwidth.share(configuration_.name);
     if (network && share.packet_delay != packet_delay_) {

@@ -81,7 +81,7 @@ class Camera {
     CameraResult<> watch(ArvCamera* camera, AravisStream& stream,
                          const std::atomic<bool>& control_lost);
     void plan_bandwidth(ArvCamera* camera, std::uint64_t payload);
-    void look_after(ArvCamera* camera);
+    void do_housekeeping(ArvCamera* camera);
     void control_exposure(ArvDevice* device);
     bool silent(HostTime began) const;
     void describe(const CameraSetup& setup);
