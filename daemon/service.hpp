@@ -80,7 +80,7 @@ class Service final : private BoardListener {
     std::unique_ptr<EventJournal> events_;
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
-    CameraSurroundings surroundings_;
+    CameraEnvironment environment_;
     std::vector<CameraUnit> cameras_;
     GridAlignment alignment_;
     std::unique_ptr<BoardLink> board_;

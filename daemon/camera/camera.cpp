@@ -27,10 +27,10 @@ void on_control_lost(ArvDevice* /*device*/, std::atomic<bool>* lost) { *lost = t
 
 }  // namespace
 
-Camera::Camera(const CameraConfiguration& configuration, CameraSurroundings& surroundings,
+Camera::Camera(const CameraConfiguration& configuration, CameraEnvironment& environment,
                CameraPipeline& pipeline, Hooks hooks)
     : configuration_(configuration),
-      surroundings_(surroundings),
+      environment_(environment),
       pipeline_(pipeline),
       hooks_(std::move(hooks)) {}
 
@@ -81,7 +81,7 @@ void Camera::run() {
     do {
         const std::uint64_t connections = report().connections;
         const auto ended = session();
-        surroundings_.bandwidth.leave(configuration_.name);
+        environment_.bandwidth.leave(configuration_.name);
         if (ended) return;
         retry =
             report().connections > connections ? first_retry : std::min(retry * 2, longest_retry);
@@ -97,7 +97,7 @@ CameraResult<> Camera::session() {
     if (!pause({})) return {};
     ArvDevice* device = arv_camera_get_device(camera->get());
     g_signal_connect(device, "control-lost", G_CALLBACK(on_control_lost), &control_lost);
-    const auto setup = set_up_camera(camera->get(), configuration_, surroundings_.presets);
+    const auto setup = set_up_camera(camera->get(), configuration_, environment_.presets);
     if (!setup && control_lost)
         return problem(CameraState::silent,
                        {configuration_.device, "went away while it was set up", ""});
@@ -123,7 +123,7 @@ void Camera::lose() {
 CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
                               const std::atomic<bool>& control_lost) {
     const auto failed = [](const Error& error) { return problem(CameraState::failed, error); };
-    if (auto done = pipeline_.prepare(surroundings_.ring_directory, setup.payload, setup.has_clock);
+    if (auto done = pipeline_.prepare(environment_.ring_directory, setup.payload, setup.has_clock);
         !done)
         return failed(done.error());
     ArvDevice* device = arv_camera_get_device(camera);
@@ -174,7 +174,7 @@ void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
     need.frame_size = payload;
     need.packet_size = packet_size;
     need.rate_hz = configuration_.rate_hz;
-    surroundings_.bandwidth.join(configuration_.name, need);
+    environment_.bandwidth.join(configuration_.name, need);
     {
         const std::lock_guard lock(mutex_);
         report_.packet_size = packet_size;
@@ -214,7 +214,7 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
 /// What changes slowly: temperature, and the share of the link as other cameras come and go.
 void Camera::do_housekeeping(ArvCamera* camera) {
     const bool network = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
-    const BandwidthShare share = surroundings_.bandwidth.share(configuration_.name);
+    const BandwidthShare share = environment_.bandwidth.share(configuration_.name);
     if (network && share.packet_delay != packet_delay_) {
         arv_camera_gv_set_packet_delay(camera, share.packet_delay.ns, nullptr);
         packet_delay_ = share.packet_delay;

@@ -44,7 +44,7 @@ struct CameraReport {
 };
 
 /// What all cameras share.
-struct CameraSurroundings {
+struct CameraEnvironment {
     std::filesystem::path ring_directory;
     std::vector<CameraPreset> presets;
     BandwidthPlan bandwidth;
@@ -61,7 +61,7 @@ class Camera {
             exposure;  ///< will be set next: the board must know before it holds
     };
 
-    Camera(const CameraConfiguration& configuration, CameraSurroundings& surroundings,
+    Camera(const CameraConfiguration& configuration, CameraEnvironment& environment,
            CameraPipeline& pipeline, Hooks hooks);
     ~Camera();
     Camera(const Camera&) = delete;
@@ -90,7 +90,7 @@ class Camera {
     bool pause(Duration duration);
 
     CameraConfiguration configuration_;
-    CameraSurroundings& surroundings_;
+    CameraEnvironment& environment_;
     CameraPipeline& pipeline_;
     Hooks hooks_;
     std::atomic<bool> streaming_{false};
