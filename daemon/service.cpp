@@ -92,11 +92,11 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       started_(host_now()) {}
 
 Expected<> Service::make_parts() {
-    surroundings_.ring_directory = directory_.path();
+    environment_.ring_directory = directory_.path();
     const std::filesystem::path own_presets = configuration_.preset_directory;
     auto presets = load_presets(own_presets.empty() ? default_preset_directory() : own_presets);
     if (!presets) return Unexpected(presets.error());
-    surroundings_.presets = std::move(*presets);
+    environment_.presets = std::move(*presets);
     auto event_ring =
         ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
     if (!event_ring) return Unexpected(event_ring.error());
@@ -146,7 +146,7 @@ void Service::add_camera(const CameraConfiguration& configuration) {
         if (pipeline->triggered()) board_->announce_exposure(configuration.output, from, exposure);
     };
     unit.camera =
-        std::make_unique<Camera>(configuration, surroundings_, *pipeline, std::move(hooks));
+        std::make_unique<Camera>(configuration, environment_, *pipeline, std::move(hooks));
     cameras_.push_back(std::move(unit));
 }
 
