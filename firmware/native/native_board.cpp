@@ -6,8 +6,8 @@
 
 namespace versavis::firmware {
 
-NativeBoard::NativeBoard(const Identity& identity, Surroundings surroundings, Nanoseconds boot)
-    : surroundings_(std::move(surroundings)),
+NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot)
+    : environment_(std::move(environment)),
       now_(boot),
       fed_(boot),
       board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this},
@@ -127,7 +127,7 @@ void NativeBoard::drive_pins(Nanoseconds at) {
                                                      : (inputs_ >> routes_.test_input & 1U) != 0);
     if (pins == pins_) return;
     pins_ = pins;
-    if (surroundings_.outputs_changed) surroundings_.outputs_changed(at, pins);
+    if (environment_.outputs_changed) environment_.outputs_changed(at, pins);
 }
 
 void NativeBoard::consume(std::size_t size, Nanoseconds at) {
@@ -182,15 +182,15 @@ bool NativeBoard::complete(ImuReply& reply) {
     const Burst burst = *std::exchange(burst_, std::nullopt);
     reply = {};
     reply.started = burst.at;
-    if (surroundings_.imu_transfer)
-        surroundings_.imu_transfer(burst.at, burst.transfer,
-                                   std::span(reply.bytes, burst.transfer.size));
+    if (environment_.imu_transfer)
+        environment_.imu_transfer(burst.at, burst.transfer,
+                                  std::span(reply.bytes, burst.transfer.size));
     return true;
 }
 
 void NativeBoard::Uart::write(const std::uint8_t* data, std::size_t size) {
-    if (board.surroundings_.uart_sent)
-        board.surroundings_.uart_sent(board.now_, board.baud_, std::span(data, size));
+    if (board.environment_.uart_sent)
+        board.environment_.uart_sent(board.now_, board.baud_, std::span(data, size));
 }
 
 std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity,
@@ -238,7 +238,7 @@ std::size_t NativeBoard::read(std::uint8_t* data, std::size_t capacity, Nanoseco
 
 void NativeBoard::publish(const ImuImage& image) {
     image_ = image;
-    if (surroundings_.imu_output_ready) surroundings_.imu_output_ready(now_);
+    if (environment_.imu_output_ready) environment_.imu_output_ready(now_);
 }
 
 std::vector<std::uint16_t> NativeBoard::read_imu_output(std::span<const std::uint16_t> words) {
@@ -263,18 +263,17 @@ std::vector<std::uint16_t> NativeBoard::read_imu_output(std::span<const std::uin
 }
 
 std::size_t NativeBoard::load(std::uint8_t* data, std::size_t capacity) {
-    if (surroundings_.flash == nullptr) return 0;
-    std::copy_n(surroundings_.flash->begin(), std::min(capacity, surroundings_.flash->size()),
-                data);
-    return surroundings_.flash->size();
+    if (environment_.flash == nullptr) return 0;
+    std::copy_n(environment_.flash->begin(), std::min(capacity, environment_.flash->size()), data);
+    return environment_.flash->size();
 }
 
 void NativeBoard::store(const std::uint8_t* data, std::size_t size) {
-    if (surroundings_.flash != nullptr) surroundings_.flash->assign(data, data + size);
+    if (environment_.flash != nullptr) environment_.flash->assign(data, data + size);
 }
 
 void NativeBoard::reboot(bool to_boot_loader) {
-    if (surroundings_.reboot) surroundings_.reboot(to_boot_loader);
+    if (environment_.reboot) environment_.reboot(to_boot_loader);
 }
 
 }  // namespace versavis::firmware

@@ -15,13 +15,13 @@
 
 namespace versavis::firmware {
 
-/// Pins that are outputs, as Surroundings sees them. The triggers of cameras 0 to 3 are bits 0
+/// Pins that are outputs, as Environment sees them. The triggers of cameras 0 to 3 are bits 0
 /// to 3.
 enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
 /// What is connected to the board. Called from run_until(), with the instants at which the hardware
 /// would act. What is not set is not connected.
-struct Surroundings {
+struct Environment {
     std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
     /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
     std::function<void(Nanoseconds at, const ImuTransfer& transfer,
@@ -48,7 +48,7 @@ class NativeBoard final : Clock64,
                           Rebooter,
                           Watchdog {
  public:
-    NativeBoard(const Identity& identity, Surroundings surroundings, Nanoseconds boot = 0);
+    NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot = 0);
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
 
@@ -147,7 +147,7 @@ class NativeBoard final : Clock64,
     void drive_pins(Nanoseconds at);
     bool exposing(unsigned camera) const;
 
-    Surroundings surroundings_;
+    Environment environment_;
     Uart uart_{*this};
     Nanoseconds now_;
     Nanoseconds fed_;

@@ -113,14 +113,13 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     imu_samples_ = 0;
     next_utc_s_ = 0;
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
-    firmware::Surroundings surroundings;
-    surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
-    surroundings.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+    firmware::Environment environment;
+    environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
+    environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
         imu_transfer(at, transfer, received);
     };
-    surroundings.reboot = [this](bool) { reset(); };
-    board_ =
-        std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings), board_now());
+    environment.reboot = [this](bool) { reset(); };
+    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(environment), board_now());
 }
 
 void BoardHost::restart() {
