@@ -89,13 +89,13 @@ void SpiImu::run(Nanoseconds now) {
     expect_edge(now);
     served_ = edge_count_;
     fast_edges_ = 0;
-    tell(wire::EventKind::imu_ready, now, part_->identity());
+    report_event(wire::EventKind::imu_ready, now, part_->identity());
 }
 
 void SpiImu::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail) {
     bus_.abort();
     pending_ = false;
-    tell_failure(kind, now, value, detail);
+    report_failure(kind, now, value, detail);
     begin_setup(now + retry_interval);
 }
 

@@ -157,11 +157,11 @@ void Vn100::next_step(Nanoseconds now) {
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
-    tell(wire::EventKind::imu_ready, now, 100);
+    report_event(wire::EventKind::imu_ready, now, 100);
 }
 
 void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
-    tell_failure(
+    report_failure(
         kind, now, value,
         state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
     fast_first_ = !fast_first_;
