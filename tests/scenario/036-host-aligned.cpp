@@ -28,7 +28,7 @@ struct Aligned {
         world.run(std::max<Nanoseconds>(to_board(host) - world.now(), 0));
     }
 
-    void tell(Nanoseconds host_second, std::uint32_t slew_ppb) {
+    void align_grid(Nanoseconds host_second, std::uint32_t slew_ppb) {
         world.send(wire::AlignGrid{to_board(host_second),
                                    static_cast<std::int32_t>(std::lround(ppm * 1e3)), slew_ppb});
     }
@@ -62,11 +62,11 @@ TEST_CASE(
     board.run_to(321 * ms);
     board.world.connect();
     REQUIRE(board.world.configure());
-    board.tell(second, 20'000);
+    board.align_grid(second, 20'000);
     board.world.start();
     for (Nanoseconds host = second; host < 60 * second; host += second) {
         board.run_to(host + 400 * ms);
-        board.tell(host + second, 20'000);
+        board.align_grid(host + second, 20'000);
     }
     board.world.finish();
     CHECK(board.world.judge() == "");
@@ -89,7 +89,7 @@ TEST_CASE(
         REQUIRE(board->world.begin());  // the grid begins here, at no second of the host
         for (Nanoseconds host = second; host < 400 * second; host += second) {
             board->run_to(host + 400 * ms);
-            if (host > 10 * second) board->tell(host + second, slew_ppb);
+            if (host > 10 * second) board->align_grid(host + second, slew_ppb);
         }
         board->world.finish();
         CHECK(board->world.judge() == "");
