@@ -55,7 +55,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
 void CameraPipeline::tell(const pairing::Evidence& evidence) {
     const clock::Stamp stamp = translator_.translate(host_now(), {});
     if (evidence_) evidence_->publish(stamp.output, pack(pairing::to_metadata(evidence)));
-    pairing::tell(pairing_, evidence);
+    pairing::apply(pairing_, evidence);
 }
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,

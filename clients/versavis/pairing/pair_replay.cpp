@@ -81,7 +81,7 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         }
         if (!pairing) continue;
         if (std::holds_alternative<Arrival>(*evidence)) ++decisions.summary.frames;
-        tell(*pairing, *evidence);
+        apply(*pairing, *evidence);
     }
     if (!pairing)
         return failure("recording", "the beginning of the stream is not in it",

@@ -44,6 +44,6 @@ EvidenceMetadata to_metadata(const Evidence& evidence);
 Expected<Evidence> from_metadata(const EvidenceMetadata& metadata);
 
 /// Does to the pairing what the evidence says; Limits are none of its business.
-void tell(Pairing& pairing, const Evidence& evidence);
+void apply(Pairing& pairing, const Evidence& evidence);
 
 }  // namespace versavis::pairing
