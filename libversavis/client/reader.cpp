@@ -70,7 +70,7 @@ struct Reader::Segment {
 
 Expected<std::unique_ptr<Reader::Segment>> Reader::map(const std::filesystem::path& path) {
     if (auto owner = check_owner(path); !owner) return Unexpected(owner.error());
-    const FileId file = file_id(path);  // before the mapping: a successor in between is seen as one
+    const FileId file = file_id(path);  // before mapping: a successor made in between is noticed
     auto mapping = Mapping::open(path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
     return std::make_unique<Segment>(Segment{std::move(*mapping), file});
@@ -173,7 +173,7 @@ Item Reader::next() {
 Item Reader::idle() {
     Item item;
     const Header& header = segment_->mapping.header();
-    // A writer that was killed never marked its segment: its silence counts, too.
+    // A writer that was killed never marked its segment: its silence counts as well.
     if (writer_alive()) return item;
     if (next_ < head()) return item;  // published since the last look: the next look finds it
     item.found = Found::gone;
@@ -208,7 +208,7 @@ Item Reader::wait(Duration timeout) {
 bool Reader::intact(const Item& item) const {
     if (item.slot == no_slot) return true;
     if (item.slot >= segment_->mapping.header().slot_count)
-        return false;  // of a segment before this one
+        return false;  // the item is from an earlier segment
     // SYNC 4: acquire fence here, release fence in Writer::acquire(): if anything that was read of
     // the payload came from a newer item, the generation has changed. Without it a mixture of two
     // payloads would pass for a good one.

@@ -76,7 +76,7 @@ std::uint64_t start_ticks_of_this_process() {
     std::ifstream stat("/proc/self/stat");
     std::string line;
     std::getline(stat, line);
-    std::size_t at = line.rfind(')');  // the command may contain blanks
+    std::size_t at = line.rfind(')');  // the command may contain spaces
     for (int field = 3; field <= 22 && at != std::string::npos; ++field)
         at = line.find(' ', at + 1);
     return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);

@@ -111,7 +111,7 @@ TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     const std::string out = clock.path("r.csv");
     std::string output;
     CHECK(clock.run({"replay", "--exchanges", bad, "--query", query, "--out", out}, &output) == 69);
-    CHECK_THAT(output, Contains("bad.csv, line 2, column m3_ns: 'three' is no integer"));
+    CHECK_THAT(output, Contains("bad.csv, line 2, column m3_ns: 'three' is not an integer"));
     CHECK(clock.run({"plot", "--exchanges", "/nowhere.csv", "--out", out}, &output) == 69);
     CHECK_THAT(output, Contains("/nowhere.csv: cannot be read"));
     CHECK_FALSE(std::filesystem::exists(out));

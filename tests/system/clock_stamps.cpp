@@ -174,7 +174,7 @@ TEST_CASE(
 
     CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", exchanges}, &text) ==
           69);
-    CHECK_THAT(text, Catch::Contains("was restarted"));
+    CHECK_THAT(text, Catch::Contains("board: restarted"));
     check_exchanges(read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns"));
     ClockStream all = from_the_first(stack);
     const auto first = next_of<RestartTold>(all);

@@ -142,7 +142,7 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
     read_until(stream, [](const auto& item) { return item.found == Found::gone; });
     std::string output;
     CHECK(stack.tool({"status"}, &output) == 69);
-    CHECK_THAT(output, Catch::Contains("died or hangs"));
+    CHECK_THAT(output, Catch::Contains("died or is hanging"));
     stack.start_service();
     read_until(stream, [](const auto& item) { return item.found == Found::restarted; });
     const auto frame = read_until(stream, is_item);

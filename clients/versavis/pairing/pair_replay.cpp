@@ -68,7 +68,7 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         const std::string where = fmt::format("line {}", ++number);
         const json line = json::parse(text, nullptr, false);
         if (line.is_discarded())
-            return failure(where, "is no JSON",
+            return failure(where, "is not valid JSON",
                            "record with: versavis tail CAMERA-evidence --oldest --json");
         auto evidence = to_evidence(line);
         if (!evidence) return failure(where, evidence.error().message());
@@ -84,8 +84,8 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         apply(*pairing, *evidence);
     }
     if (!pairing)
-        return failure("recording", "the beginning of the stream is not in it",
-                       "record from the start of the service, or with --oldest soon after it");
+        return failure("recording", "does not contain the beginning of the stream",
+                       "record from the start of the service, or soon after it with --oldest");
     return decisions.summary;
 }
 

@@ -56,13 +56,14 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
 
 Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
     const int file = ::open(path.c_str(), O_CREAT | O_TRUNC | O_RDWR | O_CLOEXEC, 0640);
-    if (file < 0) return failure(path.string(), fmt::format("cannot be made: {}", reason(errno)));
+    if (file < 0)
+        return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
     const int error = ::posix_fallocate(file, 0, static_cast<off_t>(size));
     ::close(file);
     if (error == 0) return {};
     ::unlink(path.c_str());
     return failure(path.string(),
-                   fmt::format("no memory for {} MiB: {}", size >> 20U, reason(error)),
+                   fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
                    "configure fewer slots or enlarge /dev/shm");
 }
 
@@ -104,8 +105,9 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     const bool power_of_two =
         shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
     if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
-        return failure(shape.name,
-                       "a ring needs a name below 64 characters and a power of two of descriptors");
+        return failure(
+            shape.name,
+            "a ring needs a name shorter than 64 characters and a power of two of descriptors");
     const auto path = directory / shape.name;
     const auto temporary = directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
@@ -117,7 +119,8 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     // The name points to the new segment before readers of the old one wake up and look for it.
     auto old = Mapping::open(path, Mapping::Access::read_write);
     if (::rename(temporary.c_str(), path.c_str()) != 0)
-        return failure(path.string(), fmt::format("cannot be named: {}", reason(errno)));
+        return failure(path.string(),
+                       fmt::format("cannot be renamed into place: {}", reason(errno)));
     if (old) retire(old->header(), WriterState::superseded);
     return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
 }

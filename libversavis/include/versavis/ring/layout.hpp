@@ -16,9 +16,8 @@
 //
 // 1 and 2 publish: a reader that sees the number sees all that was written before it. 3 and 4
 // withdraw: a reader that saw anything of the next item sees, in a second look, that the word has
-// changed. 5 orders waiting, 6 the end of a segment,
-// 7 its beginning. `heartbeat_ns` is relaxed on both sides: it is compared with the time, and
-// nothing else is read because of it.
+// changed. 5 orders waiting, 6 the end of a segment, 7 its beginning. `heartbeat_ns` is relaxed on
+// both sides: it is compared with the time, and nothing else is read because of it.
 #pragma once
 
 #include <array>
@@ -70,7 +69,7 @@ struct Header {
     char name[64];  ///< zero-terminated
 
     alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation (SYNC 1)
-    alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped at each publication and
+    alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped by each publication and
                                                     ///< change of state (SYNC 5)
     alignas(128) std::atomic<std::uint32_t> state;  ///< WriterState (SYNC 6)
     alignas(128)
