@@ -21,7 +21,7 @@ class ImuPort {
     static constexpr unsigned max_failures =
         20;  ///< failed checks in a row before it is set up again
 
-    /// Samples that were due but cannot be had: their numbers will be missing.
+    /// Samples that were due but were not read: their numbers will be missing.
     void miss(std::uint32_t samples = 1) {
         number_ += samples;
         overrun_ = overrun_ || samples > 0;
