@@ -8,7 +8,8 @@ using namespace versavis::scenario;
 
 namespace {
 
-/// A board whose clock is its own, told once a second where the host's next whole second lies.
+/// A board with a clock of its own that learns once a second where the host's next whole second
+/// lies.
 struct Aligned {
     Aligned(std::uint64_t seed, double skew_ppm, Nanoseconds offset)
         : world(seed), ppm(skew_ppm), zero(offset) {
@@ -46,7 +47,7 @@ struct Aligned {
     Nanoseconds zero;
 };
 
-/// From the nearest multiple of the period, apart from the phase.
+/// Distance from the nearest multiple of the period, apart from the phase.
 Nanoseconds off_grid(Nanoseconds at, Nanoseconds phase, Nanoseconds period) {
     const Nanoseconds past = (at - phase) % period;
     return past > period / 2 ? past - period : past;
@@ -86,7 +87,7 @@ TEST_CASE(
     const std::uint32_t slew_ppb = 500'000;
     for (Aligned* board : {&first, &other}) {
         board->run_to(100 * ms);
-        REQUIRE(board->world.begin());  // the grid begins here, at no second of the host
+        REQUIRE(board->world.begin());  // the grid begins here, off the seconds of the host
         for (Nanoseconds host = second; host < 400 * second; host += second) {
             board->run_to(host + 400 * ms);
             if (host > 10 * second) board->align_grid(host + second, slew_ppb);
