@@ -22,8 +22,8 @@ constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
 /// (memcpy, or a camera's driver), so to the language such a copy is a data race even with the
 /// atomic loads here. It does no harm in practice: the loads are whole words that the compiler
 /// neither repeats nor leaves out, racing loads do not trap, and no word is interpreted while it is
-/// copied. The copy may still mix two items: only intact() afterwards (SYNC 4) tells whether it is
-/// good.
+/// copied. The copy may still mix two items: only intact() afterwards (SYNC 4) decides whether it
+/// is good.
 void copy_words(const std::byte* source, std::byte* destination, std::size_t size) {
     const auto* words =
         reinterpret_cast<const std::atomic<std::uint64_t>*>(source);  // slots are page-aligned

@@ -353,15 +353,15 @@ TEST_CASE("end to end: the service manager is told of readiness, life, health an
     stack.start_rig();
     stack.start_service();
     unsetenv("NOTIFY_SOCKET");
-    std::string told;
+    std::string received;
     const auto wait_for = [&](const std::string& text) {
         const timeval limit{20, 0};
         ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
         char buffer[256];
-        while (told.find(text) == std::string::npos) {
+        while (received.find(text) == std::string::npos) {
             const ssize_t size = ::recv(socket, buffer, sizeof buffer, 0);
             if (size <= 0) return false;
-            told.append(buffer, static_cast<std::size_t>(size)) += '\n';
+            received.append(buffer, static_cast<std::size_t>(size)) += '\n';
         }
         return true;
     };

@@ -77,7 +77,7 @@ class Recording {
         return true;
     }
 
-    /// A new service, too, sees the board for the first time.
+    /// A new service meets the board for the first time, too.
     bool take(const clock::RestartTold& told) {
         const bool met_again = service_restarted_ && told.nonce == nonce_;
         service_restarted_ = false;

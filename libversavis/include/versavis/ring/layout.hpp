@@ -2,7 +2,7 @@
 // The byte layout of a shared-memory ring, as docs/contracts/shm-layout.md fixes it for every
 // language.
 //
-// How writer and reader synchronise. The code names these pairs where each half stands.
+// How writer and reader synchronise. The code names the pair at each half.
 //
 // | pair   | word        | writer                      | reader                                  |
 // |--------|-------------|-----------------------------|-----------------------------------------|
@@ -55,7 +55,7 @@ struct Header {
     std::uint32_t abi_major;
     std::uint32_t abi_minor;
     std::uint64_t total_size;
-    std::uint64_t generation;  ///< random: tells this segment from the one before it
+    std::uint64_t generation;  ///< random: distinguishes this segment from its predecessor
     std::uint8_t boot_id[16];
     std::uint32_t writer_pid;
     StreamKind kind;
