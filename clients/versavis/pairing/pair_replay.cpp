@@ -81,7 +81,7 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         }
         if (!pairing) continue;
         if (std::holds_alternative<Arrival>(*evidence)) ++decisions.summary.frames;
-        apply(*pairing, *evidence);
+        versavis::pairing::apply(*pairing, *evidence);  // unqualified, std::apply would match
     }
     if (!pairing)
         return failure("recording", "does not contain the beginning of the stream",
