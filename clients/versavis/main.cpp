@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// versavis: looks at what the service does and publishes.
+// The versavis tool: shows what the service is doing and what it publishes.
 #include <fmt/format.h>
 #include <signal.h>
 #include <sysexits.h>
@@ -30,7 +30,7 @@ int fail(const Error& error) {
     return EX_UNAVAILABLE;
 }
 
-/// 0: all is well; 1: it runs, but not all delivers; 69: it does not run.
+/// 0: all is well; 1: it is running, but something is not delivering; 69: it is not running.
 int show_status(const std::string& instance, bool json) {
     const auto status = client::read_status(instance);
     if (!status) return fail(status.error());
@@ -54,9 +54,9 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
     std::ifstream file;
     std::ofstream out;
     if (recording != "-") file.open(recording);
-    if (!file) return fail({recording, "cannot be read", ""});
+    if (!file) return fail({recording, "cannot be read", "check its name and permissions"});
     if (!decisions.empty()) out.open(decisions);
-    if (!out) return fail({decisions, "cannot be written", ""});
+    if (!out) return fail({decisions, "cannot be written", "check its directory and permissions"});
     const auto summary = client::replay_pairing(recording == "-" ? std::cin : file,
                                                 decisions.empty() ? nullptr : &out);
     if (!summary) return fail(summary.error());
@@ -67,7 +67,7 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"Looks at the VersaVIS service: its state, its streams, their items"};
+    CLI::App app{"Inspect the VersaVIS service: its state, its streams and their items"};
     app.require_subcommand(1);
     app.set_version_flag("--version", VERSAVIS_VERSION);
     std::string instance = default_instance();
@@ -76,36 +76,36 @@ int main(int argc, char** argv) {
     bool json = false;
 
     bool watch = false;
-    auto* status =
-        app.add_subcommand("status",
-                           "State of board, clock, cameras and streams; exit code 0: all well, 1: "
-                           "not all delivers, 69: not running");
-    status->add_flag("--watch", watch, "Show it again every second");
-    status->add_flag("--json", json, "The status document itself (docs/contracts/status.md)");
+    auto* status = app.add_subcommand(
+        "status",
+        "Show the state of board, clock, cameras and streams. Exits 0 if all is well, "
+        "1 if something is not delivering, 69 if the service is not running");
+    status->add_flag("--watch", watch, "Refresh every second");
+    status->add_flag("--json", json,
+                     "Print the status document as JSON (docs/contracts/status.md)");
 
-    auto* list = app.add_subcommand("list", "The streams that can be read");
-    list->add_flag("--json", json, "As a JSON array");
+    auto* list = app.add_subcommand("list", "List the streams that can be read");
+    list->add_flag("--json", json, "Print a JSON array");
 
     client::TailSettings tail;
     auto* tail_command =
-        app.add_subcommand("tail", "Print a stream as it comes, one line per item");
+        app.add_subcommand("tail", "Print the items of a stream as they arrive, one per line");
     tail_command->add_option("stream", tail.stream, "Name of the stream")->required();
-    tail_command->add_option("-n,--count", tail.count, "Stop after that many items");
-    tail_command->add_flag("--json", json, "One JSON object per line");
-    tail_command->add_flag("--oldest", tail.oldest,
-                           "Begin with the oldest item that is still there");
+    tail_command->add_option("-n,--count", tail.count, "Stop after this many items");
+    tail_command->add_flag("--json", json, "Print one JSON object per line");
+    tail_command->add_flag("--oldest", tail.oldest, "Start with the oldest item still in the ring");
 
-    auto* pair = app.add_subcommand("pair", "Pairing of frames and exposures");
+    auto* pair = app.add_subcommand("pair", "Pairing of frames with exposures");
     pair->require_subcommand(1);
     std::string recording;
     std::string decisions;
-    auto* replay = pair->add_subcommand(
-        "replay",
-        "Pair again from a recording, made by: versavis tail CAMERA-evidence --oldest --json");
+    auto* replay = pair->add_subcommand("replay",
+                                        "Redo the pairing from a recording made with: versavis "
+                                        "tail CAMERA-evidence --oldest --json");
     replay->add_option("recording", recording, "File to read; - for standard input")->required();
     replay->add_option("-o,--output", decisions,
                        "File for the decisions, one JSON object per line");
-    replay->add_flag("--json", json, "The summary as a JSON object");
+    replay->add_flag("--json", json, "Print the summary as a JSON object");
 
     client::ClockCommands clock(app, [] { return stop_requested != 0; });
 
@@ -125,7 +125,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
-    // Those that go on until they are stopped end tidily; any other ends at once.
+    // Commands that run until they are stopped end tidily; all others end at once.
     if (watch || *tail_command || clock.records())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);

@@ -42,7 +42,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
 /// What pairing is told goes through here, so that the recording is complete.
 void CameraPipeline::tell(const pairing::Evidence& evidence) {
     evidence_.record(evidence);
-    pairing::tell(pairing_, evidence);
+    pairing::apply(pairing_, evidence);
 }
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,

@@ -10,24 +10,24 @@
 namespace versavis::firmware {
 
 struct Announcement {
-    std::uint64_t trigger = 0;  ///< holds from this one on
+    std::uint64_t trigger = 0;  ///< applies from this one on
     Nanoseconds exposure = 0;
     bool clipped = false;
 };
 
-/// In the order of their triggers; at most eight, then the farthest is forgotten.
+/// In the order of their triggers; at most eight, beyond that the furthest is dropped.
 class Announcements {
  public:
     void clear() { count_ = 0; }
 
-    /// Replaces what was announced for the same trigger or later ones.
+    /// Replaces announcements for the same or later triggers.
     void add(const Announcement& announcement) {
         while (count_ > 0 && entries_[count_ - 1].trigger >= announcement.trigger) --count_;
         if (count_ == capacity) --count_;
         entries_[count_++] = announcement;
     }
 
-    /// The newest that holds for `trigger`; null: none does.
+    /// The newest one that applies to `trigger`; null: none does.
     const Announcement* find(std::uint64_t trigger) const {
         const Announcement* found = nullptr;
         for (std::size_t i = 0; i < count_ && entries_[i].trigger <= trigger; ++i)
@@ -35,7 +35,7 @@ class Announcements {
         return found;
     }
 
-    /// Forgets what holds for `trigger`: it was used.
+    /// Drops what applies to `trigger`: it has been used.
     void used(std::uint64_t trigger) {
         std::size_t taken = 0;
         while (taken < count_ && entries_[taken].trigger <= trigger) ++taken;

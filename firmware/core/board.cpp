@@ -12,8 +12,8 @@ namespace {
 constexpr Nanoseconds health_interval = 1'000'000'000;
 constexpr Nanoseconds feed_interval = 200'000'000;
 constexpr Nanoseconds stuck_limit =
-    500'000'000;                            // the output hardware moves on, or the watchdog bites
-constexpr Nanoseconds unseen_step = 1'000;  // of the grid: pulses of trains need not begin anew
+    500'000'000;  // the output hardware makes progress, or the watchdog bites
+constexpr Nanoseconds unseen_step = 1'000;         // of the grid: pulse trains need not restart
 constexpr Nanoseconds longest_wait = 200'000'000;  // for exposures, before a new configuration
 constexpr Nanoseconds stray_interval = 100'000'000;
 
@@ -49,7 +49,8 @@ Board::Board(const Hal& hal, const Identity& identity)
 
 void Board::poll() {
     const Nanoseconds began = hal_.clock.now();
-    // First what happened, then what is wanted: edges belong to what was in force when they came.
+    // First what happened, then what is wanted: edges belong to what was in force when they
+    // arrived.
     poll_outputs(began);
     poll_edges(began);
     poll_link();
@@ -125,8 +126,8 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
 }
 
 void Board::greet(const wire::HostHello& hello) {
-    // A board of another major version still says who it is: the host then tells the user what to
-    // update.
+    // A board of another major version still identifies itself, so that the host can tell the user
+    // what to update.
     greeted_ = true;
     if (configuring_) begin_trains(hal_.clock.now());
     configuring_ = false;
@@ -157,7 +158,7 @@ void Board::configure(const wire::Configuration& configuration) {
         return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
     wanted_ = configuration;
     on_sync_ = {};
-    // Pulses that were decided end first, and their exposures: none is cut, and each has its
+    // Pulses already decided, and their exposures, end first: none is cut short, and each gets its
     // record.
     sync_.stop();
     test_.stop();
@@ -214,7 +215,7 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     begin_trains(now);
 }
 
-/// An IMU whose settings did not change goes on sampling.
+/// An IMU whose settings did not change keeps sampling.
 void Board::apply_imus(const wire::Configuration& configuration, Nanoseconds now) {
     const auto changed = [&](std::size_t port, std::uint32_t true_rate) {
         wire::ImuConfiguration wanted = configuration.imus[port];
@@ -261,7 +262,7 @@ void Board::begin_trains(Nanoseconds now) {
         test_.begin(spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
 }
 
-/// What was stored is in force from power-up: IMU and its output need no host.
+/// The stored configuration is in force from power-up: the IMU and its output need no host.
 void Board::restore() {
     wire::Configuration stored{};
     std::uint8_t bytes[sizeof stored];
@@ -285,7 +286,7 @@ bool Board::all_idle() const {
 }
 
 void Board::start(const wire::Start& start) {
-    if (configuring_) return;  // it belongs to a configuration that was not answered yet
+    if (configuring_) return;  // it belongs to a configuration that has not been answered yet
     if ((start.flags & wire::start_on_sync) != 0 && !any_running()) {
         on_sync_.cameras |= start.cameras;
         on_sync_.flags = start.flags;
@@ -305,7 +306,7 @@ void Board::align(const wire::AlignGrid& wanted) {
         wanted.max_slew_ppb > 0 && wanted.max_slew_ppb <= wire::align_largest_slew_ppb;
     if (!in_reach || !pace_possible || !slew_possible) {
         ++health_.ignored;
-        return send(wire::Log{wire::LogLevel::warning, "align_grid is out of range, and ignored"});
+        return send(wire::Log{wire::LogLevel::warning, "align_grid is out of range: ignored"});
     }
     const Nanoseconds off = grid_clock_.misplaced(wanted.board_ns);
     if (any_running() || (off <= unseen_step && -off <= unseen_step))
@@ -328,8 +329,8 @@ void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
     switch_slaves();
 }
 
-/// A slave is switched on and off while its master does not expose: each of its pulses is whole,
-/// and counted.
+/// A slave is switched on and off while its master is not exposing, so that each of its pulses is
+/// whole and counted.
 void Board::switch_slaves() {
     bool changed = false;
     for (unsigned i = 0; i < camera_count; ++i) {
@@ -426,7 +427,7 @@ void Board::exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds
 void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
                   std::uint16_t detail) {
     if (kind == wire::EventKind::stray_edge) {
-        // A line that floats makes many; all are counted, some are told.
+        // A floating line makes many; all are counted, some are reported.
         ++health_.stray_edges;
         if (at < next_stray_) return;
         next_stray_ = at + stray_interval;

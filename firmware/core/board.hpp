@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board: link, cameras, IMUs, light and pulses behind one poll(), on any port that offers the
-// HAL.
+// The board: link, cameras, IMUs, light and pulses behind one poll(), on any port that implements
+// the HAL.
 #pragma once
 
 #include "camera_channel.hpp"
@@ -30,8 +30,8 @@ class Board final : private ChannelReports, private RefusalSink {
     Board(const Board&) = delete;
     Board& operator=(const Board&) = delete;
 
-    /// Does all that is due. Call it at next_wake(); when bytes, edges or an output word came or
-    /// went; and when a transfer completed.
+    /// Does all that is due. Call it at next_wake(); when bytes or edges have arrived or an output
+    /// word has left; and when a transfer has completed.
     void poll();
 
     Nanoseconds next_wake() const { return due_; }
@@ -81,7 +81,7 @@ class Board final : private ChannelReports, private RefusalSink {
     NoiseGuard noise_;
     OutputQueue outputs_;
     GridClock grid_clock_;
-    GridClock board_clock_;  ///< passes as board time does
+    GridClock board_clock_;  ///< runs as board time does
     CameraChannel cameras_[camera_count];
     Illumination light_;
     SpiImu spi_imu_;
@@ -99,15 +99,15 @@ class Board final : private ChannelReports, private RefusalSink {
     Nanoseconds last_sync_ = INT64_MIN / 2;
     std::uint32_t checked_id_ = 0;
     std::uint8_t refused_ = 0;
-    std::uint8_t exposing_ = 0;  ///< cameras whose exposure line says so
-    std::uint8_t slaves_ = 0;    ///< slaves that shall run
+    std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
+    std::uint8_t slaves_ = 0;    ///< slaves that are to run
     bool greeted_ = false;
     bool outputs_blocked_ = false;
     Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
     Nanoseconds due_ = 0;  ///< when poll() has something to do next
     Nanoseconds polled_ = 0;
-    Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be told
+    Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be reported
     std::uint32_t event_sequence_ = 0;
     std::uint32_t pulses_[wire::pulse_input_count] = {};
     wire::Health health_{};

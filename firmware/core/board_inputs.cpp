@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The part of the board that takes what comes in at its pins.
+// The part of the board that handles what arrives at its pins.
 #include "board.hpp"
 
 namespace versavis::firmware {
@@ -7,7 +7,7 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds default_sync_period = 1'000'000'000;
-constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: more than two crystals differ
+constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: two crystals differ by less
 constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
@@ -15,7 +15,7 @@ constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
 void Board::poll_edges(Nanoseconds now) {
     noise_.poll(now);
-    // Some of those that are still to be read came before, some after those that were lost.
+    // Of the edges still to be read, some came before the lost ones and some after.
     const std::uint32_t lost = hal_.edges.take_lost();
     if (lost != 0) edges_lost();
     Edge edge{};
@@ -88,7 +88,7 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         return;
     }
     if (!any_running()) {
-        // Two that are a period apart are pulses; one may be anything.
+        // Two edges a period apart are pulses; a single one may be anything.
         const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
         const Nanoseconds period = rate == 0 ? default_sync_period : uhz_ns / rate;
         if (since < period - period / sync_tolerance || since > period + period / sync_tolerance)

@@ -25,7 +25,7 @@ void CameraChannel::configure(const wire::CameraConfiguration& configuration, Na
     announcements_.clear();
     if (enabled()) grid_ = Grid(configuration.phase_ns, configuration.rate_uhz);
     wire::CameraConfiguration tracked = configuration;
-    // A slave without an exposure line of its own is tracked by its master's.
+    // A slave without an exposure line of its own is tracked by that of its master.
     if (has(wire::camera_slave) && has(wire::camera_no_strobe)) {
         tracked.flags &= ~std::uint32_t{wire::camera_no_strobe};
         tracked.latency_ns = 0;
@@ -133,9 +133,9 @@ void CameraChannel::send_trigger(Nanoseconds at, Nanoseconds now) {
 }
 
 void CameraChannel::edge(Nanoseconds at, bool level) {
-    if (!has_strobe()) return;  // nothing is wired there
+    if (!has_strobe()) return;  // no exposure line is wired
     const ExposureTracker::Completed completed = tracker_.edge(at, exposing(level));
-    // An exposure from before an announcement says nothing of those after it.
+    // An exposure from before an announcement says nothing about those after it.
     if (completed.trigger != 0 && completed.trigger >= expected_since_)
         expected_ = min(completed.duration, configuration_.max_exposure_ns);
 }

@@ -21,34 +21,34 @@ class CameraChannel {
           reports_(reports),
           tracker_(camera, reports) {}
 
-    /// Only while stopped and idle. Numbers go on. Triggers are decided `lead` sooner than the
-    /// outputs ask for.
+    /// Only while stopped and idle. Numbers continue. Triggers are decided `lead` sooner than the
+    /// outputs require.
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds lead);
 
     /// Begins triggering at the first grid point that can be met after `now`; flags:
-    /// wire::StartFlag. A channel that runs begins its pattern anew.
+    /// wire::StartFlag. A running channel begins its pattern anew.
     void start(Nanoseconds now, std::uint8_t flags);
 
-    /// Pulses that were decided are still sent, and recorded.
+    /// Pulses that were already decided are still sent and recorded.
     void stop() { running_ = false; }
     bool running() const { return running_; }
     bool slow() const { return running_ && (start_flags_ & wire::start_slow) != 0; }
     bool is_slave() const { return enabled() && has(wire::camera_slave); }
-    /// True: no exposure is waited for.
+    /// True: not waiting for any exposure.
     bool idle() const { return tracker_.empty(); }
-    /// Ends the wait for exposures.
+    /// Stops waiting for exposures.
     void give_up() { tracker_.give_up(); }
 
-    /// The grid begins anew, and counts its ticks from 0; while the camera does not run.
+    /// Restarts the grid, its ticks from 0; only while the camera is not running.
     void grid_began() { next_tick_ = 0; }
 
-    /// From `trigger` on, exposures last for `exposure`, until others are measured.
+    /// From `trigger` on, exposures are expected to last `exposure`, until others are measured.
     void announce(std::uint64_t trigger, Nanoseconds exposure);
 
     /// Takes an edge of the exposure line; edges come in order.
     void edge(Nanoseconds at, bool level);
 
-    /// The exposure line of this slave's master changed; `tick` is the master's.
+    /// The exposure line of this slave's master changed; `tick` is that of the master.
     void master_edge(Nanoseconds at, bool exposing, std::uint64_t tick);
 
     void edges_lost() {
@@ -57,7 +57,7 @@ class CameraChannel {
     }
     void left_late(Nanoseconds asked, Nanoseconds left) { tracker_.left_late(asked, left); }
 
-    /// Decides the triggers that are due and gives up exposures that did not happen.
+    /// Decides the triggers that are due and gives up on exposures that did not happen.
     void poll(Nanoseconds now);
 
     /// When poll() has something to do next.
@@ -97,7 +97,7 @@ class CameraChannel {
     std::uint8_t start_flags_ = 0;
     std::uint64_t trigger_ = 0;              ///< pulses sent since boot
     std::uint64_t first_tick_ = 0;           ///< of this run, where the pattern begins
-    std::uint64_t next_tick_ = 0;            ///< the first that was not decided yet
+    std::uint64_t next_tick_ = 0;            ///< the first not decided yet
     Nanoseconds pulse_end_ = INT64_MIN / 2;  ///< of the newest pulse
     Nanoseconds lead_ = 0;
     Nanoseconds expected_ = 0;

@@ -64,7 +64,7 @@ void check_master(const wire::Configuration& configuration, std::size_t index, C
     std::int64_t possible = -1;
     for (std::size_t i = 0; i < wire::camera_count && possible < 0; ++i)
         if (can_be_master(configuration, i, index)) possible = static_cast<std::int64_t>(i);
-    // The range names one that could be; an empty one: no camera can.
+    // The range names the cameras that could be one; if empty, none can.
     checker.range(Field::master, master == possible ? -1 : master, possible < 0 ? 0 : possible,
                   possible);
 }
@@ -119,7 +119,7 @@ void check_test(const wire::Configuration& configuration, Checker& checker) {
     const wire::PortConfiguration& ports = configuration.ports;
     const wire::ImuConfiguration& uart_imu = configuration.imus[1];
     const bool uart_ticks =
-        (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows them
+        (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows its ticks
     const int last = wire::test_imu0 + (uart_ticks ? 1 : 0);
     checker.range(Field::test, ports.test, 0, last);
     if (ports.test == wire::test_none || ports.test > last) return;
@@ -147,7 +147,7 @@ void check_ports(const wire::Configuration& configuration, RefusalSink& sink) {
         configuration.imus[0].kind == wire::ImuKind::none)
         checker.range(Field::port_options, ports.options, 0, 0);
     if ((ports.options & wire::port_nmea) == 0) return;
-    if (configuration.imus[1].kind != wire::ImuKind::none)  // it has the UART
+    if (configuration.imus[1].kind != wire::ImuKind::none)  // it occupies the UART
         checker.range(Field::port_options, ports.options, 0, wire::port_imu_output);
     if (ports.nmea_baud != 0) checker.range(Field::nmea_baud, ports.nmea_baud, 1'200, 921'600);
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Holds a configuration from the host against what the board can do.
+// Checks a configuration from the host against what the board can do.
 #pragma once
 
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {
 
-/// Takes what is refused, field by field.
+/// Receives what is refused, field by field.
 struct RefusalSink {
     virtual void refuse(const wire::Refusal& refusal) = 0;
 

@@ -5,7 +5,7 @@ namespace versavis::firmware {
 
 namespace {
 
-constexpr Nanoseconds certain_latency = 200'000;  // shorter ones may vary by as much as they are
+constexpr Nanoseconds certain_latency = 200'000;  // a shorter latency may vary by as much as itself
 
 }  // namespace
 
@@ -36,8 +36,8 @@ ExposureTracker::Completed ExposureTracker::edge(Nanoseconds at, bool exposing) 
     return {};
 }
 
-/// The edge belongs to the newest trigger that can have caused it: older ones that wait for a start
-/// were ignored by the camera.
+/// The edge belongs to the newest trigger that can have caused it: the camera ignored the older
+/// ones that still wait for a start.
 void ExposureTracker::start_edge(Nanoseconds at) {
     const Nanoseconds latency = configuration_.latency_ns;
     const Nanoseconds soonest = latency > certain_latency ? latency / 2 : 0;
@@ -48,8 +48,8 @@ void ExposureTracker::start_edge(Nanoseconds at) {
         edges_lost();  // if the line rose twice, an end in between was missed
         return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
     }
-    // The line has one level: whatever still waits before this trigger was ignored, or its end edge
-    // was lost.
+    // The line has only one level: whatever still waits before this trigger was ignored, or its end
+    // edge was lost.
     for (; found > 0; --found)
         finish_first(started(flights_[0]) ? wire::exposure_no_end : wire::exposure_no_start);
     flights_[0].record.start_ns = at;
@@ -75,7 +75,7 @@ void ExposureTracker::edges_lost() {
 
 Nanoseconds ExposureTracker::busy_until(Nanoseconds now) const {
     if (count_ == 0) return last_end_;
-    for (std::size_t i = 0; i < count_; ++i)  // overdue: it may last for any time
+    for (std::size_t i = 0; i < count_; ++i)  // overdue: it may last any length of time
         if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < now)
             return never / 2;
     const Flight& newest = flights_[count_ - 1];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Joins the edges of one exposure line with the triggers that were sent: one record for each
-// trigger, whatever comes.
+// Matches the edges of one exposure line to the triggers that were sent: one record for each
+// trigger, whatever happens.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace versavis::firmware {
 
-/// Where a channel reports to.
+/// What a channel reports to.
 struct ChannelReports {
     virtual void exposure(const wire::Exposure& record) = 0;
     virtual void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at,
@@ -37,7 +37,7 @@ class ExposureTracker {
     /// A trigger that was sent, or is set to leave; times increase.
     void add(const wire::Exposure& record, Nanoseconds expected);
 
-    /// The word of `asked` left later.
+    /// The word due at `asked` left later.
     void left_late(Nanoseconds asked, Nanoseconds left);
 
     /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure
@@ -48,17 +48,17 @@ class ExposureTracker {
     };
     Completed edge(Nanoseconds at, bool exposing);
 
-    /// Edges were lost: an end that comes now may belong to another exposure than the start that
-    /// was seen.
+    /// Edges were lost: an end that arrives now may not belong to the exposure whose start was
+    /// seen.
     void edges_lost();
 
-    /// Gives up what did not happen.
+    /// Gives up on what did not happen.
     void expire(Nanoseconds now);
 
-    /// Ends the wait for all.
+    /// Stops waiting for all of them.
     void give_up();
 
-    /// When the newest exposure will have ended, as far as it is known now.
+    /// When the newest exposure will have ended, as far as is known now.
     Nanoseconds busy_until(Nanoseconds now) const;
 
     /// Grid point of the newest trigger before `at`; 0: there was none.

@@ -33,7 +33,7 @@ class Grid {
         }
     }
 
-    /// Goes to a tick close before `at` in a few steps, however long ago the origin was.
+    /// Moves to a tick shortly before `at` in a few steps, however long ago the origin was.
     void skip_before(Nanoseconds at) {
         while (at - next_ > 2 * (whole_ + 1)) {
             std::int64_t ticks = (at - next_) / (whole_ + 1);

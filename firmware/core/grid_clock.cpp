@@ -32,8 +32,7 @@ bool GridClock::sync_pulse(Nanoseconds at) {
     const Nanoseconds periods = (since + period_ / 2) / period_;
     if (periods <= 0) return false;
     const Nanoseconds nominal = periods * period_;
-    // Pulses may be missing. Once the pace is known, it says when the next one comes, however long
-    // that is.
+    // Pulses may be missing. Once the pace is known, it predicts the next one after any gap.
     const Nanoseconds off = at - board_time(line_.grid() + nominal);
     Nanoseconds tolerance = (periods > longest_first_gap ? period_ : nominal) / largest_pace;
     if (pace_known_) tolerance = period_ / largest_change;
@@ -45,7 +44,7 @@ bool GridClock::sync_pulse(Nanoseconds at) {
 
 void GridClock::align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb,
                       Nanoseconds now) {
-    // What is on its way keeps its time: the new relation begins where the old one is now.
+    // What is already under way keeps its time: the new line starts where the old one is now.
     const Nanoseconds grid = grid_time(now);
     const GridLine unmoved(board_time(grid), grid, pace_ppb);
     const Nanoseconds whole = nearest_second(unmoved.grid_time(second));

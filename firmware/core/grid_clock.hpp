@@ -7,12 +7,12 @@
 
 namespace versavis::firmware {
 
-/// Board time over grid time, straight through an anchor; without divisions, which take long on
-/// small processors. Exact to a nanosecond within some minutes of the anchor.
+/// Board time as a straight line over grid time, through an anchor; without divisions, which are
+/// slow on small processors. Exact to a nanosecond within some minutes of the anchor.
 class GridLine {
  public:
     GridLine() = default;
-    /// Board time passes by `pace_ppb` faster than grid time: at most 1900 ppm either way.
+    /// Board time passes faster than grid time by `pace_ppb`: at most 1900 ppm either way.
     GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb);
 
     Nanoseconds board() const { return board_; }
@@ -46,12 +46,13 @@ class GridLine {
     std::int64_t pace_ = 0;  ///< parts of 2^40
 };
 
-/// Grid time counts from the origin. By itself it passes as board time does. While sync pulses
-/// come, it passes as the board that sends them has it: between two pulses at the pace of the two
-/// before. Aligned, it passes as the host says, whose whole seconds are approached without a step.
+/// Grid time counts from the origin. By itself it runs like board time. While sync pulses arrive,
+/// it runs like the clock of the board that sends them: between two pulses at the pace of the two
+/// before. When aligned, it runs at the pace that the host gives and approaches the host's whole
+/// seconds without a step.
 class GridClock {
  public:
-    /// Grid time 0 is at `origin`; `sync_period` as the sender has it, 0: unknown, pulses are not
+    /// Grid time 0 is at `origin`; `sync_period` by the sender's clock; 0: unknown, pulses are not
     /// followed.
     void begin(Nanoseconds origin, Nanoseconds sync_period) {
         *this = {};
@@ -69,16 +70,16 @@ class GridClock {
         return (approaches ? approach_ : line_).grid_time(board_time);
     }
 
-    /// False: the pulse is none of the sender's, and is not followed.
+    /// False: the pulse is not from the sender, and is ignored.
     bool sync_pulse(Nanoseconds at);
 
-    /// A whole second of grid time belongs at `second`, and board time passes by `pace_ppb` faster
-    /// from there on. The nearest one goes there, from `now` on, by no more than `max_slew_ppb` of
-    /// the time beyond the pace. Sync pulses are no longer followed.
+    /// A whole second of grid time belongs at `second`, and from there on board time passes faster
+    /// by `pace_ppb`. From `now` on the nearest whole second is moved there, at no more than
+    /// `max_slew_ppb` beyond the pace. Sync pulses are no longer followed.
     void align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb,
                Nanoseconds now);
 
-    /// The same at once.
+    /// The same, at once.
     void place(Nanoseconds second, std::int32_t pace_ppb);
 
     /// How far place() would move the grid there.
@@ -88,7 +89,7 @@ class GridClock {
     static constexpr Nanoseconds no_bend = INT64_MIN;
 
     Nanoseconds period_ = 0;
-    GridLine line_;      ///< from the newest pulse, or towards the second that the host named
+    GridLine line_;      ///< from the newest pulse, or towards the second given by the host
     GridLine approach_;  ///< until line_ is reached
     Nanoseconds bend_ = no_bend;  ///< grid time from which on line_ holds
     bool pace_known_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the portable core needs of a board: time, scheduled outputs, stamped edges, routing, buses
+// What the portable core needs from a board: time, scheduled outputs, stamped edges, routing, buses
 // and a byte link.
 #pragma once
 
@@ -38,7 +38,7 @@ struct OutputSchedule {
         Nanoseconds asked;
         Nanoseconds left;
     };
-    /// A word that left later than asked; each is told once.
+    /// A word that left later than requested; each is reported once.
     virtual bool take_late(Late& late) = 0;
 
  protected:
@@ -58,12 +58,12 @@ struct Edge {
     bool level;
 };
 
-/// Edges of the inputs, stamped by hardware, in order; of data-ready inputs only those that rise.
+/// Edges of the inputs, stamped by hardware, in order; of data-ready inputs only rising ones.
 struct EdgeStream {
     /// Edges of inputs outside of the mask cost nothing and are not reported.
     virtual void listen(std::uint32_t inputs) = 0;
     virtual bool pop(Edge& edge) = 0;
-    /// Edges lost since the last call because nobody popped them.
+    /// Edges lost since the last call because they were not popped in time.
     virtual std::uint32_t take_lost() = 0;
 
  protected:
@@ -72,7 +72,7 @@ struct EdgeStream {
 
 inline constexpr std::uint8_t not_routed = 0xFF;
 
-/// What follows from levels without waiting for code.
+/// What follows input levels directly, without waiting for code.
 struct Routes {
     /// Camera whose exposure line drives the trigger of this one: active while it exposes.
     /// not_routed: the schedule drives it.
@@ -82,7 +82,7 @@ struct Routes {
     std::uint8_t light_cameras = 0;       ///< the light is gate and (lead or any of these exposes)
     bool light_inverted = false;
     Nanoseconds light_limit =
-        0;  ///< after so long on it goes off, even if the code hangs, until the gate closes
+        0;  ///< after this long it goes off until the gate closes, even if the code hangs
     std::uint8_t test_input = not_routed;  ///< input that drives the test output; else the schedule
 };
 
@@ -103,7 +103,7 @@ struct ImuTransfer {
     std::uint8_t chip = 0;          ///< chip select: 0 or 1
     std::uint8_t size = 0;          ///< bytes, both ways
     std::uint32_t clock_hz = 0;     ///< at most
-    std::uint32_t word_gap_ns = 0;  ///< other than 0: deselected so long after each 16-bit word
+    std::uint32_t word_gap_ns = 0;  ///< if not 0: deselected for this long after each 16-bit word
     std::uint8_t bytes[max_transfer] = {};
 };
 
@@ -117,7 +117,7 @@ struct ImuBus {
     /// False while a transfer is set or under way.
     virtual bool start(Nanoseconds at, const ImuTransfer& transfer) = 0;
     virtual bool complete(ImuReply& reply) = 0;
-    /// Gives up what is set or under way.
+    /// Cancels what is set or under way.
     virtual void abort() = 0;
 
  protected:
@@ -158,19 +158,20 @@ struct ByteLink {
     virtual void write(const std::uint8_t* data, std::size_t size) = 0;
     /// `received` is when the newest of the bytes entered the board.
     virtual std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) = 0;
-    /// Asks when the newest byte that was written leaves: is acknowledged, or handed to what does
-    /// not tell more. The newest question alone is answered. A link that cannot tell never answers.
+    /// Asks when the newest byte written leaves, which means acknowledged or, if the link knows no
+    /// more, handed over. Only the newest question is answered; a link that cannot tell never
+    /// answers.
     virtual void watch_departure() {}
-    /// True, once: the byte that was asked for left at `at`, not later than the host could have it.
+    /// True, once: the byte asked about left at `at`, no later than the host could receive it.
     virtual bool take_departure(Nanoseconds& /*at*/) { return false; }
 
  protected:
     ~ByteLink() = default;
 };
 
-/// Memory that outlives the power.
+/// Memory that survives a power cycle.
 struct Persist {
-    /// Size of what was stored last, or 0.
+    /// Size of what was last stored, or 0.
     virtual std::size_t load(std::uint8_t* data, std::size_t capacity) = 0;
     virtual void store(const std::uint8_t* data, std::size_t size) = 0;
 
@@ -185,7 +186,7 @@ struct Rebooter {
     ~Rebooter() = default;
 };
 
-/// Resets the board when it was not fed for a second.
+/// Resets the board when it has not been fed for a second.
 struct Watchdog {
     virtual void feed() = 0;
 

@@ -6,8 +6,9 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds lead_overlap =
-    50'000;  // the lead lasts into the exposure: no gap when it begins
-constexpr Nanoseconds start_patience = 2'000'000;  // a camera that exposes so late still gets light
+    50'000;  // the lead lasts into the exposure, so that there is no gap when it begins
+constexpr Nanoseconds start_patience =
+    2'000'000;  // a camera that starts this late still gets light
 constexpr Nanoseconds shortest_light = 10'000;
 constexpr std::int64_t million = 1'000'000;
 
@@ -19,7 +20,7 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 void Illumination::configure(const wire::IlluminationConfiguration& configuration,
                              Nanoseconds now) {
     stop(now);
-    // Another configuration is no reason for more light; the first finds a full store.
+    // A new configuration does not earn more light; the very first finds a full store.
     saved_ = configuration_.max_on_ns == 0 ? configuration.max_on_ns
                                            : min(budget(now), configuration.max_on_ns);
     saved_at_ = now;
@@ -36,12 +37,13 @@ void Illumination::stop(Nanoseconds now) {
 
 /// On-time that a span of time earns.
 Nanoseconds Illumination::earned(Nanoseconds span) const {
-    span = min(span, configuration_.max_on_ns * million);  // enough for all, and no overflow
+    span = min(span,
+               configuration_.max_on_ns * million);  // earns the full store, and does not overflow
     return span / million * configuration_.duty_ppm +
            span % million * configuration_.duty_ppm / million;
 }
 
-/// What may be spent at `at`: never more than one longest light.
+/// On-time available at `at`: never more than the longest single light.
 Nanoseconds Illumination::budget(Nanoseconds at) const {
     return min(configuration_.max_on_ns, saved_ + earned(at - saved_at_));
 }
@@ -61,7 +63,7 @@ void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds dura
     open_next(now);
 }
 
-/// The leads of all plans as one; where they overlap there is no edge.
+/// The union of the leads of all plans; there is no edge where they overlap.
 void Illumination::set_leads(Nanoseconds now) {
     outputs_.cancel(output_light_lead);
     for (std::size_t i = 0; i < plan_count_;) {
@@ -107,7 +109,7 @@ void Illumination::open_gate(Nanoseconds on, Nanoseconds now) {
     gate_on_ = outputs_.set(on, output_light_gate, true);
     gate_off_ = outputs_.set(gate_on_ + allowed, output_light_gate, false);
     last_off_ = gate_off_;
-    saved_ = earned(allowed);  // all is spent, until it is known that less was
+    saved_ = earned(allowed);  // all counts as spent, until it is known how much really was
     saved_at_ = gate_off_;
 }
 

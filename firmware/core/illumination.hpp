@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Light while any camera exposes, never for longer than it may: the hardware lets the exposure
-// lines through only while the gate is open, and the end of the gate is set before it opens.
+// Light while any camera exposes, never for longer than allowed: the hardware lets the exposure
+// lines through only while the gate is open, and the closing of the gate is set before it opens.
 #pragma once
 
 #include "exposure_tracker.hpp"
@@ -25,10 +25,10 @@ class Illumination {
     /// An exposure line changed.
     void edge(std::uint8_t camera, bool exposing, Nanoseconds now);
 
-    /// What the lines say is not known any more, until they change.
+    /// The levels of the lines are unknown from here on, until they change.
     void edges_lost();
 
-    /// The word of `asked` left later: the light was on for longer.
+    /// The word due at `asked` left later: the light was on for longer.
     void left_late(Nanoseconds asked, Nanoseconds left);
 
     void poll(Nanoseconds now);
@@ -56,7 +56,7 @@ class Illumination {
     wire::IlluminationConfiguration configuration_{};
     Plan plans_[max_plans] = {};
     std::size_t plan_count_ = 0;
-    std::uint8_t exposing_ = 0;  ///< cameras whose line says so
+    std::uint8_t exposing_ = 0;  ///< cameras whose line is active
     Nanoseconds gate_on_ = 0;
     Nanoseconds gate_off_ = never;        ///< never: the gate is closed
     Nanoseconds dark_until_ = INT64_MIN;  ///< after the limit was reached

@@ -82,7 +82,7 @@ bool time_of_day(const Text& text, std::int64_t& seconds) {
 
 bool leap(unsigned year) { return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0; }
 
-/// Days since 1970. False: there is no such day.
+/// Days since 1970. False: not a valid date.
 bool days(unsigned year, unsigned month, unsigned day, std::int64_t& out) {
     constexpr unsigned before_month[] = {0,   31,  59,  90,  120, 151, 181,
                                          212, 243, 273, 304, 334, 365};
@@ -149,7 +149,7 @@ bool NmeaReader::take(std::uint8_t byte, Nanoseconds at, UtcLabel& label) {
     }
     if (byte == '\r' || byte == '\n') return finish(label);
     if (size_ == longest) {
-        size_ = 0;  // no sentence is so long
+        size_ = 0;  // no sentence is that long
         return false;
     }
     line_[size_++] = static_cast<char>(byte);

@@ -10,18 +10,17 @@
 namespace versavis::firmware {
 
 /// Seconds since 1970 of an RMC or ZDA sentence of any talker, "$GPRMC,..*hh" without the end of
-/// the line. False: it is none, is damaged, warns of itself (status V), is of no whole second or of
-/// a leap second.
+/// the line. False: not such a sentence, damaged, marked invalid (status V), not at a whole second,
+/// or at a leap second.
 bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s);
 
-/// A pulse and its name.
+/// A pulse and the second it marks.
 struct UtcLabel {
     Nanoseconds pulse = 0;
     std::int64_t utc_s = 0;
 };
 
-/// A sentence names the pulse that came last before the sentence began, if that is less than 0.9 s
-/// old.
+/// A sentence labels the last pulse before the sentence began, if that is less than 0.9 s old.
 class NmeaReader {
  public:
     void begin(std::uint32_t baud);
@@ -31,7 +30,7 @@ class NmeaReader {
         newest_ = at;
     }
 
-    /// A byte whose end arrived at `at`. True: `label` is that of a pulse; each is told once.
+    /// A byte whose end arrived at `at`. True: `label` is that of a pulse; each is given once.
     bool take(std::uint8_t byte, Nanoseconds at, UtcLabel& label);
 
     Nanoseconds byte_duration() const { return byte_duration_; }

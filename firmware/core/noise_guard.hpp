@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Keeps an input that changes without end, like one that is not connected, from taking all the
+// Keeps an input that never stops changing, such as one that is not connected, from taking all the
 // time.
 #pragma once
 
@@ -7,7 +7,7 @@
 
 namespace versavis::firmware {
 
-/// An input with more edges than any sensor makes is not listened to for a second.
+/// An input with more edges than any sensor makes is ignored for a second.
 class NoiseGuard {
  public:
     explicit NoiseGuard(EdgeStream& edges) : edges_(edges) {}
@@ -19,7 +19,7 @@ class NoiseGuard {
         edges_.listen(inputs);
     }
 
-    /// False: this edge was one too many, and the last for a second.
+    /// False: this edge was one too many; the input is ignored for a second.
     bool take(const Edge& edge) {
         if (edge.at - window_ >= window) {
             window_ = edge.at;
@@ -27,7 +27,7 @@ class NoiseGuard {
         }
         if (edge.input >= input_count || ++counts_[edge.input] < limit) return true;
         if ((muted_ >> edge.input & 1U) != 0)
-            return true;  // what was stamped before it fell silent
+            return true;  // stamped before the input was switched off
         muted_ |= 1U << edge.input;
         until_ = edge.at + silence;
         edges_.listen(inputs_ & ~muted_);

@@ -22,8 +22,8 @@ void OutputQueue::remove_first(std::size_t count) {
     size_ -= count;
 }
 
-/// True: the first edge cannot leave when it should, and was put off, with those of its output
-/// behind it.
+/// True: the first edge cannot leave on time and was postponed, with those of its output behind
+/// it.
 bool OutputQueue::postpone_first(Nanoseconds now) {
     const std::uint8_t output = edges_[0].output;
     const auto earliest = [&](const PendingEdge& edge, Nanoseconds before) {
@@ -49,8 +49,7 @@ bool OutputQueue::postpone_first(Nanoseconds now) {
 bool OutputQueue::commit(Nanoseconds now) {
     while (size_ > 0 && edges_[0].at <= now + horizon) {
         if (postpone_first(now)) continue;
-        // An edge that would undo another of the same word waits for the next, which it is put off
-        // to.
+        // An edge that would undo another of the same word is postponed to the next word.
         const Nanoseconds at = edges_[0].at;
         std::uint32_t levels = levels_;
         std::uint32_t changed = 0;
@@ -61,7 +60,7 @@ bool OutputQueue::commit(Nanoseconds now) {
             changed |= bit;
             levels = edges_[end].level ? levels | bit : levels & ~bit;
         }
-        if (!hardware_.push(at, levels)) return false;  // it is tried again at the next poll
+        if (!hardware_.push(at, levels)) return false;  // tried again at the next poll
         for (std::size_t i = 0; i < end; ++i) {
             changed_[edges_[i].output] = at;
             if (at > edges_[i].asked && late_count_ < late_capacity)

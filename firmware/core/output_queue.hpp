@@ -12,7 +12,7 @@ namespace versavis::firmware {
 
 class OutputQueue {
  public:
-    /// What is set to leave sooner than this after now goes to the hardware, and stays.
+    /// Edges due within this time go to the hardware and can no longer be changed.
     static constexpr Nanoseconds horizon = 1'000'000;
 
     explicit OutputQueue(OutputSchedule& hardware) : hardware_(hardware) {}
@@ -22,11 +22,12 @@ class OutputQueue {
     bool empty() const { return size_ == 0; }
 
     /// Sets the level of `output` at `at`, or as soon as possible after what was already committed,
-    /// and not sooner than `hold` after its level before: a pulse that is late keeps its width.
-    /// Returns the instant that is asked for. Without room nothing is set.
+    /// and not sooner than `hold` after its previous edge: a late pulse keeps its width. Returns
+    /// the instant requested. Without room nothing is set.
     Nanoseconds set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold = 0);
 
-    /// A pulse of `width` and, before it, the shortest pause that tells it from the one before.
+    /// A pulse of `width` and, before it, the shortest pause that separates it from the previous
+    /// one.
     Nanoseconds pulse(Nanoseconds at, unsigned output, bool active, Nanoseconds width) {
         const Nanoseconds begins = set(at, output, active, shortest_pause);
         set(begins + width, output, !active, width);
@@ -35,25 +36,25 @@ class OutputQueue {
 
     static constexpr Nanoseconds shortest_pause = 10'000;
 
-    /// An edge that leaves later than it was asked for; each is told once.
+    /// An edge that leaves later than requested; each is reported once.
     bool take_late(OutputSchedule::Late& late);
 
-    /// Hands to the hardware what is due within the horizon. False: its queue is full.
+    /// Hands what is due within the horizon to the hardware. False: its queue is full.
     bool commit(Nanoseconds now);
 
-    /// Instant of the first edge that is not committed; never: none.
+    /// Instant of the first edge that is not committed yet; never: none.
     Nanoseconds next() const { return size_ == 0 ? never : edges_[0].at; }
 
-    /// Removes the edges of `output` that are not committed. Returns the level that it is left at.
+    /// Removes the edges of `output` that are not committed yet. Returns the level that remains.
     bool cancel(unsigned output);
 
-    /// cancel(), and to `level` as soon as possible. Returns when it will be there at the latest.
+    /// cancel(), then `level` as soon as possible. Returns when it is reached at the latest.
     Nanoseconds rest(unsigned output, bool level, Nanoseconds now) {
         if (cancel(output) != level) return set(now, output, level);
         return committed_until_ > now ? committed_until_ : now;
     }
 
-    /// Most edges that waited since the last call.
+    /// High-water mark of waiting edges since the last call.
     std::size_t take_high_water() {
         const std::size_t most = high_water_;
         high_water_ = size_;

@@ -7,7 +7,7 @@ namespace {
 
 constexpr Nanoseconds second = 1'000'000'000;
 constexpr Nanoseconds longest_gap = 10 * second;
-constexpr Nanoseconds tolerance_per_second = 200'000;  // 200 ppm: more than any crystal is off
+constexpr Nanoseconds tolerance_per_second = 200'000;  // 200 ppm: no crystal is off by more
 constexpr std::size_t pulses_to_trust = 4;
 
 }  // namespace
@@ -20,8 +20,8 @@ void PpsMonitor::pulse(Nanoseconds at) {
                          off <= seconds * tolerance_per_second &&
                          -off <= seconds * tolerance_per_second;
     if (!regular) {
-        // Noise, or a new phase: begin with it. A source that goes on is trusted again after a few
-        // pulses.
+        // Noise, or a new phase: start over with it. A source that keeps pulsing is trusted again
+        // after a few pulses.
         count_ = 0;
     } else if (count_ == capacity) {
         for (std::size_t i = 1; i < capacity; ++i) {

@@ -20,7 +20,7 @@ class PpsMonitor {
     static constexpr std::size_t capacity = 33;
 
     Nanoseconds pulses_[capacity] = {};     ///< oldest first; whole seconds apart
-    std::uint16_t seconds_[capacity] = {};  ///< from the pulse before
+    std::uint16_t seconds_[capacity] = {};  ///< since the previous pulse
     std::size_t count_ = 0;
     std::int32_t error_ppb_ = 0;
 };

@@ -23,7 +23,7 @@ class PulseTrain {
 
     void poll(Nanoseconds now) {
         if (clock_ == nullptr) return;
-        // One that is too late would be taken for one at its time: it is left out.
+        // A late pulse would be taken for one on time: it is left out.
         if (at() < now) skip(now);
         while (at() - OutputQueue::horizon <= now && outputs_.has_room()) {
             outputs_.pulse(at(), output_, true, width_);

@@ -5,7 +5,7 @@ namespace versavis::firmware {
 
 namespace {
 
-/// 0, which says that it is unknown, when it is no age, or one that the field cannot hold.
+/// 0, for unknown, when the age is negative or does not fit the field.
 std::uint32_t age(Nanoseconds of, Nanoseconds now) {
     const Nanoseconds passed = now - of;
     return passed < 0 || passed > UINT32_MAX ? 0 : static_cast<std::uint32_t>(passed);
@@ -55,7 +55,7 @@ bool Transmitter::stage() {
            stage_first_of(healths_) || stage_first_of(samples_) || stage_first_of(logs_);
 }
 
-/// What is staged next carries the time of now.
+/// The packet staged next carries the current time.
 void Transmitter::stamp() {
     const Nanoseconds now = clock_.now();
     if (!clock_answers_.empty()) clock_answers_.front().sent_ns = now;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Packets that wait for the host, by class: when it does not read, the newest of each class stay,
-// and what is missing is counted.
+// Packets that wait for the host, by class: when it does not read, the newest of each class are
+// kept, and the missing ones are counted.
 #pragma once
 
 #include "hal.hpp"
@@ -8,7 +8,7 @@
 
 namespace versavis::firmware {
 
-/// First in, first out; when it is full the oldest makes room.
+/// First in, first out; when full, the oldest is dropped.
 template <class Message, std::size_t Capacity>
 class MessageQueue {
  public:
@@ -44,30 +44,30 @@ class Transmitter {
     Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce)
         : link_(link), clock_(clock), nonce_(nonce) {}
 
-    /// A new connection: what waits was for the one before.
+    /// A new connection: what is waiting was meant for the previous one.
     void begin();
 
     void send(const wire::BoardHello& message) { hellos_.push(message); }
     void send(const wire::Refusal& message) { refusals_.push(message); }
     void send(const wire::ConfigurationAnswer& message) { answers_.push(message); }
-    /// Its time of sending is filled when it is handed to the link; when it truly left follows
-    /// after it.
+    /// Its time of sending is filled in when it is handed to the link; a second message says when
+    /// it really left.
     void send(const wire::ClockAnswer& message) { clock_answers_.push(message); }
     void send(const wire::Exposure& message) { exposures_.push(message); }
     void send(const wire::Event& message) { events_.push(message); }
     void send(const wire::Health& message) { healths_.push(message); }
-    /// How old it is when it leaves is filled in then.
+    /// Its age is filled in when it leaves.
     void send(const wire::ImuSample& message) { samples_.push(message); }
     void send(const wire::Log& message) { logs_.push(message); }
 
-    /// Writes as much as the link takes.
+    /// Writes as much as the link accepts.
     void pump();
 
     /// True: pump() has something to do as soon as the link has room.
     bool waiting() const { return written_ < frame_.size || waiting_packets() != 0; }
 
     void count_drops(wire::Health& health) const;
-    /// Most packets that waited since the last call.
+    /// High-water mark of waiting packets since the last call.
     std::uint32_t take_high_water();
 
  private:

@@ -6,7 +6,7 @@
 
 namespace versavis::firmware {
 
-NativeBoard::NativeBoard(const Identity& identity, Surroundings environment, Nanoseconds boot)
+NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot)
     : environment_(std::move(environment)),
       now_(boot),
       fed_(boot),
@@ -57,7 +57,7 @@ void NativeBoard::run_until(Nanoseconds until) {
         attention_ = false;
         advance_hardware();
         board_.poll();
-        // What nobody reads in time is lost.
+        // What is not read in time is lost.
         while (!uart_bytes_.empty() && uart_bytes_.front().at <= now_) uart_bytes_.pop_front();
     }
     now_ = std::max(now_, until);
@@ -201,7 +201,7 @@ std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity,
     const std::size_t size = std::min(capacity, first.bytes.size());
     std::copy_n(first.bytes.begin(), size, data);
     first.bytes.erase(first.bytes.begin(), first.bytes.begin() + static_cast<std::ptrdiff_t>(size));
-    // Ten bits for each byte that is still to be read.
+    // Ten bits for each byte still to be read.
     received =
         first.at - static_cast<Nanoseconds>(first.bytes.size()) * 10'000'000'000 / board.baud_;
     if (first.bytes.empty()) board.uart_bytes_.pop_front();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board as a host process: runs the core event by event, in whatever time its owner gives it.
+// The board in a host process: runs the core event by event, in the time that its owner gives it.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@
 
 namespace versavis::firmware {
 
-/// Pins that are outputs, as Surroundings sees them. The triggers of cameras 0 to 3 are bits 0
+/// Pins that are outputs, as Environment sees them. The triggers of cameras 0 to 3 are bits 0
 /// to 3.
 enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
 /// What is connected to the board. Called from run_until(), with the instants at which the hardware
-/// would act. What is not set is not connected.
-struct Surroundings {
+/// would act. A function that is not set is not connected.
+struct Environment {
     std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
     /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
     std::function<void(Nanoseconds at, const ImuTransfer& transfer,
@@ -31,12 +31,12 @@ struct Surroundings {
         uart_sent;
     std::function<void(Nanoseconds at)> imu_output_ready;
     std::function<void(bool to_boot_loader)> reboot;
-    /// What the board stores, and finds when it begins.
+    /// What the board stores, and finds when it starts.
     std::vector<std::uint8_t>* flash = nullptr;
 };
 
-/// Events happen at the instants of the model, not when the process wakes up: after a late call of
-/// run_until() all that lies in between is made up for, in order. Not thread-safe.
+/// Events happen at the instants of the model, not when the process wakes up: a late call of
+/// run_until() catches up on everything in between, in order. Not thread-safe.
 class NativeBoard final : Clock64,
                           OutputSchedule,
                           EdgeStream,
@@ -48,7 +48,7 @@ class NativeBoard final : Clock64,
                           Rebooter,
                           Watchdog {
  public:
-    NativeBoard(const Identity& identity, Surroundings environment, Nanoseconds boot = 0);
+    NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot = 0);
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
 
@@ -67,18 +67,18 @@ class NativeBoard final : Clock64,
     /// Runs everything up to and including `until`.
     void run_until(Nanoseconds until);
 
-    /// From now on the code stands still and the hardware goes on, or both go on.
+    /// From now on the code stalls while the hardware continues, or both continue.
     void set_stalled(bool stalled) { stalled_ = stalled; }
-    /// True: it stood still for longer than the watchdog allows.
+    /// True: the code stalled for longer than the watchdog allows.
     bool watchdog_bit() const { return watchdog_bit_; }
 
-    /// From now on no IMU transfer completes, or all do again.
+    /// From now on no IMU transfer completes, or all of them do again.
     void set_imu_bus_stuck(bool stuck) { imu_bus_stuck_ = stuck; }
 
     /// When run_until() has something to do next, if no bytes come.
     Nanoseconds next_wake() const;
 
-    /// Bytes for the host that were not consumed yet; at the capacity the core has to wait.
+    /// Bytes for the host not consumed yet; when full, the core has to wait.
     std::span<const std::uint8_t> transmitted() const { return transmitted_; }
     /// They left at `at`, or later.
     void consume(std::size_t size, Nanoseconds at);
@@ -130,7 +130,7 @@ class NativeBoard final : Clock64,
     void reboot(bool to_boot_loader) override;
     void feed() override { fed_ = now_; }
 
-    /// Apart, since its functions have the names of the link's.
+    /// A class of its own, because its functions have the same names as the link's.
     struct Uart final : ImuUart {
         explicit Uart(NativeBoard& of) : board(of) {}
         void set_baud(std::uint32_t baud) override { board.baud_ = baud; }
@@ -147,7 +147,7 @@ class NativeBoard final : Clock64,
     void drive_pins(Nanoseconds at);
     bool exposing(unsigned camera) const;
 
-    Surroundings environment_;
+    Environment environment_;
     Uart uart_{*this};
     Nanoseconds now_;
     Nanoseconds fed_;

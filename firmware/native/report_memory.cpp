@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Tells at each build how much static memory the core takes: it has no other.
+// Prints at each build how much static memory the core takes: it has no other.
 #include <cstdio>
 
 #include "board.hpp"

@@ -18,8 +18,12 @@ namespace {
 constexpr std::int64_t longest_wait_ns = 20'000'000;
 constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
 
-/// Copies with relaxed atomic loads, so that a copy that races with the writer is stale but
-/// defined.
+/// Copies a payload that the writer may be overwriting. The writer fills slots with plain stores
+/// (memcpy, or a camera's driver), so to the language such a copy is a data race even with the
+/// atomic loads here. It does no harm in practice: the loads are whole words that the compiler
+/// neither repeats nor leaves out, racing loads do not trap, and no word is interpreted while it is
+/// copied. The copy may still mix two items: only intact() afterwards (SYNC 4) decides whether it
+/// is good.
 void copy_words(const std::byte* source, std::byte* destination, std::size_t size) {
     const auto* words =
         reinterpret_cast<const std::atomic<std::uint64_t>*>(source);  // slots are page-aligned
@@ -66,7 +70,7 @@ struct Reader::Segment {
 
 Expected<std::unique_ptr<Reader::Segment>> Reader::map(const std::filesystem::path& path) {
     if (auto owner = check_owner(path); !owner) return Unexpected(owner.error());
-    const FileId file = file_id(path);  // before the mapping: a successor in between is seen as one
+    const FileId file = file_id(path);  // before mapping: a successor made in between is noticed
     auto mapping = Mapping::open(path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
     return std::make_unique<Segment>(Segment{std::move(*mapping), file});
@@ -90,6 +94,9 @@ Reader::~Reader() = default;
 StreamKind Reader::kind() const { return segment_->mapping.header().kind; }
 const char* Reader::name() const { return segment_->mapping.header().name; }
 std::uint64_t Reader::head() const {
+    // SYNC 1: acquire here, release in Writer::write_descriptor(): all items below `head` are
+    // complete in memory. Without it a new head could show an old descriptor, and an item that has
+    // just been published would be taken for lost.
     return segment_->mapping.header().head.load(std::memory_order_acquire);
 }
 std::uint32_t Reader::writer_pid() const { return segment_->mapping.header().writer_pid; }
@@ -105,6 +112,8 @@ HostTime Reader::last_heartbeat() const {
 }
 
 bool Reader::writer_alive() const {
+    // SYNC 6: acquire here, release in retire(): whoever sees the segment closed also sees its
+    // last item when it looks at `head` again. Without it that item could go unread.
     const auto state = segment_->mapping.header().state.load(std::memory_order_acquire);
     return state == static_cast<std::uint32_t>(WriterState::live) &&
            (host_now() - last_heartbeat()).ns < heartbeat_limit_ns;
@@ -116,6 +125,9 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     Item item;
     item.number = number;
     const std::uint64_t complete = 2 * number + 2;
+    // SYNC 2: acquire here, release in Writer::write_descriptor(): the descriptor's words, the
+    // payload and the slot's generation are at least as new as this item. Without it the words of
+    // the item that lay here before could be taken for this one's.
     if (descriptor.sequence.load(std::memory_order_acquire) != complete) return item;
     item.slot_generation = descriptor.slot_generation.load(std::memory_order_relaxed);
     const std::uint64_t length_and_slot =
@@ -123,6 +135,9 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     item.time.ns = descriptor.output_time_ns.load(std::memory_order_relaxed);
     for (std::size_t i = 0; i < metadata_words; ++i)
         item.metadata[i] = descriptor.metadata[i].load(std::memory_order_relaxed);
+    // SYNC 3: acquire fence here, release fence in Writer::write_descriptor(): if any word above
+    // came from the next item, the sequence below is no longer this item's. Without it a mixture of
+    // two descriptors would pass.
     std::atomic_thread_fence(std::memory_order_acquire);
     if (descriptor.sequence.load(std::memory_order_relaxed) != complete) return item;
 
@@ -158,8 +173,9 @@ Item Reader::next() {
 Item Reader::idle() {
     Item item;
     const Header& header = segment_->mapping.header();
-    // A writer that was killed never marked its segment: its silence counts, too.
+    // A writer that was killed never marked its segment: its silence counts as well.
     if (writer_alive()) return item;
+    if (next_ < head()) return item;  // published since the last look: the next look finds it
     item.found = Found::gone;
     if (file_id(path_) == segment_->file) return item;
     auto successor = map(path_);
@@ -174,6 +190,9 @@ Item Reader::wait(Duration timeout) {
     const HostTime deadline = host_now() + timeout;
     for (;;) {
         const auto& wake = segment_->mapping.header().wake;
+        // SYNC 5: acquire here, release in Writer::write_descriptor() and retire(): whatever moved
+        // `wake` to the value seen is visible to next(); whatever comes later changes it, and the
+        // kernel does not go to sleep. Without it a reader could sleep over an item.
         const std::uint32_t seen = wake.load(std::memory_order_acquire);
         Item item = next();
         const bool final_result = item.found != Found::nothing && item.found != Found::gone;
@@ -189,7 +208,10 @@ Item Reader::wait(Duration timeout) {
 bool Reader::intact(const Item& item) const {
     if (item.slot == no_slot) return true;
     if (item.slot >= segment_->mapping.header().slot_count)
-        return false;  // of a segment before this one
+        return false;  // the item is from an earlier segment
+    // SYNC 4: acquire fence here, release fence in Writer::acquire(): if anything that was read of
+    // the payload came from a newer item, the generation has changed. Without it a mixture of two
+    // payloads would pass for a good one.
     std::atomic_thread_fence(std::memory_order_acquire);
     return segment_->mapping.generation(item.slot).load(std::memory_order_relaxed) ==
            item.slot_generation;

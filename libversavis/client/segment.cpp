@@ -56,6 +56,8 @@ Expected<Mapping> Mapping::open_unchecked(const std::filesystem::path& path, Acc
 Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access) {
     auto mapping = open_unchecked(path, access);
     if (!mapping) return mapping;
+    // SYNC 7: acquire here, release at the end of the writer's fill_header(): with the magic, the
+    // rest of the header is complete. Without it a header could be checked and used half filled.
     if (mapping->size() < page_size ||
         mapping->header().magic.load(std::memory_order_acquire) != magic)
         return failure(path.string(), "is not a VersaVIS ring");
@@ -74,7 +76,7 @@ std::uint64_t start_ticks_of_this_process() {
     std::ifstream stat("/proc/self/stat");
     std::string line;
     std::getline(stat, line);
-    std::size_t at = line.rfind(')');  // the command may contain blanks
+    std::size_t at = line.rfind(')');  // the command may contain spaces
     for (int field = 3; field <= 22 && at != std::string::npos; ++field)
         at = line.find(' ', at + 1);
     return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
@@ -86,7 +88,10 @@ bool is_own(const Header& header) {
 }
 
 void retire(Header& header, WriterState state) {
+    // SYNC 6: release here, acquire in Reader::writer_alive(): the last item, and the name of the
+    // successor, precede the new state.
     header.state.store(static_cast<std::uint32_t>(state), std::memory_order_release);
+    // SYNC 5: release here, acquire in Reader::wait(): a reader that wakes up sees the new state.
     header.wake.fetch_add(1, std::memory_order_release);
     futex_wake(header.wake);
 }

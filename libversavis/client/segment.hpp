@@ -16,10 +16,10 @@ class Mapping {
  public:
     enum class Access { read_only, read_write };
 
-    /// Maps and checks `path`; every offset is proved to lie inside the file.
+    /// Maps and checks `path`; every offset is checked to lie inside the file.
     static Expected<Mapping> open(const std::filesystem::path& path, Access access);
 
-    /// Maps a file that is being made: nothing is checked.
+    /// Maps a file that is still being filled in: nothing is checked.
     static Expected<Mapping> open_unchecked(const std::filesystem::path& path, Access access);
 
     Header& header() const { return *static_cast<Header*>(region_.get_address()); }
@@ -42,20 +42,20 @@ class Mapping {
     boost::interprocess::mapped_region region_;
 };
 
-/// Field 22 of /proc/self/stat: with the process id, tells this process from all before it.
+/// Field 22 of /proc/self/stat. With the process id it identifies this process until reboot.
 std::uint64_t start_ticks_of_this_process();
 
 /// True when this process made the segment.
 bool is_own(const Header& header);
 
-/// Marks a segment that some writer left behind as `state` and wakes its readers.
+/// Ends a segment: marks it as `state` and wakes its readers.
 void retire(Header& header, WriterState state);
 
 /// Wakes every process that waits on the futex `word`. std::atomic::notify would reach this process
 /// only.
 void futex_wake(const std::atomic<std::uint32_t>& word);
 
-/// Waits until `word` is no longer `value`, or `timeout_ns` has passed, or for no reason.
+/// Waits until `word` is no longer `value`, or `timeout_ns` has passed; may also return early.
 void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
                 std::int64_t timeout_ns);
 

@@ -9,7 +9,7 @@
 
 namespace versavis::wire {
 
-/// Largest encoded size of `size` bytes, delimiter not included.
+/// Largest encoded size of `size` bytes, without the delimiter.
 constexpr std::size_t cobs_bound(std::size_t size) { return size + size / 254 + 1; }
 
 /// Encodes `size` bytes of `data` to `out`, which has room for cobs_bound(size); returns the

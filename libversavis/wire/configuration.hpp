@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the host tells the board to be: the configuration and its answer
+// How the host configures the board, and what the board answers
 // (docs/contracts/wire-protocol.md); freestanding C++17.
 #pragma once
 
@@ -22,8 +22,8 @@ struct CameraConfiguration {
     std::uint32_t pulse_ns;        ///< trigger pulse width: 1'000 to 10'000'000
     std::uint32_t latency_ns;      ///< trigger to start of exposure: up to 100'000'000
     std::uint32_t gap_ns;          ///< least time from end of exposure to the next trigger
-    std::int64_t exposure_ns;      ///< expected until one was measured or announced
-    std::int64_t max_exposure_ns;  ///< an exposure that lasts longer is given up
+    std::int64_t exposure_ns;      ///< expected until one has been measured or announced
+    std::int64_t max_exposure_ns;  ///< the board gives up on an exposure that lasts longer
     std::uint8_t master;           ///< of a slave: the camera whose exposure line triggers it
     std::uint8_t reserved[7];
 };
@@ -52,7 +52,7 @@ struct ImuConfiguration {
     std::uint8_t filter;   ///< strength of the part's own filter; 0: the weakest
     std::uint8_t options;  ///< bits of ImuOption
     std::uint8_t reserved;
-    std::uint32_t rate_millihertz;  ///< sample rate; with data-ready one that the part has
+    std::uint32_t rate_millihertz;  ///< sample rate; with data-ready, one of the part's own
 };
 
 enum IlluminationFlag : std::uint8_t { illumination_inverted = 1U << 0U };  ///< low is on
@@ -62,7 +62,7 @@ struct IlluminationConfiguration {
     std::uint8_t cameras;  ///< bit mask; 0: no light
     std::uint8_t flags;    ///< bits of IlluminationFlag
     std::uint16_t reserved;
-    std::uint32_t lead_ns;    ///< on so long before the exposure: up to 1'000'000
+    std::uint32_t lead_ns;    ///< on this long before the exposure: up to 1'000'000
     std::uint32_t max_on_ns;  ///< never on for longer at a time: 10'000 to 1'000'000'000
     std::uint32_t duty_ppm;   ///< never on for a larger part of the time: 1 to 1'000'000
 };
@@ -72,7 +72,8 @@ inline constexpr std::size_t pulse_input_count = 4;
 
 enum PortOption : std::uint8_t {
     port_imu_output = 1U << 0U,  ///< the second SPI port serves the samples of IMU 0
-    port_nmea = 1U << 1U,  ///< a GNSS receiver's NMEA sentences come at the UART, instead of an IMU
+    port_nmea =
+        1U << 1U,  ///< a GNSS receiver is at the UART and sends NMEA sentences, instead of an IMU
 };
 
 /// What the test output shows: a grid point of a camera, where the middle of its exposure should
@@ -80,7 +81,7 @@ enum PortOption : std::uint8_t {
 enum TestSource : std::uint8_t { test_none = 0, test_camera0 = 1, test_imu0 = 5 };
 
 struct PortConfiguration {
-    std::uint8_t inputs;   ///< bit mask of PulseInput that are listened to
+    std::uint8_t inputs;   ///< bit mask of the PulseInputs in use
     std::uint8_t falling;  ///< bit mask of those whose falling edge counts
     std::uint8_t options;  ///< bits of PortOption
     std::uint8_t test;     ///< TestSource: test_camera0 + camera, or test_imu0 + port
@@ -95,7 +96,7 @@ enum ConfigurationFlag : std::uint32_t {
         1U << 0U,  ///< also in force after the next power-up, before any host says so
 };
 
-/// The whole configuration; taken as a whole or not at all, and only while stopped.
+/// The whole configuration; accepted as a whole or not at all, and only while stopped.
 struct Configuration {
     static constexpr Type type = Type::configuration;
     std::uint32_t id;     ///< repeated in the answer
@@ -132,7 +133,7 @@ enum class ConfigurationField : std::uint8_t {
     nmea_baud = 21,
 };
 
-/// One field that the board does not take; one packet for each, before the answer.
+/// One field that the board refuses; one packet for each, before the answer.
 struct Refusal {
     static constexpr Type type = Type::refusal;
     std::uint32_t id;  ///< of the configuration

@@ -46,7 +46,7 @@ enum Capability : std::uint32_t {
     capability_sync = 1U << 6U,
     capability_imu_output = 1U << 7U,
     capability_host_grid = 1U << 8U,  ///< the grid can be aligned by the host
-    capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART name the pulses of the PPS input
+    capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART label the pulses of the PPS input
 };
 
 struct BoardHello {
@@ -73,7 +73,7 @@ enum ExposureFlag : std::uint16_t {
     exposure_overlong =
         1U << 7U,  ///< longer than the maximum exposure (no end), or than the period
     exposure_clipped =
-        1U << 8U,  ///< more was announced than the maximum exposure, which was expected then
+        1U << 8U,  ///< more than the maximum exposure was announced; the maximum was used
     exposure_from_master =
         1U << 9U,               ///< a slave without exposure line: start and end are the master's
     exposure_slow = 1U << 10U,  ///< part of the slow start
@@ -130,19 +130,20 @@ enum class EventKind : std::uint8_t {
     pps = 5,              ///< value: pulses of this input since boot
     aux_pulse = 6,        ///< source: 0 or 1; value: pulses of this input since boot
     sync_pulse = 7,       ///< value: pulses of this input since boot
-    input_noisy = 8,      ///< an input is not listened to for a second; source: input of the board
+    input_noisy = 8,      ///< an input is ignored for a second; source: input of the board
     illumination_limited =
         9,            ///< the light would have been on for too long; value: ns that it stays dark
-    imu_ready = 10,   ///< the part answers and is set up; value: what identifies it
-    imu_failed = 11,  ///< the part is not what it should be; detail: step; value: what it said
-    imu_silent = 12,  ///< no data-ready edge, no end of a transfer or no bytes came
-    utc_label = 13,  ///< a sentence named the PPS pulse of this time; value: UTC seconds since 1970
+    imu_ready = 10,   ///< the part answers and is set up; value: its identity
+    imu_failed = 11,  ///< the part is not the one configured; detail: step; value: what it answered
+    imu_silent = 12,  ///< no data-ready edge, end of transfer or bytes arrived
+    utc_label =
+        13,  ///< a sentence labelled the PPS pulse at this time; value: UTC seconds since 1970
 };
 
 enum class SkipReason : std::uint16_t {
     busy = 0,  ///< the camera was, or would have been, exposing
-    late = 1,  ///< the instant had gone by
-    full = 2,  ///< too many pulses wait already
+    late = 1,  ///< the instant had passed
+    full = 2,  ///< too many pulses are waiting already
 };
 
 struct Event {
@@ -169,7 +170,7 @@ struct ClockAnswer {
     std::int64_t sent_ns;      ///< this answer, stamped as it was handed to the link
 };
 
-/// After the answer, from boards whose link can tell: when it truly left.
+/// Follows the answer, from boards whose link can tell when it really left.
 struct ClockFollowUp {
     static constexpr Type type = Type::clock_follow_up;
     std::uint32_t id;  ///< of the request
@@ -179,7 +180,7 @@ struct ClockFollowUp {
 
 enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
 
-/// Once a second; counters since boot, high-water marks since the report before.
+/// Once a second; counters since boot, high-water marks since the previous report.
 struct Health {
     static constexpr Type type = Type::health;
     std::int64_t board_time_ns;
@@ -191,16 +192,16 @@ struct Health {
     std::uint32_t dropped_logs;
     std::uint32_t receive_errors;         ///< packets from the host that were malformed
     std::uint32_t imu_errors[imu_count];  ///< samples with a failed check
-    std::uint32_t imu_restarts;           ///< times that an IMU had to be set up again
+    std::uint32_t imu_restarts;           ///< how often an IMU had to be set up again
     std::uint32_t late_outputs;
     std::uint32_t lost_edges;
     std::uint32_t stray_edges;
     std::uint32_t skipped_triggers;
-    std::uint32_t noisy_inputs;      ///< times that an input was not listened to for a second
+    std::uint32_t noisy_inputs;      ///< times that an input was ignored for a second
     std::uint32_t output_queue_max;  ///< edges that waited
     std::uint32_t link_queue_max;    ///< packets that waited
-    std::uint32_t loop_max_ns;   ///< longest time from when something was due to when it was done
-    std::int32_t pps_error_ppb;  ///< board clock against PPS: positive runs fast
+    std::uint32_t loop_max_ns;       ///< longest delay between something being due and being done
+    std::int32_t pps_error_ppb;      ///< board clock against PPS: positive runs fast
     PpsState pps_state;
     ResetCause reset_cause;
     std::uint16_t ignored;  ///< messages of the host that were out of range, modulo 2^16
@@ -221,7 +222,7 @@ enum StartFlag : std::uint8_t {
         1U << 2U,  ///< begin the grid at the next pulse of the sync input, and follow them
 };
 
-/// Starts the cameras of the mask; one that runs already begins its pattern anew.
+/// Starts the cameras of the mask; one that is already running begins its pattern anew.
 struct Start {
     static constexpr Type type = Type::start;
     std::uint8_t cameras;  ///< bit mask
@@ -250,29 +251,29 @@ struct Reboot {
 };
 inline constexpr std::uint32_t reboot_magic = 0x544F4F42U;
 
-/// The nearest whole second of the grid belongs at `board_ns`; from there on the grid keeps this
+/// The nearest whole second of the grid belongs at `board_ns`; from there on the grid runs at this
 /// pace.
 struct AlignGrid {
     static constexpr Type type = Type::align_grid;
     std::int64_t board_ns;  ///< at most 100 s from now
-    std::int32_t pace_ppb;  ///< board time passes so much faster than grid time: up to 500 ppm
+    std::int32_t pace_ppb;  ///< how much faster board time passes than grid time: up to 500 ppm
     std::uint32_t
-        max_slew_ppb;  ///< the grid goes there by no more than so much beyond its pace: 1 to 10^6
+        max_slew_ppb;  ///< the grid gets there at no more than this beyond its pace: 1 to 10^6
 };
 inline constexpr std::int64_t align_reach_ns = 100'000'000'000;
 inline constexpr std::int32_t align_largest_pace_ppb = 500'000;
 inline constexpr std::uint32_t align_largest_slew_ppb = 1'000'000;
 
 /// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first;
-/// afterwards all do. Four neighbouring gaps that are not all equal stand nowhere else in any of
-/// them, so that five frames name their triggers, and show it when the cables of two cameras are
-/// swapped. A slave has its master's.
+/// afterwards all do. Four neighbouring gaps that are not all equal occur only once in all of the
+/// patterns, so that five frames identify their triggers, and show when the cables of two cameras
+/// are swapped. A slave has its master's.
 inline constexpr std::uint32_t start_pattern_bits[camera_count] = {0xE4A9B, 0xA3A73, 0xE2765,
                                                                    0xE1AE3};
 inline constexpr unsigned start_pattern_length = 20;
 
-/// Slow start: every so many grid points get a pulse. Each camera has an interval of its own, of 1
-/// s at least.
+/// Slow start: only every n-th grid point gets a pulse. Each camera has an interval of its own, at
+/// least 1 s.
 constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera) {
     return (rate_uhz * (4 + camera) + 3'999'999) / 4'000'000;
 }

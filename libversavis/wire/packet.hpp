@@ -12,17 +12,17 @@
 namespace versavis::wire {
 
 inline constexpr std::size_t crc_size = sizeof(std::uint32_t);
-/// Largest number of bytes that one packet takes in the stream, delimiter included.
+/// Most bytes that one packet takes in the stream, with its delimiter.
 inline constexpr std::size_t max_frame_size = cobs_bound(max_packet_size) + 1;
 static_assert(sizeof(Header) + sizeof(ConfigurationAnswer) + crc_size <= max_packet_size);
 
-/// Bytes of one encoded packet, delimiter included.
+/// Bytes of one encoded packet, with its delimiter.
 struct Frame {
     std::uint8_t bytes[max_frame_size];
     std::size_t size;
 };
 
-/// A packet whose CRC was right, and whose size was if its type is known: receivers ignore unknown
+/// A packet with the right CRC and, if its type is known, the right size: receivers ignore unknown
 /// types. `payload` lives until the decoder's next call.
 struct Packet {
     Header header;
@@ -81,7 +81,7 @@ class Decoder {
         }
     }
 
-    /// Runs of bytes between delimiters that were no valid packet.
+    /// Runs of bytes between delimiters that were not a valid packet.
     std::uint32_t errors() const { return errors_; }
 
  private:

@@ -15,7 +15,7 @@ inline constexpr std::uint8_t protocol_major = 2;
 inline constexpr std::uint8_t protocol_minor = 2;
 inline constexpr std::size_t camera_count = 4;
 
-/// Time fields of value `no_time` say that the instant was not observed.
+/// `no_time` in a time field: the instant was not observed.
 inline constexpr std::int64_t no_time = INT64_MIN;
 
 enum class Type : std::uint8_t {

@@ -13,7 +13,7 @@ constexpr Nanoseconds ms = 1'000'000;
 constexpr std::uint32_t burst_clock_limit_hz = 1'000'000;
 constexpr std::uint32_t clock_limit_hz = 2'000'000;
 
-/// The maker's recipe: shift right by the unreversed polynomial, invert, swap.
+/// The manufacturer's recipe: shift right by the unreversed polynomial, invert, swap.
 std::uint16_t crc16(const std::vector<std::uint16_t>& words, std::size_t first, std::size_t last) {
     unsigned crc = 0xFFFF;
     for (std::size_t i = first; i <= last; ++i)

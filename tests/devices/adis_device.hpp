@@ -13,7 +13,7 @@ enum class AdisModel { adis16445, adis16448a, adis16448b, adis16460, adis16470 }
 
 class AdisDevice final : public SpiImuDevice {
  public:
-    /// It answers from 290 ms after power-up on, as the slowest of them.
+    /// It answers from 290 ms after power-up on, like the slowest of them.
     AdisDevice(AdisModel model, World world, Nanoseconds answers_from = 290'000'000);
 
     void transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
@@ -40,7 +40,7 @@ class AdisDevice final : public SpiImuDevice {
         bool octaves;
         bool magnetic;
         Nanoseconds stall, reset;
-        Nanoseconds word_interval;  ///< least time from word to word, outside of bursts
+        Nanoseconds word_interval;  ///< shortest time from word to word, outside bursts
         std::uint16_t control_default, rate_default, filter_default;
     };
     static const Map& map(AdisModel model);

@@ -51,8 +51,8 @@ void Icm42688pDevice::write(unsigned address, std::uint8_t value, Nanoseconds at
         return;
     }
     const bool mode = address == 0x4E || address == 0x4F || address == 0x50;
-    // While it runs only rate, range and mode may change; and nothing right after it was switched
-    // on.
+    // While it is running only rate, range and mode may change; and nothing right after it was
+    // switched on.
     if (running() && (!mode || at < on_at_ + 200 * us)) ++breaches_;
     if (address == 0x4E && (value & 0x0FU) == 0x0F && !running()) on_at_ = at;
     registers_[address] = value;
@@ -147,7 +147,7 @@ std::uint8_t Bmi088Device::read_gyro(unsigned address, Nanoseconds at) const {
 std::uint8_t Bmi088Device::read_accel(unsigned address, Nanoseconds at) const {
     const bool data = (address >= 0x12 && address <= 0x17) || address == 0x22 || address == 0x23;
     if (!data || !accel_on()) return accel_[address];
-    // It samples by a clock of its own, 0.4 % off.
+    // It samples with a clock of its own, 0.4 % off.
     constexpr double rates[] = {1, 1, 1, 1, 1, 12.5, 25, 50, 100, 200, 400, 800, 1600, 1, 1, 1};
     const UpdateTimes times{accel_on_at_, 1.004e9 / rates[accel_[0x40] & 0xFU]};
     const Inertial felt = world_(times.time(times.index_at(at)));

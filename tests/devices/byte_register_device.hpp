@@ -49,7 +49,7 @@ class Bmi088Device final : public SpiImuDevice {
                   std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
-    /// Of the accelerometer alone: the gyro goes on.
+    /// Of the accelerometer alone: the gyro keeps running.
     void brown_out(Nanoseconds at) override {
         reset_accel(at);
         accel_spi_ = true;

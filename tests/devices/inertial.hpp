@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an IMU feels at an instant, and what every model of one offers.
+// What an IMU feels at an instant, and the interface of every model of one.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct Inertial {
     double pressure_mbar = 1013.25;
 };
 
-/// True motion and surroundings at a time.
+/// True motion and environment at an instant.
 using World = std::function<Inertial(Nanoseconds at)>;
 
 /// Instants at which a sensor takes new data: `period_ns` apart, counted from `origin`, without
@@ -43,9 +43,9 @@ class SpiImuDevice {
     virtual void transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
                           std::span<std::uint8_t> received) = 0;
 
-    /// When new data is taken, as it is set up now; a data-ready edge rises at each of them.
+    /// When new data is taken with the present settings; a data-ready edge rises at each instant.
     virtual UpdateTimes updates() const = 0;
-    /// False: the data-ready line does not pulse, as it is set up now.
+    /// False: the data-ready line does not pulse with the present settings.
     virtual bool signals(Nanoseconds at) const = 0;
 
     /// The part loses its settings, as after a brown-out.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A VN-100 as the other end of its UART sees it: text commands in, text and binary packets out.
+// A VN-100 as seen from the other end of its UART: text commands in, text and binary packets out.
 #pragma once
 
 #include <optional>

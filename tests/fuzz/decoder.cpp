@@ -14,14 +14,14 @@ namespace {
 constexpr firmware::Nanoseconds step_ns = 200'000;
 
 /// An IMU that answers with its input bytes over and over.
-firmware::Surroundings babbling(std::span<const std::uint8_t> bytes) {
-    firmware::Surroundings surroundings;
-    surroundings.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&,
-                                                               auto received) mutable {
+firmware::Environment babbling(std::span<const std::uint8_t> bytes) {
+    firmware::Environment environment;
+    environment.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&,
+                                                              auto received) mutable {
         for (std::uint8_t& byte : received)
             byte = bytes.empty() ? 0xFF : bytes[next++ % bytes.size()];
     };
-    return surroundings;
+    return environment;
 }
 
 /// Something of everything.

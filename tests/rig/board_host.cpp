@@ -22,7 +22,7 @@ namespace versavis::rig {
 
 namespace {
 
-constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is seen after that
+constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is noticed after this time
 
 devices::Inertial felt(const Motion& motion, HostTime at) {
     constexpr double degrees = 180 / 3.14159265358979;
@@ -39,7 +39,7 @@ constexpr Duration marked_ahead = milliseconds(500);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
 
-/// As a receiver in Zurich says it.
+/// As a receiver in Zurich reports it.
 std::string rmc(std::int64_t utc_s) {
     const std::time_t seconds = utc_s;
     std::tm utc{};
@@ -62,7 +62,8 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
     sockaddr_un self{};
     self.sun_family = AF_UNIX;
     if (socket_path.size() >= sizeof self.sun_path)
-        return failure(socket_path, "the socket's path is too long");
+        return failure(socket_path, "the path of the socket is too long",
+                       "choose a shorter one with --socket");
     std::memcpy(self.sun_path, socket_path.c_str(), socket_path.size() + 1);
     ::unlink(socket_path.c_str());
     const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -113,14 +114,13 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     imu_samples_ = 0;
     next_utc_s_ = 0;
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
-    firmware::Surroundings surroundings;
-    surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
-    surroundings.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+    firmware::Environment environment;
+    environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
+    environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
         imu_transfer(at, transfer, received);
     };
-    surroundings.reboot = [this](bool) { reset(); };
-    board_ =
-        std::make_unique<firmware::NativeBoard>(identity, std::move(surroundings), board_now());
+    environment.reboot = [this](bool) { reset(); };
+    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(environment), board_now());
 }
 
 void BoardHost::restart() {
@@ -167,7 +167,7 @@ void BoardHost::run() {
     }
 }
 
-/// The pulse of each second, and its sentence.
+/// The pulse at each second, and its sentence.
 void BoardHost::hear_gnss() {
     constexpr std::int64_t second_ns = 1'000'000'000;
     const Duration offset = utc_->offset();
@@ -211,13 +211,13 @@ void BoardHost::exchange_bytes() {
     ssize_t size = 0;
     while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0) {
         const firmware::Nanoseconds at = board_now();
-        board_->run_until(at);  // nothing answers before it was asked
+        board_->run_until(at);  // nothing answers before it is asked
         board_->receive({buffer, static_cast<std::size_t>(size)}, at);
         board_->run_until(at);
     }
     if (size == 0 || errno != EAGAIN) return drop_host();
     const auto out = board_->transmitted();
-    // The time before: the host may have the bytes before this process goes on.
+    // Stamped before writing: the host may receive the bytes before this process continues.
     const firmware::Nanoseconds leaving = board_now();
     const ssize_t sent = out.empty() ? 0 : ::send(host_, out.data(), out.size(), MSG_NOSIGNAL);
     if (sent > 0) board_->consume(static_cast<std::size_t>(sent), leaving);

@@ -21,7 +21,7 @@ namespace versavis::rig {
 
 class BoardHost {
  public:
-    /// Error: the socket cannot be made.
+    /// Error: the socket cannot be created.
     static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
                                                        const std::string& socket_path,
                                                        HostTime zero, const Motion& motion,
@@ -31,7 +31,7 @@ class BoardHost {
     BoardHost(const BoardHost&) = delete;
     BoardHost& operator=(const BoardHost&) = delete;
 
-    /// The board starts anew as soon as it can. From any thread.
+    /// The board restarts as soon as it can. Callable from any thread.
     void reset() { reset_pending_ = true; }
 
  private:
@@ -55,7 +55,7 @@ class BoardHost {
     std::string serial_;
     std::uint64_t seed_;
     ClockErrors clock_errors_;
-    std::optional<clock::OutputClock> utc_;  ///< that the GNSS receiver tells, if there is one
+    std::optional<clock::OutputClock> utc_;  ///< what the GNSS receiver sends, if there is one
     std::string imu_name_;
     std::string socket_path_;
     devices::AdisDevice imu_;
@@ -70,7 +70,7 @@ class BoardHost {
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
-    std::int64_t next_utc_s_ = 0;  ///< that the receiver is to mark; 0: the next
+    std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
     std::atomic<bool> reset_pending_{false};
     std::atomic<bool> stop_{false};
     std::thread thread_;

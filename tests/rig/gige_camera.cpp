@@ -67,8 +67,8 @@ bool same(const sockaddr_in& a, const sockaddr_in& b) {
     return a.sin_addr.s_addr == b.sin_addr.s_addr && a.sin_port == b.sin_port;
 }
 
-/// Hears what is sent to everybody. Never on loopback: a rig there must not show up on the
-/// machine's real networks.
+/// Receives broadcasts. Never on loopback: a rig there must not show up on the machine's real
+/// networks.
 int open_broadcast_socket(sockaddr_in self) {
     if ((ntohl(self.sin_addr.s_addr) >> 24U) == 127) return -1;
     self.sin_addr.s_addr = INADDR_BROADCAST;
@@ -373,7 +373,7 @@ Missing GigeCamera::missing_part() const {
     return Missing::nothing;
 }
 
-/// The scene is as bright as it was exposed long.
+/// The brightness of the scene follows the exposure time.
 void GigeCamera::light_up(StreamFrame& frame, Duration exposure) const {
     const double gain = settings_.light * static_cast<double>(exposure.ns) * 1e-6;
     std::array<std::uint8_t, 256> table{};
@@ -386,7 +386,7 @@ void GigeCamera::light_up(StreamFrame& frame, Duration exposure) const {
     frame.owned_pixels = std::move(lit);
 }
 
-/// Each chunk is followed by its id and length; the image's lies at its end.
+/// Each chunk is followed by its id and length; those of the image come right after it.
 std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure) const {
     std::vector<std::uint8_t> out;
     put_word(out, chunk_id_image);

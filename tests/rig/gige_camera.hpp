@@ -23,7 +23,7 @@ namespace versavis::rig {
 
 class GigeCamera final : public TriggeredCamera {
  public:
-    /// Binds the control port. Error: the address is not there or taken.
+    /// Binds the control port. Error: the address does not exist or is taken.
     static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario,
                                                         const CameraScenario& settings,
                                                         HostTime zero, const Motion& motion,
@@ -34,7 +34,7 @@ class GigeCamera final : public TriggeredCamera {
 
     std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) override;
 
-    /// Calls `reset` with each of these exposures, counted since the rig's start.
+    /// Calls `reset` at each of these exposures, counted since the rig's start.
     void reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset);
 
     const CameraScenario& settings() const override { return settings_; }
@@ -94,7 +94,7 @@ class GigeCamera final : public TriggeredCamera {
     std::atomic<bool> power_cycle_pending_{false};
     std::atomic<bool> stop_{false};
     int socket_;
-    int broadcast_socket_;  ///< hears discovery; -1 on loopback, which does not broadcast
+    int broadcast_socket_;  ///< receives discovery; -1 on loopback, which does not broadcast
     std::thread server_;
 };
 

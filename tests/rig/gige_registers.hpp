@@ -47,7 +47,7 @@ enum Register : std::uint32_t {
     reg_acquisition_mode = 0x10010,
     reg_acquisition_start = 0x10014,
     reg_acquisition_stop = 0x10018,
-    reg_frame_rate = 0x1001C,  ///< float, big-endian, as all floats here
+    reg_frame_rate = 0x1001C,  ///< float, big-endian, like all floats here
     reg_trigger_selector = 0x10020,
     reg_trigger_mode = 0x10024,
     reg_trigger_source = 0x10028,
@@ -95,7 +95,7 @@ class GigeRegisters {
     };
     explicit GigeRegisters(const Identity& identity);
 
-    /// All registers as after power-up.
+    /// Puts all registers into their state after power-up.
     void reset();
 
     /// False: no such register.

@@ -23,8 +23,8 @@ void GroundTruth::add(const TrueTrigger& t) {
 
 void GroundTruth::add(const TrueExposure& e) {
     write(fmt::format(
-        R"({{"type":"exposure","camera":"{}","board_life":{},"trigger":{},"serial":{},"block_id":{},)"
-        R"("start_ns":{},"end_ns":{},"sent":{}}})",
+        R"({{"type":"exposure","camera":"{}","board_life":{},"trigger":{},"serial":{},)"
+        R"("block_id":{},"start_ns":{},"end_ns":{},"sent":{}}})",
         e.camera, e.board_life, e.trigger, e.serial, e.block_id, e.start.ns, e.end.ns, e.sent));
 }
 

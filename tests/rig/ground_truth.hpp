@@ -16,7 +16,7 @@ namespace versavis::rig {
 struct TrueTrigger {
     std::string camera;
     std::uint64_t board_life = 0;
-    std::uint64_t trigger = 0;  ///< pulses on this camera's line in this life of the board
+    std::uint64_t trigger = 0;  ///< pulses on this camera's line since the board's boot
     HostTime at;
     bool taken = false;  ///< false: the camera did not expose
 };
@@ -25,7 +25,7 @@ struct TrueExposure {
     std::string camera;
     std::uint64_t board_life = 0;
     std::uint64_t trigger = 0;  ///< 0: free run
-    std::uint64_t serial = 0;   ///< stands in the first pixels of the frame
+    std::uint64_t serial = 0;   ///< written into the first pixels of the frame
     std::uint64_t block_id = 0;
     HostTime start;
     HostTime end;
@@ -46,7 +46,7 @@ struct TrueImuSample {
     HostTime at;
 };
 
-/// Thread-safe. Each record is one line, written at once.
+/// Thread-safe. Each record is one line, written immediately.
 class GroundTruth {
  public:
     /// Empty path: nothing is written.

@@ -186,7 +186,7 @@ void GvspTransmitter::run() {
         const StreamFrame frame = queue_.front();
         queue_.pop_front();
         const StreamSettings settings = settings_;
-        // What is to be missing is missing when it is asked for again, too.
+        // A packet that is to be missing is also missing when it is requested again.
         if (frame.missing == Missing::nothing) sent_.push_back(frame);
         if (sent_.size() > most_resendable) sent_.pop_front();
         lock.unlock();
@@ -217,7 +217,7 @@ void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& s
     frame.sent(last);
 }
 
-/// One packet that is made up, not taken from the pixels as they are. Empty: it is.
+/// A packet that has to be composed. Empty: its pixels can be sent from where they are.
 std::vector<std::uint8_t> GvspTransmitter::special_body(const StreamFrame& frame,
                                                         const StreamSettings& settings,
                                                         std::uint32_t id) {

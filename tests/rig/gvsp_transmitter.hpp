@@ -20,14 +20,14 @@
 
 namespace versavis::rig {
 
-/// What of a frame never leaves.
+/// What part of a frame is never sent.
 enum class Missing { nothing, leader, end, second_half };
 
 struct StreamFrame {
     std::uint64_t block_id = 0;
     bool extended_id = false;  ///< 64 bits, else 16
     Missing missing = Missing::nothing;
-    bool after_next = false;  ///< it leaves after the frame that comes then
+    bool after_next = false;  ///< it is sent after the frame that follows it
     std::uint64_t camera_time_ns = 0;
     std::uint64_t serial = 0;
     std::uint32_t width = 0;
@@ -38,7 +38,7 @@ struct StreamFrame {
     HostTime leader_due;               ///< when the leader leaves
     HostTime due;                      ///< when the first packet after it leaves
     std::function<void(bool sent)> done;
-    std::function<void(HostTime at)> sent;  ///< its last packet leaves
+    std::function<void(HostTime at)> sent;  ///< called when its last packet leaves
 };
 
 struct StreamSettings {
@@ -59,20 +59,20 @@ class GvspTransmitter {
     /// UDP port that the packets come from.
     std::uint16_t source_port() const;
 
-    /// Queues a frame; when too many wait already it is dropped, as a camera with a full buffer
-    /// does.
+    /// Queues a frame. When too many are waiting already it is dropped, as by a camera with a full
+    /// buffer.
     void send(StreamFrame frame);
 
-    /// Packets `first` to `last` of a frame that was sent a short while ago.
+    /// Resends packets `first` to `last` of a frame that was sent recently.
     void resend(std::uint64_t block_id, std::uint32_t first, std::uint32_t last);
 
-    /// One packet of the full size, for the host to see what passes.
+    /// Sends one packet of the full size, so that the host can see what gets through.
     void send_test_packet();
 
-    /// Drops what waits.
+    /// Drops what is waiting.
     void clear();
 
-    /// Nothing leaves before `until`.
+    /// Holds everything back until `until`.
     void mute(HostTime until);
 
  private:

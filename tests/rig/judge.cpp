@@ -23,13 +23,13 @@ namespace {
 using nlohmann::json;
 
 constexpr double lost_tolerated = 0.01;
-constexpr Duration start_pattern_time = milliseconds(1500);  // with its gaps, a rate would be low
+constexpr Duration start_pattern_time = milliseconds(1500);  // its gaps would make a rate look low
 constexpr double honest_sigmas = 6;
 constexpr double honest_floor_ns =
-    300e3;  // what a loaded machine may add to a stamp, far below any exposure's period
+    300e3;  // what a loaded machine may add to a stamp; far below the period of any exposure
 constexpr std::int64_t in_flight_ns = 1'000'000'000;
 
-/// One published stamp, brought back to host time, and what it claims to be of.
+/// One published stamp, converted back to host time, and the exposure or sample it claims to be of.
 struct Published {
     std::uint64_t key;      ///< frames: serial from the pixels; IMU: sample number
     std::uint64_t trigger;  ///< frames only
@@ -39,10 +39,11 @@ struct Published {
 
 struct Recording {
     std::vector<Published> items;
-    std::uint64_t missed = 0;  ///< items that this reader was too slow for: no fault of the service
+    std::uint64_t missed =
+        0;  ///< items that this reader was too slow for; not the fault of the service
 };
 
-/// Streams of the scenario, read side by side.
+/// The streams of the scenario, read side by side.
 class Recorder {
  public:
     Recorder(const Scenario& scenario, const std::string& instance, clock::OutputClock clock)
@@ -97,7 +98,8 @@ class Recorder {
         if (item.found != Found::item) return;
         FrameMark mark{};
         if (item.payload_size >= sizeof mark) std::memcpy(&mark, item.payload, sizeof mark);
-        if ((item.data.flags & flag_suspect) != 0) return;  // it says itself that it may be wrong
+        if ((item.data.flags & flag_suspect) != 0)
+            return;  // the service says itself that it may be wrong
         if (!stream.intact(item))
             ++recording.missed;
         else
@@ -130,12 +132,13 @@ struct TrueFrame {
 
 struct Truth {
     std::map<std::string, std::map<std::uint64_t, TrueFrame>> frames;  ///< by camera and serial
-    std::multimap<std::uint64_t, std::int64_t> imu;  ///< by number, of all lives of the board
+    std::multimap<std::uint64_t, std::int64_t> imu;  ///< by number, over all boots of the board
 };
 
 Expected<Truth> load_truth(const std::string& path) {
     std::ifstream file(path);
-    if (!file) return failure(path, "the ground truth cannot be read");
+    if (!file)
+        return failure(path, "the ground truth cannot be read", "name the rig's file with --truth");
     Truth truth;
     for (std::string line; std::getline(file, line);) {
         const json record = json::parse(line, nullptr, false);
@@ -164,8 +167,8 @@ void summarise(std::vector<double>& errors, StreamVerdict& verdict) {
     verdict.error_max_ns = errors.back();
 }
 
-/// When the streams were recorded, in host time: the start pattern comes before, and does not count
-/// for the rates.
+/// When the streams were recorded, in host time. The start pattern comes before and does not count
+/// towards the rates.
 struct Interval {
     std::int64_t begin_ns = 0;
     std::int64_t end_ns = 0;
@@ -184,7 +187,7 @@ void count(const Recording& recording, const Interval& interval, StreamVerdict& 
             static_cast<double>(verdict.items - 1) / static_cast<double>(last - first) * 1e9;
 }
 
-/// A stamp that is further off than it claims is as wrong as one of another exposure.
+/// A stamp that is further off than it claims is as wrong as that of another exposure.
 bool honest(const Published& item, double error_ns) {
     return error_ns <= std::max(honest_sigmas * item.sigma_ns, honest_floor_ns);
 }
@@ -261,7 +264,7 @@ std::uint64_t withheld(const json& status, const std::string& camera) {
     return 0;
 }
 
-/// The clock that the service publishes in, by its status document.
+/// The clock of the service's stamps, from its status document.
 Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
     const HostTime deadline =
         host_now() + Duration{static_cast<std::int64_t>(settings.start_timeout_s * 1e9)};
@@ -282,7 +285,7 @@ Expected<clock::OutputClock> output_clock(const JudgeSettings& settings) {
     }
 }
 
-/// Error: a stream did not begin in time.
+/// Error: a stream did not start in time.
 Expected<Interval> record(Recorder& recorder, const JudgeSettings& settings) {
     const HostTime begin = host_now();
     std::optional<HostTime> flowing;
@@ -294,7 +297,7 @@ Expected<Interval> record(Recorder& recorder, const JudgeSettings& settings) {
         if (!flowing && recorder.complete()) flowing = now;
         if (!flowing && static_cast<double>((now - begin).ns) > settings.start_timeout_s * 1e9)
             return failure(settings.instance,
-                           "these streams did not begin in time:" + recorder.missing(),
+                           "these streams did not start in time:" + recorder.missing(),
                            "see 'versavis status' and the service's log");
         if (flowing && !recording && now - *flowing > start_pattern_time) recording = now;
         const bool over =

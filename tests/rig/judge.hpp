@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Holds what the service published against what was true in the rig.
+// Compares what the service published with what really happened in the rig.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct StreamVerdict {
     std::uint64_t items = 0;
     double rate_hz = 0;
     std::uint64_t lost =
-        0;  ///< happened and was sent between the first and the last item, but not published
+        0;  ///< happened and was sent between the first and the last item, but was not published
     std::uint64_t unpaired = 0;  ///< frames that the service received and withheld
     std::uint64_t wrong_pairs =
         0;  ///< stamps of another exposure or sample, or further off than they claim
@@ -43,7 +43,7 @@ struct JudgeSettings {
 };
 
 /// Records the streams of `scenario` for the time given, counted from when all of them flow, then
-/// compares. Error: a stream did not begin in time, or the ground truth cannot be read.
+/// compares. Errors: a stream did not start in time; the ground truth cannot be read.
 Expected<Verdict> judge(const Scenario& scenario, const JudgeSettings& settings);
 
 std::string to_json(const Verdict& verdict);

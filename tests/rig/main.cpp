@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// versavis-rig: the virtual rig, and the judge of what the service made of it.
+// versavis-rig: the virtual rig, and the judge of what the service makes of it.
 #include <fmt/format.h>
 #include <signal.h>
 #include <sysexits.h>
@@ -105,30 +105,32 @@ int main(int argc, char** argv) {
     std::string scenario_path;
     std::string socket_path = "/tmp/versavis-rig.socket";
     std::string truth_path;
-    auto* run_command =
-        app.add_subcommand("run", "Run the rig of a scenario until SIGINT or SIGTERM");
+    auto* run_command = app.add_subcommand(
+        "run", "Run the rig of a scenario until it is interrupted (SIGINT or SIGTERM)");
     run_command->add_option("scenario", scenario_path, "Scenario file (docs/user/rig.md)")
         ->required();
     run_command->add_option("--socket", socket_path, "Unix socket of the board")
         ->capture_default_str();
-    run_command->add_option("--truth", truth_path, "File for the ground truth, JSON lines");
+    run_command->add_option("--truth", truth_path,
+                            "File for the ground truth, one JSON object per line");
 
     JudgeSettings settings;
     settings.instance = default_instance();
     bool as_json = false;
-    auto* judge_command =
-        app.add_subcommand("judge", "Compare what the service publishes with the ground truth");
-    judge_command->add_option("scenario", scenario_path, "Scenario file that the rig runs")
+    auto* judge_command = app.add_subcommand(
+        "judge", "Compare what the service publishes with the ground truth. Exits 0 if it agrees");
+    judge_command->add_option("scenario", scenario_path, "Scenario file that the rig is running")
         ->required();
-    judge_command->add_option("--truth", settings.truth_path, "Ground truth that the rig writes")
+    judge_command
+        ->add_option("--truth", settings.truth_path, "Ground truth file that the rig writes")
         ->required();
     judge_command->add_option("--instance", settings.instance, "Instance of the service")
         ->capture_default_str();
-    judge_command->add_option("--seconds", settings.seconds, "How long to record")
+    judge_command->add_option("--seconds", settings.seconds, "How many seconds to record")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     judge_command->add_flag("--json", as_json,
-                            "Print the verdict as one JSON object in the last line");
+                            "Print the verdict as one JSON object on the last line");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

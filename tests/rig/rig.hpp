@@ -15,7 +15,7 @@ namespace versavis::rig {
 
 class Rig {
  public:
-    /// Errors: an address or the socket is taken, the ground truth cannot be written.
+    /// Errors: an address or the socket is taken; the ground truth cannot be written.
     static Expected<std::unique_ptr<Rig>> start(const Scenario& scenario,
                                                 const std::string& socket_path,
                                                 const std::string& truth_path);

@@ -14,14 +14,14 @@ namespace versavis::rig {
 struct BoardScenario {
     std::string serial = "RIG0001";
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
-    bool gnss = false;  ///< a receiver's time pulse and sentences come, by CLOCK_REALTIME
+    bool gnss = false;  ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
 };
 
 struct CameraScenario {
     std::string name;
     std::string address;  ///< loopback address that the camera answers on
     unsigned output =
-        0;  ///< board output that triggers it, and input that its exposure line leads to
+        0;  ///< board output that triggers it, and input that its exposure line is wired to
     std::string serial;
     std::uint32_t width = 1920;
     std::uint32_t height = 1200;
@@ -34,9 +34,10 @@ struct CameraScenario {
     double link_mbps = 1000;         ///< packets leave at this pace; 0: as fast as they can
     double packet_loss = 0;          ///< fraction
     bool extended_ids = false;       ///< block ids of 64 bits
-    bool ids_count_ignored = false;  ///< a trigger that is ignored takes a block id, too
-    bool early_leader = false;       ///< a frame's leader leaves when its exposure begins
-    double light = 0;  ///< brightness of the image per millisecond of exposure; 0: as painted
+    bool ids_count_ignored = false;  ///< an ignored trigger also takes a block id
+    bool early_leader = false;       ///< a frame's leader is sent when its exposure begins
+    double light =
+        0;  ///< brightness of the image per millisecond of exposure; 0: independent of it
     double temperature_c = 45;
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
@@ -46,15 +47,15 @@ enum class FaultKind {
     drop_leader,     ///< the frame's first packet never leaves, not even when it is asked for again
                      ///< ...
     drop_last,       ///< ... nor its last ones
-    half_frame,      ///< the frame ends in its middle, as if it were whole
+    half_frame,      ///< the frame ends in the middle, as if it were whole
     swap_frames,     ///< the frame leaves after the next one
     repeat_id,       ///< the frame has the number of the one before
-    restart_ids,     ///< numbers begin anew
+    restart_ids,     ///< numbers start again
     jump_clock,      ///< the camera's clock steps by `seconds`, from this frame on
     ignore_trigger,  ///< the camera does not expose
     camera_mute,     ///< no answer and no packet for `seconds`
     camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
-    board_reset,     ///< the board starts anew with another nonce; `camera` names whose exposures
+    board_reset,     ///< the board restarts with another nonce; `camera` names whose exposures
                      ///< count
 };
 
@@ -63,7 +64,7 @@ struct Fault {
     std::string camera;
     std::uint64_t at_exposure =
         0;  ///< happens with this exposure of the camera, counted since the rig's start
-    std::uint64_t count = 1;  ///< that many exposures in a row
+    std::uint64_t count = 1;  ///< this many exposures in a row
     double seconds = 1;       ///< negative for a clock that steps back
 };
 

@@ -13,7 +13,7 @@ constexpr double nodding_rad_s = 2 * 3.14159265358979 * 0.5;
 
 double seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
 
-/// A hash of two cell coordinates: brightness that looks random and is the same in each run.
+/// A hash of two cell coordinates: brightness that looks random but is the same in each run.
 std::uint8_t cell_brightness(std::uint64_t x, std::uint64_t y, std::uint64_t seed) {
     std::uint64_t h =
         seed * 0x9E3779B97F4A7C15U + x * 0xC2B2AE3D27D4EB4FU + y * 0x165667B19E3779F9U;

@@ -11,7 +11,7 @@
 
 namespace versavis::rig {
 
-/// First bytes of each frame's pixels, so that a test knows which exposure it looks at.
+/// First bytes of each frame's pixels, so that a test knows which exposure it is looking at.
 struct FrameMark {
     static constexpr std::uint64_t expected_magic = 0x4B52414D47495256;  // "VRIGMARK"
     std::uint64_t magic;
@@ -29,7 +29,7 @@ class Motion {
     HostTime zero_;
 };
 
-/// A textured wall, rendered once and twice as high as the image: a view of it needs no copying.
+/// A textured wall, rendered once at twice the height of the image: a view of it needs no copying.
 class Wall {
  public:
     Wall(std::uint32_t width, std::uint32_t height, std::uint64_t seed);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the board's wires see of a camera, whatever bus its frames take.
+// A camera as seen from the board's wires, whatever bus its frames take.
 #pragma once
 
 #include <cstdint>

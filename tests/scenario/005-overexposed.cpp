@@ -14,7 +14,7 @@ TEST_CASE("005-overexposed: an exposure longer than the period costs triggers, n
     };
     world.add_camera(0, settings);
     world.configuration.cameras[0].max_exposure_ns = 100 * ms;
-    world.busy_allowed = true;  // while the long one lasts on after it was given up
+    world.busy_allowed = true;  // while the long one continues after the board gave up on it
     REQUIRE(world.begin());
     world.run(5 * second);
     world.finish();

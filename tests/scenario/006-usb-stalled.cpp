@@ -31,8 +31,8 @@ TEST_CASE(
     }
     REQUIRE(world.inbox().clock_answers.size() == 1);
     CHECK(world.inbox().clock_answers[0].id == 7);
-    // Samples were dropped, are counted, and each that came is still right (judge); the newest
-    // stayed.
+    // Samples were dropped and counted; each one that arrived is right (judge); the newest were
+    // kept.
     const wire::Health& health = world.inbox().healths.back();
     CHECK(health.dropped_exposures == 0);
     CHECK(health.dropped_clock_answers == 0);

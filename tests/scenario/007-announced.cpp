@@ -14,7 +14,7 @@ TEST_CASE(
     settings.exposure = [exposure](std::uint64_t pulse, auto) { return exposure(pulse); };
     world.add_camera(0, settings);
     REQUIRE(world.begin());
-    // Three ahead, as an auto exposure on the host does it.
+    // Three ahead, as an auto exposure on the host announces them.
     for (std::uint64_t trigger = 1; trigger < 400; ++trigger) {
         while (world.camera(0).pulses().size() + 3 < trigger) world.run(ms);
         world.send(wire::ExpectedExposure{0, {}, trigger, exposure(trigger)});

@@ -22,7 +22,7 @@ TEST_CASE("017-illumination: light leads each exposure and lasts through the uni
     world.finish();
     CHECK(world.judge() == "");
     CHECK(world.inbox().events_of(wire::EventKind::illumination_limited).empty());
-    // Dark in between: no longer on than the exposures and their leads.
+    // Dark in between: on only for the exposures and their leads.
     Nanoseconds on = 0;
     for (const Interval& interval : world.lights()) on += interval.off - interval.on;
     Nanoseconds exposed = 0;

@@ -54,7 +54,7 @@ TEST_CASE(
         for (const wire::Exposure& record : world.inbox().exposures[camera])
             if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
     CHECK(world.inbox().healths.back().stray_edges > 100);
-    // Told ten times a second, counted all.
+    // Reported ten times a second; all are counted.
     CHECK(world.inbox().events_of(wire::EventKind::stray_edge).size() <= 30);
     CHECK(world.inbox().events_of(wire::EventKind::input_noisy).size() == 1);
     for (const wire::Exposure& record : world.inbox().exposures[1])

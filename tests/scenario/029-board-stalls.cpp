@@ -29,7 +29,7 @@ TEST_CASE(
         healths.begin(), healths.end(),
         [](const auto& a, const auto& b) { return a.loop_max_ns < b.loop_max_ns; });
     CHECK(longest->loop_max_ns >= stall / 2);
-    // A sync pulse is at its time, or not at all.
+    // A sync pulse is on time, or left out.
     for (const Nanoseconds at : world.rises(firmware::pin_sync)) {
         const Nanoseconds phase = (at - world.grid_time(0, 0)) % (100 * ms);
         REQUIRE(phase == 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What happens between the cases: commands in the middle of exposures, pulses that would meet,
-// edges that are lost.
+// What happens in between: commands in the middle of exposures, pulses that would merge, edges
+// that are lost.
 #include "scenario.hpp"
 
 using namespace versavis;
@@ -178,7 +178,7 @@ TEST_CASE("035-sync-and-start: a start that waits for sync disturbs nobody, and 
         pulse(at);  // noise: none a period apart
     world.run(1900 * ms);
     CHECK(world.camera(0).pulses().empty());
-    world.start(1);  // it shall not wait any longer
+    world.start(1);  // it must not wait any longer
     world.run(second);
     const std::size_t before = world.camera(0).pulses().size();
     CHECK(before > 15);

@@ -8,7 +8,8 @@ using namespace versavis::scenario;
 
 namespace {
 
-/// A board whose clock is its own, told once a second where the host's next whole second lies.
+/// A board with a clock of its own that learns once a second where the host's next whole second
+/// lies.
 struct Aligned {
     Aligned(std::uint64_t seed, double skew_ppm, Nanoseconds offset)
         : world(seed), ppm(skew_ppm), zero(offset) {
@@ -28,7 +29,7 @@ struct Aligned {
         world.run(std::max<Nanoseconds>(to_board(host) - world.now(), 0));
     }
 
-    void tell(Nanoseconds host_second, std::uint32_t slew_ppb) {
+    void align_grid(Nanoseconds host_second, std::uint32_t slew_ppb) {
         world.send(wire::AlignGrid{to_board(host_second),
                                    static_cast<std::int32_t>(std::lround(ppm * 1e3)), slew_ppb});
     }
@@ -46,7 +47,7 @@ struct Aligned {
     Nanoseconds zero;
 };
 
-/// From the nearest multiple of the period, apart from the phase.
+/// Distance from the nearest multiple of the period, apart from the phase.
 Nanoseconds off_grid(Nanoseconds at, Nanoseconds phase, Nanoseconds period) {
     const Nanoseconds past = (at - phase) % period;
     return past > period / 2 ? past - period : past;
@@ -62,11 +63,11 @@ TEST_CASE(
     board.run_to(321 * ms);
     board.world.connect();
     REQUIRE(board.world.configure());
-    board.tell(second, 20'000);
+    board.align_grid(second, 20'000);
     board.world.start();
     for (Nanoseconds host = second; host < 60 * second; host += second) {
         board.run_to(host + 400 * ms);
-        board.tell(host + second, 20'000);
+        board.align_grid(host + second, 20'000);
     }
     board.world.finish();
     CHECK(board.world.judge() == "");
@@ -86,10 +87,10 @@ TEST_CASE(
     const std::uint32_t slew_ppb = 500'000;
     for (Aligned* board : {&first, &other}) {
         board->run_to(100 * ms);
-        REQUIRE(board->world.begin());  // the grid begins here, at no second of the host
+        REQUIRE(board->world.begin());  // the grid begins here, off the seconds of the host
         for (Nanoseconds host = second; host < 400 * second; host += second) {
             board->run_to(host + 400 * ms);
-            if (host > 10 * second) board->tell(host + second, slew_ppb);
+            if (host > 10 * second) board->align_grid(host + second, slew_ppb);
         }
         board->world.finish();
         CHECK(board->world.judge() == "");

@@ -27,7 +27,7 @@ std::vector<std::int64_t> grid_points(const World& world, unsigned camera, std::
 
 void run(World& world, std::uint8_t flags, Nanoseconds duration) {
     world.record_trace();
-    if (!world.begin(flags)) throw std::runtime_error("the configuration was not taken");
+    if (!world.begin(flags)) throw std::runtime_error("the board refused the configuration");
     world.run(duration);
 }
 
@@ -172,7 +172,7 @@ int main(int argc, char** argv) {
         if (!check) {
             std::ofstream(path) << diagram.svg;
         } else if (!same_as_file(path, diagram.svg)) {
-            std::cerr << path << " is not what the firmware does now: run ./dev diagrams\n";
+            std::cerr << path << " does not show what the firmware does now: run ./dev diagrams\n";
             ++outdated;
         }
     }

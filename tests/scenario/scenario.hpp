@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every scenario begins with: a World that leaves its trace where VERSAVIS_VCD says.
+// What every scenario starts with: a World that writes its trace to the directory $VERSAVIS_VCD.
 #pragma once
 
 #include <catch2/catch.hpp>

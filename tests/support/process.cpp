@@ -19,7 +19,7 @@ namespace versavis::test {
 
 namespace {
 
-/// Between two looks at something that only looking can tell.
+/// Between two looks at something that can only be polled.
 void pause_between_looks() {
     const timespec pause{0, 2'000'000};
     nanosleep(&pause, nullptr);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A child process whose output is kept, and which does not outlive its owner.
+// A child process that keeps its output and does not outlive its owner.
 #pragma once
 
 #include <sys/types.h>
@@ -22,14 +22,14 @@ class Process {
 
     void signal(int number) const;
 
-    /// Waits for its end; its exit code, or 128 + the signal that ended it, or -1 when it is still
-    /// running at `timeout`.
+    /// Waits for its end. Returns its exit code, or 128 + the signal that ended it, or -1 when it
+    /// is still running at `timeout`.
     int wait(Duration timeout);
 
     /// SIGTERM, then wait().
     int terminate(Duration timeout = seconds(20));
 
-    /// Waits until its output contains `text`; false at `timeout`, or when it has ended without.
+    /// Waits until its output contains `text`; false at `timeout`, or when it has ended without it.
     bool wait_for_output(const std::string& text, Duration timeout);
 
     std::string output() const;
@@ -41,7 +41,7 @@ class Process {
     int code_ = -1;
 };
 
-/// Runs a program to its end and returns its exit code; `output` takes what it printed on both
+/// Runs a program to its end and returns its exit code; `output` receives what it printed on both
 /// streams.
 int run(const std::vector<std::string>& arguments, const std::string& log,
         std::string* output = nullptr);

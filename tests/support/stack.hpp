@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rig and service as processes of one test, on addresses and names of its own.
+// Rig and service as processes of one test, with addresses and names of their own.
 #pragma once
 
 #include <functional>
@@ -29,14 +29,14 @@ struct StackSettings {
     std::string link{};  ///< of the service to the board; empty: the rig's socket
     std::string
         slave_extra{};     ///< instead of a rate, for the cameras of the service after the first
-    std::string device{};  ///< of every camera, as the service is told; empty: its address
-    bool swapped = false;  ///< the service takes each camera for another
+    std::string device{};  ///< `device` of every camera of the service; empty: its address
+    bool swapped = false;  ///< the service takes each camera for the other
     std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
     std::string imu_extra{};               ///< more keys of the IMU
 };
 
-/// All that is configured delivers proved data.
+/// Everything that is configured delivers proved data.
 inline bool healthy(const nlohmann::json& status) { return status["health"] == "ok"; }
 
 class Stack {
@@ -62,10 +62,10 @@ class Stack {
     }
     const std::string& instance() const { return settings_.name; }
 
-    /// For rig::judge(), on what this rig does and this service publishes.
+    /// Settings for rig::judge() on this rig and this service.
     rig::JudgeSettings judging(double seconds) const;
 
-    /// The newest status document that meets the condition; throws when none does in time.
+    /// Waits for a status document that meets the condition; throws when none does in time.
     nlohmann::json wait_for_status(const std::function<bool(const nlohmann::json&)>& condition,
                                    Duration timeout = seconds(30));
 
@@ -82,7 +82,7 @@ class Stack {
     std::unique_ptr<Process> service_;
 };
 
-/// Opens a stream as soon as it is there; throws when it is not in time.
+/// Opens a stream as soon as it exists; throws when it does not in time.
 template <class S>
 S wait_for_stream(const std::string& name, const std::string& instance,
                   Duration timeout = seconds(20)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A directory that is gone with its owner.
+// A directory that is removed with its owner.
 #pragma once
 
 #include <cstdlib>
@@ -12,11 +12,11 @@ namespace versavis::test {
 
 class TemporaryDirectory {
  public:
-    /// Below `parent`; rings want one in shared memory.
+    /// Created below `parent`; rings need one in shared memory.
     explicit TemporaryDirectory(const std::string& parent = "/tmp") {
         std::string name = parent + "/versavis-test-XXXXXX";
         if (mkdtemp(name.data()) == nullptr)
-            throw std::runtime_error("no temporary directory below " + parent);
+            throw std::runtime_error("cannot create a temporary directory below " + parent);
         path_ = name;
     }
     ~TemporaryDirectory() {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What cameras do wrong, live through Aravis: each stamp that is published still belongs to its
-// frame.
+// What cameras do wrong, live through Aravis: each published stamp still belongs to its frame.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -81,7 +80,7 @@ TEST_CASE(
     const auto status = stack.wait_for_status(healthy);
     for (const auto& camera : status["cameras"]) {
         INFO(camera.dump(1));
-        // Aravis takes ids that begin anew for late ones until they are a hundred behind.
+        // Aravis takes restarted ids for late ones until they are a hundred behind.
         CHECK(camera["connections"] == 1);
         CHECK(camera["frames_without_trigger"].get<int>() < 25);
         CHECK(camera["slips"].get<int>() <= 4);
@@ -142,8 +141,8 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {
         const auto exposure = s["cameras"][0]["exposure_ns"].template get<std::int64_t>();
-        const auto told = s["cameras"][0]["camera_exposure_ns"].template get<std::int64_t>();
-        return exposure > 1'500'000 && told != 0 && std::abs(exposure - told) < 50'000;
+        const auto reported = s["cameras"][0]["camera_exposure_ns"].template get<std::int64_t>();
+        return exposure > 1'500'000 && reported != 0 && std::abs(exposure - told) < 50'000;
     });
     CHECK(status["cameras"][0]["frames_without_trigger"] == 0);
     CHECK(judge(stack, 2).ok);

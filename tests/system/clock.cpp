@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The `versavis clock` command as a user runs it, on stamps that were really exchanged.
+// The `versavis clock` command as a user runs it, on time stamps from a real exchange.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -43,8 +43,8 @@ std::vector<std::string> fields(const std::string& line) {
     return all;
 }
 
-/// After each exchange of the trace, the newest first: when is it now on the board? Both clocks
-/// were the same.
+/// One query after each exchange of the trace, the newest first: what is the host time of this
+/// board time? Both clocks were the same.
 std::string questions() {
     std::string text;
     const auto rows = lines(trace);
@@ -81,7 +81,7 @@ TEST_CASE("clock: a recorded trace is translated again") {
     }
     CHECK(locked > 200);
 
-    // The published filter, as shipped, is still half a second off.
+    // The published filter with its own start values is still half a second off.
     const std::vector<std::string> ekf{
         "replay", "--exchanges",       trace,         "--query", query,
         "--out",  clock.path("e.csv"), "--estimator", "ekf"};
@@ -111,7 +111,7 @@ TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     const std::string out = clock.path("r.csv");
     std::string output;
     CHECK(clock.run({"replay", "--exchanges", bad, "--query", query, "--out", out}, &output) == 69);
-    CHECK_THAT(output, Contains("bad.csv, line 2, column m3_ns: 'three' is no integer"));
+    CHECK_THAT(output, Contains("bad.csv, line 2, column m3_ns: 'three' is not an integer"));
     CHECK(clock.run({"plot", "--exchanges", "/nowhere.csv", "--out", out}, &output) == 69);
     CHECK_THAT(output, Contains("/nowhere.csv: cannot be read"));
     CHECK_FALSE(std::filesystem::exists(out));

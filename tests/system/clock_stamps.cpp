@@ -17,7 +17,7 @@ using namespace versavis::clock;
 
 namespace {
 
-/// The next item of the ring, of whatever kind; throws when none comes in time.
+/// The next item of the ring, of any kind; throws when none arrives in time.
 ClockItem next(ClockStream& stream) {
     const HostTime deadline = host_now() + seconds(20);
     while (host_now() < deadline) {
@@ -27,7 +27,7 @@ ClockItem next(ClockStream& stream) {
         REQUIRE(told);
         return *told;
     }
-    throw std::runtime_error("no clock stamps came in time");
+    throw std::runtime_error("no clock stamps arrived in time");
 }
 
 template <class Item>
@@ -55,7 +55,7 @@ std::vector<std::vector<std::int64_t>> read_csv(const std::string& path,
     const auto columns = std::count(header.begin(), header.end(), ',') + 1;
     std::vector<std::vector<std::int64_t>> rows;
     while (std::getline(file, line)) {
-        CHECK_FALSE(file.eof());  // the last line ends, too
+        CHECK_FALSE(file.eof());  // the last line is complete as well
         std::istringstream cells(line);
         std::string cell;
         std::vector<std::int64_t> row;
@@ -104,7 +104,7 @@ TEST_CASE("clock stamps: each exchange, each sample's way and the output clock a
         if (last) CHECK(exchange.sent > last->arrived);
         last = exchange;
     }
-    // By the stamps of one exchange, host time of the board's zero lies between these two.
+    // By the stamps of one exchange, the host time of the board's zero lies between these two.
     const std::int64_t earliest_ns = last->sent.ns - last->received.ns;
     for (int i = 0; i < 20; ++i) {
         const auto one_way = next_of<OneWayTold>(stream);
@@ -138,7 +138,8 @@ TEST_CASE(
     std::string text;
     const std::string exchanges = stack.log_path("x.csv");
     const std::string one_way = stack.log_path("y.csv");
-    CHECK(stack.tool({"clock", "record", "--exchanges", exchanges}, &text) == 69);  // nobody serves
+    CHECK(stack.tool({"clock", "record", "--exchanges", exchanges}, &text) ==
+          69);  // no service is running
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status(healthy);
@@ -174,7 +175,7 @@ TEST_CASE(
 
     CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", exchanges}, &text) ==
           69);
-    CHECK_THAT(text, Catch::Contains("was restarted"));
+    CHECK_THAT(text, Catch::Contains("board: restarted"));
     check_exchanges(read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns"));
     ClockStream all = from_the_first(stack);
     const auto first = next_of<RestartTold>(all);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rig, service and readers as processes, over the real protocols, held against the rig's ground
+// Rig, service and readers as processes, over the real protocols, compared with the rig's ground
 // truth.
 #include <signal.h>
 #include <sys/socket.h>
@@ -29,7 +29,7 @@ rig::Verdict judge(const Stack& stack, double seconds) {
     return *verdict;
 }
 
-/// Reads on until `condition` is true of an item; throws when none comes in time.
+/// Reads until `condition` is true of an item; throws when none arrives in time.
 template <class S, class Condition>
 auto read_until(S& stream, Condition condition, Duration timeout = seconds(30)) {
     const HostTime deadline = host_now() + timeout;
@@ -37,7 +37,7 @@ auto read_until(S& stream, Condition condition, Duration timeout = seconds(30)) 
         auto item = stream.wait(milliseconds(200));
         if (condition(item)) return item;
     }
-    throw std::runtime_error("nothing of the kind came in time");
+    throw std::runtime_error("no such item arrived in time");
 }
 
 bool is_item(const ring::Item& item) { return item.found == Found::item; }
@@ -142,7 +142,7 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
     read_until(stream, [](const auto& item) { return item.found == Found::gone; });
     std::string output;
     CHECK(stack.tool({"status"}, &output) == 69);
-    CHECK_THAT(output, Catch::Contains("died or hangs"));
+    CHECK_THAT(output, Catch::Contains("died or is hanging"));
     stack.start_service();
     read_until(stream, [](const auto& item) { return item.found == Found::restarted; });
     const auto frame = read_until(stream, is_item);
@@ -308,7 +308,7 @@ TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie 
         last = label.data.value;
         CHECK(absolute(label.time - OutputTime{last * 1'000'000'000}) < milliseconds(1));
     }
-    // Four of them make the stamps.
+    // From the fourth on they make the stamps.
     const auto status =
         stack.wait_for_status([](const auto& s) { return s["clock"]["pps"] == "used"; });
     CHECK(status["clock"]["pps_rejected"] == 0);
@@ -353,15 +353,15 @@ TEST_CASE("end to end: the service manager is told of readiness, life, health an
     stack.start_rig();
     stack.start_service();
     unsetenv("NOTIFY_SOCKET");
-    std::string told;
+    std::string received;
     const auto wait_for = [&](const std::string& text) {
         const timeval limit{20, 0};
         ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
         char buffer[256];
-        while (told.find(text) == std::string::npos) {
+        while (received.find(text) == std::string::npos) {
             const ssize_t size = ::recv(socket, buffer, sizeof buffer, 0);
             if (size <= 0) return false;
-            told.append(buffer, static_cast<std::size_t>(size)) += '\n';
+            received.append(buffer, static_cast<std::size_t>(size)) += '\n';
         }
         return true;
     };

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads frames of a stream by docs/contracts/shm-layout.md alone: prints item number, output time, trigger and size.
+"""Reads frames of a stream, written from docs/contracts/shm-layout.md alone.
 
-read_ring.py FILE COUNT: exit code 0 after COUNT intact frames, 1 when the file is no ring or none come in ten seconds.
+read_ring.py FILE COUNT: prints item number, output time, trigger and size of each frame.
+Exits 0 after COUNT intact frames, 1 if FILE is not a ring or they do not arrive in ten seconds.
 """
 import mmap
 import os
@@ -20,8 +21,9 @@ def main(path, count):
         memory = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
     magic, major, _minor, total = unpack(memory, "8sIIQ", 0)
     if magic != b"VERSAVIS" or major != 1 or total != os.stat(path).st_size:
-        sys.exit("no ring of version 1")
-    descriptors, slots, slot_size, descriptors_at, generations_at, slots_at = unpack(memory, "IIQQQQ", 64)
+        sys.exit(f"{path}: not a ring of version 1")
+    descriptors, slots, slot_size = unpack(memory, "IIQ", 64)
+    descriptors_at, generations_at, slots_at = unpack(memory, "QQQ", 80)
     number = unpack(memory, "Q", 256)[0]
     deadline = time.monotonic() + 10
     while count > 0 and time.monotonic() < deadline:
@@ -30,14 +32,15 @@ def main(path, count):
             continue
         at = descriptors_at + number % descriptors * 128
         sequence, generation, length_and_slot, output_time = unpack(memory, "QQQq", at)
-        trigger, _block_id, _board, _host, _arrival, _exposure, _camera = unpack(memory, "QQqqqqq", at + 32)
+        (trigger,) = unpack(memory, "Q", at + 32)
         _sigma, width, height, stride = unpack(memory, "IIII", at + 32 + 56)
         length, slot = length_and_slot >> 32, length_and_slot & 0xFFFFFFFF
         complete = sequence == 2 * number + 2 == unpack(memory, "Q", at)[0]
         if complete and slot < slots and length <= slot_size:
             begin = slots_at + slot * slot_size
             pixels = memory[begin : begin + length]
-            if unpack(memory, "Q", generations_at + 64 * slot)[0] == generation and len(pixels) == stride * height:
+            (generation_now,) = unpack(memory, "Q", generations_at + 64 * slot)
+            if generation_now == generation and len(pixels) == stride * height:
                 print(f"{number} {output_time} trigger {trigger}: {width} x {height}")
                 count -= 1
         number += 1

@@ -230,7 +230,7 @@ TEST_CASE("clock_replay: what cannot be done is said") {
     };
     SECTION("no exchanges") {
         settings.exchanges = directory.write("empty.csv", "h1_ns,m2_ns,m3_ns,h4_ns\n");
-        CHECK_THAT(message(), Contains("empty.csv: has no exchanges"));
+        CHECK_THAT(message(), Contains("empty.csv: contains no exchanges"));
     }
     SECTION("the output is an input") {
         settings.out = settings.queries;

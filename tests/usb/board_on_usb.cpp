@@ -40,7 +40,7 @@ TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes b
     bridge.plug();
     const auto again = stack.wait_for_status(healthy);
     CHECK(again["board"]["connections"] == 2);
-    // The board ran on: its clock and numbers are still those of the first connection.
+    // The board kept running: its clock and numbers are still those of the first connection.
     CHECK(again["clock"]["epoch"] == status["clock"]["epoch"]);
     CHECK(stack.service().terminate() == 0);
 }

@@ -17,8 +17,8 @@ using namespace versavis::test;
 
 namespace {
 
-/// The testbed must live in the process that runs under the wrapper: board and camera do, too,
-/// here.
+/// The testbed must live in the process that runs under the wrapper: here board and camera do as
+/// well.
 class UsbRig {
  public:
     explicit UsbRig(const Stack& stack)
@@ -69,7 +69,7 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
         judge(stack);
 
         rig.camera.camera().stall_data();
-        // It may be opened anew before a status tells of it.
+        // It may be opened again before a status reports it.
         REQUIRE(stack.service().wait_for_output("cam0: silent", seconds(30)));
         stack.wait_for_status(
             [](const auto& s) { return healthy(s) && s["cameras"][0]["connections"] == 2; });

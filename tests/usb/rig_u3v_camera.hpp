@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A camera of the rig whose frames come by USB3 Vision.
+// A camera of the rig that sends its frames by USB3 Vision.
 #pragma once
 
 #include <cmath>

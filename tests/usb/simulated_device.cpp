@@ -69,7 +69,7 @@ SimulatedDevice::SimulatedDevice(UMockdevTestbed* testbed, const std::string& po
 SimulatedDevice::~SimulatedDevice() { unplug(); }
 
 // Loading the description creates sysfs entries and the node first and sends the "add" uevent last,
-// so a client sees no half device.
+// so that no client sees half a device.
 std::string SimulatedDevice::describe(const std::string& node, unsigned device_number) const {
     const UsbDescription& usb = function_->description();
     const std::string minor = std::to_string(device_number - 1);

@@ -80,16 +80,17 @@ UsbDescription describe(const U3vRegisters::Identity& identity) {
     // clang-format off
     usb.device = {
         18, 1, 0x00, 0x03,  // USB 3.0
-        0xef, 2, 1,         // class by interface association: demanded
+        0xef, 2, 1,         // class by interface association: required
         9, 0x09, 0x12, 0x54, 0x56, 0x00, 0x01,
         1, 2, 3,            // manufacturer, product, serial
         1};
     usb.configuration = {
         9, 2, 0, 0, 2, 1, 0, 0x80, 112,
-        8, 11, 0, 2, 0xef, 5, 0, 0,     // association: interfaces 0 and 1 are one USB3 Vision camera
+        8, 11, 0, 2, 0xef, 5, 0, 0,     // association: interfaces 0 and 1 are one camera
         9, 4, 0, 0, 2, 0xef, 5, 0, 0,   // interface 0: control
         20, 0x24, 1, 1, 0, 1, 0, 0, 0, 1, 0,  // GenCP 1.1, USB3 Vision 1.0
-            4, 1, 2, 0, 0, 0, 3, 0, 8,  // GUID, vendor, model, family, version, information, serial, user name; SuperSpeed
+            4, 1, 2, 0, 0, 0, 3, 0, 8,  // strings: GUID, vendor, model, family, version,
+                                        // information, serial, user name; SuperSpeed
         7, 5, control_in, 2, 0x00, 0x04, 0,
         6, 0x30, 0, 0, 0, 0,
         7, 5, control_out, 2, 0x00, 0x04, 0,
@@ -335,7 +336,7 @@ void U3vCamera::send_leader(const Frame& frame) {
     node()->send(data_in, std::move(leader));
 }
 
-// In transfers of the size that the host has set. One that ends early is ended by a short packet.
+// In transfers of the size that the host has set. A short packet ends one that is not full.
 void U3vCamera::send_payload(const Frame& frame, Defect defect) {
     std::uint32_t size = registers_.value(reg_payload_size);
     if (defect == Defect::half_payload) size /= 2;

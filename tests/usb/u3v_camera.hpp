@@ -22,7 +22,7 @@ namespace versavis::test {
 
 class U3vCamera final : public UsbFunction {
  public:
-    /// What the host may learn of an exposure, and what became of its frame.
+    /// What the host may learn about an exposure, and what became of its frame.
     struct Exposure {
         std::uint64_t block_id;
         std::uint64_t start_ns;  ///< of the camera's clock: what the leader carries
@@ -98,7 +98,7 @@ class U3vCamera final : public UsbFunction {
     UsbDescription description_;
     U3vRegisters registers_;
 
-    std::mutex sending_;  ///< held while a frame goes to the node: an unplug waits for its end
+    std::mutex sending_;        ///< held while a frame goes to the node: an unplug waits for it
     mutable std::mutex mutex_;  ///< guards what follows, down to exposures_
     std::condition_variable changed_;
     bool plugged_ = false;

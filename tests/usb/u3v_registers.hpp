@@ -91,7 +91,7 @@ class U3vRegisters {
     };
     explicit U3vRegisters(const Identity& identity);
 
-    /// All registers as after power-up.
+    /// Puts all registers into their state after power-up.
     void reset();
 
     /// False: no such register.

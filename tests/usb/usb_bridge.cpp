@@ -20,7 +20,7 @@ UsbBridge::UsbBridge(UMockdevTestbed* testbed, const std::string& socket_path,
     std::strncpy(peer.sun_path, socket_path.c_str(), sizeof peer.sun_path - 1);
     if (::connect(socket_, reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0) {
         ::close(socket_);
-        throw std::runtime_error("the rig is not at " + socket_path);
+        throw std::runtime_error("no rig is listening at " + socket_path);
     }
     device_ = std::make_unique<SimulatedUsbDevice>(
         testbed, serial, [this](std::span<const std::byte> bytes) {

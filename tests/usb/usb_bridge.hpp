@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Puts the rig's board on simulated USB: bytes between its unix socket and the bulk endpoints.
+// Puts the rig's board on simulated USB: passes bytes between its unix socket and the bulk
+// endpoints.
 #pragma once
 
 #include <atomic>

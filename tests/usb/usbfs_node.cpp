@@ -397,7 +397,7 @@ void UsbfsNode::hold_reap(Client* client, bool wait) {
     held_.insert_or_assign(client, std::move(held));
 }
 
-// Urbs are worked on later on the GLib thread, whoever asks: umockdev copies
+// Urbs are handled later on the GLib thread, whoever asks: umockdev copies
 // their memory without a lock while it finishes the current ioctl.
 void UsbfsNode::post_pump() {
     const std::lock_guard lock{mutex_};

@@ -39,7 +39,7 @@ using GSourcePtr = std::unique_ptr<GSource, GSourceDestroy>;
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// All that a host learns about a device before it talks to it.
+/// Everything that a host learns about a device before it talks to it.
 struct UsbDescription {
     Bytes device;
     Bytes configuration;
@@ -55,7 +55,7 @@ class UsbFunction {
     virtual ~UsbFunction() = default;
     /// Must not change while the device exists.
     virtual const UsbDescription& description() const = 0;
-    /// Answers a class or vendor request: 0, or -EPIPE for a stall. Standard requests never come
+    /// Answers a class or vendor request: 0, or -EPIPE for a stall. Standard requests never arrive
     /// here.
     virtual int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
                         Bytes& reply);

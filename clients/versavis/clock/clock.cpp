@@ -34,14 +34,14 @@ void add_estimator(CLI::App& command, EstimatorKind& estimator, bool& fair_start
     static const std::map<std::string, bool> starts{{"published", false}, {"fair", true}};
     command
         .add_option("--estimator", estimator,
-                    "envelope (default), or ekf: the original system's, as published")
+                    "envelope (default), or ekf: the original system's filter, as published")
         ->transform(CLI::CheckedTransformer(estimators).description("{envelope,ekf}"))
         ->type_name("NAME")
         ->default_str("envelope");
     command
         .add_option(
             "--ekf-start", fair_start,
-            "Start values of the ekf: published (default), or fair: it believes the first exchange")
+            "Start values of the ekf: published (default), or fair: taken from the first exchange")
         ->transform(CLI::CheckedTransformer(starts).description("{published,fair}"))
         ->type_name("NAME")
         ->default_str("published");
@@ -50,8 +50,8 @@ void add_estimator(CLI::App& command, EstimatorKind& estimator, bool& fair_start
 }  // namespace
 
 ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
-    : clock_(app.add_subcommand("clock",
-                                "The board's clock: state, recordings, and its estimation again")) {
+    : clock_(app.add_subcommand(
+          "clock", "The board's clock: show its state, record it, estimate it again")) {
     clock_->require_subcommand(1);
     record_settings_.stop = std::move(stop);
     add_status();
@@ -63,50 +63,51 @@ ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
 void ClockCommands::add_status() {
     status_ = clock_->add_subcommand(
         "status",
-        "State of the translation of the board's clock; exit code 0: locked, 1: "
-        "not locked, 69: the service is not running");
+        "Show how well board time is translated to host time. Exits 0 if locked, 1 if not "
+        "locked, 69 if the service is not running");
     status_->add_flag("--json", json_,
-                      "The object `clock` of the status document (docs/contracts/status.md)");
+                      "Print the object `clock` of the status document (docs/contracts/status.md)");
 }
 
 void ClockCommands::add_record() {
-    record_ = clock_->add_subcommand("record", "Write the stamps that the clocks are compared by");
-    record_->add_option("--seconds", recording_s_, "How long; without it, until it is stopped")
+    record_ =
+        clock_->add_subcommand("record", "Record the stamps by which the clocks are compared");
+    record_->add_option("--seconds", recording_s_, "How long to record (default: until stopped)")
         ->check(CLI::PositiveNumber);
     record_->add_option("--exchanges", record_settings_.exchanges, "CSV file for the exchanges")
         ->required();
     record_->add_option("--oneway", record_settings_.one_way,
-                        "CSV file for the board's other messages");
+                        "CSV file for the board's one-way messages");
 }
 
 void ClockCommands::add_replay() {
     replay_ = clock_->add_subcommand(
         "replay",
-        "Translate board times again from recorded exchanges (files: docs/user/clock.md)");
+        "Redo the translation of board times from recorded exchanges (files: docs/user/clock.md)");
     add_inputs(*replay_, replay_settings_.exchanges, replay_settings_.oneway);
     replay_
         ->add_option("--query", replay_settings_.queries,
-                     "CSV file with the columns available_ns,board_ns: each answer uses what was "
-                     "known by then")
+                     "CSV file with the columns available_ns,board_ns: each answer uses only "
+                     "what was known by then")
         ->required();
     replay_
-        ->add_option(
-            "--out", replay_settings_.out,
-            "CSV file to write: board_ns,host_ns,sigma_ns,state, one row per query in their order")
+        ->add_option("--out", replay_settings_.out,
+                     "CSV file to write: board_ns,host_ns,sigma_ns,state, one row per query, in "
+                     "the same order")
         ->required();
     add_estimator(*replay_, estimator_, fair_start_);
     replay_->add_flag(
         "--smoothed", replay_settings_.smoothed,
-        "Use all messages for each answer, later ones, too (estimator envelope only)");
+        "Use all messages for each answer, later ones as well (estimator envelope only)");
 }
 
 void ClockCommands::add_plot() {
     CLI::App* plot = clock_->add_subcommand(
-        "plot", "Draw offset, skew, residual and innovation over recorded exchanges as SVG");
+        "plot", "Plot offset, skew, residual and innovation over recorded exchanges as SVG");
     add_inputs(*plot, plot_settings_.exchanges, plot_settings_.oneway);
     plot->add_option("--out", plot_settings_.out, "SVG file to write")->required();
     add_estimator(*plot, estimator_, fair_start_);
-    plot->add_option("--title", plot_settings_.title, "Title; without: the name of the file");
+    plot->add_option("--title", plot_settings_.title, "Title (default: the name of the file)");
 }
 
 bool ClockCommands::chosen() const { return clock_->parsed(); }
@@ -138,15 +139,16 @@ int ClockCommands::replay() {
     replay_settings_.estimator = estimator_;
     if (replay_settings_.smoothed && estimator_ != EstimatorKind::envelope) {
         fmt::print(stderr,
-                   "versavis: --smoothed excludes --estimator ekf: that filter has no smoother\n");
+                   "versavis: --smoothed cannot be combined with --estimator ekf: that filter has "
+                   "no smoother\n");
         return EX_USAGE;
     }
     const auto done = replay_clock(replay_settings_);
     if (!done) return fail(done.error());
-    fmt::print("{}: {} answers from {} messages, {} of them from before the first\n",
+    fmt::print("{}: {} answers from {} messages; {} queries precede the first message\n",
                replay_settings_.out, done->answers, done->messages, done->unanswered);
     if (done->ignored != 0)
-        fmt::print(stderr, "versavis: {} rows with stamps beyond 73 years were left out\n",
+        fmt::print(stderr, "versavis: {} rows with stamps beyond 73 years were ignored\n",
                    done->ignored);
     return EX_OK;
 }

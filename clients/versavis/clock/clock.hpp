@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The command `versavis clock`: state of the board's clock, recordings of its stamps, and its
-// estimation from them again.
+// The command `versavis clock`: state of the board's clock, recordings of its stamps, and
+// the estimate made again from them.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -15,17 +15,17 @@ namespace versavis::client {
 
 class ClockCommands {
  public:
-    /// Adds the command and its subcommands to the options of the program; `stop` says that it
-    /// shall end.
+    /// Adds the command and its subcommands to the options of the program; `stop` returns
+    /// true when the program is to end.
     ClockCommands(CLI::App& app, std::function<bool()> stop);
     ClockCommands(const ClockCommands&) = delete;  // options write to the members
     ClockCommands& operator=(const ClockCommands&) = delete;
 
-    /// After parsing: the user asked for one of them.
+    /// After parsing: the user chose one of the clock commands.
     bool chosen() const;
-    bool records() const;  ///< that goes on until it is stopped
+    bool records() const;  ///< one that runs until it is stopped
 
-    /// Does it and returns the program's exit code.
+    /// Runs the chosen command; returns the program's exit code.
     int run(const std::string& instance);
 
  private:

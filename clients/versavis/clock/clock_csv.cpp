@@ -23,7 +23,7 @@ std::string_view trimmed(std::string_view text) {
     return text.substr(begin, text.find_last_not_of(blank) - begin + 1);
 }
 
-/// What a file contains may be anything, and long: it must not spoil the terminal.
+/// A file may contain anything: what is quoted from it must not garble the terminal.
 std::string shown(std::string_view text, std::size_t most = 40) {
     std::string out;
     for (const char c : text.substr(0, most)) {
@@ -69,7 +69,7 @@ class Reader {
             const auto done = width_ == 0 ? take_header(text) : take_row(text);
             if (!done) return Unexpected(done.error());
         }
-        if (in.bad()) return failure(name_, "cannot be read to its end", "is it a file?");
+        if (in.bad()) return failure(name_, "cannot be read to the end", "is it a file?");
         if (width_ == 0)
             return failure(name_, "is empty", "its first line must name its columns: " + needed());
         return std::move(table_);
@@ -90,7 +90,7 @@ class Reader {
             const auto found = std::find(fields_.begin(), fields_.end(), names_[i]);
             if (found == fields_.end() && i < required_) return missing(names_[i], text);
             if (found != fields_.end() && std::count(found, fields_.end(), names_[i]) > 1)
-                return failure(line(), fmt::format("column {} is there twice", names_[i]),
+                return failure(line(), fmt::format("column {} appears twice", names_[i]),
                                "rename one of the two");
             positions_.push_back(found == fields_.end()
                                      ? absent
@@ -109,8 +109,7 @@ class Reader {
     }
 
     Expected<void> unclosed() const {
-        return failure(line(), "a quote is not closed",
-                       "close it on the same line, or leave quotes out");
+        return failure(line(), "a quote is not closed", "close it on the same line, or remove it");
     }
 
     Expected<void> take_row(std::string_view text) {
@@ -126,7 +125,7 @@ class Reader {
     }
 
     Expected<void> wrong_width() const {
-        // Name the first column that is missing, so that one need not count commas.
+        // Name the first column that is missing, so that nobody has to count commas.
         std::string what = fmt::format("{} fields instead of {}", fields_.size(), width_);
         for (std::size_t i = 0; i < names_.size(); ++i)
             if (positions_[i] != absent && positions_[i] >= fields_.size()) {
@@ -151,7 +150,7 @@ class Reader {
         if (error == std::errc::result_out_of_range && stopped == end)
             return failure(where, fmt::format("{} does not fit into 64 bits", shown(field)),
                            "is its unit nanoseconds?");
-        return failure(where, fmt::format("'{}' is no integer", shown(field)),
+        return failure(where, fmt::format("'{}' is not an integer", shown(field)),
                        "write whole nanoseconds, without a point or an exponent");
     }
 

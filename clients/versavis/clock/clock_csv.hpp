@@ -11,8 +11,7 @@
 
 namespace versavis::client {
 
-/// The columns that were asked for; those not required come last and are empty when the file has
-/// none.
+/// The requested columns; optional ones come last and are empty if the file does not have them.
 struct CsvTable {
     std::vector<std::vector<std::int64_t>> columns;
     std::size_t rows = 0;
@@ -27,7 +26,7 @@ struct CsvColumns {
 /// lines, spaces and quotes around fields are accepted. Errors name file, line and column.
 Expected<CsvTable> read_csv(const std::string& path, const CsvColumns& columns);
 
-/// The same from a stream; `name` is for errors.
+/// The same from a stream; `name` is used in errors.
 Expected<CsvTable> read_csv(std::istream& in, const std::string& name, const CsvColumns& columns);
 
 }  // namespace versavis::client

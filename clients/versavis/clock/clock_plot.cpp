@@ -24,7 +24,7 @@ constexpr const char* blue = "#1f5fa8";
 constexpr const char* pale_blue = "#c9dcf2";
 constexpr const char* dark = "#333";
 
-constexpr double start_s = 10;  // what the start shows, unless exchanges are rare
+constexpr double start_s = 10;  // shown as the start, unless exchanges are rare
 constexpr std::size_t start_points = 30;
 constexpr double page_width = 1200;
 constexpr double page_height = 910;
@@ -34,12 +34,12 @@ constexpr double first_top = 104;
 constexpr double panel_pitch = 198;
 constexpr std::array column_left{95.0, 690.0};
 
-using Wide = __int128;  // recorded stamps may be anything
+using Wide = __int128;  // recorded stamps may have any value
 
 BoardTime board_middle(const Exchange& e) { return {std::midpoint(e.received.ns, e.answered.ns)}; }
 HostTime host_middle(const Exchange& e) { return {std::midpoint(e.sent.ns, e.arrived.ns)}; }
 
-/// Unit that makes the numbers of an axis short.
+/// The unit that keeps the labels of an axis short.
 struct Unit {
     const char* name;
     double ns;
@@ -133,7 +133,7 @@ class Column {
         const auto value = [&](const ClockPoint& p) { return p.offset_ns - line_.at(p.time_s); };
         const auto band = [](const ClockPoint& p) { return p.sigma_ns; };
         const svg::Span span = svg::span_of(collected(points_, value));
-        return curve(0, "offset", "offset estimate less a straight line", unit_for(span), value,
+        return curve(0, "offset", "offset estimate minus a straight line", unit_for(span), value,
                      band);
     }
 
@@ -284,7 +284,7 @@ std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTex
                     std::round(line.slope * 10) * 1e-4 + 0.0),
         Anchor::middle, 12, "#666");
     out += Column(begin, column_left[0], line, start_title(begin)).drawn();
-    out += Column(std::move(rest), column_left[1], line, "in convergence").drawn();
+    out += Column(std::move(rest), column_left[1], line, "after convergence").drawn();
     return out + "</svg>\n";
 }
 
@@ -296,8 +296,8 @@ Expected<std::size_t> plot_clock(const ClockPlotSettings& settings) {
     const auto estimator = make_estimator(settings.estimator);
     const Points history = clock_history(*recording, *estimator);
     if (history.empty())
-        return failure(settings.exchanges, "has no exchange that an estimator could begin with",
-                       "round trips must be positive: is the order of the columns right?");
+        return failure(settings.exchanges, "contains no exchange that an estimator can start from",
+                       "round trips must be positive: are the columns in the right order?");
     const std::string name = settings.estimator == EstimatorKind::envelope ? "envelope"
                              : settings.estimator == EstimatorKind::ekf
                                  ? "ekf, published start values"

@@ -12,7 +12,7 @@ namespace versavis::client {
 /// State of the estimator after one exchange.
 struct ClockPoint {
     double time_s = 0;     ///< since the first exchange
-    double offset_ns = 0;  ///< host minus board clock, less the same at the first exchange
+    double offset_ns = 0;  ///< host minus board clock, relative to the first exchange
     double sigma_ns = 0;   ///< of the offset
     double skew_ppm = 0;   ///< host clock against board clock
     double skew_sigma_ppm = 0;
@@ -28,7 +28,7 @@ struct ClockPlotTexts {
     std::string estimator;
 };
 
-/// An SVG document: offset, skew, residual and innovation, after the start and in convergence.
+/// An SVG document: offset, skew, residual and innovation, at the start and after convergence.
 std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTexts& texts);
 
 struct ClockPlotSettings {

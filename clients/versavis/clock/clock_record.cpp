@@ -29,7 +29,7 @@ class Recording {
         return open(one_way_file_, settings.one_way, "m_ns,h_ns");
     }
 
-    /// False: the board restarted, this item is of its new life.
+    /// False: the board restarted, and this item belongs to its new boot.
     bool add(const clock::ClockItem& item) {
         return std::visit([this](const auto& told) { return take(told); }, item);
     }
@@ -40,8 +40,7 @@ class Recording {
         exchange_file_.close();
         if (one_way_file_.is_open()) one_way_file_.close();
         if (!exchange_file_ || !one_way_file_)
-            return failure("recording", "could not be written in full",
-                           "is there space on the disk?");
+            return failure("recording", "could not be written completely", "is the disk full?");
         return {};
     }
 
@@ -52,7 +51,8 @@ class Recording {
     static Expected<> open(std::ofstream& file, const std::string& path, const char* header) {
         file.open(path);
         file << header << '\n';
-        if (!file.flush()) return failure(path, "cannot be written");
+        if (!file.flush())
+            return failure(path, "cannot be written", "check its directory and permissions");
         return {};
     }
 
@@ -106,7 +106,7 @@ bool take(const Received<clock::ClockMetadata>& item, Recording& recording) {
     return !told || recording.add(*told);
 }
 
-/// Reads on until it is time. False: the board restarted before.
+/// Reads until the time is up. False: the board restarted first.
 bool run(clock::ClockStream& stream, Recording& recording, const ClockRecordSettings& settings) {
     const bool limited = settings.duration.ns > 0;
     const HostTime end = host_now() + settings.duration;
@@ -116,7 +116,7 @@ bool run(clock::ClockStream& stream, Recording& recording, const ClockRecordSett
         if (!take(stream.wait(short_wait ? std::max(left, Duration{}) : longest_wait), recording))
             return false;
     }
-    // What was there by then is part of it.
+    // What had been published by then belongs to the recording.
     const std::uint64_t head = stream.reader().head();
     for (auto item = stream.next(); item.found == Found::item || item.found == Found::lost;
          item = stream.next()) {
@@ -144,10 +144,11 @@ int record_clock(const ClockRecordSettings& settings) {
     if (const auto closed = recording.close(); !closed) return fail(closed.error());
     fmt::print("{} exchanges, {} one-way messages\n", recording.exchanges(), recording.one_way());
     if (!to_its_end)
-        return fail({"board", "was restarted, its clock began anew",
-                     "the recording ends there; record again for its new life"});
+        return fail({"board", "restarted, and its clock with it",
+                     "the recording ends there; start another"});
     if (recording.exchanges() == 0)
-        return fail({"clock", "no exchange came", "see 'versavis status' for the board"});
+        return fail(
+            {"clock", "no exchange arrived", "'versavis status' shows the state of the board"});
     return EX_OK;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Writes the stamps that the clocks are compared by to CSV files.
+// Writes the stamps by which the clocks are compared to CSV files.
 #pragma once
 
 #include <functional>
@@ -17,9 +17,9 @@ struct ClockRecordSettings {
     std::function<bool()> stop;
 };
 
-/// Prints what it does and why it ended; returns an exit code. A recording is of one life of the
-/// board: when the board restarts it ends. What was recorded until then is in the files, whole
-/// lines only.
+/// Prints what it does and why it ended; returns an exit code. A recording covers one boot of the
+/// board and ends when the board restarts. What was recorded until then is in the files, in whole
+/// lines.
 int record_clock(const ClockRecordSettings& settings);
 
 }  // namespace versavis::client

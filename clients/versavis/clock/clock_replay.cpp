@@ -44,8 +44,8 @@ Expected<void> read_exchanges(const std::string& path, ClockRecording& recording
     const auto table = read_csv(path, {{"h1_ns", "m2_ns", "m3_ns", "h4_ns"}, {"available_ns"}});
     if (!table) return Unexpected(table.error());
     if (table->rows == 0)
-        return failure(path, "has no exchanges, only a header",
-                       "record some, at least for a few seconds");
+        return failure(path, "contains no exchanges, only a header",
+                       "record for at least a few seconds");
     const auto& columns = table->columns;
     const auto& available = columns[4].empty() ? columns[3] : columns[4];
     for (std::size_t i = 0; i < table->rows; ++i) {
@@ -175,7 +175,8 @@ Expected<void> check_output(const std::string& out, const std::vector<std::strin
     for (const std::string& input : inputs)
         if (std::filesystem::is_regular_file(input, ignored) &&
             std::filesystem::equivalent(input, out, ignored))
-            return failure(out, "is read, too, and would be overwritten", "name another file");
+            return failure(out, "is an input as well and would be overwritten",
+                           "name another file");
     return {};
 }
 
@@ -192,7 +193,7 @@ Expected<void> write_whole_file(const std::string& path, const std::string& text
     if (file && (special || !error)) return {};
     if (!special) std::filesystem::remove(temporary, error);
     return failure(path, "cannot be written",
-                   "check its directory, permissions and the space left");
+                   "check its directory, permissions and the free space");
 }
 
 }  // namespace versavis::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Translates board times again from recorded stamps, as it would have been done at the time.
+// Translates board times again from recorded stamps, as it would have been done live.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ namespace versavis::client {
 enum class EstimatorKind {
     envelope,
     ekf,       ///< the published filter from its published start values
-    ekf_fair,  ///< the same, but it believes the first exchange
+    ekf_fair,  ///< the same, but started from the first exchange
 };
 
 /// An estimator chosen at run time.
@@ -32,7 +32,7 @@ class ClockEstimator {
 };
 std::unique_ptr<ClockEstimator> make_estimator(EstimatorKind kind);
 
-/// A message, and when it was known: an answer from before must not use it.
+/// A message, and when it became known: earlier answers must not use it.
 struct TimedMessage {
     HostTime available;
     clock::Message message;
@@ -45,11 +45,11 @@ struct ClockQuery {
 
 using ClockAnswers = std::vector<clock::HostEstimate>;  ///< state init: time and sigma are unknown
 
-/// What was recorded, in order of availability; at the same instant exchanges come first, for they
-/// bound the offset from both sides, then it is the order of the files.
+/// What was recorded, in order of availability. At the same instant exchanges come first, because
+/// they bound the offset from both sides; the rest keep the order of the files.
 struct ClockRecording {
     std::vector<TimedMessage> messages;
-    std::uint64_t ignored = 0;  ///< rows with stamps of more than 73 years, which no clock shows
+    std::uint64_t ignored = 0;  ///< rows with stamps beyond 73 years, which no clock shows
 };
 
 /// `oneway` may be empty. Error: a file cannot be read; no exchange in it.
@@ -60,7 +60,7 @@ Expected<ClockRecording> read_clock_recording(const std::string& exchanges,
 ClockAnswers replayed_answers(const std::vector<TimedMessage>& messages,
                               const std::vector<ClockQuery>& queries, ClockEstimator& estimator);
 
-/// One answer per query from all messages, later ones included.
+/// One answer per query, from all messages including later ones.
 ClockAnswers smoothed_answers(const std::vector<TimedMessage>& messages,
                               const std::vector<ClockQuery>& queries);
 
@@ -83,11 +83,11 @@ struct ClockReplaySummary {
 /// Reads the files, answers and writes the answers. `out` appears complete or not at all.
 Expected<ClockReplaySummary> replay_clock(const ClockReplaySettings& settings);
 
-/// A slip of the hand must not replace what was recorded.
+/// Error: `out` is one of the inputs. A slip of the hand must not destroy a recording.
 Expected<void> check_output(const std::string& out, const std::vector<std::string>& inputs);
 
-/// Writes `text` under a temporary name, then renames; straight to `path` when that is no regular
-/// file.
+/// Writes `text` under a temporary name, then renames; straight to `path` when that is not a
+/// regular file.
 Expected<void> write_whole_file(const std::string& path, const std::string& text);
 
 }  // namespace versavis::client

@@ -76,7 +76,7 @@ Span span_of(std::vector<double> values, double cut) {
     const double low = quantile(values, cut);
     const double high = quantile(values, 1 - cut);
     const double size = std::max(std::abs(low), std::abs(high));
-    // A constant, too, needs a scale: one with short labels.
+    // A constant needs a scale as well: one with short labels.
     const double room =
         std::max(0.08 * (high - low), high - low <= 1e-6 * size ? 0.01 * size : 0.0);
     if (room == 0) return {-1, 1};

@@ -40,28 +40,29 @@ std::string escaped(std::string_view text);
 std::string text(double x, double y, std::string_view content, Anchor anchor, int size,
                  const char* colour = "#222");
 
-/// All values, but without that share at each side when there are many, and some room; never empty.
+/// Spans all values, with some room; when there are many, a share of `cut` is left out on each
+/// side. Never empty.
 Span span_of(std::vector<double> values, double cut = 0.005);
 
-/// Round numbers within the span, about as many.
+/// Round numbers within the span, `about` as many.
 std::vector<double> ticks(Span span, int about);
 
-/// As many digits as ticks at such a distance need.
+/// With as many digits as ticks `step` apart need.
 std::string tick_label(double value, double step);
 
 class Panel {
  public:
     Panel(const Box& box, Span x, Span y) : box_(box), x_(x), y_(y) {}
 
-    /// What is outside of the axes is cut off.
+    /// What lies outside the axes is cut off.
     void band(const std::vector<Bar>& bars, const char* colour);
     void line(const std::vector<Point>& points, const char* colour);
 
-    /// Dots; when they would cover each other, their range and its middle half per pixel. Returns
-    /// how many are outside of the axes.
+    /// Draws dots or, when they would cover each other, their range and its middle half per pixel.
+    /// Returns how many lie outside the axes.
     std::size_t cloud(const std::vector<Point>& points, const char* colour);
 
-    /// Frame, grid and ticks below and above what was drawn; labels along x only if asked for.
+    /// What was drawn, with frame, grid and ticks; an empty label leaves out the labels along x.
     std::string finished(const std::string& y_label, const std::string& x_label) const;
 
  private:

@@ -108,7 +108,7 @@ Evidence read(const json& line) {
     if (kind == "start")
         return StartRequest{static_cast<Start>(line.at("start").get<std::uint32_t>()),
                             {line.at("now_ns")}};
-    throw std::invalid_argument(fmt::format("'{}' is no evidence", kind));
+    throw std::invalid_argument(fmt::format("'{}' is not a kind of evidence", kind));
 }
 
 }  // namespace

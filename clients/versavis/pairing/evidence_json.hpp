@@ -11,7 +11,7 @@ namespace versavis::client {
 
 nlohmann::json to_json(const pairing::Evidence& evidence);
 
-/// Errors: no evidence, or a field that is missing or of the wrong type.
+/// Errors: not evidence, or a field that is missing or of the wrong type.
 Expected<pairing::Evidence> to_evidence(const nlohmann::json& line);
 
 }  // namespace versavis::client

@@ -68,7 +68,7 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         const std::string where = fmt::format("line {}", ++number);
         const json line = json::parse(text, nullptr, false);
         if (line.is_discarded())
-            return failure(where, "is no JSON",
+            return failure(where, "is not valid JSON",
                            "record with: versavis tail CAMERA-evidence --oldest --json");
         auto evidence = to_evidence(line);
         if (!evidence) return failure(where, evidence.error().message());
@@ -81,11 +81,11 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
         }
         if (!pairing) continue;
         if (std::holds_alternative<Arrival>(*evidence)) ++decisions.summary.frames;
-        tell(*pairing, *evidence);
+        versavis::pairing::apply(*pairing, *evidence);  // unqualified, std::apply would match
     }
     if (!pairing)
-        return failure("recording", "the beginning of the stream is not in it",
-                       "record from the start of the service, or with --oldest soon after it");
+        return failure("recording", "does not contain the beginning of the stream",
+                       "record from the start of the service, or soon after it with --oldest");
     return decisions.summary;
 }
 

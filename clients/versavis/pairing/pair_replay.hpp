@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The pairing of a camera done again from a recording of its evidence.
+// The pairing of a camera, redone from a recording of its evidence.
 #pragma once
 
 #include <istream>
@@ -21,7 +21,7 @@ struct ReplaySummary {
 
 /// Reads the lines of `versavis tail CAMERA-evidence --json` and writes each decision to `out`, if
 /// it is not null, as one JSON object per line. What precedes the beginning of a stream in the
-/// recording is left out. Errors name the line: no JSON, no evidence; no beginning anywhere.
+/// recording is ignored. Errors name the line: not JSON, not evidence; no beginning anywhere.
 Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* out);
 
 std::string to_text(const ReplaySummary& summary, bool json);

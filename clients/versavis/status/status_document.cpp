@@ -18,15 +18,15 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
             newest = std::move(text);
     }
     if (!stream->reader().writer_alive())
-        return failure(fmt::format("instance {}", instance), "the service has died or hangs",
+        return failure(fmt::format("instance {}", instance), "the service has died or is hanging",
                        "see its log ('journalctl -u versavisd'), then restart it");
     if (!newest)
         return failure(fmt::format("instance {}", instance),
-                       "the service has not published its status yet");
+                       "the service has not published its status yet", "try again in a second");
     auto document = nlohmann::json::parse(*newest, nullptr, false);
     if (document.is_discarded() || document.value("schema", 0) != 1)
         return failure(fmt::format("instance {}", instance),
-                       "the status document is of another version",
+                       "the status document has another version",
                        "install service and clients of the same release");
     return document;
 }

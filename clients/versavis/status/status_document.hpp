@@ -10,7 +10,7 @@
 
 namespace versavis::client {
 
-/// The newest document of `instance`. Error: the service does not run, or its document is older
+/// The newest document of `instance`. Errors: the service is not running, or its document is older
 /// than three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
 

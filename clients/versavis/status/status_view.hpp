@@ -9,8 +9,8 @@ namespace versavis::client {
 
 std::string status_text(const nlohmann::json& status);
 
-/// The clock's part alone, one fact per line; keys that this version does not know are shown by
-/// their names.
+/// The clock's part alone, one fact per line; keys that this version does not know are shown as
+/// they are.
 std::string clock_text(const nlohmann::json& status);
 
 }  // namespace versavis::client

@@ -36,7 +36,7 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
         if (entry.path().filename().string().front() != '.') paths.push_back(entry.path());
     if (error)
         return failure(directory.string(), error.message(),
-                       "is versavisd running? --instance names another instance");
+                       "is versavisd running? --instance selects another instance");
     std::sort(paths.begin(), paths.end());
     nlohmann::json document = nlohmann::json::array();
     std::string text;
@@ -51,7 +51,7 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
                             {"alive", alive}});
         text += fmt::format("{:<12} {:<7} {:>10} items, {:>6} retained{}\n", reader->name(),
                             kind_name(reader->kind()), reader->head(), reader->retained(),
-                            alive ? "" : ", its writer is gone");
+                            alive ? "" : ", writer gone");
     }
     return as_json ? document.dump() + "\n" : text;
 }

@@ -8,7 +8,7 @@
 
 namespace versavis::client {
 
-/// One line per stream, or a JSON array. Error: the service does not run here.
+/// One line per stream, or a JSON array. Error: the service is not running here.
 Expected<std::string> list_streams(const std::string& instance, bool json);
 
 }  // namespace versavis::client

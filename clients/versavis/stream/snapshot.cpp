@@ -38,11 +38,11 @@ Expected<> write_png(const std::string& path, const FrameMetadata& frame,
     const auto layout = layout_of(frame.pixel_format);
     if (!layout)
         return failure(path,
-                       fmt::format("pixel format {:#010x} cannot be written", frame.pixel_format),
+                       fmt::format("pixel format {:#010x} is not supported", frame.pixel_format),
                        "choose an unpacked format of 8 or 16 bits in the camera's [features]");
     if (std::uint64_t{frame.stride} * frame.height > pixels.size() ||
         frame.stride < frame.width * layout->bytes_per_pixel)
-        return failure(path, "the frame is smaller than its size says");
+        return failure(path, "the frame holds fewer bytes than its width and height require");
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
     image.width = frame.width;
@@ -72,7 +72,7 @@ Expected<std::string> snapshot(const std::string& instance, const std::string& s
         return fmt::format("{}: {} x {}, {} stamp {} ns", path, item.data.width, item.data.height,
                            to_string(item.data.stamp_kind()), item.time.ns);
     }
-    return failure(stream_name, "no frame came in time", "see 'versavis status'");
+    return failure(stream_name, "no frame arrived in time", "see 'versavis status'");
 }
 
 }  // namespace versavis::client

@@ -9,9 +9,9 @@
 
 namespace versavis::client {
 
-/// Waits for the next frame and writes it. 8 and 16 bit grey, RGB and BGR are known; Bayer patterns
-/// are written grey. Errors: no such stream, no frame in time, an unknown pixel format, the file
-/// cannot be written.
+/// Waits for the next frame and writes it. Supports 8 and 16 bit grey, RGB and BGR; Bayer patterns
+/// are written as grey. Errors: no such stream, no frame in time, a pixel format that is not
+/// supported, the file cannot be written.
 Expected<std::string> snapshot(const std::string& instance, const std::string& stream,
                                const std::string& path, Duration timeout);
 

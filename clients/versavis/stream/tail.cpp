@@ -159,7 +159,8 @@ Expected<> tail(const TailSettings& settings) {
         case ring::StreamKind::evidence: return print_stream<pairing::EvidenceStream>(settings);
         case ring::StreamKind::clock: return print_stream<clock::ClockStream>(settings);
     }
-    return failure(settings.stream, "is of a kind that this program does not know");
+    return failure(settings.stream, "is a kind of stream that this program does not know",
+                   "install service and clients of the same release");
 }
 
 }  // namespace versavis::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Prints a stream as it comes, one line per item.
+// Prints the items of a stream as they arrive, one per line.
 #pragma once
 
 #include <cstdint>

@@ -45,7 +45,7 @@ std::uint32_t Adis::rate(std::uint32_t wanted_millihertz) const {
 
 void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
     const std::uint16_t code = rate_code(rate_millihertz);
-    // In octaves the rate stands in the high byte, beside the bit that chooses the internal clock.
+    // In octaves the rate is in the high byte, beside the bit that selects the internal clock.
     const auto rate =
         static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
     const auto filters = static_cast<std::uint16_t>(facts_.filter_base | filter);
@@ -56,7 +56,7 @@ void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setu
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
     setup.write(0, facts_.filter_register, filters,
-                settle_us);  // choosing the range may alter the filter
+                settle_us);  // changing the range may change the filter
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }
@@ -101,7 +101,7 @@ void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
     }
     if (facts_.magnetic) sample.pressure = words[10];
     std::uint16_t temperature = words[facts_.magnetic ? 11 : 7];
-    // Twelve bits in the older parts; the others are not used.
+    // Twelve bits in the older parts; the other bits are unused.
     if (facts_.octaves)
         temperature = static_cast<std::uint16_t>(((temperature & 0xFFFU) ^ 0x800U) - 0x800U);
     sample.temperature = signed_word(temperature);
@@ -109,7 +109,7 @@ void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
 }
 
 Verdict Adis::parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const {
-    // What comes while the command goes out means nothing.
+    // What arrives while the command goes out means nothing.
     const std::uint8_t* newest = replies[count - 1].bytes + 2;
     std::uint16_t words[max_words] = {};
     for (std::size_t i = 0; i < facts_.words; ++i) words[i] = big_endian(newest, i);
@@ -127,7 +127,7 @@ Verdict Adis::parse(const ImuReply* replies, unsigned count, wire::ImuSample& sa
         equal = equal && words[i] == big_endian(before, i);
         alive = alive || (words[i] != 0 && words[i] != 0xFFFF);
     }
-    // An update may lie between two readings, or within one.
+    // An update may fall between two readings, or within one.
     if (!equal && count < max_readings) return Verdict::unsure;
     fill(words, sample);
     if (!equal || !alive) sample.flags |= wire::imu_check_failed;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Analog Devices' ADIS164xx family: 16-bit registers behind a pipelined SPI, samples in one burst;
-// by the data sheets of ADIS16448 (rev E) and ADIS16470 (rev A), and the register maps that the
+// from the data sheets of ADIS16448 (rev E) and ADIS16470 (rev A), and the register maps that the
 // maker publishes for the others.
 #pragma once
 
@@ -13,7 +13,7 @@ namespace versavis::firmware {
 /// inverted and its bytes swapped at the end.
 std::uint16_t adis16448_crc(const std::uint16_t* words);
 
-/// How the members of the family differ.
+/// What differs between the members of the family.
 struct AdisFacts {
     enum class Check : std::uint8_t { twice, crc, byte_sum };
 
@@ -29,8 +29,8 @@ struct AdisFacts {
     std::uint32_t fastest_millihertz;
     bool octaves;            ///< rates are fractions by powers of two, else by whole numbers
     std::uint8_t words;      ///< of a burst, the check included
-    bool magnetic;           ///< with magnetometer and barometer
-    std::uint16_t failures;  ///< bits of DIAG_STAT that say so
+    bool magnetic;           ///< has magnetometer and barometer
+    std::uint16_t failures;  ///< bits of DIAG_STAT that report one
     Check check;
     std::uint32_t word_gap_ns;
     std::uint32_t reset_us;

@@ -28,7 +28,7 @@ enum AccelRegister : std::uint8_t {
     accel_chip_id = 0x00,
     accel_error = 0x02,
     accel_data = 0x12,
-    accel_temperature = 0x22,  // high byte first, unlike all else
+    accel_temperature = 0x22,  // high byte first, unlike everything else
     accel_conf = 0x40,
     accel_range = 0x41,
     accel_pwr_conf = 0x7C,
@@ -43,7 +43,7 @@ constexpr std::uint8_t error_bits = 0x1D;  // the others are reserved
 constexpr std::uint8_t active = 0x00;
 constexpr std::uint8_t on = 0x04;
 
-// The codes with the widest bandwidth of each rate.
+// The codes with the widest bandwidth at each rate.
 constexpr RateCode rates[] = {
     {2'000'000, 0}, {1'000'000, 2}, {400'000, 3}, {200'000, 6}, {100'000, 7}};
 // The accelerometer has a clock of its own: at its fastest rate its data is at most 625 us older
@@ -81,7 +81,7 @@ void Bmi088::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& se
     setup.write(gyro, gyro_int_ctrl, 0x80, write_pause_us);
 }
 
-/// The last reading proves that the accelerometer has not reset itself: it would be suspended.
+/// The last reading proves that the accelerometer has not reset itself, which would suspend it.
 void Bmi088::reading(unsigned index, ImuTransfer& transfer) const {
     if (index == 0)
         burst(gyro, gyro_chip_id, gyro_burst, transfer);

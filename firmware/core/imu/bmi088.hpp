@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bosch BMI088, by its data sheet BST-BMI088-DS001 rev 1.4: gyro (chip 0) at 2000 deg/s, which
+// Bosch BMI088, from its data sheet BST-BMI088-DS001 rev 1.4: gyro (chip 0) at 2000 deg/s, which
 // paces the samples, and accelerometer (chip 1) at 24 g.
 #pragma once
 

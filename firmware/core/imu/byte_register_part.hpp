@@ -31,7 +31,7 @@ class ByteRegisterPart : public ImuPart {
     static constexpr std::uint8_t read_bit = 0x80;
 
     virtual std::uint32_t clock_hz() const = 0;
-    /// Bytes without meaning between address and data of a read.
+    /// Meaningless bytes between the address and the data of a read.
     virtual std::size_t dummies(std::uint8_t chip) const = 0;
 
     void burst(std::uint8_t chip, std::uint8_t first, std::size_t registers,

@@ -41,9 +41,9 @@ void Icm42688p::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup&
     setup.write(0, device_config, 1, 2'000);  // reset; the sheet asks for 1 ms
     setup.expect(0, who_am_i, identity());
     setup.write(0, int_config, 0x03);  // INT1 pulsed, push-pull, active high
-    // Short pulses where the rate asks for them; the asynchronous reset bit must be cleared.
+    // Short pulses where the rate requires them; the asynchronous reset bit must be cleared.
     setup.write(0, int_config1, rate_millihertz >= fast_millihertz ? 0x60 : 0x00);
-    setup.write(0, int_source0, 0x08);  // data ready alone
+    setup.write(0, int_source0, 0x08);  // data ready only
     setup.write(0, gyro_accel_config0, static_cast<std::uint16_t>(filter << 4U | filter));
     setup.write(0, gyro_config0, code);
     setup.write(0, accel_config0, code);
@@ -51,8 +51,8 @@ void Icm42688p::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup&
     setup.expect(0, pwr_mgmt0, both_low_noise);
 }
 
-/// The second reading proves that the part is there and has not reset itself: ones or zeros of a
-/// dead bus look like data, and so does what a part shows that is switched off.
+/// The second reading proves that the part is there and has not reset itself: the ones or zeros of
+/// a dead bus look like data, and so does what a part shows while switched off.
 void Icm42688p::reading(unsigned index, ImuTransfer& transfer) const {
     if (index == 0)
         burst(0, temp_data1, burst_registers, transfer);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// TDK ICM-42688-P, by its data sheet DS-000347 rev 1.5: 2000 deg/s, 16 g, 12.5 Hz to 8 kHz.
+// TDK ICM-42688-P, from its data sheet DS-000347 rev 1.5: 2000 deg/s, 16 g, 12.5 Hz to 8 kHz.
 #pragma once
 
 #include "imu/byte_register_part.hpp"

@@ -18,7 +18,7 @@ constexpr double temperature_at_zero_c = 31.0;
 
 constexpr std::int64_t q32(double ratio) { return static_cast<std::int64_t>(ratio * 4294967296.0); }
 
-/// Raw words of a kind in those of an ADIS16448, times 2^32.
+/// Scale from the raw words of a kind to those of an ADIS16448, times 2^32.
 struct Scale {
     constexpr Scale(wire::ImuKind of, double gyro_lsb_deg_s, double accel_lsb_g,
                     double temperature_lsb_c, double at_zero_c, double magnetic_lsb_gauss = 0,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Samples of any IMU as an ADIS16448 would show them, for a flight controller on the second SPI
+// Samples of any IMU as an ADIS16448 would give them, for a flight controller on the second SPI
 // port.
 #pragma once
 

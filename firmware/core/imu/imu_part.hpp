@@ -14,7 +14,7 @@ struct SetupStep {
     Action action = Action::write;
     std::uint8_t chip = 0;
     std::uint8_t address = 0;
-    std::uint16_t value = 0;     ///< to write, or that a read must give
+    std::uint16_t value = 0;     ///< to write, or that a read must return
     std::uint32_t pause_us = 0;  ///< before the next step
 };
 
@@ -54,22 +54,22 @@ inline constexpr unsigned max_readings = 5;
 class ImuPart {
  public:
     virtual wire::ImuKind kind() const = 0;
-    /// What identifies the part, as an `imu_ready` event tells it.
+    /// What identifies the part, as reported by an `imu_ready` event.
     virtual std::uint16_t identity() const = 0;
     virtual std::uint32_t fastest_millihertz() const = 0;
     virtual std::uint8_t strongest_filter() const = 0;
-    /// Its slowest rate that is not below `wanted_millihertz`, or its fastest.
+    /// Its slowest rate not below `wanted_millihertz`, or its fastest.
     virtual std::uint32_t rate(std::uint32_t wanted_millihertz) const = 0;
 
     /// `rate_millihertz` is one of its rates.
     virtual void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const = 0;
     virtual void access(const SetupStep& step, ImuTransfer& transfer) const = 0;
-    /// What the register held that `asked` read.
+    /// The value of the register that `asked` read.
     virtual std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const = 0;
 
-    /// Least time between two transfers.
+    /// Shortest time between two transfers.
     virtual Nanoseconds pause() const = 0;
-    /// Transfers that make a sample.
+    /// Transfers that make up a sample.
     virtual unsigned readings() const = 0;
     virtual void reading(unsigned index, ImuTransfer& transfer) const = 0;
     /// Fills the raw words and flags of `sample` from `count` replies.
@@ -80,7 +80,7 @@ class ImuPart {
     ~ImuPart() = default;
 };
 
-/// The part of a kind; null: the kind is none on the SPI bus.
+/// The part of a kind; null: not a kind on the SPI bus.
 const ImuPart* find_part(wire::ImuKind kind);
 
 }  // namespace versavis::firmware

@@ -21,7 +21,7 @@ class ImuPort {
     static constexpr unsigned max_failures =
         20;  ///< failed checks in a row before it is set up again
 
-    /// Samples that were due but cannot be had: their numbers will be missing.
+    /// Samples that were due but were not read: their numbers will be missing.
     void miss(std::uint32_t samples = 1) {
         number_ += samples;
         overrun_ = overrun_ || samples > 0;
@@ -42,15 +42,16 @@ class ImuPort {
         return failures_ < max_failures;
     }
 
-    void tell(wire::EventKind kind, Nanoseconds at, std::int64_t value, std::uint16_t detail = 0) {
+    void report_event(wire::EventKind kind, Nanoseconds at, std::int64_t value,
+                      std::uint16_t detail = 0) {
         reports_.event(kind, port_, at, value, detail);
     }
-    void tell_failure(wire::EventKind kind, Nanoseconds at, std::int64_t value,
-                      std::uint16_t detail = 0) {
+    void report_failure(wire::EventKind kind, Nanoseconds at, std::int64_t value,
+                        std::uint16_t detail = 0) {
         ++restarts_;
         failures_ = 0;
         miss();  // at least one, until it is running again
-        tell(kind, at, value, detail);
+        report_event(kind, at, value, detail);
     }
 
     std::uint8_t port_;

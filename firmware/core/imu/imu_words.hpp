@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sensor words out of the bytes of a transfer, and rates out of a table.
+// Sensor words from the bytes of a transfer, and rates from a table.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +22,7 @@ struct RateCode {
     std::uint8_t code;
 };
 
-/// The slowest entry that is not below `wanted_millihertz`, or the first; entries from fast to
-/// slow.
+/// The slowest entry not below `wanted_millihertz`, or the first; entries from fast to slow.
 template <std::size_t N>
 const RateCode& slowest_not_below(const RateCode (&rates)[N], std::uint32_t wanted_millihertz) {
     std::size_t found = 0;

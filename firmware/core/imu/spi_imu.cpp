@@ -6,7 +6,7 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds set_ahead = 500'000;          // of 1 ms at the highest rate on a grid
-constexpr Nanoseconds transfer_limit = 10'000'000;  // none takes so long, unless the bus hangs
+constexpr Nanoseconds transfer_limit = 10'000'000;  // none takes this long unless the bus hangs
 constexpr Nanoseconds power_up_time = 300'000'000;  // of the slowest part
 constexpr unsigned max_fast_edges = 20;
 constexpr Nanoseconds silence_floor = 100'000'000;
@@ -14,8 +14,8 @@ constexpr std::uint16_t while_running = 0xFFFF;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
-/// Read on a grid, the part shall be much faster than the grid: its newest sample is then never
-/// old.
+/// When read on a grid, the part must be much faster than the grid, so that its newest sample is
+/// never old.
 std::uint32_t part_rate(const ImuPart& part, const wire::ImuConfiguration& configuration) {
     const std::uint32_t wanted = configuration.rate_millihertz;
     return part.rate((configuration.options & wire::imu_data_ready) != 0 ? wanted : 4 * wanted);
@@ -89,13 +89,13 @@ void SpiImu::run(Nanoseconds now) {
     expect_edge(now);
     served_ = edge_count_;
     fast_edges_ = 0;
-    tell(wire::EventKind::imu_ready, now, part_->identity());
+    report_event(wire::EventKind::imu_ready, now, part_->identity());
 }
 
 void SpiImu::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail) {
     bus_.abort();
     pending_ = false;
-    tell_failure(kind, now, value, detail);
+    report_failure(kind, now, value, detail);
     begin_setup(now + retry_interval);
 }
 
@@ -120,7 +120,7 @@ void SpiImu::ready_edge(Nanoseconds at, Nanoseconds now) {
             edges.later[edges.later_count++] = at;
 }
 
-/// The data is that of the newest edge before it was read; samples of edges before that were never
+/// The data is that of the newest edge before the reading; samples of earlier edges were never
 /// read.
 Nanoseconds SpiImu::stamp(unsigned reading) {
     const Edges& edges = edges_[reading];
@@ -147,7 +147,7 @@ bool SpiImu::take(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sampl
         start_reading(now, now);
         return false;
     }
-    // Of the readings that were compared, the first: an update may lie before it.
+    // Of the readings that were compared, the first: an update may precede it.
     const unsigned read = reading_ - part_->readings();
     reading_ = 0;
     sample.kind = part_->kind();
@@ -157,7 +157,7 @@ bool SpiImu::take(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sampl
     return true;
 }
 
-/// Sets the reading at the next grid point when it is time to.
+/// Sets the reading for the next grid point when it is time.
 void SpiImu::pace(Nanoseconds now) {
     while (grid_.next() - set_ahead <= now) {
         if (pending_ || grid_.next() < now)
@@ -181,7 +181,7 @@ bool SpiImu::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (state_ == State::set_up && !pending_ && now >= resume_) next_step(now);
     if (state_ == State::running && paced_by_part() && now >= silent_at_)
         fail(wire::EventKind::imu_silent, now, 0, while_running);
-    // A part that has reset itself goes on at another rate.
+    // A part that has reset itself continues at another rate.
     if (state_ == State::running && fast_edges_ >= max_fast_edges)
         fail(wire::EventKind::imu_failed, now, 0, while_running);
     if (state_ == State::running && !paced_by_part()) pace(now);

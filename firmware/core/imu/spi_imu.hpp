@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The IMU on the SPI bus: sets it up, reads it at its data-ready edges or on a grid, and begins
-// anew when it fails.
+// The IMU on the SPI bus: sets it up, reads it at its data-ready edges or on a grid, and sets it up
+// again when it fails.
 #pragma once
 
 #include "imu/imu_part.hpp"
@@ -13,10 +13,10 @@ class SpiImu final : public ImuPort {
     SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports)
         : ImuPort(port, reports), bus_(bus) {}
 
-    /// A kind that is not on this bus: nothing is read.
+    /// With a kind that is not on this bus, nothing is read.
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
 
-    /// The data-ready line rose. Hand over all edges before poll(): what is read belongs to the
+    /// The data-ready line rose. Pass on all edges before poll(): what is read belongs to the
     /// newest.
     void ready_edge(Nanoseconds at, Nanoseconds now);
 
@@ -28,14 +28,14 @@ class SpiImu final : public ImuPort {
     /// Instants of the samples without data-ready.
     const Grid& grid() const { return grid_; }
 
-    /// Rate of the configuration as it will be in force.
+    /// The rate that a configuration leads to.
     static std::uint32_t true_rate(const wire::ImuConfiguration& configuration);
 
  private:
     enum class State : std::uint8_t { off, set_up, running };
 
-    /// Data-ready edges known when a reading was asked for, and the first that were seen later:
-    /// they may have come before it began.
+    /// Data-ready edges known when a reading was requested, and the first ones seen later, which
+    /// may have come before it began.
     struct Edges {
         Nanoseconds newest = 0;
         std::uint32_t count = 0;
@@ -64,7 +64,7 @@ class SpiImu final : public ImuPort {
     std::size_t step_ = 0;
     Nanoseconds resume_ = 0;    ///< when the next step may begin
     Grid grid_;                 ///< unless the part paces the samples
-    Nanoseconds patience_ = 0;  ///< how long its data-ready may stay away
+    Nanoseconds patience_ = 0;  ///< how long its data-ready edge may fail to come
     ImuTransfer transfer_;
     bool pending_ = false;           ///< a transfer is set or under way
     Nanoseconds pending_until_ = 0;  ///< when it must have ended
@@ -73,7 +73,7 @@ class SpiImu final : public ImuPort {
     Edges edges_[max_readings];  ///< as each reading of the sample began
     Nanoseconds completed_ = 0;  ///< when the newest transfer was found complete
     Nanoseconds period_ = 0;     ///< of the edges, as the part was told
-    unsigned fast_edges_ = 0;    ///< in a row that came sooner
+    unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
     Nanoseconds newest_edge_ = 0;
     std::uint32_t edge_count_ = 0;
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed

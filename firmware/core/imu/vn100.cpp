@@ -115,7 +115,7 @@ void Vn100::send_step(Nanoseconds now) {
     TextLine text;
     switch (step_) {
         case Step::quiet: text << "VNASY,0"; break;
-        // No output of another program may be left: it could be too much for the line.
+        // No output that another program set up may remain: it could be too much for the line.
         case Step::no_text: text << "VNWRG,06,0"; break;
         case Step::no_binary1: text << "VNWRG,75,0,8,01,0001"; break;
         case Step::no_binary2: text << "VNWRG,76,0,8,01,0001"; break;
@@ -157,11 +157,11 @@ void Vn100::next_step(Nanoseconds now) {
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
-    tell(wire::EventKind::imu_ready, now, 100);
+    report_event(wire::EventKind::imu_ready, now, 100);
 }
 
 void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
-    tell_failure(
+    report_failure(
         kind, now, value,
         state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
     fast_first_ = !fast_first_;
@@ -178,14 +178,15 @@ void Vn100::drop(std::size_t size) {
     filled_ -= size;
 }
 
-/// Of the line that stands first, its end included; 0: none ends soon.
+/// Length of the first line, including its end; 0: none ends soon.
 std::size_t Vn100::line_length() const {
     for (std::size_t i = 0; i < filled_ && i < max_line; ++i)
         if (bytes_[i] == '\n') return i + 1;
     return 0;
 }
 
-/// The answer to the step that was sent, or an error. False: what stands there is no intact line.
+/// The answer to the step that was sent, or an error. False: the first bytes are not an intact
+/// line.
 bool Vn100::take_line(Nanoseconds now) {
     const std::size_t end = line_length() - 1;
     const char* line = reinterpret_cast<const char*>(bytes_);
@@ -209,7 +210,7 @@ bool Vn100::take_line(Nanoseconds now) {
 
 bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     using namespace vn100;
-    // The bytes behind it, and its own, went over the line at the baud rate, ten bits each.
+    // Its own bytes and those behind it crossed the line at the baud rate, ten bits each.
     const Nanoseconds first_byte = received_ - static_cast<Nanoseconds>(filled_) * 10'000'000'000 /
                                                    static_cast<Nanoseconds>(baud_);
     const std::uint8_t* packet = bytes_;
@@ -241,8 +242,8 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     return true;
 }
 
-/// The part's own clock tells how many samples were lost on the way. Returns the time since the
-/// sample before; 0: there was none.
+/// The part's own clock shows how many samples were lost on the way. Returns the time since the
+/// previous sample; 0: there was none.
 Nanoseconds Vn100::count(std::uint64_t startup_ns) {
     const auto since = static_cast<Nanoseconds>(startup_ns - startup_ns_);
     const bool first = startup_ns_ == 0 || since <= 0;
@@ -253,8 +254,8 @@ Nanoseconds Vn100::count(std::uint64_t startup_ns) {
     return since;
 }
 
-/// A packet leaves within a base period of its sample: the newest edge before it is that sample's,
-/// if the part's clock agrees.
+/// A packet leaves within a base period of its sample: the newest edge before it belongs to that
+/// sample, if the part's clock agrees.
 void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSample& sample) {
     sample.time_ns = first_byte;
     if ((configuration_.options & wire::imu_data_ready) == 0) return;
@@ -269,7 +270,7 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     sample.flags |= wire::imu_stamped;
 }
 
-/// Takes what stands first among the bytes. True: it was a sample.
+/// Takes the first item from the bytes. True: it was a sample.
 bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
     while (filled_ > 0) {
         if (bytes_[0] == sync) {
@@ -294,7 +295,7 @@ bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
 
 bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (state_ == State::off) return false;
-    // What was read is looked at before more is: `received_` belongs to the last byte.
+    // Bytes already read are handled before more are read: `received_` belongs to the last one.
     if (parse(now, sample)) return true;
     while (const std::size_t size =
                uart_.read(bytes_ + filled_, sizeof bytes_ - filled_, received_)) {

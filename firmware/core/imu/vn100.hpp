@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// VectorNav VN-100 on the UART: set up by its text commands, read as binary packets, by the user
+// VectorNav VN-100 on the UART: set up by text commands, read as binary packets; from the user
 // manual UM001 v2.22.
 #pragma once
 
@@ -10,12 +10,12 @@ namespace versavis::firmware {
 /// CRC-16 with the polynomial 0x1021, from zero; over a packet with its CRC it is zero.
 std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size);
 
-/// An IEEE float as a whole number of 2^-`fraction_bits`, without floating point; saturates. False:
-/// it is not a number.
+/// An IEEE float as a multiple of 2^-`fraction_bits`, without floating point; saturates. False: it
+/// is not a number.
 bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t& out);
 
 namespace vn100 {
-// Raw words of its samples are whole numbers of these.
+// The raw words of its samples are multiples of these.
 inline constexpr unsigned gyro_bits = 24;        ///< 2^-24 rad/s
 inline constexpr unsigned accel_bits = 20;       ///< 2^-20 m/s^2
 inline constexpr unsigned magnetic_bits = 13;    ///< 2^-13 gauss
@@ -78,9 +78,9 @@ class Vn100 final : public ImuPort {
     wire::ImuConfiguration configuration_{};
     State state_ = State::off;
     std::uint32_t baud_ = 0;
-    bool fast_first_ = false;  ///< the part may still talk as fast as it was told before
+    bool fast_first_ = false;  ///< the part may still use the faster baud rate set earlier
     Step step_ = Step::quiet;
-    bool waiting_ = false;      ///< for the answer of the step
+    bool waiting_ = false;      ///< for the answer to the step
     Nanoseconds wake_ = never;  ///< the next attempt, or the end of patience
     Nanoseconds period_ = 0;
     Nanoseconds edges_[max_edges] = {};  ///< of the sync output, the newest first

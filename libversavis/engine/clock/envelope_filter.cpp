@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/rounding.hpp"
+
 namespace versavis::clock {
 
 namespace {

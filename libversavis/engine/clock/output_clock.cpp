@@ -42,7 +42,7 @@ Expected<OutputClock> OutputClock::create(OutputClockKind kind, bool force_tai,
 
 OutputClock::OutputClock(OutputClockKind kind, std::shared_ptr<SystemClocks> clocks)
     : kind_(kind), clocks_(std::move(clocks)), slept_(slept()), times_set_(clocks_->times_set()) {
-    if (kind_ != OutputClockKind::monotonic_raw) parted(best_sandwich());
+    if (kind_ != OutputClockKind::monotonic_raw) stepped_from_monotonic(best_sandwich());
     next_look_ = read_host() + look_interval;
 }
 
@@ -53,13 +53,13 @@ OutputReading OutputClock::read() {
         return {now, {}, {}, steps_};
     }
     Sandwich sandwich = best_sandwich();
-    const bool seen_parted = parted(sandwich);
-    if (seen_parted || sandwich.width() > wide_sandwich || sandwich.after >= next_look_) {
+    const bool seen_step = stepped_from_monotonic(sandwich);
+    if (seen_step || sandwich.width() > wide_sandwich || sandwich.after >= next_look_) {
         const std::uint32_t before = steps_;
-        look_for_steps(sandwich.after, seen_parted);
-        if (steps_ != before && !seen_parted) {  // it may have come after the sandwich
+        look_for_steps(sandwich.after, seen_step);
+        if (steps_ != before && !seen_step) {  // it may have come after the sandwich
             sandwich = best_sandwich();
-            parted(sandwich);
+            stepped_from_monotonic(sandwich);
         }
     }
     const HostTime at = middle(sandwich.before, sandwich.after);
@@ -86,7 +86,7 @@ OutputClock::Sandwich OutputClock::best_sandwich() {
 
 /// Output clock minus CLOCK_MONOTONIC is a constant of the kernel between two steps, however it is
 /// slewed.
-bool OutputClock::parted(const Sandwich& sandwich) {
+bool OutputClock::stepped_from_monotonic(const Sandwich& sandwich) {
     const std::int64_t read_later_ns = sandwich.output_ns - sandwich.monotonic_ns;
     const Bounds now{read_later_ns,
                      read_later_ns + sandwich.width().ns + sandwich.width().ns / largest_slew};
@@ -116,22 +116,22 @@ bool OutputClock::was_suspended() {
 
 /// The kernel tells of each time that CLOCK_REALTIME is set, once, and some time after it can be
 /// read.
-bool OutputClock::was_set(HostTime now, bool seen_parted) {
+bool OutputClock::was_set(HostTime now, bool seen_step) {
     const std::uint32_t times = clocks_->times_set();
     const bool told = times != std::exchange(times_set_, times);
-    const bool known = seen_parted || now < set_is_known_until_;
-    if (seen_parted && !told) set_is_known_until_ = now + longest_report;
-    if (told && !seen_parted) set_is_known_until_ = {};
+    const bool known = seen_step || now < set_is_known_until_;
+    if (seen_step && !told) set_is_known_until_ = now + longest_report;
+    if (told && !seen_step) set_is_known_until_ = {};
     // TAI goes on when UTC alone is stepped, as by a leap second: the comparison says all of it.
     return told && !known && kind_ == OutputClockKind::realtime;
 }
 
-void OutputClock::look_for_steps(HostTime now, bool seen_parted) {
+void OutputClock::look_for_steps(HostTime now, bool seen_step) {
     next_look_ = now + look_interval;
     const bool suspended = was_suspended();
-    const bool set = was_set(now, seen_parted);
+    const bool set = was_set(now, seen_step);
     if (suspended) ++suspends_;
-    if (suspended || set || seen_parted) ++steps_;
+    if (suspended || set || seen_step) ++steps_;
 }
 
 }  // namespace versavis::clock

@@ -71,10 +71,10 @@ class OutputClock {
     Sandwich read_sandwich();
     Sandwich best_sandwich();
     Bounds slept();
-    bool parted(const Sandwich& sandwich);
+    bool stepped_from_monotonic(const Sandwich& sandwich);
     bool was_suspended();
-    bool was_set(HostTime now, bool seen_parted);
-    void look_for_steps(HostTime now, bool seen_parted);
+    bool was_set(HostTime now, bool seen_step);
+    void look_for_steps(HostTime now, bool seen_step);
 
     OutputClockKind kind_;
     std::shared_ptr<SystemClocks> clocks_;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/rounding.hpp"
+
 namespace versavis::clock {
 
 namespace {

@@ -18,7 +18,7 @@ constexpr double two_to_the(int exponent) {
     return exponent == 0 ? 1 : two_to_the(exponent + 1) / 2;
 }
 
-// By the data sheets: gyro, accelerometer, magnetometer, pressure and temperature per LSB,
+// From the data sheets: gyro, accelerometer, magnetometer, pressure and temperature per LSB,
 // temperature at zero. The VN-100's floats come as whole numbers of powers of two
 // (docs/contracts/wire-protocol.md).
 constexpr std::array<ImuModel, 8> models{{

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Raw IMU words to SI units, by the part's data sheet.
+// Raw IMU words to SI units, as the part's data sheet has it.
 #pragma once
 
 #include <optional>
@@ -26,8 +26,8 @@ struct ImuModel {
 /// Names of all models, as the configuration has them.
 std::vector<std::string> model_names();
 
-/// The model of a part, by the kind on the wire or by the name in the configuration; null when
-/// there is none.
+/// The model of a part, by its kind on the wire or its name in the configuration; null when there
+/// is none.
 const ImuModel* find_model(wire::ImuKind kind);
 const ImuModel* find_model(const std::string& name);
 

@@ -53,7 +53,7 @@ EvidenceMetadata to_metadata(const Evidence& evidence) {
 
 Expected<Evidence> from_metadata(const EvidenceMetadata& metadata) { return read(metadata); }
 
-void tell(Pairing& pairing, const Evidence& evidence) {
+void apply(Pairing& pairing, const Evidence& evidence) {
     std::visit(
         [&](const auto& item) {
             using Item = std::decay_t<decltype(item)>;

@@ -43,7 +43,7 @@ EvidenceMetadata to_metadata(const Evidence& evidence);
 /// Errors: a kind that this version does not know.
 Expected<Evidence> from_metadata(const EvidenceMetadata& metadata);
 
-/// Does to the pairing what the evidence says; Limits are none of its business.
-void tell(Pairing& pairing, const Evidence& evidence);
+/// Applies one item of evidence to the pairing; Limits are left to the caller.
+void apply(Pairing& pairing, const Evidence& evidence);
 
 }  // namespace versavis::pairing

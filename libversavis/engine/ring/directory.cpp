@@ -18,8 +18,8 @@ namespace versavis::ring {
 
 namespace {
 
-// A reader could lock a segment through its read-only descriptor; this file only the owner can
-// open.
+// A reader could lock a segment through its read-only descriptor; only the owner can open this
+// file.
 constexpr auto lock_name = ".lock";
 
 }  // namespace
@@ -31,7 +31,7 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     if (!error && ::mkdir(path.c_str(), 0750) != 0 && errno != EEXIST)
         error = {errno, std::generic_category()};
     if (error)
-        return failure(path.string(), fmt::format("cannot be made: {}", error.message()),
+        return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
     const int lock = ::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
     if (lock < 0)

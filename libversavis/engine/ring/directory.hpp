@@ -12,8 +12,8 @@ namespace versavis::ring {
 
 class OwnedDirectory {
  public:
-    /// Makes `path` (0750) if needed and locks it for this process. Segments that a dead owner left
-    /// are kept until remove_stale(), so that their readers can be handed over. Errors: no
+    /// Creates `path` (0750) if needed and locks it for this process. Segments that a dead owner
+    /// left are kept until remove_stale(), so that their readers can be handed over. Errors: no
     /// permission, another service owns it.
     static Expected<OwnedDirectory> claim(const std::filesystem::path& path);
 
@@ -21,8 +21,8 @@ class OwnedDirectory {
     OwnedDirectory& operator=(OwnedDirectory&&) = delete;
     ~OwnedDirectory();  ///< releases the lock
 
-    /// Retires and removes the segments that were not made by this process, but for those of the
-    /// names in `keep`: their readers are handed over when the segment is made anew.
+    /// Retires and removes the segments that another process made, except those named in `keep`:
+    /// their readers are handed over when the segment is made anew.
     void remove_stale(const std::vector<std::string>& keep) const;
 
     const std::filesystem::path& path() const { return path_; }

@@ -26,6 +26,7 @@ struct Writer::Segment {
         : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
     ~Segment() {
         const auto live = static_cast<std::uint32_t>(WriterState::live);
+        // Relaxed: a successor may be retiring this segment right now. Retired twice does no harm.
         if (mapping.header().state.load(std::memory_order_relaxed) == live)
             retire(mapping.header(), WriterState::closed);
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
@@ -55,13 +56,14 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
 
 Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
     const int file = ::open(path.c_str(), O_CREAT | O_TRUNC | O_RDWR | O_CLOEXEC, 0640);
-    if (file < 0) return failure(path.string(), fmt::format("cannot be made: {}", reason(errno)));
+    if (file < 0)
+        return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
     const int error = ::posix_fallocate(file, 0, static_cast<off_t>(size));
     ::close(file);
     if (error == 0) return {};
     ::unlink(path.c_str());
     return failure(path.string(),
-                   fmt::format("no memory for {} MiB: {}", size >> 20U, reason(error)),
+                   fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
                    "configure fewer slots or enlarge /dev/shm");
 }
 
@@ -86,6 +88,8 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.head.store(shape.first_item, std::memory_order_relaxed);
     header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
     header.heartbeat_ns.store(host_now().ns, std::memory_order_relaxed);
+    // SYNC 7: release here, acquire in Mapping::open(): the magic says that all of the above is in
+    // memory.
     header.magic.store(magic, std::memory_order_release);
 }
 
@@ -101,8 +105,9 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     const bool power_of_two =
         shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
     if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
-        return failure(shape.name,
-                       "a ring needs a name below 64 characters and a power of two of descriptors");
+        return failure(
+            shape.name,
+            "a ring needs a name shorter than 64 characters and a power of two of descriptors");
     const auto path = directory / shape.name;
     const auto temporary = directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
@@ -114,7 +119,8 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     // The name points to the new segment before readers of the old one wake up and look for it.
     auto old = Mapping::open(path, Mapping::Access::read_write);
     if (::rename(temporary.c_str(), path.c_str()) != 0)
-        return failure(path.string(), fmt::format("cannot be named: {}", reason(errno)));
+        return failure(path.string(),
+                       fmt::format("cannot be renamed into place: {}", reason(errno)));
     if (old) retire(old->header(), WriterState::superseded);
     return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
 }
@@ -139,19 +145,23 @@ std::optional<std::uint32_t> Writer::acquire() {
     if (free_.empty()) return std::nullopt;
     const std::uint32_t slot = free_.front();
     free_.pop_front();
-    segment_->mapping.generation(slot).fetch_add(1,
-                                                 std::memory_order_relaxed);  // odd: being written
+    // SYNC 4: release fence here, acquire fence in Reader::intact(): the generation is odd before
+    // the first byte of the new payload is stored.
+    segment_->mapping.generation(slot).fetch_add(1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
     return slot;
 }
 
 void Writer::abandon(std::uint32_t slot) {
+    // Belongs to no pair: no descriptor names this generation, so every reader refuses the slot.
     segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release);
     free_.push_front(slot);  // it holds nothing that a reader could want
 }
 
 void Writer::publish(std::uint32_t slot, std::uint32_t length, OutputTime time,
                      const Metadata& metadata) {
+    // Readers here learn this generation from the descriptor, so SYNC 2 orders the payload for
+    // them. Release serves a reader in another language that acquires the generation by itself.
     const std::uint64_t generation =
         segment_->mapping.generation(slot).fetch_add(1, std::memory_order_release) + 1;
     free_.push_back(slot);
@@ -168,14 +178,20 @@ void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t lengt
     const std::uint64_t number = segment_->head++;
     Descriptor& descriptor = segment_->mapping.descriptor(number);
     descriptor.sequence.store(2 * number + 1, std::memory_order_relaxed);
+    // SYNC 3: release fence here, acquire fence in Reader::read_descriptor(): the sequence is odd
+    // before the first word of the new item is stored.
     std::atomic_thread_fence(std::memory_order_release);
     descriptor.slot_generation.store(slot_generation, std::memory_order_relaxed);
     descriptor.length_and_slot.store(length_and_slot, std::memory_order_relaxed);
     descriptor.output_time_ns.store(time.ns, std::memory_order_relaxed);
     for (std::size_t i = 0; i < metadata_words; ++i)
         descriptor.metadata[i].store(metadata[i], std::memory_order_relaxed);
+    // SYNC 2: release here, acquire in Reader::read_descriptor(): words, payload and the slot's
+    // generation are in memory before the sequence says so.
     descriptor.sequence.store(2 * number + 2, std::memory_order_release);
+    // SYNC 1: release here, acquire in Reader::head(): the descriptor is complete before it counts.
     header.head.store(number + 1, std::memory_order_release);
+    // SYNC 5: release here, acquire in Reader::wait(): a reader that sees this sees the new head.
     header.wake.fetch_add(1, std::memory_order_release);
     futex_wake(header.wake);
 }

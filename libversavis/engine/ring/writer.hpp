@@ -28,16 +28,16 @@ struct Shape {
 /// Not thread-safe: one thread at a time may call it. Readers never block it.
 class Writer {
  public:
-    /// Makes the segment `directory / shape.name`, its memory allocated and populated; one that a
-    /// writer before left there is marked superseded and its readers are woken. Errors: the
-    /// directory or the memory cannot be had.
+    /// Makes the segment `directory / shape.name`, its memory allocated and populated. A segment
+    /// that an earlier writer left there is marked superseded and its readers are woken. Errors:
+    /// the file cannot be created, or its memory not reserved.
     static Expected<Writer> create(const std::filesystem::path& directory, const Shape& shape);
 
     Writer(Writer&&) noexcept;
     Writer& operator=(Writer&&) noexcept;
     ~Writer();  ///< closes the stream, wakes its readers and removes the segment's name
 
-    /// Takes the slot whose item is oldest, whose readers lose it from here on; none when all are
+    /// Takes the slot with the oldest item, which readers lose from here on; none when all are
     /// taken.
     std::optional<std::uint32_t> acquire();
     std::byte* slot_data(std::uint32_t slot) const;
@@ -58,7 +58,7 @@ class Writer {
     /// Items published so far, the number of the next one.
     std::uint64_t head() const;
 
-    /// Tells readers that the writer lives; call it at least once a second.
+    /// Tells readers that the writer is alive; call it at least once a second.
     void heartbeat(HostTime now);
 
  private:

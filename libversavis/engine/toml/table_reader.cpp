@@ -65,7 +65,7 @@ void TableReader::read(std::string_view key, std::string& value) {
     if (const auto text = node->value_exact<std::string>())
         value = *text;
     else
-        fail(key, fmt::format("'{}' must be a text in quotes", key));
+        fail(key, fmt::format("'{}' must be a string in quotes", key));
 }
 
 void TableReader::read(std::string_view key, bool& value) {
@@ -92,8 +92,8 @@ void TableReader::read(std::string_view key, std::vector<std::string>& values) {
     if (node == nullptr) return;
     const toml::array* array = node->as_array();
     if (array == nullptr || !(array->empty() || array->is_homogeneous(toml::node_type::string)))
-        return fail(key,
-                    fmt::format("'{}' must be a list of texts in quotes: [\"...\", \"...\"]", key));
+        return fail(
+            key, fmt::format("'{}' must be a list of strings in quotes: [\"...\", \"...\"]", key));
     values.clear();
     for (const toml::node& entry : *array) values.push_back(*entry.value_exact<std::string>());
 }
@@ -141,7 +141,7 @@ std::vector<const toml::table*> TableReader::tables(std::string_view key) {
 }
 
 std::string TableReader::nearest(std::string_view key) const {
-    // Somebody who left out the unit meant the key that begins the same.
+    // Whoever left out the unit meant the key that begins the same.
     const auto distance = [key](const std::string& known) {
         return known.rfind(key, 0) == 0 ? 0 : edit_distance(key, known);
     };

@@ -13,7 +13,7 @@
 
 namespace versavis {
 
-/// What is known of the file that is being read; the first error wins.
+/// The file that is being read; the first error wins.
 struct TomlFile {
     std::string path;
     std::string manual;  ///< where the keys are documented
@@ -22,7 +22,7 @@ struct TomlFile {
     void fail(const toml::node& node, const std::string& what, const std::string& cure = {});
 };
 
-/// Parses `path`. Error: it cannot be read, or is no TOML.
+/// Parses `path`. Errors: it cannot be read, or is not valid TOML.
 Expected<toml::table> parse_toml(const std::string& path);
 
 /// A key that is absent leaves its value as it is. finish() refuses keys that nobody asked for.
@@ -34,7 +34,7 @@ class TableReader {
     void read(std::string_view key, bool& value);
     void read(std::string_view key, std::vector<std::string>& values);
 
-    /// Whole numbers are taken for real ones, too.
+    /// Accepts whole numbers as well.
     void read(std::string_view key, double& value, double minimum, double maximum);
 
     template <class Integer>

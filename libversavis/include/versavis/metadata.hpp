@@ -24,8 +24,8 @@ enum ItemFlag : std::uint32_t {
     stamp_kind_mask = 0x3,    ///< StampKind
     flag_suspect = 1U << 2U,  ///< the pairing is not proved: trigger and stamp are a guess
     flag_holdover =
-        1U << 3U,  ///< the clocks were without contact, or messages contradict them: sigma grows
-    flag_clamped = 1U << 4U,       ///< the stamp was held so that it did not go backwards
+        1U << 3U,             ///< the clocks lost contact, or messages contradict them: sigma grows
+    flag_clamped = 1U << 4U,  ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
 };
 
@@ -86,12 +86,12 @@ enum class EventKind : std::uint32_t {
     pps = 13,              ///< an edge of the PPS input; value: edges since the board's boot
     aux_pulse = 14,        ///< an edge of an auxiliary input; source: 0 or 1; value: as for pps
     sync_pulse = 15,       ///< an edge of the sync input; value: as for pps
-    input_noisy = 16,      ///< an input is not listened to for a second; source: input of the board
+    input_noisy = 16,      ///< an input is ignored for a second; source: input of the board
     illumination_limited = 17,  ///< the light was cut, or stayed dark; value: ns that it was on
     imu_ready = 18,             ///< value: identity of the part
-    imu_failed = 19,            ///< the part is not what it should be; value: what it said
-    imu_silent = 20,            ///< no data-ready edge, no end of a transfer or no bytes came
-    utc_label = 21,  ///< a PPS pulse, of this time, was named; value: UTC seconds since 1970
+    imu_failed = 19,            ///< the part is not the one configured; value: what it answered
+    imu_silent = 20,            ///< no data-ready edge, end of transfer or bytes arrived
+    utc_label = 21,  ///< the PPS pulse at this time was labelled; value: UTC seconds since 1970
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
@@ -104,15 +104,15 @@ enum class EventReason : std::uint32_t {
     mismatch = 5,          ///< the evidence contradicts the pairing
     no_clock = 7,          ///< board time could not be translated
     wrong_size = 8,        ///< the frame is not of the size the camera announced
-    reset = 9,             ///< camera or board began anew in between
+    reset = 9,             ///< camera or board restarted in between
     trigger_ignored = 10,  ///< the camera did not expose
     camera_busy = 11,      ///< it was, or would have been, still exposing
-    too_late = 12,         ///< the instant had gone by before the board came to it
+    too_late = 12,         ///< the instant had passed before the board got to it
     queue_full = 13,       ///< too many pulses waited on the board
     out_of_order = 14,     ///< this frame, or a newer one, was published before
-    no_buffer = 15,        ///< the frame had no slot to go to: readers or the service were too slow
-    camera_silent = 16,    ///< nothing at all came from the camera
-    wrong_exposure = 17,   ///< the exposure line shows another exposure than the camera tells
+    no_buffer = 15,        ///< no slot was free: too many frames were waiting
+    camera_silent = 16,    ///< nothing at all arrived from the camera
+    wrong_exposure = 17,   ///< the exposure line shows another exposure than the camera reports
 };
 
 struct EventMetadata {

@@ -34,9 +34,6 @@ constexpr Duration milliseconds(std::int64_t n) { return {n * 1'000'000}; }
 constexpr Duration seconds(std::int64_t n) { return {n * 1'000'000'000}; }
 constexpr Duration absolute(Duration d) { return d.ns < 0 ? -d : d; }
 
-/// The nearest whole number of nanoseconds, cut at 36 years either way.
-VERSAVIS_API Duration rounded(double ns);
-
 /// An instant on the clock named by Clock, in nanoseconds since that clock's own zero.
 template <class Clock>
 struct Time {

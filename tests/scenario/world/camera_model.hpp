@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A camera at the board's trigger output: exposes after a latency, ignores triggers while it is
-// busy, and remembers what it truly did.
+// busy, and remembers what it really did.
 #pragma once
 
 #include <functional>
@@ -24,14 +24,14 @@ enum class Fault {
     ignored,     ///< the camera does not take the trigger
     no_strobe,   ///< neither edge is seen
     start_lost,  ///< the start edge is not seen
-    end_lost,    ///< the line falls with the start of the next exposure only, unseen
+    end_lost,    ///< the line falls only with the start of the next exposure, unseen
     late_start,  ///< it starts a millisecond late
 };
 
 struct CameraSettings {
     Nanoseconds latency = 20 * us;
     Nanoseconds jitter = 0;   ///< of the latency, to both sides
-    Nanoseconds readout = 0;  ///< after an exposure no trigger is taken for so long
+    Nanoseconds readout = 0;  ///< for this long after an exposure no trigger is accepted
     bool trigger_inverted = false;
     bool strobe_inverted = false;
     bool strobe = true;          ///< the exposure line is wired
@@ -62,7 +62,7 @@ class CameraModel {
 
     using Edges = std::vector<firmware::Edge>;
 
-    /// The trigger line changed. Returns edges of the exposure line, of now and to come.
+    /// The trigger line changed. Returns edges of the exposure line, present and future.
     Edges trigger_line(Nanoseconds at, bool level);
 
     const CameraSettings& settings() const { return settings_; }

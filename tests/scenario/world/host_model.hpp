@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The other end of the link: reads at the pace of USB, or stands still, and keeps every message.
+// The other end of the link: reads at the pace of USB, or stalls, and keeps every message.
 #pragma once
 
 #include <map>

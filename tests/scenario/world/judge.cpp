@@ -33,9 +33,9 @@ std::string World::judge() {
     judge_imu(1, out);
     judge_pulses(out);
     judge_light(out);
-    if (inbox().lost != 0) complain(out, "{} packets are missing by their numbers", inbox().lost);
+    if (inbox().lost != 0) complain(out, "{} packets are missing, by their numbers", inbox().lost);
     if (spi_imu_ && spi_imu_->breaches() != 0)
-        complain(out, "{} breaches of the IMU's rules", spi_imu_->breaches());
+        complain(out, "{} violations of the IMU's data sheet", spi_imu_->breaches());
     if (board_->watchdog_bit()) complain(out, "the watchdog bit");
     return out;
 }
@@ -141,7 +141,7 @@ void World::judge_imu(unsigned port, std::string& out) {
         if (step != 1 && (sample.flags & wire::imu_overrun) == 0 && !drops_allowed)
             complain(out, "IMU {}: {} numbers are missing before {}", port, step - 1,
                      sample.number);
-        // The first of a VN-100 has nothing that its edge could be held against, and says so.
+        // The first sample of a VN-100 has nothing to check its edge against, and says so.
         if (port == 1 && (sample.flags & wire::imu_stamped) == 0) {
             last_index = -1;
             continue;
@@ -224,7 +224,7 @@ void World::judge_light(std::string& out) {
                                  saved + static_cast<double>(interval.on - before) * duty);
         saved += static_cast<double>(on) * (duty - 1);
         before = interval.off;
-        // Code that hangs can cost one longest light, which is made up for later.
+        // Hanging code can cost one light of the longest duration, which is made up for later.
         if (saved < -1000 - (drops_allowed ? light.max_on_ns : 0.0))
             complain(out, "the light was on for too much of the time at {}", interval.on);
     }

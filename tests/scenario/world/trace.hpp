@@ -20,7 +20,7 @@ class Trace {
         std::string title;
         std::int64_t from_ns;
         std::int64_t to_ns;
-        std::int64_t tick_ns;  ///< distance of the time marks
+        std::int64_t tick_ns;  ///< distance between time marks
         std::vector<std::string> lines;
         std::vector<std::int64_t>
             marks;  ///< instants with a dashed line through all, such as grid points

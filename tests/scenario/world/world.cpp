@@ -27,20 +27,20 @@ devices::Inertial World::motion(Nanoseconds at) {
 }
 
 void World::make_board(wire::ResetCause cause) {
-    firmware::Surroundings surroundings;
-    surroundings.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
-    surroundings.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+    firmware::Environment environment;
+    environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
+    environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
         if (spi_imu_ && !dead_bus_) return spi_imu_->transfer(at, transfer, received);
         std::fill(received.begin(), received.end(), dead_bus_.value_or(0xFF));
     };
-    surroundings.uart_sent = [this](auto at, auto baud, auto bytes) { uart_sent(at, baud, bytes); };
-    surroundings.reboot = [this](bool) { ++reboots_; };
-    surroundings.flash = &flash_;
+    environment.uart_sent = [this](auto at, auto baud, auto bytes) { uart_sent(at, baud, bytes); };
+    environment.reboot = [this](bool) { ++reboots_; };
+    environment.flash = &flash_;
     pins_ = 0;
     const auto nonce =
         static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);
     board_ = std::make_unique<firmware::NativeBoard>(firmware::Identity{nonce, cause, "TEST"},
-                                                     std::move(surroundings), now_);
+                                                     std::move(environment), now_);
     board_->set_link_capacity(link_capacity_);
     for (const auto& [output, camera] : cameras_)
         if (camera->settings().strobe_inverted) board_->set_level(camera->settings().input, true);

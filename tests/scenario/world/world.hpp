@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The board in virtual time, wired to models of cameras, IMUs and pulse sources, and to a host;
-// keeps what truly happened, and judges what was reported by it.
+// keeps what really happened, and judges the reports by it.
 #pragma once
 
 #include <map>
@@ -40,7 +40,7 @@ class World {
  public:
     explicit World(std::uint64_t seed = 1);
 
-    /// A motion that is easy to recognise, slow against every IMU.
+    /// A motion that is easy to recognise, and slow compared with every IMU.
     static devices::Inertial motion(Nanoseconds at);
 
     // What is there; before connect().
@@ -51,7 +51,7 @@ class World {
     devices::Vn100Device& add_vn100(double rate_hz, bool data_ready);
     void add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns,
                     Nanoseconds width = 100 * us);
-    /// Edges without end at an input, `period` apart.
+    /// Endless edges at an input, `period` apart.
     void add_noise(std::uint8_t input, Nanoseconds period, Nanoseconds from, Nanoseconds to);
 
     // What the host does.
@@ -63,52 +63,52 @@ class World {
     }
     void send_bytes(std::span<const std::uint8_t> bytes);
     void connect();
-    /// Sends `configuration`. False: it was not taken.
+    /// Sends `configuration`. False: it was refused.
     bool configure();
     void start(std::uint8_t cameras = 0xF, std::uint8_t flags = 0);
     void stop(std::uint8_t cameras = 0xF);
     /// connect(), configure() and start().
     bool begin(std::uint8_t flags = 0);
-    /// Nothing is read for `duration` from now.
+    /// The host reads nothing for `duration` from now.
     void stall_host(Nanoseconds duration) { host_reads_from_ = now_ + duration; }
     /// Bytes that the host reads, how often, and what the board can hold of them.
     void set_link(Nanoseconds interval, std::size_t bytes, std::size_t capacity);
 
     void run(Nanoseconds duration);
-    /// Stops the cameras, and waits for all that is still to come.
+    /// Stops the cameras and waits for everything still to come.
     void finish();
-    /// The board's code stands still for `duration`; all else goes on.
+    /// The board's code stalls for `duration`; everything else continues.
     void stall_board(Nanoseconds duration);
-    /// The board begins anew; what the host knows stays.
+    /// The board restarts; what the host knows stays.
     void reboot(wire::ResetCause cause);
 
     Nanoseconds now() const { return now_; }
     firmware::NativeBoard& board() { return *board_; }
     Inbox& inbox() { return host_.inbox; }
     CameraModel& camera(unsigned output) { return *cameras_.at(output); }
-    /// Lines over time, once it was asked for.
+    /// Lines over time, recorded since record_trace().
     const Trace& trace() const { return trace_; }
     void record_trace() { tracing_ = true; }
     const std::vector<Interval>& lights() const { return lights_; }
     const std::vector<Nanoseconds>& rises(unsigned pin) const { return rises_[pin]; }
     int reboots() const { return reboots_; }
     devices::SpiImuDevice& spi_imu() { return *spi_imu_; }
-    /// The SPI bus reads this byte alone, or what the part says.
+    /// The SPI bus reads only this byte, or what the part sends.
     void set_dead_bus(std::optional<std::uint8_t> level) { dead_bus_ = level; }
 
     /// True time of a grid point.
     Nanoseconds grid_time(unsigned camera, std::uint64_t tick) const;
-    /// Middle of a measured exposure against its grid point.
+    /// Middle of a measured exposure relative to its grid point.
     Nanoseconds grid_error(const wire::Exposure& record) const;
     const wire::Exposure& record(unsigned camera, std::uint64_t trigger);
 
-    // What judge() puts up with.
+    // What judge() tolerates.
     bool drops_allowed = false;  ///< records and events that the board had to drop
     bool busy_allowed = false;   ///< triggers into a busy camera that nobody could foresee
     bool gaps_allowed =
         false;  ///< grid points without pulse or event: pattern, slow start, restarts
 
-    /// Everything that was reported against everything that happened; empty: all is right.
+    /// Compares everything that was reported with everything that happened; empty: all is right.
     std::string judge();
 
     wire::Configuration configuration{};

@@ -1,6 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The byte layout of a shared-memory ring, as docs/contracts/shm-layout.md fixes it for every
 // language.
+//
+// How writer and reader synchronise. The code names the pair at each half.
+//
+// | pair   | word        | writer                      | reader                                  |
+// |--------|-------------|-----------------------------|-----------------------------------------|
+// | SYNC 1 | head        | release, write_descriptor() | acquire, Reader::head()                 |
+// | SYNC 2 | sequence    | release, 2n + 2 stored last | acquire, first load, read_descriptor()  |
+// | SYNC 3 | sequence    | release fence after 2n + 1  | acquire fence before the second load    |
+// | SYNC 4 | generation  | release fence after odd     | acquire fence in intact()               |
+// | SYNC 5 | wake        | release, add                | acquire, Reader::wait() before next()   |
+// | SYNC 6 | state       | release, retire()           | acquire, Reader::writer_alive()         |
+// | SYNC 7 | magic       | release, stored last        | acquire, Mapping::open()                |
+//
+// 1 and 2 publish: a reader that sees the number sees all that was written before it. 3 and 4
+// withdraw: a reader that saw anything of the next item sees, in a second look, that the word has
+// changed. 5 orders waiting, 6 the end of a segment, 7 its beginning. `heartbeat_ns` is relaxed on
+// both sides: it is compared with the time, and nothing else is read because of it.
 #pragma once
 
 #include <array>
@@ -34,11 +51,11 @@ enum class WriterState : std::uint32_t { live = 1, closed = 2, superseded = 3 };
 
 /// Header page. Words that change lie on cache lines of their own.
 struct Header {
-    std::atomic<std::uint64_t> magic;  ///< stored last: what is read after it is complete
+    std::atomic<std::uint64_t> magic;  ///< stored last: what is read after it is complete (SYNC 7)
     std::uint32_t abi_major;
     std::uint32_t abi_minor;
     std::uint64_t total_size;
-    std::uint64_t generation;  ///< random: tells this segment from the one before it
+    std::uint64_t generation;  ///< random: distinguishes this segment from its predecessor
     std::uint8_t boot_id[16];
     std::uint32_t writer_pid;
     StreamKind kind;
@@ -51,10 +68,10 @@ struct Header {
     std::uint64_t slots_at;
     char name[64];  ///< zero-terminated
 
-    alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation
-    alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped at each publication and
-                                                    ///< state change
-    alignas(128) std::atomic<std::uint32_t> state;  ///< WriterState
+    alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation (SYNC 1)
+    alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped by each publication and
+                                                    ///< change of state (SYNC 5)
+    alignas(128) std::atomic<std::uint32_t> state;  ///< WriterState (SYNC 6)
     alignas(128)
         std::atomic<std::int64_t> heartbeat_ns;  ///< host time of the writer's last sign of life
 };
@@ -62,7 +79,7 @@ struct Header {
 /// One published item. Item n lies in descriptor n % descriptor_count.
 struct alignas(128) Descriptor {
     std::atomic<std::uint64_t>
-        sequence;  ///< 2n + 2 once item n is complete, 2n + 1 while it is written
+        sequence;  ///< 2n + 2 once item n is complete, 2n + 1 while it is written (SYNC 2, 3)
     std::atomic<std::uint64_t> slot_generation;  ///< the slot's generation word when published
     std::atomic<std::uint64_t> length_and_slot;  ///< length << 32 | slot
     std::atomic<std::int64_t> output_time_ns;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A reader of a shared-memory ring: read-only, independent of the writer's and of other readers'
-// fate.
+// A reader of a shared-memory ring: read-only, and independent of what becomes of the writer and of
+// other readers.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ namespace versavis::ring {
 enum class Found {
     item,       ///< an item, the next in order
     nothing,    ///< nothing new (in the time given)
-    lost,       ///< items were overwritten before they were read; reading goes on at newer ones
-    restarted,  ///< the service was restarted; reading goes on with its first item
-    gone,  ///< the writer is closed or dead, and no new one is there yet; looking again is right
+    lost,       ///< items were overwritten before they were read; reading continues with newer ones
+    restarted,  ///< the service was restarted; reading continues with its first item
+    gone,       ///< the writer has closed or died, and there is no new one yet; look again later
 };
 
 struct Item {
@@ -66,7 +66,7 @@ class VERSAVIS_API Reader {
     StreamKind kind() const;
     const char* name() const;
     std::uint64_t head() const;      ///< items published so far
-    std::uint64_t retained() const;  ///< items that can be read at a time
+    std::uint64_t retained() const;  ///< how many items can be read at any one time
     HostTime last_heartbeat() const;
     std::uint32_t writer_pid() const;
     bool writer_alive()

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/time.hpp"
+#include "engine/rounding.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
 using namespace versavis;
 
-TEST_CASE("time: what is rounded fits, and leaves room for sums") {
+TEST_CASE("rounding: what is rounded fits, and leaves room for sums") {
     CHECK(rounded(2.6) == nanoseconds(3));
     CHECK(rounded(-2.6) == nanoseconds(-3));
     constexpr Duration limit = nanoseconds(std::int64_t{1} << 60);
