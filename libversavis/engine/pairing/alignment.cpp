@@ -9,9 +9,38 @@ namespace versavis::pairing {
 
 namespace {
 
-constexpr double lateness_spread = 0.6;  // of the smallest gap
+// How close a frame's time must come to that of an exposure to be of it, in smallest gaps. At half
+// alignment by arrival needs steadier frames; at twice each frame lies near some exposure.
+constexpr double coincidence = 0.25;
+
+// Differences of the clocks that are this close, in smallest gaps, are tried once. At half more are
+// tried and lead to the same; at twice, as far as `coincidence`, the one that fits may be skipped.
+constexpr double same_difference = 0.125;
+
+// How much the gaps between triggers must vary to prove anything, in smallest gaps. They are whole
+// periods: half of it changes nothing, and at twice a gap of two periods among ones does not count.
+constexpr double irregularity = 0.5;
+
+// A frame that is later than the quickest one of a start by more, in smallest gaps, is not proved
+// with the others. At half starts with some jitter fail; at twice one period late passes.
+constexpr double lateness_spread = 0.6;
+
+// How far the camera's own exposure time may be off from the measured one. At half the ramps of
+// some exposure outputs look like another exposure; at twice short exposures are told apart less.
 constexpr Duration length_tolerance = microseconds(200);
-constexpr int length_tolerance_part = 20;
+
+// The same for long exposures, as a share. At half coarse exposure times of cameras contradict; at
+// twice auto exposure must change by more before it tells one exposure from the next.
+constexpr double length_tolerance_share = 0.05;
+
+// Frames that a start needs by the camera's clock: their gaps must fit one place in the pattern. At
+// half (3) too few gaps tell places apart; at twice starts take longer, and a lost frame is
+// likelier.
+constexpr std::size_t frames_by_clock = 5;
+
+// Frames that a start needs by arrival, a second apart. At half (2) one pair of stray frames could
+// be taken for the camera's; at twice such a start takes six seconds.
+constexpr std::size_t frames_by_arrival = 3;
 
 struct Alignment {
     std::vector<std::uint64_t> triggers;
@@ -43,7 +72,7 @@ class Search {
                                           exposures_[i].instant_ns(timeline_));
         std::sort(differences.begin(), differences.end());
         const auto same = [this](std::int64_t a, std::int64_t b) {
-            return b - a < tolerance_ns() / 2;
+            return b - a < part_of(gap_ns_, same_difference);
         };
         differences.erase(std::unique(differences.begin(), differences.end(), same),
                           differences.end());
@@ -93,7 +122,7 @@ class Search {
             shortest = std::min(shortest, (after.start - before.start).ns);
             longest = std::max(longest, (after.start - before.start).ns);
         }
-        return longest > shortest + 2 * tolerance_ns();
+        return longest > shortest + part_of(gap_ns_, irregularity);
     }
 
     /// A frame of another exposure than these could not have arrived when it did.
@@ -128,8 +157,7 @@ class Search {
         const std::int64_t least = *std::min_element(late.begin(), late.end());
         std::vector<std::uint64_t> kept;
         for (std::size_t i = 0; i < triggers.size(); ++i) {
-            if (static_cast<double>(late[i] - least) >
-                lateness_spread * static_cast<double>(gap_ns_))
+            if (late[i] - least > part_of(gap_ns_, lateness_spread))
                 triggers[i] = 0;
             else
                 kept.push_back(triggers[i]);
@@ -140,7 +168,7 @@ class Search {
     }
 
  private:
-    std::int64_t tolerance_ns() const { return gap_ns_ / 4; }
+    std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
 
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
@@ -180,7 +208,8 @@ unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to
 }
 
 bool lengths_differ(Duration told, Duration measured) {
-    return absolute(told - measured) > std::max(length_tolerance, measured / length_tolerance_part);
+    const Duration share{part_of(measured.ns, length_tolerance_share)};
+    return absolute(told - measured) > std::max(length_tolerance, share);
 }
 
 bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {
@@ -188,7 +217,9 @@ bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {
     return lengths_differ(arrival.exposure, exposure.end - exposure.start);
 }
 
-std::size_t frames_for_proof(Timeline timeline) { return timeline == Timeline::camera ? 5 : 3; }
+std::size_t frames_for_proof(Timeline timeline) {
+    return timeline == Timeline::camera ? frames_by_clock : frames_by_arrival;
+}
 
 std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
                                  Timeline timeline, const Limits& limits) {

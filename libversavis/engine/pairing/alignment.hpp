@@ -11,18 +11,31 @@
 
 namespace versavis::pairing {
 
+// How far the board's time on the host may be off before the clock is settled. At half frames of
+// very quick cameras may seem to arrive too early; at twice frames before the pulse pass more
+// often.
+inline constexpr Duration translation_error = milliseconds(5);
+
+// A frame that comes later than this after its exposure counts as lost. At half busy networks lose
+// frames; at twice frames of more triggers compete in a search, and a lost frame is known later.
+inline constexpr Duration usual_latest_arrival = milliseconds(500);
+
+// A frame whose exposure's record has not come for so long is given up. At half a stalled USB link
+// costs more frames; at twice each frame without record holds up those behind it for longer.
+inline constexpr Duration usual_exposure_wait = milliseconds(250);
+
 struct Limits {
-    Duration period = milliseconds(50);  ///< of the triggers, when none is left out
-    Duration earliest_arrival =
-        milliseconds(-5);  ///< after the end of exposure; negative: error of translation
-    Duration latest_arrival = milliseconds(500);  ///< after the end of exposure
-    Duration exposure_wait =
-        milliseconds(250);                   ///< how long a frame waits for its exposure's record
-    Duration pattern_duration = seconds(1);  ///< how long the board's start pattern takes
-    std::uint32_t frames_held = 8;           ///< most frames that wait for proof
-    bool camera_clock = true;                ///< false: pair by arrival, whatever the frames say
+    Duration period = milliseconds(50);              ///< of the triggers, when none is left out
+    Duration earliest_arrival = -translation_error;  ///< after the end of exposure
+    Duration latest_arrival = usual_latest_arrival;  ///< after the end of exposure
+    Duration exposure_wait = usual_exposure_wait;    ///< of a frame for its exposure's record
+    Duration pattern_duration = seconds(1);          ///< how long the board's start pattern takes
+    std::uint32_t frames_held = 8;                   ///< most frames that wait for proof
+    bool camera_clock = true;  ///< false: pair by arrival, whatever the frames say
 };
 
+// An alignment that takes so many faults is ruled out. At half (1) a single fault that nobody saw
+// makes a wrong alignment the only one; at twice (4) hardly any start can be proved.
 inline constexpr unsigned faults_to_refute = 2;
 
 bool arrival_possible(const Limits& limits, const Arrival& arrival, const Exposure& exposure);

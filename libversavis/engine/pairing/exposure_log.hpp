@@ -13,6 +13,11 @@ namespace versavis::pairing {
 /// the arrival its end on the host.
 enum class Timeline { camera, arrival };
 
+/// A share of a gap between exposures, as all tolerances are stated.
+inline std::int64_t part_of(std::int64_t ns, double share) {
+    return static_cast<std::int64_t>(share * static_cast<double>(ns));
+}
+
 struct Record {
     Exposure exposure;
     bool used = false;           ///< a frame of it was published

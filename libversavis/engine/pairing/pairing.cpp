@@ -8,21 +8,105 @@ namespace versavis::pairing {
 
 namespace {
 
+// Newest frames that a search tries to align; the oldest may be of another life of the camera. At
+// half a stale frame at the start costs another pattern; at twice each search takes longer.
 constexpr std::size_t frames_in_search = 12;
+
+// Exposures remembered. At half a fast camera that waits for records loses some; at twice a search
+// looks at more that are too old to matter.
+constexpr std::size_t exposures_kept = 128;
+
+// Exposures that a search keeps even when no frame of them can arrive any more. At half slow
+// patterns may lose their beginning; at twice more old ones compete.
+constexpr std::size_t exposures_for_search = 32;
+
+// Frames known to be lost whose triggers have not been given up yet. At half a burst of losses is
+// reported without reasons; at twice memory.
+constexpr std::size_t shortfalls_kept = 32;
+
+// Frames in a row for which two kinds of evidence must agree against the third. At half (2) one
+// coincidence is enough to lock wrongly; at twice a slip costs twice as many frames.
 constexpr int frames_to_relock = 3;
+
+// Frames without agreement after which the relation is searched anew. At half a few late frames
+// cost a start pattern; at twice a true slip costs twice as many frames first.
 constexpr int frames_to_give_up = 5;
-// Lateness passes. Without a camera's clock nothing else can tell a late frame from a missed
-// trigger.
+
+// ... but not before this time: lateness passes. At half a busy moment of the host costs a start
+// pattern; at twice fast cameras wait longer for theirs.
 constexpr Duration shortest_check = milliseconds(100);
+
+// The same without a camera's clock, where nothing else tells a late frame from a trigger that was
+// missed. At half frames that were only late cost a slow start; at twice real slips last longer.
 constexpr Duration shortest_check_by_arrival = milliseconds(300);
+
+// Ids this far behind the newest are of frames out of order; further behind, of a counter that
+// began anew. At half links that reorder more look like it; at twice a restart is seen as disorder.
 constexpr std::uint64_t ids_back = 16;
+
+// Start patterns that fail before a slow start is tried. At half a second fault during the start
+// costs a slow one; at twice cameras that need the slow one wait for two more patterns.
 constexpr int patterns_before_slow = 2;
+
+// Starts asked for without a pause between them. At half trouble that passes lasts longer; at twice
+// a camera that can never be paired loses more triggers.
 constexpr int starts_in_a_row = 3;
+
+// Most that the pauses grow to, in durations of a start. At half a hopeless camera loses twice the
+// triggers; at twice it is found twice as late once it is repaired.
 constexpr int longest_patience = 10;
+
+// What a slow start takes: `frames_for_proof` pulses a second apart, and the same again for frames
+// in the air or lost. At half one lost frame fails the start; at twice a failed one costs 12 s.
 constexpr Duration slow_duration = seconds(6);
+
+// How long frames wait for a search to succeed. At half slow starts lose their first frames; at
+// twice buffers are held for longer by a camera that is never found.
 constexpr Duration search_patience = seconds(10);
+
+// The same in periods, on top, for slow cameras. At half one at 0.5 Hz loses frames of its pattern;
+// at twice it holds buffers for longer.
+constexpr std::int64_t search_patience_periods = 10;
+
+// How far two stamps of a stepped clock may be off from their exposures' distance, for jitter. At
+// half coarse clocks never prove that they stepped; at twice steps on the way are found later.
 constexpr std::int64_t step_tolerance_ns = 30'000;
-constexpr std::int64_t step_tolerance_part = 2'000;  // 500 ppm
+
+// The same for its rate, per time between them. At half bad crystals never prove that they
+// stepped; at twice it matters only for frames seconds apart.
+constexpr double step_tolerance_rate = 500e-6;
+
+// How close a frame must come to an exposure by the camera's clock while locked, in smallest gaps.
+// At half frames after a long silence slip; at twice, every time is close to some exposure.
+constexpr double close_by_clock = 0.25;
+
+// How far from its usual lateness a frame may arrive and still say which exposure it is of, in
+// smallest gaps. At half jitter makes arrival silent; at twice (2/3) two exposures would do.
+constexpr double close_by_arrival = 1.0 / 3;
+
+// How far the newest record must reach up to a frame's arrival, less this part of a gap, before the
+// frame is judged without newer ones. At half it waits a little longer; at twice a record may miss.
+constexpr double record_may_lack = 0.75;
+
+// A frame this much later than usual, in smallest gaps, could be of the exposure after. At half
+// jitter makes frames wait for a witness; at twice (4/3) one period late passes as usual.
+constexpr double late_part = 2.0 / 3;
+
+// A frame this much quicker than the quickest so far, in smallest gaps, is of an earlier exposure.
+// At half jitter at a start slips; at twice (4/3) a frame one period early passes.
+constexpr double early_part = 2.0 / 3;
+
+// Mean deviation of the arrivals beyond which they say nothing, in smallest gaps. At half ordinary
+// jitter of fast cameras silences them; at twice (1/3) they speak when they may be one off.
+constexpr double largest_deviation = 1.0 / 6;
+
+// How far the usual lateness may grow past the shortest before frames must be queueing, in smallest
+// gaps. At half slow links fall silent; at twice (1.5) a dropped frame of a queue is not noticed.
+constexpr double largest_queue = 0.75;
+
+double in_gaps(std::int64_t ns, std::int64_t gap_ns) {
+    return static_cast<double>(ns) / static_cast<double>(gap_ns);
+}
 
 }  // namespace
 
@@ -40,6 +124,11 @@ Pairing::Pairing(const Limits& limits, Outcome& outcome)
       outcome_(outcome),
       timeline_(limits.camera_clock ? Timeline::camera : Timeline::arrival),
       exposures_(limits.period) {}
+
+std::int64_t Pairing::loose_ns() const {
+    return part_of(exposures_.smallest_gap_ns(),
+                   timeline_ == Timeline::camera ? close_by_clock : close_by_arrival);
+}
 
 std::int64_t Pairing::frame_ns(const Arrival& arrival) const {
     return timeline_ == Timeline::camera ? arrival.camera_time.ns : arrival.arrived.ns;
@@ -89,7 +178,7 @@ void Pairing::process() {
 bool Pairing::records_complete(const Arrival& arrival) const {
     if (exposures_.empty()) return false;
     const Duration until = exposures_.back().exposure.earliest_on_host - arrival.arrived;
-    return until.ns > -exposures_.smallest_gap_ns() / 4 * 3;
+    return until.ns > -part_of(exposures_.smallest_gap_ns(), record_may_lack);
 }
 
 /// The oldest frames may be of another life of camera or board: they need no place in the
@@ -209,7 +298,7 @@ std::int64_t Pairing::lateness_ns(const Arrival& arrival, const Record& record) 
 /// A frame may be late, but not earlier than the quickest ever was.
 bool Pairing::early(const Arrival& arrival, const Record& record) const {
     const std::int64_t delay = (arrival.arrived - record.exposure.end_on_host).ns;
-    return 3 * (delay - shortest_delay_ns_) < -2 * exposures_.smallest_gap_ns();
+    return in_gaps(delay - shortest_delay_ns_, exposures_.smallest_gap_ns()) < -early_part;
 }
 
 /// Frames that come later and later wait for each other somewhere. When one of them is dropped, the
@@ -217,16 +306,17 @@ bool Pairing::early(const Arrival& arrival, const Record& record) const {
 /// if those do not count the dropped one.
 bool Pairing::latency_trusted() const {
     const std::int64_t gap = exposures_.smallest_gap_ns();
-    return 6 * latency_.deviation_ns() <= gap &&
-           4 * (latency_.difference_ns() - shortest_delay_ns_) < 3 * gap;
+    return in_gaps(latency_.deviation_ns(), gap) <= largest_deviation &&
+           in_gaps(latency_.difference_ns() - shortest_delay_ns_, gap) < largest_queue;
 }
 
 bool Pairing::punctual(const Arrival& arrival, const Record& record) const {
-    return 3 * std::abs(lateness_ns(arrival, record)) < exposures_.smallest_gap_ns();
+    return in_gaps(std::abs(lateness_ns(arrival, record)), exposures_.smallest_gap_ns()) <
+           close_by_arrival;
 }
 
 bool Pairing::late(const Arrival& arrival, const Record& record) const {
-    return 3 * lateness_ns(arrival, record) > 2 * exposures_.smallest_gap_ns();
+    return in_gaps(lateness_ns(arrival, record), exposures_.smallest_gap_ns()) > late_part;
 }
 
 /// Where ids leave a choice, because a trigger may have been ignored, a camera clock that steps
@@ -269,7 +359,7 @@ const Record* Pairing::by_clock(const Arrival& arrival, std::int64_t tolerance_n
 const Record* Pairing::by_latency(const Arrival& arrival) const {
     if (!latency_trusted()) return nullptr;
     return exposures_.near(Timeline::arrival, latency_.expected_instant_ns(arrival.arrived.ns),
-                           exposures_.smallest_gap_ns() / 3);
+                           part_of(exposures_.smallest_gap_ns(), close_by_arrival));
 }
 
 /// The only exposure that ids and arrival allow.
@@ -341,7 +431,7 @@ bool Pairing::consistent(Stepped kind, const Pair& before, const Pair& now) {
     if (kind != Stepped::clock) return true;
     const std::int64_t elapsed = (now.record.exposure.start - before.record.exposure.start).ns;
     const std::int64_t step = (now.arrival.camera_time - before.arrival.camera_time).ns;
-    return std::abs(step - elapsed) <= step_tolerance_ns + elapsed / step_tolerance_part;
+    return std::abs(step - elapsed) <= step_tolerance_ns + part_of(elapsed, step_tolerance_rate);
 }
 
 void Pairing::give_up_front() {
@@ -443,14 +533,15 @@ EventReason Pairing::explanation(const Record& record, EventReason otherwise) {
 }
 
 bool Pairing::arrival_expired(HostTime now) const {
-    const Duration patience =
-        state_ == State::searching ? search_patience + limits_.period * 10 : limits_.exposure_wait;
+    const Duration patience = state_ == State::searching
+                                  ? search_patience + limits_.period * search_patience_periods
+                                  : limits_.exposure_wait;
     return !arrivals_.empty() && now - arrivals_.front().arrived > patience;
 }
 
 /// A search needs the exposures of several frames, however slow the camera.
 bool Pairing::exposure_expired(HostTime now) const {
-    const std::size_t keep = state_ == State::searching ? exposures_kept / 4 : 0;
+    const std::size_t keep = state_ == State::searching ? exposures_for_search : 0;
     return exposures_.size() > keep && now - exposures_.front().exposure.earliest_on_host >
                                            limits_.latest_arrival + limits_.exposure_wait;
 }

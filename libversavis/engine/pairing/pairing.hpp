@@ -86,9 +86,6 @@ class Pairing {
     }
 
  private:
-    static constexpr std::size_t exposures_kept = 128;
-    static constexpr std::size_t shortfalls_kept = 32;
-
     /// What may have stepped at a slip, so that the other kinds of evidence still agree.
     enum class Stepped : std::size_t { ids, clock };
 
@@ -103,9 +100,7 @@ class Pairing {
 
     std::int64_t frame_ns(const Arrival& arrival) const;
     std::int64_t expected_instant_ns(const Arrival& arrival) const;
-    std::int64_t loose_ns() const {
-        return exposures_.smallest_gap_ns() / (timeline_ == Timeline::camera ? 4 : 3);
-    }
+    std::int64_t loose_ns() const;
 
     void process();
     bool records_complete(const Arrival& arrival) const;

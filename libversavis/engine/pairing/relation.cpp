@@ -9,19 +9,60 @@ namespace versavis::pairing {
 
 namespace {
 
+// Share of a surprise that counts as drift, per second between frames. At half the rate of a
+// camera's clock takes twice as long to learn; at twice its jitter enters the rate.
 constexpr double drift_gain_per_s = 0.2;
+
+// Most of that share, however far apart frames are. At half slow cameras learn the rate in twice
+// as many frames; at twice one odd stamp bends the rate for several frames.
 constexpr double largest_drift_gain = 0.05;
+
+// Fastest rate believed, far beyond any crystal. At half (250 ppm) bad oscillators are still
+// followed; at twice one wild stamp may bend the rate further.
 constexpr double largest_drift = 500e-6;
+
+// Share of a surprise that counts as difference of the clocks. At half a change of rate is followed
+// later; at twice half of the stamps' jitter is followed.
 constexpr double difference_gain = 0.25;
+
+// The same for frames that come earlier than usual. At half the usual lateness stays too high after
+// a slow start; at twice one quick frame makes the next ones look late.
 constexpr double earlier_gain = 0.125;
+
+// The same for frames that come later than usual: less, for a busy host delays single frames. At
+// half a lasting delay is learned in twice as many frames; at twice single late ones count more.
 constexpr double later_gain = 0.0625;
+
+// A lateness beyond this, plus some deviations, is cut: it says little of the frames to come. At
+// half a growing delay is followed later; at twice a host that hangs for a moment counts more.
 constexpr double outlier_ns = 2e6;
+
+// The deviations on top. At half lasting jitter is learned later, at twice rare hangs count more.
 constexpr double outlier_deviations = 2;
+
+// Frames over which the mean deviation is taken. At half it jumps with single frames; at twice it
+// remembers for long after jitter has ended.
 constexpr std::int64_t deviation_memory = 16;
+
+// Least distance that a camera's stamp may be off: jitter of stamp and trigger. At half cameras
+// with coarse clocks depend on the learned deviation alone; at twice small steps may be missed.
 constexpr std::int64_t tolerance_floor_ns = 30'000;
+
+// Mean deviations that a stamp may be off. At half ordinary jitter looks like a step of the clock;
+// at twice a step that falls close to another exposure is taken for jitter.
 constexpr std::int64_t deviations_tolerated = 5;
+
+// Time after which the rate counts as learned. At half it may still be off when it is trusted; at
+// twice gaps between frames widen the tolerance for longer.
 constexpr std::int64_t time_until_drift_is_known_ns = 10'000'000'000;
+
+// How fast the tolerance grows without frames until then: two crystals of 100 ppm, and some. At
+// half bad crystals seem to step in a gap of seconds; at twice a step within such a gap may be
+// missed.
 constexpr double drift_unknown = 250e-6;
+
+// The same afterwards: what a warming crystal changes. At half a change of temperature looks like
+// a step; at twice a step after a long gap may be missed.
 constexpr double drift_known = 20e-6;
 
 }  // namespace
