@@ -21,10 +21,14 @@ include(CMakePackageConfigHelpers)
 write_basic_package_version_file(versavis-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis-config-version.cmake
     DESTINATION ${package_directory})
-set(pkgconfig_directory ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)
-file(RELATIVE_PATH to_prefix ${pkgconfig_directory} ${CMAKE_INSTALL_PREFIX})
-file(RELATIVE_PATH to_library ${pkgconfig_directory} ${CMAKE_INSTALL_FULL_LIBDIR})
-file(RELATIVE_PATH to_include ${pkgconfig_directory} ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+# relative_to_pkgconfig(NAME DIRECTORY): sets NAME, so that the whole may be moved.
+function(relative_to_pkgconfig name directory)
+    cmake_path(RELATIVE_PATH directory BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)
+    set(${name} ${directory} PARENT_SCOPE)
+endfunction()
+relative_to_pkgconfig(to_prefix ${CMAKE_INSTALL_PREFIX})
+relative_to_pkgconfig(to_library ${CMAKE_INSTALL_FULL_LIBDIR})
+relative_to_pkgconfig(to_include ${CMAKE_INSTALL_FULL_INCLUDEDIR})
 configure_file(cmake/versavis.pc.in versavis.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
