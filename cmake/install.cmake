@@ -1,11 +1,49 @@
 # SPDX-License-Identifier: BSD-3-Clause
+# What is installed, and where. The prefix may change when `cmake --install` is told another.
 include(GNUInstallDirs)
-install(TARGETS versavisd versavis-rig versavis_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS versavis LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY daemon/camera/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis FILES_MATCHING PATTERN *.toml)
+set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/versavis)
+
+install(TARGETS versavisd versavis_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(DIRECTORY daemon/camera/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
+    FILES_MATCHING PATTERN *.toml)
+if(TARGET versavis-rig)
+    install(TARGETS versavis-rig RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+    install(DIRECTORY tests/rig/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
+        FILES_MATCHING PATTERN *.toml)
+endif()
+
+# The library, for pkg-config and for find_package(versavis).
+install(TARGETS versavis EXPORT versavis LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY libversavis/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES systemd/versavisd.service DESTINATION lib/systemd/system)
-install(FILES systemd/60-versavis.rules DESTINATION lib/udev/rules.d)
-install(FILES systemd/versavis.sysusers DESTINATION lib/sysusers.d RENAME versavis.conf)
-install(FILES systemd/versavis.tmpfiles DESTINATION lib/tmpfiles.d RENAME versavis.conf)
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(EXPORT versavis FILE versavis-config.cmake NAMESPACE versavis::
+    DESTINATION ${package_directory})
+include(CMakePackageConfigHelpers)
+write_basic_package_version_file(versavis-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis-config-version.cmake
+    DESTINATION ${package_directory})
+# relative_to_pkgconfig(NAME DIRECTORY): sets NAME, so that the whole may be moved.
+function(relative_to_pkgconfig name directory)
+    cmake_path(RELATIVE_PATH directory BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)
+    set(${name} ${directory} PARENT_SCOPE)
+endfunction()
+relative_to_pkgconfig(to_prefix ${CMAKE_INSTALL_PREFIX})
+relative_to_pkgconfig(to_library ${CMAKE_INSTALL_FULL_LIBDIR})
+relative_to_pkgconfig(to_include ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+configure_file(cmake/versavis.pc.in versavis.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+# The documents keep their folders, so that the links between them hold.
+install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES systemd/versavis.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
+install(DIRECTORY clients/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
+
+# Last, as it may need rights that the rest does not: what starts the service.
+install(CODE "
+    set(source_directory \"${CMAKE_CURRENT_SOURCE_DIR}/systemd\")
+    set(system_directory \"${VERSAVIS_SYSTEM_DIR}\")
+    set(sysconfdir \"${VERSAVIS_SYSCONFDIR}\")
+    set(bindir \"${CMAKE_INSTALL_BINDIR}\")
+    set(docdir \"${CMAKE_INSTALL_DOCDIR}\")")
+install(SCRIPT cmake/install_service.cmake)

@@ -17,7 +17,7 @@ namespace {
 using namespace versavis;
 using namespace versavis::daemon;
 
-constexpr auto default_configuration = "/etc/versavis/versavis.toml";
+constexpr auto default_configuration = VERSAVIS_SYSCONFDIR "/versavis/versavis.toml";
 
 /// Signals that this service handles, blocked in all threads: they are only taken by the main loop.
 sigset_t block_signals() {
