@@ -2,35 +2,29 @@
 #include "imu/imu_output.hpp"
 
 #include "imu/adis.hpp"
-#include "imu/vn100.hpp"
+#include "wire/imu_scale.hpp"
 
 namespace versavis::firmware {
 
 namespace {
 
-// One LSB of an ADIS16448.
-constexpr double gyro_deg_s = 0.04;
-constexpr double accel_g = 1.0 / 1200;
-constexpr double magnetic_gauss = 1.0 / 7000;
-constexpr double pressure_pa = 2.0;
-constexpr double temperature_c = 0.07386;
-constexpr double temperature_at_zero_c = 31.0;
-
 constexpr std::int64_t q32(double ratio) { return static_cast<std::int64_t>(ratio * 4294967296.0); }
 
-/// Scale from the raw words of a kind to those of an ADIS16448, times 2^32.
+constexpr wire::ImuScale adis16448 = wire::imu_scale(wire::ImuKind::adis16448b);
+
+/// Raw words of a kind in those of an ADIS16448, times 2^32.
 struct Scale {
-    constexpr Scale(wire::ImuKind of, double gyro_lsb_deg_s, double accel_lsb_g,
-                    double temperature_lsb_c, double at_zero_c, double magnetic_lsb_gauss = 0,
-                    double pressure_lsb_pa = 0)
-        : kind(of),
-          gyro(q32(gyro_lsb_deg_s / gyro_deg_s)),
-          accel(q32(accel_lsb_g / accel_g)),
-          temperature(q32(temperature_lsb_c / temperature_c)),
-          temperature_offset(
-              static_cast<std::int32_t>((at_zero_c - temperature_at_zero_c) / temperature_c - 0.5)),
-          magnetic(q32(magnetic_lsb_gauss / magnetic_gauss)),
-          pressure(q32(pressure_lsb_pa / pressure_pa)) {}
+    constexpr explicit Scale(const wire::ImuScale& of)
+        : kind(of.kind),
+          gyro(q32(of.gyro_rad_s / adis16448.gyro_rad_s)),
+          accel(q32(of.accel_m_s2 / adis16448.accel_m_s2)),
+          temperature(q32(of.temperature_c / adis16448.temperature_c)),
+          temperature_offset(static_cast<std::int32_t>(
+              (of.temperature_at_zero_c - adis16448.temperature_at_zero_c) /
+                  adis16448.temperature_c -
+              0.5)),
+          magnetic(q32(of.magnetic_t / adis16448.magnetic_t)),
+          pressure(q32(of.pressure_pa / adis16448.pressure_pa)) {}
 
     wire::ImuKind kind;
     std::int64_t gyro;
@@ -41,21 +35,15 @@ struct Scale {
     std::int64_t pressure;
 };
 
-constexpr double degrees = 57.29577951308232;
-constexpr double gravity = 9.80665;
-
 constexpr Scale scales[] = {
-    {wire::ImuKind::adis16445, 0.01, 0.00025, temperature_c, temperature_at_zero_c},
-    {wire::ImuKind::adis16460, 0.005, 0.00025, 0.05, 25},
-    {wire::ImuKind::adis16470, 0.1, 0.00125, 0.1, 0},
-    {wire::ImuKind::icm42688p, 1 / 16.4, 1.0 / 2048, 1 / 132.48, 25},
-    {wire::ImuKind::bmi088, 2000.0 / 32768, 24.0 / 32768, 0.125, 23},
-    {wire::ImuKind::vn100, degrees / (1U << vn100::gyro_bits),
-     1 / gravity / (1U << vn100::accel_bits), 1.0 / (1U << vn100::temperature_bits), 0,
-     1.0 / (1U << vn100::magnetic_bits), 1000.0 / (1U << vn100::pressure_bits)},
+    Scale(wire::imu_scale(wire::ImuKind::adis16445)),
+    Scale(wire::imu_scale(wire::ImuKind::adis16460)),
+    Scale(wire::imu_scale(wire::ImuKind::adis16470)),
+    Scale(wire::imu_scale(wire::ImuKind::icm42688p)),
+    Scale(wire::imu_scale(wire::ImuKind::bmi088)),
+    Scale(wire::imu_scale(wire::ImuKind::vn100)),
 };
-constexpr Scale same{wire::ImuKind::adis16448b, gyro_deg_s,     accel_g,    temperature_c,
-                     temperature_at_zero_c,     magnetic_gauss, pressure_pa};
+constexpr Scale same(adis16448);
 
 constexpr std::uint16_t self_test_failed = 1U << 5U;
 

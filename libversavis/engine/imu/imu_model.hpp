@@ -11,16 +11,10 @@
 
 namespace versavis::imu {
 
-/// Scale factors of one part; a linear reading is `raw * scale + offset`.
+/// One part, as the configuration names it, and what its raw words are worth.
 struct ImuModel {
-    wire::ImuKind kind = wire::ImuKind::none;
     const char* name = "none";
-    double gyro_rad_s = 0;     ///< per LSB
-    double accel_m_s2 = 0;     ///< per LSB
-    double magnetic_t = 0;     ///< per LSB; 0: no magnetometer
-    double pressure_pa = 0;    ///< per LSB; 0: no barometer
-    double temperature_c = 0;  ///< per LSB
-    double temperature_at_zero_c = 0;
+    wire::ImuKind kind = wire::ImuKind::none;
 };
 
 /// Names of all models, as the configuration has them.

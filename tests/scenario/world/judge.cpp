@@ -7,6 +7,7 @@
 #include <set>
 
 #include "engine/imu/imu_model.hpp"
+#include "wire/imu_scale.hpp"
 #include "world.hpp"
 
 namespace versavis::scenario {
@@ -165,18 +166,19 @@ void World::judge_imu(unsigned port, std::string& out) {
         }
         if ((sample.flags & wire::imu_check_failed) != 0) continue;
         const ImuMetadata si = imu::to_si(model, sample);
+        const wire::ImuScale scale = wire::imu_scale(sample.kind);
         const devices::Inertial felt = motion(taken);
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const double rate = felt.gyro_deg_s[axis] * 3.14159265358979 / 180;
             const double acceleration = felt.accel_g[axis] * 9.80665;
-            if (std::abs(si.gyro[axis] - rate) > 0.6 * model.gyro_rad_s + 1e-6)
+            if (std::abs(si.gyro[axis] - rate) > 0.6 * scale.gyro_rad_s + 1e-6)
                 complain(out, "IMU {} sample {}: gyro {} is {}, not {}", port, sample.number, axis,
                          si.gyro[axis], rate);
-            if (std::abs(si.accel[axis] - acceleration) > 0.7 * model.accel_m_s2 + 1e-5)
+            if (std::abs(si.accel[axis] - acceleration) > 0.7 * scale.accel_m_s2 + 1e-5)
                 complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port,
                          sample.number, axis, si.accel[axis], acceleration);
         }
-        if (std::abs(si.temperature - felt.temperature_c) > 0.6 * model.temperature_c)
+        if (std::abs(si.temperature - felt.temperature_c) > 0.6 * scale.temperature_c)
             complain(out, "IMU {} sample {}: temperature is {}", port, sample.number,
                      si.temperature);
     }
