@@ -14,19 +14,19 @@ constexpr Duration output_interval = seconds(1);
 void ClockRecorder::board_restarted(std::uint32_t nonce) {
     const std::lock_guard lock(mutex_);
     nonce_ = nonce;
-    publish(clock::RestartTold{nonce});
+    publish(clock::RecordedRestart{nonce});
 }
 
 void ClockRecorder::exchange(std::uint32_t request, const clock::Exchange& exchange) {
     const std::lock_guard lock(mutex_);
-    publish(clock::ExchangeTold{nonce_, request, 0, exchange.sent, exchange.received,
-                                exchange.answered, exchange.arrived},
+    publish(clock::RecordedExchange{nonce_, request, 0, exchange.sent, exchange.received,
+                                    exchange.answered, exchange.arrived},
             exchange.arrived);
 }
 
 void ClockRecorder::one_way(const clock::OneWay& message) {
     const std::lock_guard lock(mutex_);
-    publish(clock::OneWayTold{nonce_, message.sent, message.arrived}, message.arrived);
+    publish(clock::RecordedMessage{nonce_, message.sent, message.arrived}, message.arrived);
 }
 
 void ClockRecorder::tick(HostTime now) {
@@ -47,8 +47,8 @@ void ClockRecorder::publish(const clock::ClockItem& item, std::optional<HostTime
 void ClockRecorder::tell_output(const clock::OutputRelation& relation) {
     epoch_ = relation.epoch;
     next_output_ = relation.host + output_interval;
-    const clock::OutputTold told{relation.epoch, relation.host, relation.minus_host,
-                                 relation.uncertainty};
+    const clock::RecordedOutput told{relation.epoch, relation.host, relation.minus_host,
+                                     relation.uncertainty};
     ring_.publish({relation.host.ns + relation.minus_host.ns}, pack(clock::to_metadata(told)));
 }
 

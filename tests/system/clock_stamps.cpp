@@ -90,11 +90,11 @@ TEST_CASE("clock stamps: each exchange, each sample's way and the output clock a
     const auto status = stack.wait_for_status(healthy);
     const std::uint32_t nonce = status["board"]["nonce"];
     ClockStream stream = from_the_first(stack);
-    CHECK(next_of<RestartTold>(stream).nonce == nonce);
+    CHECK(next_of<RecordedRestart>(stream).nonce == nonce);
 
-    std::optional<ExchangeTold> last;
+    std::optional<RecordedExchange> last;
     for (int i = 0; i < 25; ++i) {
-        const auto exchange = next_of<ExchangeTold>(stream);
+        const auto exchange = next_of<RecordedExchange>(stream);
         CHECK(exchange.nonce == nonce);
         CHECK(exchange.arrived - exchange.sent > exchange.answered - exchange.received);
         CHECK(exchange.arrived - exchange.sent < milliseconds(500));
@@ -107,14 +107,14 @@ TEST_CASE("clock stamps: each exchange, each sample's way and the output clock a
     // By the stamps of one exchange, the host time of the board's zero lies between these two.
     const std::int64_t earliest_ns = last->sent.ns - last->received.ns;
     for (int i = 0; i < 20; ++i) {
-        const auto one_way = next_of<OneWayTold>(stream);
+        const auto one_way = next_of<RecordedMessage>(stream);
         CHECK(one_way.nonce == nonce);
         const Duration delay{one_way.arrived.ns - one_way.departed.ns - earliest_ns};
         CHECK(delay > Duration{});
         CHECK(delay < milliseconds(500));
     }
-    const auto output = next_of<OutputTold>(stream);
-    const auto after = next_of<OutputTold>(stream);
+    const auto output = next_of<RecordedOutput>(stream);
+    const auto after = next_of<RecordedOutput>(stream);
     auto clock = OutputClock::create(OutputClockKind::realtime);
     REQUIRE(clock);
     CHECK(absolute(clock->offset() - after.minus_host) < milliseconds(10));
@@ -165,7 +165,7 @@ TEST_CASE(
         stack.log_path("stopped.log"));
     REQUIRE(stopped.wait_for_output("recording to", seconds(10)));
     auto stream = wait_for_stream<ClockStream>("clock", "record");
-    const auto seen = next_of<ExchangeTold>(stream);
+    const auto seen = next_of<RecordedExchange>(stream);
     stopped.signal(SIGINT);
     CHECK(stopped.wait(seconds(10)) == 0);
     const auto until_stopped = read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns");
@@ -178,10 +178,10 @@ TEST_CASE(
     CHECK_THAT(text, Catch::Contains("board: restarted"));
     check_exchanges(read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns"));
     ClockStream all = from_the_first(stack);
-    const auto first = next_of<RestartTold>(all);
-    const auto second = next_of<RestartTold>(all);
+    const auto first = next_of<RecordedRestart>(all);
+    const auto second = next_of<RecordedRestart>(all);
     CHECK(first.nonce != second.nonce);
-    CHECK(next_of<ExchangeTold>(all).nonce == second.nonce);
+    CHECK(next_of<RecordedExchange>(all).nonce == second.nonce);
 }
 
 TEST_CASE(

@@ -66,11 +66,11 @@ TEST_CASE(
     "clock_recorder: what it is told is in the ring, with the board's nonce and the output time") {
     Recording recording;
     recording.recorder.board_restarted(77);
-    CHECK(recording.expect<OutputTold>().epoch == 0);
-    CHECK(recording.expect<RestartTold>().nonce == 77);
+    CHECK(recording.expect<RecordedOutput>().epoch == 0);
+    CHECK(recording.expect<RecordedRestart>().nonce == 77);
     const HostTime arrived = recording.now() - milliseconds(3);
     recording.recorder.exchange(5, {arrived - microseconds(80), {1'000}, {2'000}, arrived});
-    const auto exchange = recording.expect<ExchangeTold>();
+    const auto exchange = recording.expect<RecordedExchange>();
     CHECK(exchange.nonce == 77);
     CHECK(exchange.request == 5);
     CHECK(exchange.flags == 0);
@@ -80,7 +80,7 @@ TEST_CASE(
     CHECK(exchange.arrived == arrived);
     CHECK(absolute(recording.time - (recording.output_now() - milliseconds(3))) < microseconds(1));
     recording.recorder.one_way({{3'000}, arrived});
-    const auto one_way = recording.expect<OneWayTold>();
+    const auto one_way = recording.expect<RecordedMessage>();
     CHECK(one_way.nonce == 77);
     CHECK(one_way.departed == BoardTime{3'000});
     CHECK(one_way.arrived == arrived);
@@ -94,8 +94,8 @@ TEST_CASE("clock_recorder: the output clock is told once a second, and at each s
         recording.tick();
         recording.clocks->pass(milliseconds(50));
     }
-    const auto first = recording.expect<OutputTold>();
-    const auto second = recording.expect<OutputTold>();
+    const auto first = recording.expect<RecordedOutput>();
+    const auto second = recording.expect<RecordedOutput>();
     CHECK_FALSE(recording.next());
     CHECK(absolute(second.host - first.host - seconds(1)) <= milliseconds(51));
     CHECK(second.epoch == first.epoch);
@@ -103,7 +103,7 @@ TEST_CASE("clock_recorder: the output clock is told once a second, and at each s
     CHECK(recording.time.ns == second.host.ns + second.minus_host.ns);
     recording.clocks->step(seconds(1));
     recording.tick();
-    const auto stepped = recording.expect<OutputTold>();
+    const auto stepped = recording.expect<RecordedOutput>();
     CHECK(stepped.epoch == first.epoch + 1);
     CHECK(absolute(stepped.minus_host - first.minus_host - seconds(1)) < microseconds(1));
     recording.tick();
@@ -113,11 +113,11 @@ TEST_CASE("clock_recorder: the output clock is told once a second, and at each s
 TEST_CASE("clock_recorder: a step is told before the first item that is stamped after it") {
     Recording recording;
     recording.tick();
-    recording.expect<OutputTold>();
+    recording.expect<RecordedOutput>();
     recording.clocks->step(-seconds(1));
     recording.recorder.one_way({{1}, recording.now()});
-    const auto stepped = recording.expect<OutputTold>();
-    recording.expect<OneWayTold>();
+    const auto stepped = recording.expect<RecordedOutput>();
+    recording.expect<RecordedMessage>();
     CHECK(stepped.epoch == 1);
     CHECK(absolute(recording.time - recording.output_now()) < microseconds(1));
 }

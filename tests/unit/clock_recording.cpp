@@ -26,12 +26,12 @@ T at(const ring::Metadata& bytes, std::size_t offset) {
     return value;
 }
 
-const ExchangeTold exchange{0x11223344, 7, 5, {-1}, {0x7000000000000002}, {3}, {4}};
+const RecordedExchange exchange{0x11223344, 7, 5, {-1}, {0x7000000000000002}, {3}, {4}};
 
 }  // namespace
 
 TEST_CASE("clock_recording: items come back from the ring as they were") {
-    const ExchangeTold same = there_and_back(exchange);
+    const RecordedExchange same = there_and_back(exchange);
     CHECK(same.nonce == 0x11223344);
     CHECK(same.request == 7);
     CHECK(same.flags == 5);
@@ -39,17 +39,17 @@ TEST_CASE("clock_recording: items come back from the ring as they were") {
     CHECK(same.received.ns == 0x7000000000000002);
     CHECK(same.answered.ns == 3);
     CHECK(same.arrived.ns == 4);
-    const OneWayTold one_way = there_and_back(OneWayTold{9, {10}, {11}});
+    const RecordedMessage one_way = there_and_back(RecordedMessage{9, {10}, {11}});
     CHECK(one_way.nonce == 9);
     CHECK(one_way.departed.ns == 10);
     CHECK(one_way.arrived.ns == 11);
-    CHECK(there_and_back(RestartTold{12}).nonce == 12);
-    const OutputTold output = there_and_back(OutputTold{13, {14}, {-15}, {16}});
+    CHECK(there_and_back(RecordedRestart{12}).nonce == 12);
+    const RecordedOutput output = there_and_back(RecordedOutput{13, {14}, {-15}, {16}});
     CHECK(output.epoch == 13);
     CHECK(output.host.ns == 14);
     CHECK(output.minus_host.ns == -15);
     CHECK(output.uncertainty.ns == 16);
-    CHECK(there_and_back(OutputTold{0, {}, {}, seconds(60)}).uncertainty.ns == UINT32_MAX);
+    CHECK(there_and_back(RecordedOutput{0, {}, {}, seconds(60)}).uncertainty.ns == UINT32_MAX);
 }
 
 TEST_CASE("clock_recording: layout by the document, and kinds that nobody knows") {
@@ -62,14 +62,14 @@ TEST_CASE("clock_recording: layout by the document, and kinds that nobody knows"
     CHECK(at<std::int64_t>(bytes, 24) == 0x7000000000000002);
     CHECK(at<std::int64_t>(bytes, 32) == 3);
     CHECK(at<std::int64_t>(bytes, 40) == 4);
-    const ring::Metadata output = pack(to_metadata(OutputTold{13, {14}, {-15}, {16}}));
+    const ring::Metadata output = pack(to_metadata(RecordedOutput{13, {14}, {-15}, {16}}));
     CHECK(at<std::uint32_t>(output, 0) == 4);
     CHECK(at<std::uint32_t>(output, 4) == 13);
     CHECK(at<std::int64_t>(output, 8) == 14);
     CHECK(at<std::int64_t>(output, 16) == -15);
     CHECK(at<std::uint32_t>(output, 24) == 16);
-    CHECK(to_metadata(OneWayTold{}).kind == 2);
-    CHECK(to_metadata(RestartTold{}).kind == 3);
+    CHECK(to_metadata(RecordedMessage{}).kind == 2);
+    CHECK(to_metadata(RecordedRestart{}).kind == 3);
     ClockMetadata unknown = to_metadata(exchange);
     unknown.kind = GENERATE(0U, 5U, 0xFFFFFFFFU);
     CHECK_FALSE(from_metadata(unknown));
@@ -81,8 +81,8 @@ TEST_CASE("clock_recording: as JSON") {
     CHECK(line["nonce"] == 0x11223344);
     CHECK(line["sent_ns"] == -1);
     CHECK(line["answered_ns"] == 3);
-    CHECK(client::to_json(ClockItem{OneWayTold{9, {10}, {11}}})["departed_ns"] == 10);
-    CHECK(client::to_json(ClockItem{RestartTold{12}})["clock"] == "board_restarted");
-    CHECK(client::to_json(ClockItem{OutputTold{13, {14}, {-15}, {16}}})["output_minus_host_ns"] ==
-          -15);
+    CHECK(client::to_json(ClockItem{RecordedMessage{9, {10}, {11}}})["departed_ns"] == 10);
+    CHECK(client::to_json(ClockItem{RecordedRestart{12}})["clock"] == "board_restarted");
+    CHECK(client::to_json(
+              ClockItem{RecordedOutput{13, {14}, {-15}, {16}}})["output_minus_host_ns"] == -15);
 }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/clock/delay_edge.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
+#include <vector>
 
 using namespace versavis;
 using namespace versavis::clock;
@@ -63,4 +66,72 @@ TEST_CASE("delay_edge: the shortest of a slot is kept") {
     CHECK(shortest->at == BoardTime{2});
     CHECK_FALSE(edge.take());
     CHECK(edge.sign() == -1);
+}
+
+namespace {
+
+/// The mean overshoot after many slots whose shortest delays `draw` gives, in ns.
+template <class Draw>
+double overshoot_of(const Draw& draw) {
+    double sum = 0;
+    constexpr unsigned seeds = 20;
+    for (unsigned seed = 1; seed <= seeds; ++seed) {
+        std::mt19937_64 random(seed);
+        DelayEdge edge(Direction::to_host);
+        edge.begin(1e5);
+        for (std::int64_t slot = 0; slot < 300; ++slot)
+            edge.remember({{slot}, {std::llround(draw(random))}}, [](const Passage& p) {
+                return static_cast<double>(p.host_minus_board.ns);
+            });
+        sum += edge.overshoot_ns() / seeds;
+    }
+    return sum;
+}
+
+}  // namespace
+
+TEST_CASE("delay_edge: a sharp edge is not overshot, wherever it is and whatever the scale") {
+    for (const double scale : {5e3, 50e3}) {
+        const double overshoot = overshoot_of([&](std::mt19937_64& random) {
+            return 70e3 + std::exponential_distribution<>(1 / scale)(random);
+        });
+        CHECK(overshoot < 0.05 * scale);
+    }
+}
+
+TEST_CASE("delay_edge: delays that thin out are overshot by about what they lack to the shortest") {
+    const double median = GENERATE(15e3, 40e3);
+    double least = 1e9;
+    const double overshoot = overshoot_of([&](std::mt19937_64& random) {
+        double shortest = 1e9;
+        for (int message = 0; message < 20; ++message) {
+            const double polled = std::uniform_real_distribution<>(0, 125e3)(random);
+            const double awake = std::lognormal_distribution<>(std::log(median), 0.5)(random);
+            shortest = std::min(shortest, polled + awake);
+        }
+        least = std::min(least, shortest);
+        return shortest;
+    });
+    CHECK(overshoot > 0.4 * median / 2.6);
+    CHECK(overshoot < 1.5 * median / 2.6);
+    CHECK(least > 0.1 * median);
+}
+
+TEST_CASE("delay_edge: the overshoot is limited, and unknown until there are enough slots") {
+    CHECK(overshoot_of([](std::mt19937_64& random) {
+              return std::normal_distribution<>(5e6, 500e3)(random);
+          }) == Approx(20e3).epsilon(0.1));
+    DelayEdge edge(Direction::to_host);
+    std::mt19937_64 random(1);
+    const auto remember = [&] {
+        const double delay = std::normal_distribution<>(80e3, 10e3)(random);
+        edge.remember({{0}, {std::llround(delay)}},
+                      [](const Passage& p) { return static_cast<double>(p.host_minus_board.ns); });
+    };
+    for (std::size_t slot = 1; slot < remembered_slots; ++slot) remember();
+    CHECK(edge.overshoot_ns() == 0);
+    remember();
+    CHECK(edge.overshoot_ns() > 0);
+    edge.begin(1e5);
+    CHECK(edge.overshoot_ns() == 0);
 }

@@ -196,3 +196,25 @@ TEST_CASE("envelope_filter: absurd stamps are left out") {
         filter.add(link.exchange(t));
     CHECK(std::abs(error_ns(filter, link, HostTime{10'000'000'000})) < 100e3);
 }
+
+TEST_CASE("envelope_filter: a measured asymmetry takes the place of the presumed one") {
+    // To the host delays thin out towards 50 us, to the board they break off there.
+    EnvelopeFilter filter;
+    std::mt19937_64 random(4);
+    std::lognormal_distribution<> wake_up(std::log(30e3), 0.5);
+    std::uniform_real_distribution<> frame(0, 1e6);
+    HostTime at{1'000'000'000};
+    for (int i = 0; i < 5000; ++i, at = at + milliseconds(100)) {
+        const HostTime received = at + microseconds(50) + Duration{std::llround(frame(random))};
+        const HostTime arrived =
+            received + microseconds(50) + Duration{std::llround(wake_up(random))};
+        filter.add(Exchange{at, {received.ns}, {received.ns}, arrived});
+    }
+    const Duration presumed = filter.asymmetry_offset();
+    CHECK(presumed > microseconds(1));
+    CHECK(presumed <= microseconds(10));
+    const HostTime before = filter.translate({at.ns}).time;
+    filter.set_asymmetry(Asymmetry{microseconds(3), microseconds(1)});
+    CHECK(filter.asymmetry_offset() == microseconds(3));
+    CHECK(filter.translate({at.ns}).time == before + presumed - microseconds(3));
+}

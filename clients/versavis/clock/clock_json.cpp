@@ -8,7 +8,7 @@ namespace {
 using nlohmann::json;
 using namespace clock;
 
-json describe(const ExchangeTold& item) {
+json describe(const RecordedExchange& item) {
     return {{"clock", "exchange"},
             {"nonce", item.nonce},
             {"request", item.request},
@@ -19,18 +19,18 @@ json describe(const ExchangeTold& item) {
             {"arrived_ns", item.arrived.ns}};
 }
 
-json describe(const OneWayTold& item) {
+json describe(const RecordedMessage& item) {
     return {{"clock", "one_way"},
             {"nonce", item.nonce},
             {"departed_ns", item.departed.ns},
             {"arrived_ns", item.arrived.ns}};
 }
 
-json describe(const RestartTold& item) {
+json describe(const RecordedRestart& item) {
     return {{"clock", "board_restarted"}, {"nonce", item.nonce}};
 }
 
-json describe(const OutputTold& item) {
+json describe(const RecordedOutput& item) {
     return {{"clock", "output"},
             {"epoch", item.epoch},
             {"host_time_ns", item.host.ns},

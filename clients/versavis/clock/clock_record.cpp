@@ -61,7 +61,7 @@ class Recording {
         return nonce == *nonce_;
     }
 
-    bool take(const clock::ExchangeTold& told) {
+    bool take(const clock::RecordedExchange& told) {
         if (!same_life(told.nonce)) return false;
         exchange_file_ << fmt::format("{},{},{},{}\n", told.sent.ns, told.received.ns,
                                       told.answered.ns, told.arrived.ns);
@@ -69,7 +69,7 @@ class Recording {
         return true;
     }
 
-    bool take(const clock::OneWayTold& told) {
+    bool take(const clock::RecordedMessage& told) {
         if (!same_life(told.nonce)) return false;
         if (one_way_file_.is_open())
             one_way_file_ << fmt::format("{},{}\n", told.departed.ns, told.arrived.ns);
@@ -78,14 +78,14 @@ class Recording {
     }
 
     /// A new service meets the board for the first time, too.
-    bool take(const clock::RestartTold& told) {
+    bool take(const clock::RecordedRestart& told) {
         const bool met_again = service_restarted_ && told.nonce == nonce_;
         service_restarted_ = false;
         if (exchanges_ + one_way_ == 0) nonce_ = told.nonce;
         return met_again || exchanges_ + one_way_ == 0;
     }
 
-    bool take(const clock::OutputTold& /*told*/) { return true; }
+    bool take(const clock::RecordedOutput& /*told*/) { return true; }
 
     std::ofstream exchange_file_;
     std::ofstream one_way_file_;

@@ -7,10 +7,17 @@ namespace versavis::clock {
 
 namespace {
 
-// A share of the delay, and some instructions more or less on short ones.
+// Allowance for unequal directions, as a share of the shortest delay. Half or twice: sigma of
+// slow links changes by little, as their jitter is larger.
 constexpr double share = 0.04;
+
+// A further share for short delays: some instructions more or less. Half: NEES over USB leaves
+// its range. Twice: sigma is too large there.
 constexpr double share_of_short = 0.08;
-constexpr double most_of_short_ns = 3000;
+
+// The most of that further share. Half: as above for links of more than 20 us. Twice: sigma of
+// delays of 50 us is a fifth larger.
+constexpr double most_of_short_ns = 3000.0;
 
 double square(double x) { return x * x; }
 

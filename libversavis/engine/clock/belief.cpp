@@ -8,11 +8,33 @@ namespace versavis::clock {
 
 namespace {
 
-constexpr double start_skew_sigma = 50e3;  // ns/s: two crystals of 50 ppm, nearly always
-constexpr double skew_walk = 12.0;         // ns/s per sqrt(s)
-constexpr double drift_walk = 0.15;  // ns/s^2 per sqrt(s): 2 ppm in ten minutes are no surprise
-constexpr double drift_memory_s = 600.0;  // a drift fades: temperature settles
-constexpr double delay_walk = 20.0;       // ns per sqrt(s)
+// Skew of two crystals before anything is known, in ns/s: 50 ppm. Half: a crystal of 50 ppm
+// surprises. Twice: the first second is less certain.
+constexpr double start_skew_sigma = 50e3;
+
+// Random walk of the skew, in ns/s per sqrt(s); crystals have some 10. Half: the estimate lags
+// behind. Twice: it is noisier, and holdover claims less.
+constexpr double skew_walk = 12.0;
+
+// Random walk of the drift, in ns/s^2 per sqrt(s): 2 ppm in ten minutes are no surprise. Half:
+// warming up is followed later. Twice: holdover claims less.
+constexpr double drift_walk = 0.15;
+
+// A drift fades within this time: temperature settles. Half or twice shows only after minutes
+// without contact.
+constexpr double drift_memory_s = 600.0;
+
+// Random walk of the shortest delay, in ns per sqrt(s). Half: a link that changes is followed
+// later. Twice: the offset holds the level less firmly.
+constexpr double delay_walk = 20.0;
+
+// Shortest delay after one exchange, and its deviation, as a share of the round trip. Half or
+// twice: what one exchange says lasts for some slots only.
+constexpr double start_delay_of_round_trip = 0.25;
+
+// Deviation of the offset after one exchange, as a share of its round trip: sqrt(1/24), two equal
+// uniform delays. Half: sigma is too small at first. Twice: too large.
+constexpr double start_sigma_of_round_trip = 0.2041;
 
 double to_seconds(Duration span) { return static_cast<double>(span.ns) * 1e-9; }
 
@@ -20,9 +42,10 @@ double to_seconds(Duration span) { return static_cast<double>(span.ns) * 1e-9; }
 
 Belief Belief::after_exchange(double round_trip_ns) {
     Belief belief;
-    belief.mean[3] = round_trip_ns / 4;
-    const double delay_sigma = round_trip_ns / 4;
-    belief.covariance.diagonal() << round_trip_ns * round_trip_ns / 24,
+    belief.mean[3] = start_delay_of_round_trip * round_trip_ns;
+    const double delay_sigma = belief.mean[3];
+    const double offset_sigma = start_sigma_of_round_trip * round_trip_ns;
+    belief.covariance.diagonal() << offset_sigma * offset_sigma,
         start_skew_sigma * start_skew_sigma, drift_walk * drift_walk * drift_memory_s / 2,
         delay_sigma * delay_sigma;
     return belief;

@@ -40,6 +40,10 @@ std::optional<double> delay_scale(std::vector<double>& delays_ns);
 /// By so much the edge of delays of this scale is uncertain in itself, in ns.
 double edge_blur(double scale_ns);
 
+/// Slots whose shortest delays tell how delays spread. Half as many: scale and overshoot scatter
+/// by 1.4 times as much. Twice as many: the clocks' wandering blurs them.
+constexpr std::size_t remembered_slots = 64;
+
 /// The delays of one direction: the shortest of the present slot, and how those of the last slots
 /// spread.
 class DelayEdge {
@@ -56,7 +60,7 @@ class DelayEdge {
     template <class DelayOf>
     void remember(const Passage& passage, const DelayOf& delay_of) {
         passages_.push_back(passage);
-        if (passages_.size() > remembered) passages_.pop_front();
+        if (passages_.size() > remembered_slots) passages_.pop_front();
         delays_.clear();
         for (const Passage& p : passages_) delays_.push_back(delay_of(p));
         rescale();
@@ -69,13 +73,16 @@ class DelayEdge {
     double sign() const { return static_cast<double>(direction_); }
     double scale_ns() const { return scale_ns_; }
 
+    /// By how much even the shortest delays seen probably exceed the shortest possible one, in ns:
+    /// 0 where delays break off sharply, more where they thin out, as those of a host's wake-ups.
+    double overshoot_ns() const;
+
     /// The least delay of the newest slots; none: there are too few.
     std::optional<double> newest_least_ns() const { return newest_least_ns_; }
 
  private:
-    static constexpr std::size_t remembered = 64;  ///< slots
-
     void rescale();
+    void judge_shape();
 
     Direction direction_;
     std::optional<Passage> shortest_;
@@ -83,8 +90,12 @@ class DelayEdge {
     std::deque<Passage> passages_;
     std::vector<double> delays_;  ///< of the passages
     std::vector<double> newest_;
+    std::vector<double> sorted_;
     double scale_ns_ = 0;
     std::optional<double> newest_least_ns_;
+    std::size_t judged_ = 0;       ///< windows that the next two are averaged over
+    double lower_quarter_ns_ = 0;  ///< between the least delay and the one a quarter are below
+    double lower_half_ns_ = 0;     ///< and the one half are below
 };
 
 }  // namespace versavis::clock

@@ -10,26 +10,78 @@ namespace versavis::clock {
 
 namespace {
 
+// Length of a slot in the long run. Half: its shortest delay is further from the edge, and sigma
+// is a tenth too small. Twice: the clocks wander within it.
 constexpr std::int64_t longest_slot_ns = 2'000'000'000;
+
+// A slot lasts one over this of the time since the beginning. Half or twice: p99 after five
+// minutes changes by a tenth with IMU packets.
 constexpr std::int64_t slots_per_age = 16;
+
+// The bound counts the shortest round trip of one to two of these. Half or twice: it follows a
+// changed link sooner or later; the estimate does not depend on it.
 constexpr std::int64_t window_ns = 300'000'000'000;
+
+// A message older than this did not just arrive out of order: the board's clock went back. Half
+// or twice matters only after such a step.
 constexpr std::int64_t longest_disorder_ns = 5'000'000'000;
-constexpr std::int64_t furthest_ns = std::int64_t{1}
-                                     << 61;  // 73 years: what is summed cannot overflow
-constexpr double surprising = 3.0;           // deviations below the edge
-constexpr double shift_deviations = 4.0;     // of the shortest delay, that is no chance
+
+// Deviations below the edge that a delay surprises by. Half: sigma is a sixth too large. Twice:
+// p99 of invisible jitter grows by a quarter, and sigma is a quarter too small.
+constexpr double surprising = 3.0;
+
+// Deviations of the shortest delay by which a link must have changed for the level to follow.
+// Half or twice: no figure changes.
+constexpr double shift_deviations = 4.0;
+
+// The most that one surprise inflates the covariance by. Half: a large step takes more messages.
+// Twice: a single wild stamp costs more of what was known.
 constexpr double most_inflation = 100.0;
-constexpr double surprise_memory = 0.9;  // per message that is used
+
+// What is left of a surprise when the next message is used. Half: only surprises in a row count.
+// As it is below one, twice is no value.
+constexpr double surprise_memory = 0.9;
+
+// Fading surprises beyond which the skew is doubted, too. Half: two suffice. Twice: a change of
+// skew is followed some slots later.
 constexpr double surprises_of_skew = 2.0;
-constexpr double surprise_span_s = 2.0;  // a slot
-constexpr double contradicting =
-    6.0;  // deviations that a message seems to arrive before it was sent
+
+// The time within which the skew is taken to have caused the surprise: a slot. Half or twice: the
+// skew is doubted twice or half as much.
+constexpr double surprise_span_s = 2.0;
+
+// Deviations of the offset by which a message may seem to arrive before it was sent. Half: bad
+// luck passes for a step. Twice: small steps are followed as surprises, slowly.
+constexpr double contradicting = 6.0;
+
+// Contradicting exchanges in a row that begin the estimate anew. One: a single wild stamp does.
+// Six: a step is followed 0.3 s later.
 constexpr int contradictions_to_restart = 3;
-constexpr double largest_skew = 1e6;      // ns/s: no two clocks differ by 1000 ppm
-constexpr double kept_skew_sigma = 10e3;  // ns/s: the crystal is the one it was
+
+// In ns/s; no two clocks differ by 1000 ppm. Half or twice is as far from any crystal.
+constexpr double largest_skew = 1e6;
+
+// Deviation of a skew that is kept over a restart, in ns/s: the crystal is the one it was. Half
+// or twice: the first seconds change by little.
+constexpr double kept_skew_sigma = 10e3;
+
+// Share of the first round trip that delays are taken to spread by. Half or twice matters for the
+// first three slots.
+constexpr double start_scale_of_round_trip = 0.5;
+
+// Fewer slots count as converging. Half or twice: `locked` comes after half or twice the time.
 constexpr std::uint64_t slots_to_lock = 10;
+
+// A larger sigma of the offset counts as converging. Half: links of several ms take longer to
+// lock. Twice: they lock with an error of 0.5 ms.
 constexpr double locked_sigma_ns = 250e3;
+
+// Silence after which the state is `holdover`. Half: an exchange a second comes close to it.
+// Twice: silence is told later; sigma grows either way.
 constexpr std::int64_t holdover_after_ns = 3'000'000'000;
+
+/// 73 years: what is summed cannot overflow.
+const std::int64_t furthest_ns = std::int64_t{1} << 61;
 
 template <class Clock>
 bool sane(Time<Clock> t) {
@@ -117,15 +169,15 @@ void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     reset_ = false;
     contradictions_ = 0;
     contradiction_ = {};
-    up_.begin(static_cast<double>(round_trip.ns) / 2);
-    down_.begin(static_cast<double>(round_trip.ns) / 2);
+    const double scale = start_scale_of_round_trip * static_cast<double>(round_trip.ns);
+    up_.begin(scale);
+    down_.begin(scale);
     down_in_slot_ = false;
     last_contact_ = started_ = slot_begin_ = std::max(exchange.received, exchange.answered);
     slots_ = 0;
     smallest_in_window_ = smallest_before_ = {INT64_MAX};
     remember_round_trip(started_, round_trip);
     if (sites_ == nullptr) return;
-    const double scale = static_cast<double>(round_trip.ns) / 2;
     sites_->push_back(
         {to_board(exchange.sent, exchange.received), Direction::to_board, scale, restarts_});
     sites_->push_back(
@@ -273,6 +325,11 @@ Duration EnvelopeFilter::smallest_round_trip() const {
 
 double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(belief_.covariance(1, 1)) * 1e-3; }
 
+Duration EnvelopeFilter::asymmetry_offset() const {
+    if (asymmetry_) return asymmetry_->offset;
+    return rounded((up_.overshoot_ns() - down_.overshoot_ns()) / 2);
+}
+
 HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     HostEstimate estimate;
     if (reset_) estimate.state = ClockState::reset;
@@ -281,7 +338,7 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     const double variance = belief_.offset_variance_after(since);
     const double offset = belief_.offset_after(since);
     const double doubt = static_cast<double>(contradiction_.ns);
-    const Duration asymmetry = asymmetry_ ? asymmetry_->offset : Duration{};
+    const Duration asymmetry = asymmetry_offset();
     estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
     estimate.sigma = rounded(
         std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)));

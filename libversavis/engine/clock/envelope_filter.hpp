@@ -42,8 +42,12 @@ class EnvelopeFilter {
     /// The board began a new life: its clock starts anew, with the crystal and the link it had.
     void board_restarted();
 
-    /// A measured asymmetry takes the place of the allowance for an unknown one.
+    /// A measured asymmetry takes the place of the presumed one, and of the allowance for it.
     void set_asymmetry(const std::optional<Asymmetry>& asymmetry) { asymmetry_ = asymmetry; }
+
+    /// What is taken off for the asymmetry: as measured, or presumed by how sharply the delays of
+    /// each direction break off.
+    Duration asymmetry_offset() const;
 
     /// Host time of `board`, for instants near the newest message or later.
     HostEstimate translate(BoardTime board) const;

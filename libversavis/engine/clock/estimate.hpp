@@ -16,7 +16,9 @@ enum class ClockState {
 };
 const char* to_string(ClockState state);
 
-constexpr double bound_sigmas = 3.3;  ///< standard deviations that a bound allows for
+/// Standard deviations that a bound allows for besides the round trip: one of 1000 exceeds them.
+/// Half: one of ten does. Twice: the bound is loose where sigma is large, as in holdover.
+constexpr double bound_sigmas = 3.3;
 
 struct HostEstimate {
     HostTime time;

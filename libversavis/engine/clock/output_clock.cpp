@@ -7,13 +7,32 @@ namespace versavis::clock {
 
 namespace {
 
+// A reading between two of the host clock that are further apart is tried again. Half: most
+// readings of a slow machine are. Twice: a stamp may carry 2 us of reading error.
 constexpr Duration wide_sandwich = microseconds(2);
+
+// Tries for a narrow reading. Half: a loaded machine gets a wide one more often, and sigma says
+// so. Twice: a stamp may cost twice as much there.
 constexpr int most_tries = 8;
+
+// A smaller step of the output clock goes unnoticed. Half: reading noise could pass for a step and
+// begin an epoch. Twice: a step of up to 2 us stays within an epoch.
 constexpr Duration smallest_step = microseconds(1);
+
+// A shorter suspend is taken for reading noise. No host suspends for half or for twice as long.
 constexpr Duration smallest_suspend = milliseconds(1);
+
+// How often steps and suspends are looked for while readings show none. Half: twice the system
+// calls. Twice: a suspend may go unnoticed for 0.2 s of stamps.
 constexpr Duration look_interval = milliseconds(100);
-constexpr Duration longest_report = seconds(1);  // of a step by the kernel, after it could be seen
-constexpr int largest_slew = 8;  // the kernel slews by a tenth at most, less than 1/8
+
+// How long after a step was seen the kernel may still report it. Half: a late report may count the
+// step twice. Twice: a second step within two seconds may be missed if it shows no other way.
+constexpr Duration longest_report = seconds(1);
+
+// One over the fastest slew allowed for: the kernel slews by a tenth at most. Half: room for
+// slews that do not exist. Twice: a clock slewed by a tenth seems to step.
+constexpr int largest_slew = 8;
 
 SystemClock system_clock(OutputClockKind kind) {
     return kind == OutputClockKind::tai ? SystemClock::tai : SystemClock::realtime;

@@ -10,12 +10,32 @@ namespace versavis::clock {
 
 namespace {
 
-constexpr double pulse_sigma_ns = 100;   // receiver, input and its sampling
-constexpr double crystal_sigma = 100e3;  // ns/s
-constexpr double misfit_sigmas = 8;
-constexpr double smallest_misfit_ns = 2000;
+// Noise of a pulse: receiver, input and its sampling, in ns. Half: sigma promises more than a
+// receiver of 100 ns holds. Twice: stamps follow a pulse more slowly, by half as much.
+constexpr double pulse_sigma_ns = 100.0;
+
+// Skew of two crystals before a second pulse has come, in ns/s. Half still covers crystals of
+// 50 ppm; twice changes nothing after two pulses.
+constexpr double crystal_sigma = 100e3;
+
+// A pulse further off than this, in standard deviations, does not fit. Half: one of 16,000 good
+// pulses is left out. Twice: a false one may move the map by twice as much.
+constexpr double misfit_sigmas = 8.0;
+
+// Nearer than this, in ns, a pulse fits whatever sigma says. Half: pulses are left out after a
+// change of temperature that the model does not expect. Twice: as for misfit_sigmas.
+constexpr double smallest_misfit_ns = 2000.0;
+
+// Pulses in a row that do not fit before the map begins anew. One: a single false pulse restarts
+// it. Six: a receiver that was reset is ignored for six seconds.
 constexpr int misfits_to_restart = 3;
+
+// Pulses in a row before the map is used. Two: its skew is that of one interval, off by 0.14 ppm.
+// Eight: PPS takes over four seconds later.
 constexpr std::uint64_t pulses_to_trust = 4;
+
+// Age of the newest pulse at which PPS counts as gone. Half: one lost pulse ends it. Twice: the
+// loss is noticed five seconds late.
 constexpr Duration pulse_overdue = milliseconds(2500);
 
 }  // namespace

@@ -8,13 +8,30 @@ namespace versavis::clock {
 
 namespace {
 
-constexpr std::int64_t second_ns = 1'000'000'000;
-constexpr Duration largest_doubt =
-    milliseconds(100);                              // beyond that the second could be the next one
-constexpr Duration host_named_memory = seconds(3);  // the link takes over
+const std::int64_t second_ns = 1'000'000'000;
+// Beyond this a pulse could belong to the next second, and is not labelled. Half: a host that is
+// off by 60 ms cannot use PPS. Twice: little is left of the half second that decides.
+constexpr Duration largest_doubt = milliseconds(100);
+
+// Standard deviations of the estimate that count towards largest_doubt. Half or twice matters only
+// while sigma is tens of milliseconds.
+constexpr double doubt_sigmas = 3.0;
+
+// After this long without pulses that the host names, messages take over. Half: one lost pulse
+// makes the two take turns. Twice: a drift of the PPS map by some 10 ns more.
+constexpr Duration host_named_memory = seconds(3);
+
+// Pulses that measure the asymmetry before it is taken off. Half: it scatters by 1.4 times as
+// much. Twice: it is corrected half a minute later.
 constexpr unsigned pulses_to_measure = 32;
+
+// Least weight of a new pulse in the mean. Half: a change of the link is followed in two minutes.
+// Twice: the mean scatters by 1.4 times as much.
 constexpr double slowest_gain = 1.0 / 64;
-constexpr Duration measurement_floor = microseconds(3);  // what the estimate wanders by, slowly
+
+// What the estimate wanders by too slowly to show as spread between pulses. Half: sigma of the
+// corrected estimate is too small. Twice: it is 6 us where 3 us would do.
+constexpr Duration measurement_floor = microseconds(3);
 
 /// The whole second nearest to an instant, on the output clock.
 OutputTime nearest_second(OutputTime at) {
@@ -40,7 +57,9 @@ void PpsReference::pulse(BoardTime at, const HostEstimate& by_link, const Output
     const OutputTime instant{by_link.time.ns + output.minus_host.ns};
     const OutputTime second = nearest_second(instant);
     const Duration residual = instant - second;
-    if (by_link.sigma * 3 + absolute(residual) > largest_doubt) return;
+    const Duration doubt =
+        rounded(doubt_sigmas * static_cast<double>(by_link.sigma.ns)) + absolute(residual);
+    if (doubt > largest_doubt) return;
     add(at, second, residual);
     if (map_.healthy(at)) measure(residual);
 }

@@ -14,7 +14,7 @@
 namespace versavis::clock {
 
 /// A request and its answer: host -> board -> host.
-struct ExchangeTold {
+struct RecordedExchange {
     std::uint32_t nonce =
         0;  ///< drawn by the board at each boot: board times of equal nonce compare
     std::uint32_t request = 0;
@@ -26,19 +26,19 @@ struct ExchangeTold {
 };
 
 /// A message of the board that was not asked for.
-struct OneWayTold {
+struct RecordedMessage {
     std::uint32_t nonce = 0;
     BoardTime departed;
     HostTime arrived;
 };
 
 /// The board's clock begins anew.
-struct RestartTold {
+struct RecordedRestart {
     std::uint32_t nonce = 0;
 };
 
 /// The output clock against the host clock.
-struct OutputTold {
+struct RecordedOutput {
     std::uint32_t epoch = 0;
     HostTime host;
     Duration minus_host;
@@ -46,7 +46,7 @@ struct OutputTold {
 };
 
 /// One item of the ring `clock`.
-using ClockItem = std::variant<ExchangeTold, OneWayTold, RestartTold, OutputTold>;
+using ClockItem = std::variant<RecordedExchange, RecordedMessage, RecordedRestart, RecordedOutput>;
 
 /// The 96 bytes of an item of kind `clock` (docs/contracts/shm-layout.md).
 struct ClockMetadata {

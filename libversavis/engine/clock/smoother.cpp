@@ -11,11 +11,32 @@ namespace versavis::clock {
 
 namespace {
 
+// Passes over a recording. Half: sites are not settled. Twice: takes twice the time and gains
+// nothing.
 constexpr int sweeps = 5;
-constexpr double damping = 0.6;  // of what a sweep changes: expectation propagation may swing
-constexpr std::size_t neighbours = 32;  // on each side
+
+// Share of a site's change that a sweep makes: expectation propagation may swing. Half: it is not
+// settled after the sweeps. Twice exceeds one, and swings.
+constexpr double damping = 0.6;
+
+// Messages on each side whose delays give the scale of one. Half: scales scatter by 1.4 times as
+// much. Twice: bursts of load are blurred.
+constexpr std::size_t neighbours = 32;
+
+// Early messages are thinned to the shortest delay of this time, as in later slots. Half or
+// twice: those of the first half minute count for more or less than they say.
 constexpr Duration slot = seconds(2);
-constexpr Duration short_slots = seconds(32);  // from the filter's beginning on
+
+// How long slots are short after a beginning. Half: some short ones are judged by the delays of
+// long ones. Twice: nothing changes.
+constexpr Duration short_slots = seconds(32);
+
+// Below this share of the precision, nothing but the message itself is known of its level, and it
+// keeps its weight. Half or twice matters at the ends of a recording.
+constexpr double least_of_others = 0.01;
+
+// How far from its messages a segment counts as locked; as in the filter. Half or twice: only the
+// state changes.
 constexpr Duration longest_silence = seconds(3);
 
 double square(double x) { return x * x; }
@@ -178,7 +199,7 @@ void Smoother::weigh(Segment& segment) {
         const Belief::Vector direction = level_now(knot.site.direction);
         const double precision = 1 / direction.dot(knot.smoothed.covariance * direction);
         const double others = precision - knot.precision;
-        if (others <= 0.01 * precision) continue;  // all that is known comes from it
+        if (others <= least_of_others * precision) continue;  // all that is known comes from it
         const double mean =
             (precision * direction.dot(knot.smoothed.mean) - knot.precision_mean) / others;
         judge(knot, level_ns(segment, knot), mean, 1 / others, damping);

@@ -14,10 +14,15 @@ std::uint32_t saturated(Duration sigma) {
     return static_cast<std::uint32_t>(std::clamp<std::int64_t>(sigma.ns, 0, sigma_unknown - 1));
 }
 
-constexpr std::int64_t second_ns = 1'000'000'000;
-constexpr Duration largest_jump =
-    microseconds(100);         // within an epoch, when PPS and the link take turns
-constexpr int inversions = 4;  // each leaves a thousandth of the error at most
+// Within an epoch stamps may jump by this when PPS and the messages take turns. Half: links that
+// are asymmetric by 0.1 ms begin epochs. Twice: stamps jump by 0.2 ms without saying so.
+constexpr Duration largest_jump = microseconds(100);
+
+// Steps of the iteration that turns an output time into a board time; each leaves a thousandth of
+// the error. Half suffices for 1 us; twice gains nothing.
+constexpr int inversions = 4;
+
+const std::int64_t second_ns = 1'000'000'000;
 
 /// A wide reading of the output clock is part of the stamp's uncertainty: it is off by up to so
 /// much, evenly.
@@ -84,7 +89,7 @@ void Translator::use_asymmetry(const std::optional<Asymmetry>& stored) {
 void Translator::correct_link() {
     const auto left = pps_.left_in_link();
     if (!left) return;
-    asymmetry_ = {asymmetry_.offset + left->offset, left->sigma};
+    asymmetry_ = {filter_.asymmetry_offset() + left->offset, left->sigma};
     asymmetry_source_ = AsymmetrySource::pps;
     filter_.set_asymmetry(asymmetry_);
     pps_.link_corrected();

@@ -41,19 +41,19 @@ class UsbFullSpeed final : public Link {
           phase_{std::uniform_int_distribution<std::int64_t>(0, frame.ns)(random)} {}
 
     Duration to_board(TrueTime sent, Random& random) override {
-        const Duration awake = wake_up(sent, random) / 3;
+        const Duration awake = wake_up(sent, random) / 3 * (settings_.wakes_up_to_send ? 1 : 0);
         const Duration interrupt{std::uniform_int_distribution<std::int64_t>(0, 3'000)(random)};
-        return awake + until_next(frame, sent + awake) + transfer + interrupt + slowed(sent);
+        return awake + until_next(frame, sent + awake) + settings_.transfer + interrupt +
+               slowed(sent);
     }
     Duration to_host(TrueTime sent, Random& random) override {
-        const Duration polled = until_next(poll, sent) + transfer;
+        const Duration polled = until_next(poll, sent) + settings_.transfer;
         return polled + wake_up(sent + polled, random) + settings_.longer_to_host + slowed(sent);
     }
 
  private:
     static constexpr Duration frame = milliseconds(1);
     static constexpr Duration poll = microseconds(125);
-    static constexpr Duration transfer = microseconds(12);
 
     Duration until_next(Duration period, TrueTime at) const {
         return {period.ns - 1 - (at.ns + frame.ns - phase_.ns) % period.ns};
@@ -62,7 +62,8 @@ class UsbFullSpeed final : public Link {
         return settings_.slow.holds(at) ? settings_.slower : Duration{};
     }
     Duration wake_up(TrueTime at, Random& random) const {
-        double ns = std::lognormal_distribution<>(std::log(15e3), 0.5)(random);
+        const auto median_ns = static_cast<double>(settings_.wake_up.ns);
+        double ns = std::lognormal_distribution<>(std::log(median_ns), 0.5)(random);
         const double luck = std::uniform_real_distribution<>()(random);
         if (luck < 0.03) ns += std::exponential_distribution<>(1 / 150e3)(random);
         if (luck > 0.997) ns += std::exponential_distribution<>(1 / 2e6)(random);

@@ -36,6 +36,9 @@ struct UsbSettings {
     Duration longer_to_host{};
     Span slow{};        ///< each direction takes longer
     Duration slower{};  ///< by so much
+    Duration transfer = microseconds(12);
+    Duration wake_up = microseconds(15);  ///< of the host, in the median
+    bool wakes_up_to_send = true;         ///< a third of a wake-up is between stamp and bus
 };
 
 /// USB full speed: to the board in the next frame of 1 ms, to the host at the next poll, every 125
