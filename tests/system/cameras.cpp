@@ -142,7 +142,7 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
     const auto status = stack.wait_for_status([](const auto& s) {
         const auto exposure = s["cameras"][0]["exposure_ns"].template get<std::int64_t>();
         const auto reported = s["cameras"][0]["camera_exposure_ns"].template get<std::int64_t>();
-        return exposure > 1'500'000 && reported != 0 && std::abs(exposure - told) < 50'000;
+        return exposure > 1'500'000 && reported != 0 && std::abs(exposure - reported) < 50'000;
     });
     CHECK(status["cameras"][0]["frames_without_trigger"] == 0);
     CHECK(judge(stack, 2).ok);
