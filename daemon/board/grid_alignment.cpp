@@ -5,24 +5,36 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/rounding.hpp"
+
 namespace versavis::daemon {
 
 namespace {
 
+/// Between messages to the board. At half, the link carries twice as many; at twice, the grid
+/// drifts for twice as long by what the clocks' pace is known wrongly.
 constexpr Duration interval = seconds(1);
-constexpr Duration largest_sigma = milliseconds(1);
-constexpr std::size_t offsets_kept =
-    8;  // a reading of the output clock is good to some ten nanoseconds
-constexpr std::size_t errors_kept = 9;
-constexpr Duration memory = seconds(3);  // what is older says nothing of now
-constexpr Duration aligned_within = microseconds(100);
-constexpr std::int64_t second_ns = 1'000'000'000;
 
-/// From the nearest whole second.
-std::int64_t off_whole_second(std::int64_t ns) {
-    const std::int64_t past = (ns % second_ns + second_ns) % second_ns;
-    return past > second_ns / 2 ? past - second_ns : past;
-}
+/// A clock that is worse tells the board nothing. At half, a rough link is never aligned; at twice,
+/// the grid is moved by errors that one sees.
+constexpr Duration largest_sigma = milliseconds(1);
+
+/// Readings of the output clock, one a second and each good to some ten nanoseconds, that its pace
+/// against the host's is taken from. At half, the pace scatters by twice as much; at twice, a
+/// change of slew is followed more slowly.
+constexpr std::size_t offsets_kept = 8;
+
+/// Exposures whose median is the grid's error. At half, one late exposure shows; at twice, an error
+/// shows a little later.
+constexpr std::size_t errors_kept = 9;
+
+/// What is older says nothing of now. At half, slow cameras never show an error; at twice, an error
+/// that is mended shows for longer.
+constexpr Duration memory = seconds(3);
+
+/// An error up to here is called aligned. At half, cameras whose exposure was not announced are
+/// not; at twice, an error that matters for stereo with another host is overlooked.
+constexpr Duration aligned_within = microseconds(100);
 
 }  // namespace
 
@@ -77,7 +89,7 @@ void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, Ho
                                                        1'000'000'000'000'000 / camera.rate_uhz);
     const std::int64_t first_tick = middle.ns - camera.phase_ns - since_first;
     const std::lock_guard lock(mutex_);
-    errors_.push_back({now, {off_whole_second(first_tick)}});
+    errors_.push_back({now, {past_nearest_second_ns(first_tick)}});
     if (errors_.size() > errors_kept) errors_.pop_front();
 }
 

@@ -12,4 +12,11 @@ Duration rounded(double ns) {
     return {ns < limit ? std::llround(ns) : limit};
 }
 
+std::int64_t past_nearest_second_ns(std::int64_t ns) {
+    constexpr std::int64_t second_ns = 1'000'000'000;
+    const std::int64_t past = ns % second_ns;  // of the sign of `ns`
+    if (past >= second_ns / 2) return past - second_ns;
+    return past < -second_ns / 2 ? past + second_ns : past;
+}
+
 }  // namespace versavis

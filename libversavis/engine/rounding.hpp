@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From the estimators' real numbers back to integer nanoseconds.
+// From real numbers to integer nanoseconds, and to the nearest second.
 #pragma once
 
 #include "versavis/time.hpp"
@@ -8,5 +8,8 @@ namespace versavis {
 
 /// The nearest whole number of nanoseconds, cut at 36 years either way; NaN gives the lower limit.
 Duration rounded(double ns);
+
+/// How far `ns` lies past the nearest multiple of a second: from minus to plus half a second.
+std::int64_t past_nearest_second_ns(std::int64_t ns);
 
 }  // namespace versavis

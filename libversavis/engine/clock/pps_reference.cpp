@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/rounding.hpp"
+
 namespace versavis::clock {
 
 namespace {
 
-const std::int64_t second_ns = 1'000'000'000;
 // Beyond this a pulse could belong to the next second, and is not labelled. Half: a host that is
 // off by 60 ms cannot use PPS. Twice: little is left of the half second that decides.
 constexpr Duration largest_doubt = milliseconds(100);
@@ -34,10 +35,7 @@ constexpr double slowest_gain = 1.0 / 64;
 constexpr Duration measurement_floor = microseconds(3);
 
 /// The whole second nearest to an instant, on the output clock.
-OutputTime nearest_second(OutputTime at) {
-    const std::int64_t past = ((at.ns % second_ns) + second_ns) % second_ns;
-    return {at.ns - past + (past < second_ns / 2 ? 0 : second_ns)};
-}
+OutputTime nearest_second(OutputTime at) { return {at.ns - past_nearest_second_ns(at.ns)}; }
 
 }  // namespace
 
