@@ -2,6 +2,7 @@
 // sensitivity_clock: the clock's estimators in a few simulated worlds with fixed seeds. Prints its
 // figures as JSON.
 #include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/pps_reference.hpp"
 #include "engine/clock/smoother.hpp"
 #include "figures.hpp"
 #include "troubles.hpp"
@@ -28,8 +29,9 @@ class Report {
     }
 
     /// `off`: worlds that ended off.
-    Figures figures(unsigned off) const {
+    Figures figures(double pps_p99, unsigned off) const {
         Figures figures = figures_;
+        figures.emplace_back("pps_p99", pps_p99);
         figures.emplace_back("beyond", 100 * beyond_bound_ / scores_);
         figures.emplace_back("off", off);
         return figures;
@@ -104,6 +106,29 @@ Score run_smoother(unsigned seeds) {
     return result;
 }
 
+/// Pulses once a second, one in twenty of them off by more than any receiver.
+double pps_p99_us(unsigned seeds) {
+    Settings settings;
+    settings.length = seconds(120);
+    Score result;
+    for (settings.seed = 1; settings.seed <= seeds; ++settings.seed) {
+        const World world(settings);
+        Observer<EnvelopeFilter> observer(world);
+        clock::PpsReference pps(clock::PpsLabels::host);
+        Random random(settings.seed);
+        std::normal_distribution<> jitter(0, 30);
+        for (int i = 20; i < 120; ++i) {
+            const TrueTime second{seconds(i).ns};
+            const Duration off{std::llround(jitter(random)) + (i % 20 == 7 ? 5000 : 0)};
+            pps.pulse(world.board(second) + off, observer.estimate(second), {}, true);
+            const TrueTime later = second + milliseconds(700);
+            if (const auto stamp = pps.translate(world.board(later), world.board(later)))
+                result.add(stamp->time - OutputTime{world.host(later).ns}, {});
+        }
+    }
+    return result.p99_us();
+}
+
 unsigned off_after_trouble(unsigned seeds) {
     unsigned off = 0;
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
@@ -125,5 +150,6 @@ int main(int argc, char** argv) {
     report.add("silent", run_holdover(seeds_of_holdover * effort));
     report.add("start", run_start(seeds_of_start * effort));
     report.add("smooth", run_smoother(seeds_steady * effort));
-    test::print_json(report.figures(off_after_trouble(seeds_of_trouble * effort)));
+    test::print_json(report.figures(pps_p99_us(seeds_steady * effort),
+                                    off_after_trouble(seeds_of_trouble * effort)));
 }

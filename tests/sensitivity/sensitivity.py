@@ -88,6 +88,8 @@ FIGURES = {
         nees("silent_nees", "nees", ""),
         error("start_p99", "start", "... in the first 20 s ..."), nees("start_nees", "nees", ""),
         error("smooth_p99", "after", "... and smoothed"), nees("smooth_nees", "nees", ""),
+        Figure("pps_p99", "pps", "error, p99, us, of stamps by PPS: a quarter more and 0.05",
+               times(1.25, 0.05)),
         Figure("beyond", "bound", "errors beyond their bound, %: three times as many and 0.1",
                times(3, 0.1)),
         Figure("off", "off", "worlds with troubles that end off or locked out: one more",
