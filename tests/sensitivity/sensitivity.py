@@ -264,8 +264,12 @@ class Copy:
             done = subprocess.run([program, str(effort)], env=environment, timeout=time_limit,
                                   capture_output=True, text=True)
         except subprocess.TimeoutExpired:
+            print(f"{setting}: no end after {time_limit:.0f} s", file=sys.stderr)
             return None
-        return json.loads(done.stdout) if done.returncode == 0 else None
+        if done.returncode != 0:
+            print(f"{setting}: exit code {done.returncode}: {done.stderr[-500:]}", file=sys.stderr)
+            return None
+        return json.loads(done.stdout)
 
 
 def edges(folder, base, figures):
