@@ -5,6 +5,7 @@
 #include "campaign.hpp"
 #include "figures.hpp"
 
+using versavis::milliseconds;
 using namespace versavis::test;
 
 namespace {
@@ -13,6 +14,7 @@ constexpr std::uint64_t faults_with_clock = 1200;
 constexpr std::uint64_t faults_without_clock = 800;
 constexpr std::uint64_t seeds_of_drifting = 1'000'000;
 constexpr unsigned queues = 2;
+constexpr unsigned harsh_seeds = 60;
 
 void append(Totals& totals, const Totals& more) {
     totals.frames += more.frames;
@@ -46,6 +48,31 @@ Totals run_queues(unsigned seeds) {
     return totals;
 }
 
+/// Faults close together, on a host and a link that make arrivals nearly useless.
+Totals run_harsh(unsigned seeds) {
+    constexpr FaultKind kinds[] = {FaultKind::trigger_ignored, FaultKind::frame_lost,
+                                   FaultKind::duplicate_id,    FaultKind::id_restart,
+                                   FaultKind::clock_jump,      FaultKind::record_lost};
+    Totals totals;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed)
+        for (const CameraClock clock : {CameraClock::good, CameraClock::absent}) {
+            std::mt19937_64 random(seed);
+            WorldSettings settings;
+            settings.seed = seed;
+            settings.clock = clock;
+            settings.strobe = seed % 2 != 0;
+            settings.ids_count_ignored = seed / 2 % 2 != 0;
+            settings.readout = milliseconds(30);
+            settings.jitter = milliseconds(5 + 5 * static_cast<std::int64_t>(seed % 4));
+            settings.late_frames = 0.05;
+            for (std::uint64_t pulse = 40; pulse < 600; pulse += 1 + random() % 40)
+                settings.faults[pulse] = kinds[random() % std::size(kinds)];
+            settings.pulses = 700;
+            totals.add(settings, run_world(settings));
+        }
+    return totals;
+}
+
 /// Frames of neither camera may ever be published.
 Totals run_swapped(unsigned seeds) {
     Totals totals;
@@ -75,8 +102,9 @@ int main(int argc, char** argv) {
     append(with, run_random(faults_with_clock * effort, seeds_of_drifting, CameraClock::drifting));
     const Totals without = run_random(faults_without_clock * effort, 1, CameraClock::absent);
     const Totals queued = run_queues(queues * effort);
+    const Totals harsh = run_harsh(harsh_seeds * effort);
     const Totals swapped = run_swapped(2 * effort);
-    print_json({{"wrong", with.wrong + without.wrong + queued.wrong + swapped.wrong},
+    print_json({{"wrong", with.wrong + without.wrong + queued.wrong + harsh.wrong + swapped.wrong},
                 {"needless", percent(with.withheld_needlessly, with.frames)},
                 {"first", in_seconds(quantile(with.first_published, 1))},
                 {"again", in_seconds(quantile(with.recoveries, 0.99))},
@@ -84,5 +112,6 @@ int main(int argc, char** argv) {
                 {"first_no_clock", in_seconds(quantile(without.first_published, 1))},
                 {"again_no_clock", in_seconds(quantile(without.recoveries, 0.99))},
                 {"withheld_of_queues", percent(queued.withheld, queued.frames)},
+                {"withheld_when_harsh", percent(harsh.withheld, harsh.frames)},
                 {"not_locked", with.not_locked + without.not_locked}});
 }

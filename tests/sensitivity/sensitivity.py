@@ -16,20 +16,21 @@ import pathlib
 import re
 import subprocess
 import sys
+import textwrap
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HERE = "tests/sensitivity"
 FACTORS = (0.5, 2)
-TYPES = {"double", "float", "int", "unsigned", "long", "std::size_t", "std::int32_t", "std::int64_t",
-         "std::uint32_t", "std::uint64_t", "Duration", "versavis::Duration"}
+TYPES = {"double", "float", "int", "unsigned", "long", "std::size_t", "std::int32_t",
+         "std::int64_t", "std::uint32_t", "std::uint64_t", "Duration", "versavis::Duration"}
 # A run that takes so much longer than one with all constants as they are will not end.
 PATIENCE = 10
 
 # Any constexpr at column 0, and those of them that can be rewritten.
 DECLARATION = re.compile(r"^(?:inline )?constexpr (?P<head>[^=;{(]+?)\s*(?P<rest>[=;{(])", re.M)
 CONSTANT = re.compile(
-    r"^(?P<inline>inline )?constexpr (?P<type>[\w:]+) (?P<name>\w+) =\s*(?P<value>[^;{]+?);", re.M)
+    r"^(?P<inline>inline )?constexpr (?P<type>[\w:]+) (?P<name>\w+) =\s*(?P<value>[^;]+?);", re.M)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,20 +72,26 @@ FIGURES = {
         Figure("again_no_clock", "again-", "", times(1.5, 0)),
         Figure("withheld_of_queues", "queue", "frames withheld when frames queue in the camera, %:"
                " a quarter more and 1", times(1.25, 1)),
+        Figure("withheld_when_harsh", "harsh", "the same when faults are close and arrivals jitter"
+               " by 10 to 40 % of a period", times(1.25, 1)),
         Figure("not_locked", "never", "worlds that never locked again: one more",
                lambda base: base)],
     "clock": [
-        error("jittery_p99", "jitter", "error, p99, us, on links with jitter of milliseconds:"
+        error("jittery_p99", "noisy", "error, p99, us, on links with jitter of milliseconds:"
               " a quarter more and 0.2"),
         nees("jittery_nees", "nees", "mean square of error over sigma: 1.3 times more (or less)"
              " and beyond 2 (0.5)"),
         error("usb_p99", "usb", "the same two on USB, ..."), nees("usb_nees", "nees", ""),
-        error("imu_p99", "imu", "... on USB with an IMU, ..."), nees("imu_nees", "nees", ""),
-        error("loaded_p99", "load", "... under load, ..."), nees("loaded_nees", "nees", ""),
-        error("silent_p99", "silent", "... after 5 to 30 s without contact, ..."),
+        error("imu_p99", "imu", "... with an IMU, before, during and after 30 s of load, ..."),
+        nees("imu_nees", "nees", ""),
+        error("silent_p99", "mute", "... after 5 to 30 s without contact, ..."),
         nees("silent_nees", "nees", ""),
         error("start_p99", "start", "... in the first 20 s ..."), nees("start_nees", "nees", ""),
-        error("smooth_p99", "smooth", "... and smoothed"), nees("smooth_nees", "nees", ""),
+        error("smooth_p99", "after", "... and smoothed"), nees("smooth_nees", "nees", ""),
+        Figure("pps_p99", "pps", "error, p99, us, of stamps by PPS: a quarter more and 0.05",
+               times(1.25, 0.05)),
+        Figure("beyond", "bound", "errors beyond their bound, %: three times as many and 0.1",
+               times(3, 0.1)),
         Figure("off", "off", "worlds with troubles that end off or locked out: one more",
                lambda base: base)],
 }
@@ -257,8 +264,12 @@ class Copy:
             done = subprocess.run([program, str(effort)], env=environment, timeout=time_limit,
                                   capture_output=True, text=True)
         except subprocess.TimeoutExpired:
+            print(f"{setting}: no end after {time_limit:.0f} s", file=sys.stderr)
             return None
-        return json.loads(done.stdout) if done.returncode == 0 else None
+        if done.returncode != 0:
+            print(f"{setting}: exit code {done.returncode}: {done.stderr[-500:]}", file=sys.stderr)
+            return None
+        return json.loads(done.stdout)
 
 
 def edges(folder, base, figures):
@@ -334,18 +345,24 @@ def summary(folder, base, rows, skipped):
               if all(run["figures"] == base for run in row["runs"])]
     left_out = [f"{one.key}: {one.reason}" for one in skipped if one.folder == folder]
     parts = [("On an edge", on_edge), ("No figure changes with", unfelt), ("Not scaled", left_out)]
-    return "\n\n".join(f"{title}: " + ("none." if not lines else "\n" + "\n".join(
-        f"- {line}" for line in lines)) for title, lines in parts)
+    return "\n\n".join(f"{title}: none." if not lines else
+                       f"{title}:\n\n" + "\n".join(bullet(line) for line in lines)
+                       for title, lines in parts)
+
+
+def bullet(text):
+    return textwrap.fill(text, 100, initial_indent="- ", subsequent_indent="  ",
+                         break_long_words=False, break_on_hyphens=False)
 
 
 def legend(folder):
-    return "\n".join(f"- {figure.heading}: {figure.meaning}" for figure in FIGURES[folder]
+    return "\n".join(bullet(f"`{figure.heading}`: {figure.meaning}") for figure in FIGURES[folder]
                      if figure.meaning)
 
 
 def to_markdown(folder, result):
-    return (f"## {folder.capitalize()}\n\nColumns, and how much worse than `as is` counts as an edge"
-            f" (`!`):\n\n{legend(folder)}\n\n```\n"
+    return (f"## {folder.capitalize()}\n\nColumns, and how much worse than `as is` counts as"
+            f" an edge (`!`):\n\n{legend(folder)}\n\n```\n"
             f"{table(folder, result['base'], result['constants'])}\n```\n\n"
             f"{summary(folder, result['base'], result['constants'], result['skipped'])}\n")
 

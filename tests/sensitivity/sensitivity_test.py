@@ -170,6 +170,18 @@ class Judging(unittest.TestCase):
     def test_a_run_that_fails_is_an_edge(self):
         self.assertEqual(sensitivity.edges("pairing", self.BASE, None), {"run"})
 
+    def test_a_summary_names_edges_and_what_nothing_depends_on(self):
+        same = {"figures": self.BASE, "edges": []}
+        slow = {"factor": 2, "figures": self.BASE | {"first": 2}, "edges": ["first"]}
+        rows = [{"file": "a.cpp", "name": "felt", "runs": [same, slow]},
+                {"file": "a.cpp", "name": "unfelt", "runs": [same, same]}]
+        skipped = [sensitivity.Skipped("pairing", "b.cpp:second_ns", "a unit"),
+                   sensitivity.Skipped("clock", "c.cpp:other", "a unit")]
+        self.assertEqual(sensitivity.summary("pairing", self.BASE, rows, skipped),
+                         "On an edge:\n\n- a.cpp:felt x 2: first 1 -> 2\n\n"
+                         "No figure changes with:\n\n- a.cpp:unfelt\n\n"
+                         "Not scaled:\n\n- b.cpp:second_ns: a unit")
+
     def test_tables_keep_to_100_columns_and_mark_edges(self):
         rows = [{"file": "a.cpp", "name": "n" * 60, "value": "milliseconds(100)" * 4, "runs": [
             {"factor": 0.5, "figures": self.BASE | {"first": 123.456}, "edges": ["first"]},

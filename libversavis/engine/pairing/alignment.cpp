@@ -18,7 +18,8 @@ constexpr double coincidence = 0.25;
 constexpr double same_difference = 0.125;
 
 // How much the gaps between triggers must vary to prove anything, in smallest gaps. They are whole
-// periods: half of it changes nothing, and at twice a gap of two periods among ones does not count.
+// periods: at half nothing changes, and at twice only frames around a gap of three periods prove
+// anything.
 constexpr double irregularity = 0.5;
 
 // A frame that is later than the quickest one of a start by more, in smallest gaps, is not proved
@@ -33,13 +34,13 @@ constexpr Duration length_tolerance = microseconds(200);
 // twice auto exposure must change by more before it tells one exposure from the next.
 constexpr double length_tolerance_share = 0.05;
 
-// Frames that a start needs by the camera's clock: their gaps must fit one place in the pattern. At
-// half (3) too few gaps tell places apart; at twice starts take longer, and a lost frame is
-// likelier.
+// Frames that a start needs by the camera's clock: the four gaps that stand in one place of the
+// pattern only. At half (3) wrong pairs are certain; at twice starts take twice as long, and a lost
+// frame is likelier.
 constexpr std::size_t frames_by_clock = 5;
 
-// Frames that a start needs by arrival, a second apart. At half (2) one pair of stray frames could
-// be taken for the camera's; at twice such a start takes six seconds.
+// Frames that a start needs by arrival, a second apart. At half (2) one stray frame imitates the
+// single gap, and pairs are wrong; at twice such a start takes six seconds.
 constexpr std::size_t frames_by_arrival = 3;
 
 struct Alignment {

@@ -17,7 +17,7 @@ namespace versavis::pairing {
 inline constexpr Duration translation_error = milliseconds(5);
 
 // A frame that comes later than this after its exposure counts as lost. At half busy networks lose
-// frames; at twice frames of more triggers compete in a search, and a lost frame is known later.
+// frames; at twice slow triggers, a second apart, prove nothing, and a lost frame is known later.
 inline constexpr Duration usual_latest_arrival = milliseconds(500);
 
 // A frame whose exposure's record has not come for so long is given up. At half a stalled USB link
@@ -34,8 +34,8 @@ struct Limits {
     bool camera_clock = true;  ///< false: pair by arrival, whatever the frames say
 };
 
-// An alignment that takes so many faults is ruled out. At half (1) a single fault that nobody saw
-// makes a wrong alignment the only one; at twice (4) hardly any start can be proved.
+// An alignment that takes so many faults is ruled out. At half (1) one fault that nobody saw can
+// leave a wrong alignment as the only one; at twice (4) more starts stay undecided.
 inline constexpr unsigned faults_to_refute = 2;
 
 bool arrival_possible(const Limits& limits, const Arrival& arrival, const Exposure& exposure);

@@ -149,11 +149,10 @@ class Pairing {
     ExposureLog exposures_;
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::deque<Shortfall> shortfalls_;
-    Relation clock_{true};  ///< camera time against the start of the exposure
-    std::int64_t shortest_delay_ns_ =
-        0;                        ///< from the end of an exposure to its frame, since the lock
-    Relation latency_{false};     ///< arrival against its end on the host
-    std::optional<Pair> proved_;  ///< the newest that was published
+    Relation clock_{true};                   ///< camera time against the start of the exposure
+    std::int64_t shortest_delay_ns_ = 0;     ///< from end of exposure to arrival, since the lock
+    Relation latency_{false};                ///< arrival against its end on the host
+    std::optional<Pair> proved_;             ///< the newest that was published
     std::array<Suspicion, 2> suspicions_{};  ///< by Stepped
     bool waits_for_witness_ = false;
     int undecided_ = 0;  ///< frames since the slip
@@ -163,7 +162,8 @@ class Pairing {
     int fruitless_starts_ = 0;
     int frames_since_start_ = 0;
     HostTime last_arrival_;
-    HostTime start_ends_;  ///< two patterns within one arrival window could be taken for each other
+    HostTime start_ends_;  ///< no other start before: of two patterns within one arrival window, a
+                           ///< frame of one could be taken for one of the other
 };
 
 }  // namespace versavis::pairing

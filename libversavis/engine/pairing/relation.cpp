@@ -26,11 +26,11 @@ constexpr double largest_drift = 500e-6;
 constexpr double difference_gain = 0.25;
 
 // The same for frames that come earlier than usual. At half the usual lateness stays too high after
-// a slow start; at twice one quick frame makes the next ones look late.
+// a slow start; at twice it sinks to the earliest frames, and ordinary ones look irregular.
 constexpr double earlier_gain = 0.125;
 
 // The same for frames that come later than usual: less, for a busy host delays single frames. At
-// half a lasting delay is learned in twice as many frames; at twice single late ones count more.
+// half the usual lateness sinks to the earliest frames; at twice single late ones count more.
 constexpr double later_gain = 0.0625;
 
 // A lateness beyond this, plus some deviations, is cut: it says little of the frames to come. At
@@ -40,8 +40,8 @@ constexpr double outlier_ns = 2e6;
 // The deviations on top. At half lasting jitter is learned later, at twice rare hangs count more.
 constexpr double outlier_deviations = 2;
 
-// Frames over which the mean deviation is taken. At half it jumps with single frames; at twice it
-// remembers for long after jitter has ended.
+// Frames over which the mean deviation is taken. At half it wanders, and arrivals near the limit
+// say nothing at times; at twice it remembers jitter for long after it has ended.
 constexpr std::int64_t deviation_memory = 16;
 
 // Least distance that a camera's stamp may be off: jitter of stamp and trigger. At half cameras
