@@ -325,8 +325,8 @@ Duration EnvelopeFilter::smallest_round_trip() const {
 
 double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(belief_.covariance(1, 1)) * 1e-3; }
 
-Duration EnvelopeFilter::asymmetry_offset() const {
-    if (asymmetry_) return asymmetry_->offset;
+Duration EnvelopeFilter::presumed_asymmetry() const {
+    if (asymmetry_) return {};
     return rounded((up_.overshoot_ns() - down_.overshoot_ns()) / 2);
 }
 
@@ -338,7 +338,7 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     const double variance = belief_.offset_variance_after(since);
     const double offset = belief_.offset_after(since);
     const double doubt = static_cast<double>(contradiction_.ns);
-    const Duration asymmetry = asymmetry_offset();
+    const Duration asymmetry = asymmetry_ ? asymmetry_->offset : presumed_asymmetry();
     estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
     estimate.sigma = rounded(
         std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)));

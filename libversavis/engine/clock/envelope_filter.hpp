@@ -45,9 +45,9 @@ class EnvelopeFilter {
     /// A measured asymmetry takes the place of the presumed one, and of the allowance for it.
     void set_asymmetry(const std::optional<Asymmetry>& asymmetry) { asymmetry_ = asymmetry; }
 
-    /// What is taken off for the asymmetry: as measured, or presumed by how sharply the delays of
-    /// each direction break off.
-    Duration asymmetry_offset() const;
+    /// What is taken off while none is measured, by how sharply the delays of each direction break
+    /// off; else 0. What measures an asymmetry adds it to the estimate.
+    Duration presumed_asymmetry() const;
 
     /// Host time of `board`, for instants near the newest message or later.
     HostEstimate translate(BoardTime board) const;

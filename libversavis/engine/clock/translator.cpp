@@ -64,7 +64,8 @@ void Translator::add(const OneWay& message) {
 
 void Translator::pps_pulse(BoardTime at) {
     const std::lock_guard lock(mutex_);
-    const HostEstimate estimate = filter_.translate(at);
+    HostEstimate estimate = filter_.translate(at);
+    estimate.time = estimate.time + filter_.presumed_asymmetry();  // measured, it is not presumed
     if (!filter_.initialised() || estimate.state != ClockState::locked) return;
     pps_.pulse(at, estimate, output_.read(), output_.kernel_state().synchronised);
     correct_link();
@@ -89,7 +90,7 @@ void Translator::use_asymmetry(const std::optional<Asymmetry>& stored) {
 void Translator::correct_link() {
     const auto left = pps_.left_in_link();
     if (!left) return;
-    asymmetry_ = {filter_.asymmetry_offset() + left->offset, left->sigma};
+    asymmetry_ = {asymmetry_.offset + left->offset, left->sigma};
     asymmetry_source_ = AsymmetrySource::pps;
     filter_.set_asymmetry(asymmetry_);
     pps_.link_corrected();

@@ -28,7 +28,9 @@ TEST_CASE("clock 018: PPS measures what the link does unequally, and stamps bett
              second = second + seconds(1)) {
             const BoardTime seen = world.board(second) + Duration{std::llround(jitter(random))};
             // The output clock equals the host's, which shows whole seconds when the pulses come.
-            pps.pulse(seen, observer.estimate(second), {}, true);
+            clock::HostEstimate by_link = observer.estimate(second);
+            by_link.time = by_link.time + observer.at(second).presumed_asymmetry();
+            pps.pulse(seen, by_link, {}, true);
             const BoardTime later = world.board(second + milliseconds(700));
             if (const auto stamp = pps.translate(later, later)) {
                 clock::HostEstimate estimate;
