@@ -153,7 +153,8 @@ TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"),
                Catch::Contains("its master's rate"));
     CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"), Catch::Contains("is no camera"));
-    CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"), Catch::Contains("list of strings"));
+    CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"),
+               Catch::Contains("list of strings"));
     CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is no input"));
     CHECK_THAT(error_of("[ports]\ntest = \"nobody\"\n"), Catch::Contains("'test' names 'nobody'"));
     CHECK_THAT(error_of("[ports]\nsync_rate_hz = 0.01\n"), Catch::Contains("0.1 to 10"));
