@@ -37,7 +37,7 @@ int serve(Service& service, const sigset_t& signals) {
         if (signal == SIGINT || signal == SIGTERM) return signal;
         if (signal == SIGHUP)
             log(LogLevel::warning, "service",
-                "SIGHUP: the configuration is read at start only: restart the service");
+                "SIGHUP does not reload the configuration: restart the service");
         service.tick();
         sd_notify(0, "WATCHDOG=1");
         if (health == service.health()) continue;

@@ -47,8 +47,8 @@ Expected<std::optional<clock::Asymmetry>> AsymmetryStore::load(const std::string
     const auto entry = document.find(port);
     if (document.is_object() && entry == document.end()) return std::nullopt;
     if (document.is_null() || !plausible(*entry))
-        return failure(path_.string(), "is no file of asymmetries",
-                       "remove it: PPS measures them anew");
+        return failure(path_.string(), "is not a valid asymmetry file",
+                       "remove it: PPS measures the asymmetries again");
     return clock::Asymmetry{{(*entry)["offset_ns"]},
                             Duration{(*entry)["sigma_ns"]} * 2 + another_day};
 }

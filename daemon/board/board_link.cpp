@@ -165,14 +165,14 @@ Expected<> BoardLink::serve() {
     while (!stop_) {
         const HostTime now = host_now();
         if (now - last_packet_ > silence_limit)
-            return failure("board", "it fell silent", "check cable and power");
+            return failure("board", "the board went silent", "check cable and power");
         if (now >= clock_.next_request())
             if (auto sent = send(clock_.request()); !sent) return sent;
         if (auto done = read(std::min(longest_read,
                                       std::max(clock_.next_request() - host_now(), shortest_read)));
             !done)
             return done;
-        if (!greeted_) return failure("board", "it was reset");
+        if (!greeted_) return failure("board", "the board was reset");
     }
     return {};
 }
@@ -214,7 +214,7 @@ Expected<> BoardLink::configure() {
     ++configuration_.id;
     if (auto sent = send(configuration_); !sent) return sent;
     if (auto done = read_until([this] { return answered_; }, answer_timeout,
-                               "does not take its configuration");
+                               "does not answer its configuration");
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
@@ -222,7 +222,7 @@ Expected<> BoardLink::configure() {
                                ? "its cameras are running: reset it"
                                : "change the configuration");
     set_state(BoardState::refused, fmt::format("{}", fmt::join(refusals_, "; ")));
-    return failure("board", "refuses its configuration");
+    return failure("board", "rejected its configuration");
 }
 
 /// A few exchanges in a row, so that the first frame can be stamped.

@@ -52,7 +52,7 @@ class UnixStream final : public ByteStream {
             }
             pollfd writable{socket_, POLLOUT, 0};
             if (errno != EAGAIN || ::poll(&writable, 1, write_timeout_ms) <= 0)
-                return failure(path_, "the board does not take data");
+                return failure(path_, "the board does not accept data");
         }
         return {};
     }

@@ -111,7 +111,7 @@ class UsbStream final : public ByteStream {
             handle_.get(), function_.endpoint_out, const_cast<std::uint8_t*>(bytes.data()),
             static_cast<int>(bytes.size()), &done, write_timeout_ms);
         if (code != 0 || done != static_cast<int>(bytes.size()))
-            return usb_failure("the board does not take data", code);
+            return usb_failure("the board does not accept data", code);
         return {};
     }
 

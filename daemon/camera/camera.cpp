@@ -100,7 +100,7 @@ CameraResult<> Camera::session() {
     const auto setup = set_up_camera(camera->get(), configuration_, environment_.presets);
     if (!setup && control_lost)
         return problem(CameraState::silent,
-                       {configuration_.device, "went away while it was set up", ""});
+                       {configuration_.device, "disappeared while it was being set up", ""});
     if (!setup) return problem(CameraState::misconfigured, setup.error());
     describe(*setup);
     return stream(camera->get(), *setup, control_lost);
@@ -202,7 +202,8 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
                 CameraState::silent,
                 {configuration_.name,
                  pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
-                 "check the trigger cable, TriggerSource and the network; it is opened anew"});
+                 "check the trigger cable, TriggerSource and the network; the camera is being "
+                 "reopened"});
         if (exposure_) control_exposure(arv_camera_get_device(camera));
         if (host_now() < housekeeping) continue;
         housekeeping = host_now() + housekeeping_interval;

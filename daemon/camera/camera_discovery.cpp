@@ -60,7 +60,7 @@ CameraProblem explain(const std::string& device, const std::optional<Listed>& li
     if (address && !in_own_network(*address))
         return {CameraState::unreachable,
                 {device,
-                 fmt::format("its address {} is in no network of this host",
+                 fmt::format("its address {} is not in any network of this host",
                              listed ? listed->address : device),
                  "give the camera an address of this host's camera network, or the host one of the "
                  "camera's"}};
@@ -96,8 +96,7 @@ CameraResult<Object<ArvCamera>> open_camera(const std::string& device,
                                             const std::function<bool()>& cancelled) {
     static std::mutex mutex;
     const std::lock_guard lock(mutex);
-    if (cancelled())
-        return problem(CameraState::absent, {device, "is not looked for any more", ""});
+    if (cancelled()) return problem(CameraState::absent, {device, "the search was stopped", ""});
     std::optional<Listed> listed;
     if (!parse_address(device)) {
         // USB is listed at once; the network takes a second, and knows a camera's own name without

@@ -130,8 +130,10 @@ Expected<CameraPreset> choose_preset(const std::vector<CameraPreset>& presets,
     if (found != presets.end()) return *found;
     std::vector<std::string> names;
     for (const CameraPreset& preset : presets) names.push_back(preset.name);
-    return failure("preset", fmt::format("there is none for '{}' ({} {})", name, vendor, model),
-                   fmt::format("use one of: auto, {}", fmt::join(names, ", ")));
+    return failure(
+        "preset",
+        fmt::format("there is no preset '{}' for this camera ({} {})", name, vendor, model),
+        fmt::format("use one of: auto, {}", fmt::join(names, ", ")));
 }
 
 Expected<std::vector<PresetAction>> plan(const CameraPreset& preset, const std::string& group,

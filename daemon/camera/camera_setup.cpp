@@ -59,7 +59,7 @@ Expected<std::vector<PresetAction>> plan_all(const CameraPreset& preset,
         const bool asked_for = group == "chunks" || group == "ptp" || group == "pulse_width";
         if (steps == preset.groups.end() && asked_for)
             return failure(fmt::format("preset {}", preset.name),
-                           fmt::format("cameras of its kind have no '{}'", group),
+                           fmt::format("these cameras have no '{}'", group),
                            "remove the key that asks for it, or set the features by name");
         auto planned = plan(preset, group, variables, DeviceBook(device));
         if (!planned) return planned;

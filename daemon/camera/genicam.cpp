@@ -85,7 +85,7 @@ Expected<> set_feature(ArvDevice* device, const std::string& name, const std::st
     ArvGcNode* node = arv_device_get_feature(device, name.c_str());
     const std::string where = "feature " + name;
     if (node == nullptr)
-        return failure(where, "the camera has none of this name",
+        return failure(where, "the camera has no such feature",
                        "'arv-tool-0.8 features' lists them");
     GlibError error;
     try {

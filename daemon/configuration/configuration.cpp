@@ -34,7 +34,7 @@ class Names {
  public:
     void check(TableReader& reader, const std::string& name) {
         if (!valid_name(name))
-            reader.fail("name", fmt::format("'{}' is no name", name),
+            reader.fail("name", fmt::format("'{}' is not a valid name", name),
                         "use up to 31 letters, digits, '_' and '-'");
         if (name.size() >= evidence_suffix.size() &&
             name.compare(name.size() - evidence_suffix.size(), std::string::npos,
@@ -55,7 +55,7 @@ void read_board(TableReader& reader, BoardConfiguration& board) {
     reader.read("usb_product", board.usb_product, 0, 0xFFFF);
     reader.read("keep_configuration", board.keep_configuration);
     if (board.link != "usb" && board.link.rfind("unix:", 0) != 0)
-        reader.fail("link", fmt::format("'{}' is no link", board.link),
+        reader.fail("link", fmt::format("'{}' is not a valid link", board.link),
                     "use \"usb\" or \"unix:/path/of/socket\"");
 }
 
@@ -74,7 +74,7 @@ void read_clock(TableReader& reader, ClockConfiguration& clock) {
         "pps", clock.pps,
         {{"off", PpsLabels::off}, {"host", PpsLabels::host}, {"nmea", PpsLabels::nmea}});
     if (clock.pps != PpsLabels::off && clock.output == OutputClockKind::monotonic_raw)
-        reader.fail("pps", "seconds of PPS are none of CLOCK_MONOTONIC_RAW",
+        reader.fail("pps", "PPS cannot label CLOCK_MONOTONIC_RAW",
                     "choose output = \"realtime\" or \"tai\", or pps = \"off\"");
 }
 
@@ -174,7 +174,7 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader, CameraConfi
     if (!camera.camera_clock && camera.latest_arrival_ms > 900)
         reader.fail("latest_arrival_ms",
                     "without 'camera_clock', 'latest_arrival_ms' must be 900 at most",
-                    "its slow start has a pulse a second");
+                    "its slow start sends one pulse a second");
     reader.read("chunks", camera.chunks);
     reader.read("ptp", camera.ptp);
     reader.read("max_temperature_c", camera.max_temperature_c, 0, 200);
@@ -219,14 +219,14 @@ void read_ports(TableReader& reader, PortConfiguration& ports) {
         for (const std::string& name : *key == 'i' ? ports.inputs : ports.falling)
             if (std::find(pulse_input_names.begin(), pulse_input_names.end(), name) ==
                 pulse_input_names.end())
-                reader.fail(key, fmt::format("'{}' is no input", name),
+                reader.fail(key, fmt::format("'{}' is not an input", name),
                             fmt::format("use some of: {}", fmt::join(pulse_input_names, ", ")));
     reader.read("imu_output", ports.imu_output);
     reader.read("nmea", ports.nmea);
     reader.read("nmea_baud", ports.nmea_baud, 1200, 921600);
     if (ports.nmea &&
         std::find(ports.inputs.begin(), ports.inputs.end(), "pps") == ports.inputs.end())
-        reader.fail("nmea", "'nmea' names pulses of the PPS input, which is not listened to",
+        reader.fail("nmea", "'nmea' names the pulses of the PPS input, which is not enabled",
                     "add \"pps\" to 'inputs'");
     reader.read("test", ports.test);
     reader.read("sync_rate_hz", ports.sync_rate_hz, 0, 10);
@@ -240,7 +240,7 @@ void check_pps(TableReader& top, const Configuration& configuration) {
     const std::vector<std::string>& inputs = configuration.ports.inputs;
     const PpsLabels labels = configuration.clock.pps;
     if (labels != PpsLabels::off && std::find(inputs.begin(), inputs.end(), "pps") == inputs.end())
-        top.fail("clock", "'pps' of [clock] needs the PPS input, which is not listened to",
+        top.fail("clock", "'pps' of [clock] needs the PPS input, which is not enabled",
                  "add \"pps\" to 'inputs' of [ports]");
     if (labels == PpsLabels::nmea && !configuration.ports.nmea)
         top.fail("clock", "pps = \"nmea\" of [clock] needs a receiver at the board's UART",
@@ -293,10 +293,11 @@ void check_names(TableReader& top, const Configuration& configuration) {
     for (const std::string& name : configuration.illumination.cameras)
         if (find_triggered_camera(configuration, name) == nullptr)
             top.fail("illumination",
-                     fmt::format("'{}' is no camera that the board triggers", name));
+                     fmt::format("'{}' is not a camera that the board triggers", name));
     if (!test_source(configuration))
-        top.fail("ports", fmt::format("'test' names '{}', which is no triggered camera and no IMU",
-                                      configuration.ports.test));
+        top.fail("ports",
+                 fmt::format("'test' names '{}', which is neither a triggered camera nor an IMU",
+                             configuration.ports.test));
 }
 
 }  // namespace

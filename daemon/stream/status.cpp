@@ -30,7 +30,8 @@ std::string hint(const CameraStatus& status) {
         return status.camera.hint;
     if (status.pipeline.triggers == 0) return "no trigger yet: is the board running?";
     if (!status.pipeline.measured)
-        return "exposures are not measured: check the exposure line, 'strobe', 'latency_us' and "
+        return "exposures are not being measured: check the exposure line, 'strobe', 'latency_us' "
+               "and "
                "'max_exposure_us'";
     if (status.pipeline.exposure_contradicted)
         return fmt::format(
@@ -40,7 +41,8 @@ std::string hint(const CameraStatus& status) {
             "set check_exposure = false",
             status.pipeline.exposure.ns / 1000, status.pipeline.camera_exposure.ns / 1000);
     if (status.unproved)
-        return "the frames follow no trigger of this output: check that the trigger cable is on "
+        return "the frames do not follow this output's triggers: check that the trigger cable is "
+               "on "
                "it, and "
                "TriggerSource";
     return status.stalled ? "triggers are sent but no frames come: check trigger cable and network"

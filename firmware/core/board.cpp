@@ -141,7 +141,8 @@ void Board::greet(const wire::HostHello& hello) {
     answer.capabilities = capabilities;
     answer.board_time_ns = hal_.clock.now();
     std::memcpy(answer.serial, identity_.serial, sizeof answer.serial);
-    const char version[] = "versavis 0.1.0";
+    const char version[] = "versavis " VERSAVIS_VERSION;
+    static_assert(sizeof version <= sizeof answer.firmware);
     std::memcpy(answer.firmware, version, sizeof version);
     send(answer);
     if (hello.major != wire::protocol_major) greeted_ = false;

@@ -99,7 +99,7 @@ TEST_CASE("cameras: swapped trigger cables are never published, and said") {
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {
-        return s["cameras"][0]["hint"].template get<std::string>().find("follow no trigger") !=
+        return s["cameras"][0]["hint"].template get<std::string>().find("do not follow") !=
                std::string::npos;
     });
     for (const auto& camera : status["cameras"]) {
@@ -256,7 +256,7 @@ TEST_CASE("cameras: an address in no network of this host is unreachable") {
     const auto status = stack.wait_for_status(
         [](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
     CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
-               Catch::Contains("in no network of this host"));
+               Catch::Contains("not in any network of this host"));
 }
 
 TEST_CASE("cameras: a hot one is said") {

@@ -139,7 +139,7 @@ TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"),
                Catch::Contains("uses output 0, which is taken"));
     CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"),
-               Catch::Contains("is no name"));
+               Catch::Contains("is not a valid name"));
     CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"),
                Catch::Contains("is taken"));
     CHECK_THAT(error_of("[[imu]]\nname = \"clock\"\n"), Catch::Contains("is taken"));
@@ -152,10 +152,11 @@ TEST_CASE("configuration: errors name line, column and cure") {
     CHECK_THAT(error_of(camera + "master = \"cam0\"\n"), Catch::Contains("as its master"));
     CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"),
                Catch::Contains("its master's rate"));
-    CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"), Catch::Contains("is no camera"));
+    CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"),
+               Catch::Contains("is not a camera"));
     CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"),
                Catch::Contains("list of strings"));
-    CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is no input"));
+    CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is not an input"));
     CHECK_THAT(error_of("[ports]\ntest = \"nobody\"\n"), Catch::Contains("'test' names 'nobody'"));
     CHECK_THAT(error_of("[ports]\nsync_rate_hz = 0.01\n"), Catch::Contains("0.1 to 10"));
     CHECK_THAT(error_of("[ports]\nnmea = true\n"), Catch::Contains("add \"pps\" to 'inputs'"));
