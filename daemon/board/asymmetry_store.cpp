@@ -10,7 +10,11 @@ namespace versavis::daemon {
 namespace {
 
 constexpr const char* default_directory = "/var/lib/versavis";
+/// What the asymmetry of a port may change from one day to the next, added to its sigma. At half,
+/// sigma is too small after an update of the kernel; at twice, stored values are worth less.
 constexpr Duration another_day = microseconds(3);
+
+/// A stored number beyond a second is none. At half or twice, the same files are refused.
 constexpr std::int64_t largest_ns = 1'000'000'000;
 
 std::filesystem::path file_below(const std::string& directory) {

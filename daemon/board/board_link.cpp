@@ -24,9 +24,10 @@ constexpr Duration retry_refused = seconds(5);
 /// board; at twice, a dead one is noticed later.
 constexpr Duration answer_timeout = milliseconds(1000);
 
-/// Hellos until the board is given up; each has its part of answer_timeout. At half, a board that
+/// Hellos until the board is given up, and the time for the answer to each. At half, a board that
 /// boots is missed at first; at twice, a foreign device on the port holds the link up longer.
 constexpr int hello_attempts = 5;
+constexpr Duration hello_timeout = milliseconds(250);
 
 /// The board reports its health every second: so long without a packet, it is gone. At half, two
 /// lost packets end the connection; at twice, a dead board is noticed later.
@@ -187,8 +188,7 @@ Expected<> BoardLink::handshake() {
         if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}});
             !sent)
             return sent;
-        auto done = read_until([this] { return greeted_; }, answer_timeout / (hello_attempts - 1),
-                               "does not answer");
+        auto done = read_until([this] { return greeted_; }, hello_timeout, "does not answer");
         if (!done && attempt == hello_attempts - 1) return done;
     }
     if (hello_.major != wire::protocol_major) {
@@ -269,7 +269,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     last_packet_ = received;
     if (packet.read(hello_)) {
         greeted_ = true;
-        clock_.begin(hello_.minor);
+        clock_.abandon();
         nonce_ = packet.header.nonce;
         next_sequence_ = packet.header.sequence + 1;
         if (!same_life(packet.header, received)) {

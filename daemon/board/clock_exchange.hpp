@@ -17,9 +17,11 @@ class ClockExchange {
  public:
     ClockExchange(double rate_hz, clock::Translator& translator, ClockRecorder& recorder);
 
-    /// A board of this minor version of the protocol said hello: nothing that was asked before
-    /// counts.
+    /// With a board of this minor version of the protocol: nothing that was asked before counts.
     void begin(std::uint8_t board_minor);
+
+    /// Drops an answer that waits for its follow-up: the board may have begun a new life.
+    void abandon() { exchange_.reset(); }
 
     /// The board's clock began anew, and with it the nonce of its life.
     void board_restarted(std::uint32_t nonce);

@@ -14,10 +14,22 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Reads that are always under way, so that the host controller never waits for the service. At
+/// half, a late thread loses a USB frame; at twice, 16 KiB more are locked.
 constexpr std::size_t transfer_count = 4;
+
+/// Bytes of one read: some 40 packets of the board. At half, a burst takes twice the reads; at
+/// twice, nothing gains, since a short packet ends a read.
 constexpr std::size_t transfer_size = 4096;
+
+/// A board that does not take data for so long is gone. At half, one that erases its flash is lost;
+/// at twice, those who wait to send wait longer.
 constexpr unsigned write_timeout_ms = 500;
+
+/// The same for a control request. At half, a board that boots is missed at first; at twice, a
+/// foreign device holds the search up longer.
 constexpr unsigned control_timeout_ms = 500;
+
 constexpr std::uint8_t class_interface_out =
     0x21;  // request type: class, interface, host to device
 constexpr std::uint8_t set_control_line_state = 0x22;

@@ -12,8 +12,16 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Bytes that the kernel keeps while the receive thread is late: 0.27 s of gigabit Ethernet. At
+/// half, a loaded host loses packets; at twice, each camera takes 32 MiB more at worst.
 constexpr int receive_buffer = 32 << 20;
+
+/// Least time that packets which were lost may take to come again. At half, two resends do not fit;
+/// at twice, complete frames wait longer behind a broken one.
 constexpr unsigned shortest_retention_us = 100'000;
+
+/// From the end of the exposure to the trailer, for a large sensor. At half, frames of slow sensors
+/// are given up; at twice, complete frames wait longer behind a broken one.
 constexpr double readout_us = 50'000;
 
 /// A frame is kept open until its trailer may have come, even where the leader leaves when the

@@ -15,7 +15,10 @@ namespace {
 constexpr double ethernet_overhead = 38;  // preamble, header, checksum and gap, bytes
 constexpr double gvsp_overhead = 36;      // IP, UDP and GVSP headers, bytes
 constexpr double leader_and_trailer = 2;  // packets
-constexpr double usable_part = 0.95;      // for control, resends and others
+
+/// Part of a link that cameras may fill; the rest is for control and resends. At half, two cameras
+/// are refused that fit; twice does not exist.
+constexpr double usable_part = 0.95;
 
 double packets_per_frame(const BandwidthNeed& need) {
     return std::ceil(static_cast<double>(need.frame_size) / (need.packet_size - gvsp_overhead));

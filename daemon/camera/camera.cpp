@@ -15,12 +15,29 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Before a camera that was lost is opened again; doubled each time, up to longest_retry. At half,
+/// a camera that boots is asked more often; at twice, it is back 0.2 s later.
 constexpr Duration first_retry = milliseconds(200);
+
+/// At half, an absent camera costs twice the broadcasts; at twice, one that was plugged in is found
+/// half a second later.
 constexpr Duration longest_retry = milliseconds(500);
+
+/// Between looks at a streaming camera. At half, an idle service wakes twice as often; at twice,
+/// loss of control shows 20 ms later.
 constexpr Duration step = milliseconds(20);
+
+/// Between readings of what changes slowly. At half, twice the control packets; at twice, a shared
+/// link is replanned three seconds later.
 constexpr Duration housekeeping_interval = seconds(3);
+
+/// A camera is silent that leaves so many triggers and so much time without a frame. At half, a
+/// camera that skips some is opened anew; at twice, slow cameras are missed longer.
 constexpr std::uint64_t triggers_of_silence = 5;
 constexpr Duration time_of_silence = seconds(2);
+
+/// The same for a camera without triggers, whose rate nobody knows. At half, one slower than 0.4 Hz
+/// is opened anew for ever; at twice, a mute one is missed for ten seconds.
 constexpr Duration time_of_free_silence = seconds(5);
 
 void on_control_lost(ArvDevice* /*device*/, std::atomic<bool>* lost) { *lost = true; }

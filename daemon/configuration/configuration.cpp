@@ -16,11 +16,20 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Longest exposure that a camera may be set to: 10 s. At half, long exposures are refused; at
+/// twice, nothing that anybody does is allowed in addition.
 constexpr double longest_us = 1e7;
-constexpr double longest_shift_us = 4e6;  // 32 bits of nanoseconds on the wire
-constexpr unsigned spare_slots =
-    8;  // frames that wait for proof, and the newest that readers still want
-constexpr double longest_wait_s = 0.12;  // of frames behind one that lost packets
+
+/// What 32 bits of nanoseconds on the wire hold. Less would refuse what works; more does not fit.
+constexpr double longest_shift_us = 4e6;
+
+/// Slots for frames that wait for proof, and for the newest ones that readers still want. At half,
+/// a start pattern cannot be proved; at twice, each camera takes eight frames more.
+constexpr unsigned spare_slots = 8;
+
+/// How long complete frames wait behind one that lost packets. At half, fast cameras run out of
+/// buffers then; at twice, they take twice the memory for it.
+constexpr double longest_wait_s = 0.12;
 
 bool valid_name(const std::string& name) {
     const auto allowed = [](char c) {

@@ -45,12 +45,17 @@ void CameraPipeline::tell(const pairing::Evidence& evidence) {
     pairing::apply(pairing_, evidence);
 }
 
+void CameraPipeline::begin_anew() {
+    tell(pairing::Reset{});
+    middles_.clear();  // of numbers that may come again
+}
+
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
                                    std::uint64_t payload_size, bool has_clock) {
     const std::lock_guard lock(mutex_);
     if (triggered())
         if (auto opened = evidence_.open(directory, configuration_.name); !opened) return opened;
-    tell(pairing::Reset{});
+    begin_anew();
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     pairing_.set_limits(limits_);
     tell(limits_);
@@ -114,7 +119,8 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
         ++report_.published;
         frames_.publish_proved(arrival, exposure, middles_.at(exposure.trigger));
     }
-    middles_.erase(exposure.trigger);
+    // The newest used record may still be the guess for a suspect frame.
+    middles_.erase(middles_.begin(), middles_.lower_bound(exposure.trigger));
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -170,7 +176,7 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
-    tell(pairing::Reset{});
+    begin_anew();
     triggers_.answered();
 }
 

@@ -99,6 +99,7 @@ class CameraPipeline final : private pairing::Outcome {
     void slipped(const pairing::Arrival& at) override;
 
     void tell(const pairing::Evidence& evidence);
+    void begin_anew();
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
@@ -117,7 +118,8 @@ class CameraPipeline final : private pairing::Outcome {
     TriggerWatch triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;
-    /// By trigger: the middle of each exposure that pairing holds, translated once as it came.
+    /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,
+    /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
     PipelineReport report_;
 };

@@ -7,6 +7,8 @@ namespace versavis::daemon {
 
 namespace {
 
+/// Between readings of the output clock in the recording. At half, the ring holds less of the rest;
+/// at twice, a slewed clock is interpolated over two seconds.
 constexpr Duration output_interval = seconds(1);
 
 }  // namespace

@@ -21,7 +21,7 @@ class ExposureCompletion {
 
     /// Puts the exposure on the host's clock, given its middle there.
     static void place_on_host(pairing::Exposure& exposure, const wire::Exposure& record,
-                              HostTime middle);
+                              HostTime middle_on_host);
 
  private:
     Duration latency_;

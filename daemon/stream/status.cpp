@@ -13,7 +13,13 @@ namespace {
 using nlohmann::json;
 
 constexpr int schema = 1;
+
+/// After the start, what does not deliver yet is called starting. At half, slow cameras show as
+/// degraded at first; at twice, a broken rig is called so five seconds later.
 constexpr Duration grace = seconds(5);
+
+/// Without a good sample for so long an IMU does not deliver. At half, a part that sets itself up
+/// again shows as lost; at twice, a pulled cable shows three seconds later.
 constexpr Duration imu_patience = seconds(3);
 
 bool delivers(const CameraStatus& camera) {

@@ -205,3 +205,34 @@ TEST_CASE("camera_pipeline: of a record that comes twice the first counts") {
     CHECK(bench.pipeline.report().published == std::size(pattern));
     CHECK(bench.pipeline.report().triggers_without_frame == std::size(pattern));
 }
+
+TEST_CASE("camera_pipeline: a doubled frame is suspect, with the exposure that it seems to be of") {
+    auto configuration = camera(20);
+    configuration.on_unproved = OnUnproved::flag;
+    Bench bench(configuration);
+    auto reader = bench.reader("cam0");
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick);
+        bench.frame(tick);
+    }
+    for (std::size_t i = 0; i < std::size(pattern); ++i) reader.next();
+    bench.frame(pattern[std::size(pattern) - 1]);
+    for (const std::uint64_t tick : {12U, 13U}) {
+        bench.trigger(tick);
+        bench.frame(tick);
+    }
+    const ring::Item item = reader.next();
+    REQUIRE(item.found == ring::Found::item);
+    const auto frame = unpack<FrameMetadata>(item.metadata);
+    CHECK((frame.flags & flag_suspect) != 0);
+    CHECK(frame.trigger == std::size(pattern));
+    CHECK(frame.sigma_ns == sigma_unknown);
+}
+
+TEST_CASE("camera_pipeline: after a reset, numbers that come again are no repeats") {
+    Bench bench(camera(20));
+    bench.trigger(0);
+    bench.pipeline.reset();
+    bench.triggers = 0;
+    CHECK(bench.trigger(1));
+}

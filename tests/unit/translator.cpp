@@ -166,6 +166,8 @@ TEST_CASE(
     CHECK(absolute(machine.error() - seconds(7)) < microseconds(1));
     const BoardTime now{machine.clocks->value_ns(SystemClock::monotonic_raw)};
     CHECK(machine.translator.translate(now)->epoch == epoch + 1);
+    // Host time is the link's: pairing waits for frames by it.
+    CHECK(absolute(machine.translator.translate(now)->host - HostTime{now.ns}) < microseconds(50));
     CHECK(machine.translator.report().pps.residual < -seconds(6));
 }
 

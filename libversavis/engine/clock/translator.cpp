@@ -119,10 +119,8 @@ std::optional<Stamp> Translator::translate(BoardTime board) {
     const OutputReading output = output_.read();
     const OutputTime by_link{estimate.time.ns + output.minus_host.ns};
     if (const auto pps = by_pps(board, by_link))
-        return Stamp{pps->time,
-                     {pps->time.ns - output.minus_host.ns},
-                     saturated(pps->sigma),
-                     epoch(output),
+        // The output clock may be off from what PPS makes of it: the host's own time is the link's.
+        return Stamp{pps->time, estimate.time, saturated(pps->sigma), epoch(output),
                      ClockState::locked};
     return Stamp{by_link, estimate.time, saturated(widened(estimate.sigma, output)), epoch(output),
                  estimate.state};

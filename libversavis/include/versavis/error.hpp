@@ -33,7 +33,7 @@ struct Unexpected {
 template <class T = void, class E = Error>
 class [[nodiscard]] Expected {
  public:
-    template <class U = T, class = std::enable_if_t<std::is_constructible_v<T, U&&> &&
+    template <class U = T, class = std::enable_if_t<std::is_convertible_v<U&&, T> &&
                                                     !std::is_same_v<std::decay_t<U>, Expected>>>
     Expected(U&& value) : content_(std::in_place_index<0>, std::forward<U>(value)) {}
     template <class F>
