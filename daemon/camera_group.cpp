@@ -109,9 +109,9 @@ void CameraGroup::board_connected() {
     }
 }
 
-std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record) {
+std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostTime received) {
     const Unit* unit = at_output(record.camera);
-    return unit != nullptr ? unit->pipeline->add(record) : std::nullopt;
+    return unit != nullptr ? unit->pipeline->add(record, received) : std::nullopt;
 }
 
 void CameraGroup::name_source(JournalEntry& entry) const {

@@ -35,7 +35,7 @@ class CameraGroup {
     void board_connected();
 
     /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
-    std::optional<clock::Stamp> add(const wire::Exposure& record);
+    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
     /// Names an event of the camera at output `entry.source`, which becomes the camera's number.
     void name_source(JournalEntry& entry) const;

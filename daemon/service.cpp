@@ -66,7 +66,8 @@ Expected<> Service::make_rings() {
         auto ring =
             ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
         if (!ring) return Unexpected(ring.error());
-        imus_.push_back(std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_));
+        imus_.push_back(
+            std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_, *events_));
     }
     return {};
 }
@@ -126,14 +127,20 @@ void Service::align_grid(HostTime now) {
     if (const auto message = alignment_.message(now, translator_)) board_->align_grid(*message);
 }
 
-void Service::exposure(const wire::Exposure& record) {
-    const auto stamp = cameras_->add(record);
-    if (stamp) alignment_.exposure(record, stamp->output, host_now());
+void Service::exposure(const wire::Exposure& record, HostTime received) {
+    const auto stamp = cameras_->add(record, received);
+    if (stamp) alignment_.exposure(record, stamp->output, received);
 }
 
-void Service::imu_sample(const wire::ImuSample& sample) {
+bool Service::imu_sample(const wire::ImuSample& sample, HostTime received) {
     for (auto& imu : imus_)
-        if (imu->port() == sample.imu) imu->add(sample);
+        if (imu->port() == sample.imu) return imu->add(sample, received);
+    return false;
+}
+
+void Service::exchange_doubted(const Doubt& doubt) {
+    events_->add(
+        {EventKind::message_doubted, doubt.reason, 0, "board", doubt.said, {}, doubt.expected});
 }
 
 void Service::board_event(const wire::Event& event) {

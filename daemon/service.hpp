@@ -53,8 +53,9 @@ class Service final : private BoardListener {
     void board_synchronised() override;
     void board_connected() override;
     void board_lost() override;
-    void exposure(const wire::Exposure& record) override;
-    void imu_sample(const wire::ImuSample& sample) override;
+    void exposure(const wire::Exposure& record, HostTime received) override;
+    bool imu_sample(const wire::ImuSample& sample, HostTime received) override;
+    void exchange_doubted(const Doubt& doubt) override;
     void board_event(const wire::Event& event) override;
 
     Configuration configuration_;

@@ -293,14 +293,14 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::Health health{};
     wire::Log line{};
     wire::Refusal refusal{};
-    if (packet.read(exposure)) return listener_.exposure(exposure);
+    if (packet.read(exposure)) return listener_.exposure(exposure, received);
     if (packet.read(sample)) {
-        clock_.take(sample, received);
-        return listener_.imu_sample(sample);
+        if (listener_.imu_sample(sample, received)) clock_.take(sample, received);
+        return;
     }
     if (packet.read(event)) return listener_.board_event(event);
-    if (packet.read(answer)) return clock_.take(answer, received);
-    if (packet.read(follow_up)) return clock_.take(follow_up);
+    if (packet.read(answer)) return note(clock_.take(answer, received));
+    if (packet.read(follow_up)) return note(clock_.take(follow_up));
     if (packet.read(line))
         return log(static_cast<LogLevel>(line.level), "board", "{}",
                    text(line.text, sizeof line.text));
@@ -316,6 +316,15 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         const std::lock_guard lock(report_mutex_);
         report_.health = health;
     }
+}
+
+void BoardLink::note(const std::optional<Doubt>& doubt) {
+    if (!doubt) return;
+    {
+        const std::lock_guard lock(report_mutex_);
+        ++report_.exchanges_doubted;
+    }
+    listener_.exchange_doubted(*doubt);
 }
 
 /// The nonce says so, and the clock must agree: a nonce could be drawn twice.

@@ -31,8 +31,10 @@ class BoardListener {
     virtual void board_synchronised() = 0;  ///< its clock is known; no camera can be started yet
     virtual void board_connected() = 0;     ///< configured, its clock known: cameras may be started
     virtual void board_lost() = 0;
-    virtual void exposure(const wire::Exposure& record) = 0;
-    virtual void imu_sample(const wire::ImuSample& sample) = 0;
+    virtual void exposure(const wire::Exposure& record, HostTime received) = 0;
+    /// False: the sample is doubted, and nothing may be made of its times.
+    virtual bool imu_sample(const wire::ImuSample& sample, HostTime received) = 0;
+    virtual void exchange_doubted(const Doubt& doubt) = 0;
     virtual void board_event(const wire::Event& event) = 0;
 };
 
@@ -52,6 +54,7 @@ struct BoardReport {
     std::uint64_t packets = 0;
     std::uint64_t lost_packets = 0;
     std::uint64_t malformed = 0;
+    std::uint64_t exchanges_doubted = 0;  ///< answers to clock requests that cannot be true
     wire::Health health{};
 };
 
@@ -92,6 +95,7 @@ class BoardLink {
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
     bool same_life(const wire::Header& header, HostTime received) const;
+    void note(const std::optional<Doubt>& doubt);
     void count_losses(const wire::Header& header);
     template <class T>
     Expected<> send(const T& message);

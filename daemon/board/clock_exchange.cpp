@@ -16,6 +16,14 @@ constexpr double latest_part = 1.25;
 
 constexpr std::uint8_t first_minor_with_follow_up = 2;
 
+std::optional<Doubt> contradicts_causality(const clock::Exchange& exchange) {
+    const Duration waited = exchange.arrived - exchange.sent;
+    const Duration held = exchange.answered - exchange.received;
+    if (held.ns >= 0 && held < waited) return std::nullopt;
+    return Doubt{EventReason::implausible_time, exchange.answered.ns,
+                 (exchange.received + waited).ns};
+}
+
 }  // namespace
 
 ClockExchange::ClockExchange(double rate_hz, clock::Translator& translator, ClockRecorder& recorder)
@@ -51,21 +59,32 @@ void ClockExchange::plan_next_request() {
     next_request_ = host_now() + Duration{static_cast<std::int64_t>(ns)};
 }
 
-void ClockExchange::take(const wire::ClockAnswer& answer, HostTime received) {
+/// The board cannot have had the request for longer than the host waited.
+std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTime received) {
     if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout)
-        return;
+        return std::nullopt;
     request_open_ = false;
-    exchange_ = clock::Exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
     ++answers_;
+    if (!in_life(answer.received_ns) || !in_life(answer.sent_ns))
+        return Doubt{EventReason::implausible_time, answer.received_ns, 0};
+    const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
+    if (const auto doubt = contradicts_causality(exchange)) return doubt;
+    exchange_ = exchange;
     if (!follow_ups_) settle();
+    return std::nullopt;
 }
 
-/// One that says that the answer left before it was written is not believed.
-void ClockExchange::take(const wire::ClockFollowUp& follow_up) {
-    if (!exchange_ || follow_up.id != request_id_ || follow_up.sent_ns < exchange_->answered.ns)
-        return;
-    exchange_->answered.ns = follow_up.sent_ns;
+/// The answer left after it was written.
+std::optional<Doubt> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
+    if (!exchange_ || follow_up.id != request_id_) return std::nullopt;
+    clock::Exchange exchange = *exchange_;
+    if (follow_up.sent_ns < exchange.answered.ns || !in_life(follow_up.sent_ns))
+        return Doubt{EventReason::implausible_time, follow_up.sent_ns, exchange.answered.ns};
+    exchange.answered.ns = follow_up.sent_ns;
+    if (const auto doubt = contradicts_causality(exchange)) return doubt;
+    exchange_ = exchange;
     settle();
+    return std::nullopt;
 }
 
 /// The departure from a board before 2.2 is unknown.

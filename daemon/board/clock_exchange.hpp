@@ -8,6 +8,7 @@
 
 #include "engine/clock/translator.hpp"
 #include "stream/clock_recorder.hpp"
+#include "stream/doubt.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::daemon {
@@ -30,8 +31,9 @@ class ClockExchange {
     wire::ClockRequest request();
     HostTime next_request() const { return next_request_; }
 
-    void take(const wire::ClockAnswer& answer, HostTime received);
-    void take(const wire::ClockFollowUp& follow_up);
+    /// Doubted: what contradicts causality is not used.
+    std::optional<Doubt> take(const wire::ClockAnswer& answer, HostTime received);
+    std::optional<Doubt> take(const wire::ClockFollowUp& follow_up);
 
     /// When a sample left tells of the clock, too.
     void take(const wire::ImuSample& sample, HostTime received);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
 
+#include "stream/arrival_check.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -33,6 +35,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       events_(events),
       frames_(configuration),
       evidence_(translator),
+      witness_(ExposureHistory(configuration)),
       completion_(configuration),
       check_(configuration),
       triggers_(configuration),
@@ -55,6 +58,7 @@ Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
     const std::lock_guard lock(mutex_);
     if (triggered())
         if (auto opened = evidence_.open(directory, configuration_.name); !opened) return opened;
+    witness_.forget();
     begin_anew();
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     pairing_.set_limits(limits_);
@@ -93,10 +97,14 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), false);
 }
 
-std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record) {
+std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received) {
     const std::lock_guard lock(mutex_);
+    if (const auto doubted = doubt(record, received)) {
+        note(record, *doubted);
+        return std::nullopt;
+    }
     ++report_.triggers;
-    triggers_.recorded(record.trigger, host_now());
+    triggers_.recorded(record.trigger, received);
     report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
     pairing::Exposure exposure = completion_.complete(record);
@@ -111,13 +119,60 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record) {
     return stamp;
 }
 
+std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTime received) {
+    if (const auto doubt = contradicts_itself(record, configuration_)) return doubt;
+    const clock::ClockContact contact = translator_.contact();
+    follow_clock(contact.life);
+    const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
+    if (const auto doubt = contradicts_arrival(newest, received, translator_)) return doubt;
+    const auto doubt =
+        witness_.judge(WitnessedExposure{record, check_.told_at(received)}, contact.exchanges);
+    if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
+    adopt_step(record, *doubt);
+    return std::nullopt;
+}
+
+/// What pairing knows of the board's time is void when the estimate of that time is.
+void CameraPipeline::follow_clock(std::uint32_t life) {
+    if (life == clock_life_) return;
+    clock_life_ = life;
+    witness_.forget();
+    begin_anew();
+}
+
+void CameraPipeline::adopt_step(const wire::Exposure& record, const Doubt& doubt) {
+    witness_.adopt();
+    begin_anew();
+    translator_.begin_epoch();
+    events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
+                 BoardTime{record.trigger_ns}, doubt.expected});
+}
+
+void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
+    ++report_.records_doubted;
+    events_.add({EventKind::message_doubted,
+                 doubt.reason,
+                 index_,
+                 configuration_.name,
+                 doubt.said,
+                 {},
+                 doubt.expected});
+    // Two accounts of one exposure: neither is believed.
+    if (witness_.believed().disputes_newest(record)) middles_.erase(record.trigger);
+}
+
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
-    if (check_.contradicts(arrival, exposure)) {
+    const auto middle = middles_.find(exposure.trigger);
+    if (middle == middles_.end()) {
+        frame_unpaired(arrival, EventReason::mismatch, nullptr);
+    } else if (check_.contradicts(arrival, exposure)) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
+    } else if (!frames_.publish_proved(arrival, exposure, middle->second)) {
+        if (frames_.stuck()) translator_.begin_epoch();
+        frame_unpaired(arrival, EventReason::went_back, nullptr);
     } else {
         report_.last_proof = arrival.arrived;
         ++report_.published;
-        frames_.publish_proved(arrival, exposure, middles_.at(exposure.trigger));
     }
     // The newest used record may still be the guess for a suspect frame.
     middles_.erase(middles_.begin(), middles_.lower_bound(exposure.trigger));
@@ -176,6 +231,7 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
+    witness_.forget();
     begin_anew();
     triggers_.answered();
 }
@@ -197,6 +253,7 @@ pairing::Start CameraPipeline::first_start() {
 
 void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
     const std::lock_guard lock(mutex_);
+    witness_.believed().forget_grid();
     tell(pairing::StartRequest{start, now});
     triggers_.asked(now);
 }

@@ -14,6 +14,7 @@
 #include "stream/evidence_recorder.hpp"
 #include "stream/exposure_check.hpp"
 #include "stream/exposure_completion.hpp"
+#include "stream/exposure_witness.hpp"
 #include "stream/frame_publisher.hpp"
 #include "stream/trigger_watch.hpp"
 
@@ -27,6 +28,7 @@ struct PipelineReport {
     std::uint64_t published = 0;
     std::uint64_t frames_without_trigger = 0;
     std::uint64_t triggers = 0;
+    std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
     std::uint64_t triggers_without_frame = 0;
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
@@ -65,8 +67,9 @@ class CameraPipeline final : private pairing::Outcome {
     /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
     void add(const pairing::Arrival& arrival);
 
-    /// The stamp of the exposure's middle; none: board time cannot be translated yet.
-    std::optional<clock::Stamp> add(const wire::Exposure& record);
+    /// The stamp of the exposure's middle; none: board time cannot be translated yet, or the record
+    /// is doubted.
+    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
     /// Camera or board began a new life.
     void reset();
@@ -100,6 +103,10 @@ class CameraPipeline final : private pairing::Outcome {
 
     void tell(const pairing::Evidence& evidence);
     void begin_anew();
+    std::optional<Doubt> doubt(const wire::Exposure& record, HostTime received);
+    void note(const wire::Exposure& record, const Doubt& doubt);
+    void adopt_step(const wire::Exposure& record, const Doubt& doubt);
+    void follow_clock(std::uint32_t life);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
@@ -113,6 +120,8 @@ class CameraPipeline final : private pairing::Outcome {
     std::mutex mutex_;
     FramePublisher frames_;
     EvidenceRecorder evidence_;
+    ExposureWitness witness_;
+    std::uint32_t clock_life_ = 0;
     ExposureCompletion completion_;
     ExposureCheck check_;
     TriggerWatch triggers_;

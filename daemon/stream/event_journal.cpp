@@ -13,6 +13,7 @@ void EventJournal::add(const JournalEntry& entry) {
     metadata.source = entry.source;
     metadata.reason = entry.reason;
     metadata.value = entry.value;
+    metadata.expected = entry.expected;
     metadata.board_time = entry.board_time.value_or(BoardTime{});
     metadata.host_time = stamp->host;
     metadata.sigma_ns = stamp->sigma_ns;

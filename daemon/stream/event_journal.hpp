@@ -18,6 +18,7 @@ struct JournalEntry {
     std::string source_name;
     std::int64_t value = 0;
     std::optional<BoardTime> board_time{};  ///< none: it happened on the host, now
+    std::int64_t expected = 0;              ///< of a message that was doubted
 };
 
 /// Thread-safe.

@@ -18,6 +18,11 @@ class ExposureCheck {
     /// True when the exposure line shows another exposure than the camera tells.
     bool contradicts(const pairing::Arrival& arrival, const pairing::Exposure& exposure);
 
+    /// What the camera keeps to at that time; 0: it varies, is unknown, or may just have changed.
+    Duration told_at(HostTime at) const {
+        return at > since_ + settling_ ? camera_exposure_ : Duration{};
+    }
+
     Duration measured() const { return measured_; }  ///< of the newest frame; 0: unknown
     Duration told() const { return told_; }          ///< by the camera; 0: unknown
     bool contradicted() const { return contradicted_; }

@@ -56,12 +56,12 @@ Expected<> FramePublisher::prepare(const std::filesystem::path& directory,
     return {};
 }
 
-void FramePublisher::publish_proved(const pairing::Arrival& arrival,
+bool FramePublisher::publish_proved(const pairing::Arrival& arrival,
                                     const pairing::Exposure& exposure, const clock::Stamp& middle) {
     FrameMetadata metadata = describe(exposure);
     metadata.sigma_ns =
         total_sigma_ns(middle.sigma_ns, kind_sigma(exposure, arrival.arrived - middle.host));
-    publish(arrival, middle, metadata);
+    return publish(arrival, middle, metadata);
 }
 
 void FramePublisher::publish_guessed(const pairing::Arrival& arrival,
@@ -81,7 +81,7 @@ void FramePublisher::publish_arrived(const pairing::Arrival& arrival, const cloc
     publish(arrival, arrived, metadata);
 }
 
-void FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+bool FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
                              FrameMetadata metadata) {
     metadata.block_id = arrival.block_id;
     metadata.host_time = stamp.host;
@@ -92,8 +92,13 @@ void FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp
     metadata.stride = arrival.stride;
     metadata.pixel_format = arrival.pixel_format;
     metadata.epoch = stamp.epoch;
-    const OutputTime time = guard_.guard(stamp, metadata.flags);
-    ring_->publish(arrival.slot, arrival.size, time, pack(metadata));
+    const bool suspect = (metadata.flags & flag_suspect) != 0;
+    const auto guarded = guard_.guard(stamp, metadata.sigma_ns, suspect);
+    if (!guarded) return false;
+    metadata.flags |= guarded->flags;
+    metadata.sigma_ns = guarded->sigma_ns;
+    ring_->publish(arrival.slot, arrival.size, guarded->time, pack(metadata));
+    return true;
 }
 
 void FramePublisher::heartbeat(HostTime now) {

@@ -26,8 +26,9 @@ class FramePublisher {
     std::byte* slot_data(std::uint32_t slot) { return ring_->slot_data(slot); }
     void abandon(std::uint32_t slot) { ring_->abandon(slot); }
 
-    /// A frame and its exposure; `middle` is the stamp of the middle of that exposure.
-    void publish_proved(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
+    /// A frame and its exposure; `middle` is the stamp of the middle of that exposure. False: it
+    /// cannot follow the frame before in this epoch, and the slot is still the caller's.
+    bool publish_proved(const pairing::Arrival& arrival, const pairing::Exposure& exposure,
                         const clock::Stamp& middle);
 
     /// The same, but that the frame is of this exposure is a guess: its sigma is unknown.
@@ -38,11 +39,14 @@ class FramePublisher {
     void publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,
                          bool suspect);
 
+    /// Frames were refused in a row: the one before was wrong.
+    bool stuck() const { return guard_.stuck(); }
+
     void heartbeat(HostTime now);
     std::uint64_t items() const { return ring_ ? ring_->head() : 0; }
 
  private:
-    void publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+    bool publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
                  FrameMetadata metadata);
 
     std::string name_;

@@ -1,47 +1,96 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/imu_pipeline.hpp"
 
+#include "stream/arrival_check.hpp"
+
 namespace versavis::daemon {
 
 ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
-                         clock::Translator& translator)
+                         clock::Translator& translator, EventJournal& events)
     : model_(*configuration.model),
       port_(configuration.port()),
       ring_(std::move(ring)),
-      translator_(translator) {
+      translator_(translator),
+      events_(events),
+      witness_(SampleHistory(configuration)) {
     report_.name = configuration.name;
     report_.model = model_.name;
 }
 
 void ImuPipeline::board_restarted() {
     const std::lock_guard lock(mutex_);
-    last_number_.reset();
+    begin_anew();
 }
 
-void ImuPipeline::add(const wire::ImuSample& sample) {
+void ImuPipeline::begin_anew() {
+    last_number_.reset();
+    witness_.forget();
+}
+
+bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
     const std::lock_guard lock(mutex_);
+    if (const auto doubted = doubt(sample, received)) {
+        ++report_.doubted;
+        journal(EventKind::message_doubted, sample, *doubted);
+        return false;
+    }
     // 32 bits on the wire are extended by the number before.
     const std::uint64_t number =
         last_number_ ? *last_number_ + (sample.number - static_cast<std::uint32_t>(*last_number_))
                      : sample.number;
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
     last_number_ = number;
-    const auto stamp = translator_.translate(BoardTime{sample.time_ns});
-    if (!stamp) {
+    if (const auto stamp = translator_.translate(BoardTime{sample.time_ns}))
+        publish(sample, number, *stamp);
+    else
         ++report_.no_clock;
-        return;
+    return true;
+}
+
+std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
+    if (const auto doubt = contradicts_itself(sample)) return doubt;
+    const clock::ClockContact contact = translator_.contact();
+    if (contact.life != clock_life_) witness_.forget();
+    clock_life_ = contact.life;
+    const BoardTime departed = BoardTime{sample.time_ns} + Duration{sample.departure_ns};
+    if (const auto doubt = contradicts_arrival(departed, received, translator_)) return doubt;
+    const auto doubt = witness_.judge(sample, contact.exchanges);
+    if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
+    // The part was set up anew, or the board lost count.
+    witness_.adopt();
+    last_number_.reset();
+    translator_.begin_epoch();
+    journal(EventKind::stream_stepped, sample, *doubt);
+    return std::nullopt;
+}
+
+void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt) {
+    JournalEntry entry{kind, doubt.reason, port_, report_.name, doubt.said, {}, doubt.expected};
+    if (kind == EventKind::stream_stepped) entry.board_time = BoardTime{sample.time_ns};
+    events_.add(entry);
+}
+
+void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
+                          const clock::Stamp& stamp) {
+    const auto guarded = guard_.guard(stamp, stamp.sigma_ns);
+    if (!guarded) {
+        ++report_.doubted;
+        if (guard_.stuck()) translator_.begin_epoch();
+        return journal(EventKind::message_doubted, sample,
+                       {EventReason::went_back, sample.time_ns, 0});
     }
     ImuMetadata metadata = imu::to_si(model_, sample);
     metadata.board_time = {sample.time_ns};
-    metadata.host_time = stamp->host;
+    metadata.host_time = stamp.host;
     metadata.number = number;
-    metadata.sigma_ns = stamp->sigma_ns;
-    metadata.epoch = stamp->epoch;
+    metadata.sigma_ns = guarded->sigma_ns;
+    metadata.epoch = stamp.epoch;
+    metadata.flags |= guarded->flags;
     if ((metadata.flags & flag_sensor_error) != 0)
         ++report_.faulty;
     else
-        report_.last_sample = stamp->host;
-    ring_.publish(guard_.guard(*stamp, metadata.flags), pack(metadata));
+        report_.last_sample = stamp.host;
+    ring_.publish(guarded->time, pack(metadata));
     ++report_.published;
 }
 

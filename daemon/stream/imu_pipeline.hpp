@@ -8,6 +8,8 @@
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
+#include "stream/event_journal.hpp"
+#include "stream/imu_witness.hpp"
 #include "stream/stamp_guard.hpp"
 
 namespace versavis::daemon {
@@ -19,6 +21,7 @@ struct ImuReport {
     std::uint64_t lost = 0;      ///< numbers that never arrived
     std::uint64_t no_clock = 0;  ///< withheld: board time could not be translated yet
     std::uint64_t faulty = 0;    ///< published with a sensor error
+    std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
 };
 
@@ -26,9 +29,10 @@ struct ImuReport {
 class ImuPipeline {
  public:
     ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
-                clock::Translator& translator);
+                clock::Translator& translator, EventJournal& events);
 
-    void add(const wire::ImuSample& sample);
+    /// False: the sample is doubted, and nothing may be made of its time.
+    bool add(const wire::ImuSample& sample, HostTime received);
     void board_restarted();
     void heartbeat(HostTime now);
     ImuReport report();
@@ -36,11 +40,19 @@ class ImuPipeline {
     std::uint8_t port() const { return port_; }
 
  private:
+    void begin_anew();
+    std::optional<Doubt> doubt(const wire::ImuSample& sample, HostTime received);
+    void journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt);
+    void publish(const wire::ImuSample& sample, std::uint64_t number, const clock::Stamp& stamp);
+
     std::mutex mutex_;
     const imu::ImuModel& model_;
     std::uint8_t port_;
     ring::Writer ring_;
     clock::Translator& translator_;
+    EventJournal& events_;
+    ImuWitness witness_;
+    std::uint32_t clock_life_ = 0;
     StampGuard guard_;
     std::optional<std::uint64_t> last_number_;
     ImuReport report_;

@@ -36,6 +36,8 @@ const char* to_string(EventKind kind) {
         case EventKind::imu_failed: return "imu_failed";
         case EventKind::imu_silent: return "imu_silent";
         case EventKind::utc_label: return "utc_label";
+        case EventKind::message_doubted: return "message_doubted";
+        case EventKind::stream_stepped: return "stream_stepped";
     }
     return "unknown";
 }
@@ -59,6 +61,13 @@ const char* to_string(EventReason reason) {
         case EventReason::no_buffer: return "no_buffer";
         case EventReason::camera_silent: return "camera_silent";
         case EventReason::wrong_exposure: return "wrong_exposure";
+        case EventReason::implausible_number: return "implausible_number";
+        case EventReason::implausible_time: return "implausible_time";
+        case EventReason::implausible_length: return "implausible_length";
+        case EventReason::implausible_flags: return "implausible_flags";
+        case EventReason::not_yet: return "not_yet";
+        case EventReason::too_old: return "too_old";
+        case EventReason::went_back: return "went_back";
     }
     return "unknown";
 }

@@ -93,8 +93,11 @@ struct Listener final : BoardListener {
     void board_synchronised() override { synchronised(); }
     void board_connected() override { connected.set_value(); }
     void board_lost() override {}
-    void exposure(const wire::Exposure& /*record*/) override {}
-    void imu_sample(const wire::ImuSample& /*sample*/) override {}
+    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
+    bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
+        return true;
+    }
+    void exchange_doubted(const Doubt& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/) override {}
 };
 

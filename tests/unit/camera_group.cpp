@@ -17,8 +17,11 @@ class NoBoard final : public BoardListener {
     void board_synchronised() override {}
     void board_connected() override {}
     void board_lost() override {}
-    void exposure(const wire::Exposure& /*record*/) override {}
-    void imu_sample(const wire::ImuSample& /*sample*/) override {}
+    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
+    bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
+        return true;
+    }
+    void exchange_doubted(const Doubt& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/) override {}
 };
 
@@ -73,13 +76,13 @@ TEST_CASE("camera_group: a record reaches the camera of its output, and comes ba
     record.camera = 2;
     record.trigger = 1;
     record.flags = wire::exposure_measured;
-    record.start_ns = Bench::to_board(at).ns;
+    record.trigger_ns = record.start_ns = Bench::to_board(at).ns;
     record.end_ns = record.start_ns + 2'000'000;
-    const auto stamp = bench.group.add(record);
+    const auto stamp = bench.group.add(record, at + milliseconds(3));
     REQUIRE(stamp);
     CHECK(absolute(stamp->host - (at + milliseconds(1))) <= nanoseconds(1));
     record.camera = 1;
-    CHECK_FALSE(bench.group.add(record));
+    CHECK_FALSE(bench.group.add(record, at + milliseconds(3)));
     const auto cameras = bench.group.status(at);
     CHECK(cameras[0].pipeline.triggers == 1);
     CHECK(cameras[2].pipeline.triggers == 0);

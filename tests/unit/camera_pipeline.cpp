@@ -2,6 +2,7 @@
 #include "stream/camera_pipeline.hpp"
 
 #include <catch2/catch.hpp>
+#include <functional>
 
 #include "pipelines.hpp"
 
@@ -26,7 +27,6 @@ class Bench : public test::Pipelines {
     explicit Bench(const CameraConfiguration& configuration)
         : pipeline(configuration, 0, translator, events),
           period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {
-        REQUIRE(pipeline.prepare(directory.path(), frame_size, true));
         exchange(begin);
     }
 
@@ -41,7 +41,15 @@ class Bench : public test::Pipelines {
         record.trigger_ns = at.ns;
         record.start_ns = (flags & wire::exposure_no_start) != 0 ? wire::no_time : at.ns + 20'000;
         record.end_ns = (flags & wire::exposure_measured) != 0 ? at.ns + 4'020'000 : wire::no_time;
-        return pipeline.add(record);
+        return send(record);
+    }
+
+    /// It comes when the exposure is over; `lie` may damage it on its way.
+    std::optional<clock::Stamp> send(wire::Exposure record) {
+        const HostTime received =
+            begin + period * static_cast<std::int64_t>(record.tick) + milliseconds(6);
+        lie(record);
+        return pipeline.add(record, received);
     }
 
     void frame(std::uint64_t tick) {
@@ -58,11 +66,34 @@ class Bench : public test::Pipelines {
         pipeline.add(arrival);
     }
 
+    void pass(std::uint64_t tick) {
+        trigger(tick);
+        frame(tick);
+        for (auto item = reader_.next(); item.found == ring::Found::item; item = reader_.next())
+            published.push_back(unpack<FrameMetadata>(item.metadata));
+    }
+    void run(std::uint64_t from, std::uint64_t to) {
+        for (std::uint64_t tick = from; tick < to; ++tick) pass(tick);
+    }
+    void start() {
+        for (const std::uint64_t tick : {0U, 1U, 3U, 4U, 7U, 9U, 11U}) pass(tick);
+    }
+
     const HostTime begin{100'000'000'000};
+    std::function<void(wire::Exposure&)> lie = [](wire::Exposure&) {};
     CameraPipeline pipeline;
     Duration period;
     std::uint64_t triggers = 0;
     std::uint64_t frames = 0;
+    std::vector<FrameMetadata> published;  ///< by pass()
+
+ private:
+    ring::Reader prepared() {
+        REQUIRE(pipeline.prepare(directory.path(), frame_size, true));
+        return reader("cam0");
+    }
+
+    ring::Reader reader_ = prepared();
 };
 
 const std::uint64_t pattern[] = {0, 1, 3, 4, 7, 9, 11};
@@ -153,11 +184,12 @@ TEST_CASE(
     "camera_pipeline: slow cameras are given the time of their pattern before they are started "
     "again") {
     Bench bench(camera(0.4));
-    bench.pipeline.start_requested(pairing::Start::pattern, host_now());
+    bench.pipeline.start_requested(pairing::Start::pattern, bench.begin);
     bench.trigger(4);
+    const HostTime then = bench.begin + bench.period * 4;
     // The pattern's longest gap is three periods of 2.5 s.
-    CHECK_FALSE(bench.pipeline.advance(host_now() + milliseconds(7600)));
-    CHECK(bench.pipeline.advance(host_now() + seconds(15)));
+    CHECK_FALSE(bench.pipeline.advance(then + milliseconds(7600)));
+    CHECK(bench.pipeline.advance(then + seconds(15)));
 }
 
 TEST_CASE(
@@ -203,7 +235,112 @@ TEST_CASE("camera_pipeline: of a record that comes twice the first counts") {
         bench.frame(tick);
     }
     CHECK(bench.pipeline.report().published == std::size(pattern));
-    CHECK(bench.pipeline.report().triggers_without_frame == std::size(pattern));
+    CHECK(bench.pipeline.report().records_doubted == std::size(pattern));
+}
+
+TEST_CASE("camera_pipeline: of two records of a trigger that differ neither is believed") {
+    Bench bench(camera(20));
+    bench.start();
+    bench.trigger(12);
+    --bench.triggers;
+    bench.lie = [](wire::Exposure& record) { record.start_ns += 1000; };
+    CHECK_FALSE(bench.trigger(12));
+    bench.lie = [](wire::Exposure&) {};
+    bench.frame(12);
+    bench.run(13, 16);
+    CHECK(bench.pipeline.report().published == std::size(pattern) + 3);
+    CHECK(bench.pipeline.report().slips == 0);
+}
+
+namespace {
+
+void shift(wire::Exposure& record, Duration by) {
+    record.trigger_ns += by.ns;
+    record.start_ns += by.ns;
+    record.end_ns += by.ns;
+}
+
+const std::vector<std::pair<std::string, std::function<void(wire::Exposure&)>>> lies{
+    {"all times 10 ms late", [](auto& record) { shift(record, milliseconds(10)); }},
+    {"all times 0.2 ms early", [](auto& record) { shift(record, -microseconds(200)); }},
+    {"all times 1000 s late", [](auto& record) { shift(record, seconds(1000)); }},
+    {"the high word of all times", [](auto& record) { shift(record, {std::int64_t{1} << 32U}); }},
+    {"a period late", [](auto& record) { shift(record, milliseconds(50)); }},
+    {"times beyond all bounds", [](auto& record) { shift(record, {INT64_MAX / 4 * 3}); }},
+    {"start 1 ms late", [](auto& record) { record.start_ns += 1'000'000; }},
+    {"end 1 ms late", [](auto& record) { record.end_ns += 1'000'000; }},
+    {"start before the trigger", [](auto& record) { record.start_ns -= 100'000; }},
+    {"end before the start", [](auto& record) { std::swap(record.start_ns, record.end_ns); }},
+    {"no time at all", [](auto& record) { record.end_ns = wire::no_time; }},
+    {"trigger and 1000", [](auto& record) { record.trigger += 1000; }},
+    {"the trigger before", [](auto& record) { --record.trigger; }},
+    {"tick and trigger swapped", [](auto& record) { std::swap(record.tick, record.trigger); }},
+    {"another tick", [](auto& record) { record.tick += 3; }},
+    {"a tick beyond all bounds", [](auto& record) { record.tick = UINT64_MAX; }},
+    {"flags of a prediction", [](auto& record) { record.flags = wire::exposure_predicted; }},
+};
+
+}  // namespace
+
+TEST_CASE("camera_pipeline: a record that lies costs its own frame, and no other") {
+    auto configuration = camera(20);
+    configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);
+    Bench bench(configuration);
+    bench.pipeline.set_camera_exposure(milliseconds(4), bench.begin - seconds(10));
+    const auto& [name, lie] = GENERATE(from_range(lies));
+    INFO(name);
+    bench.start();
+    bench.run(12, 40);
+    bench.lie = lie;
+    bench.pass(40);
+    bench.lie = [](wire::Exposure&) {};
+    bench.run(41, 60);
+    int good = 0;
+    for (const FrameMetadata& frame : bench.published) {
+        if ((frame.flags & flag_suspect) != 0) continue;
+        ++good;
+        const HostTime middle = bench.begin + bench.period * frame.tick + microseconds(2020);
+        CHECK(absolute(frame.host_time - middle) <= microseconds(1));
+    }
+    CHECK(good == 7 + 28 + 19);
+    const auto report = bench.pipeline.report();
+    CHECK(report.records_doubted == 1);
+    CHECK(report.slips == 0);
+    CHECK(report.locks == 1);
+}
+
+TEST_CASE("camera_pipeline: when the board's clock begins anew, the lock is dropped") {
+    Bench bench(camera(20));
+    bench.start();
+    CHECK(bench.pipeline.report().pairing == pairing::State::locked);
+    const Duration step = GENERATE(milliseconds(50), -milliseconds(100));
+    bench.lie = [&](wire::Exposure& record) { shift(record, step); };
+    bench.published.clear();
+    for (std::uint64_t tick = 12; tick < 15; ++tick) {
+        const HostTime at = bench.begin + bench.period * static_cast<std::int64_t>(tick);
+        const BoardTime board = test::Pipelines::to_board(at) + step;
+        CHECK_FALSE(bench.trigger(tick));
+        bench.frame(tick);
+        bench.translator.add({at - microseconds(10), board, board, at + microseconds(10)});
+    }
+    bench.run(15, 40);
+    CHECK(bench.pipeline.report().pairing == pairing::State::searching);
+    CHECK(bench.published.empty());
+    CHECK(bench.pipeline.advance(host_now() + seconds(10)) == pairing::Start::pattern);
+}
+
+TEST_CASE(
+    "camera_pipeline: records that agree on another grid are a step, with a lock of its own") {
+    Bench bench(camera(20));
+    bench.start();
+    bench.lie = [](wire::Exposure& record) { shift(record, milliseconds(3)); };
+    for (std::uint64_t tick = 12; tick < 20; ++tick) CHECK_FALSE(bench.trigger(tick));
+    for (std::int64_t tick = 12; tick < 15; ++tick)
+        bench.exchange(bench.begin + bench.period * tick);
+    const auto before = bench.translator.output_now().epoch;
+    CHECK(bench.trigger(20));
+    CHECK(bench.translator.output_now().epoch == before + 1);
+    CHECK(bench.pipeline.report().pairing == pairing::State::searching);
 }
 
 TEST_CASE("camera_pipeline: a doubled frame is suspect, with the exposure that it seems to be of") {

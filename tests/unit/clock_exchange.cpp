@@ -91,3 +91,30 @@ TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less
         CHECK(bench.exchange.next_request() <= host_now() + milliseconds(125));
     }
 }
+
+TEST_CASE("clock_exchange: what contradicts causality is doubted and not used") {
+    Bench bench(2);
+    const auto request = bench.exchange.request();
+    const HostTime now = host_now();
+    const auto times = GENERATE(std::pair<std::int64_t, std::int64_t>{1000, 999},  // left too early
+                                std::pair<std::int64_t, std::int64_t>{1000, 1000 + 40'000'000},
+                                std::pair<std::int64_t, std::int64_t>{-5, 1000},
+                                std::pair<std::int64_t, std::int64_t>{1000, INT64_MAX});
+    const wire::ClockAnswer answer{request.id, 0, times.first, times.second};
+    CHECK(bench.exchange.take(answer, now + milliseconds(20)));
+    CHECK(bench.exchange.answers() == 1);
+    static_cast<void>(bench.exchange.request());
+    CHECK(bench.exchanges() == 0);
+}
+
+TEST_CASE("clock_exchange: a follow-up that cannot be true leaves the answer as it was") {
+    Bench bench(2);
+    const auto request = bench.exchange.request();
+    const HostTime now = host_now();
+    CHECK_FALSE(
+        bench.exchange.take(wire::ClockAnswer{request.id, 0, 1000, 2000}, now + milliseconds(20)));
+    const std::int64_t sent_ns = GENERATE(1000, 60'000'000, INT64_MIN, INT64_MAX);
+    CHECK(bench.exchange.take(wire::ClockFollowUp{request.id, 0, sent_ns}));
+    static_cast<void>(bench.exchange.request());
+    CHECK(bench.exchanges() == 1);
+}

@@ -19,36 +19,137 @@ wire::ImuSample sample(std::uint32_t number, BoardTime at, std::uint16_t flags =
     return sample;
 }
 
+/// An IMU of 200 Hz whose samples the test makes; each is here a millisecond later.
+struct Bench : test::Pipelines {
+    explicit Bench(bool clock_known = true) {
+        if (clock_known) exchange(begin);
+    }
+
+    static ImuConfiguration configuration() {
+        ImuConfiguration made;
+        made.model = imu::find_model("adis16448b");
+        return made;
+    }
+    HostTime instant(std::int64_t i) const { return begin + milliseconds(5) * i; }
+
+    /// The i-th sample, of a board whose clock is `off`.
+    bool add(std::uint32_t number, std::int64_t i, Duration off = {}, std::uint16_t flags = 0) {
+        return pipeline.add(sample(number, to_board(instant(i)) + off, flags),
+                            instant(i) + milliseconds(1));
+    }
+    void run(std::uint32_t from, std::uint32_t to, Duration off = {}) {
+        for (std::uint32_t i = from; i < to; ++i) add(i, i, off);
+    }
+    std::vector<ring::Item> published() {
+        std::vector<ring::Item> items;
+        for (auto item = reader_.next(); item.found == ring::Found::item; item = reader_.next())
+            items.push_back(item);
+        return items;
+    }
+
+    const HostTime begin{50'000'000'000};
+    ImuPipeline pipeline{configuration(), writer({"imu0", ring::StreamKind::imu, 64}), translator,
+                         events};
+
+ private:
+    ring::Reader reader_ = reader("imu0");
+};
+
 }  // namespace
 
 TEST_CASE(
     "imu_pipeline: nothing before the clock is known, numbers go on over 32 bits, losses are "
     "counted") {
-    test::Pipelines bench;
-    ImuConfiguration configuration;
-    configuration.model = imu::find_model("adis16448b");
-    ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}),
-                         bench.translator);
-    auto reader = bench.reader("imu0");
-    const HostTime begin{50'000'000'000};
-    const auto at = [&](int i) { return test::Pipelines::to_board(begin + milliseconds(5 * i)); };
-    pipeline.add(sample(0xFFFFFFFD, at(0)));
-    CHECK(pipeline.report().no_clock == 1);
-    bench.exchange(begin);
-    pipeline.add(sample(0xFFFFFFFE, at(1)));
-    pipeline.add(sample(1, at(4)));
-    pipeline.add(sample(2, at(5), wire::imu_check_failed));
-    const auto first = unpack<ImuMetadata>(reader.next().metadata);
-    const auto second = unpack<ImuMetadata>(reader.next().metadata);
-    const auto third = unpack<ImuMetadata>(reader.next().metadata);
-    CHECK(first.number == 0xFFFFFFFEU);
-    CHECK(second.number == 0x100000001U);
-    CHECK((third.flags & flag_sensor_error) != 0);
-    CHECK(pipeline.report().lost == 2);
-    CHECK(pipeline.report().faulty == 1);
-    CHECK(pipeline.report().published == 3);
-    pipeline.board_restarted();
-    pipeline.add(sample(0, at(6)));
-    CHECK(unpack<ImuMetadata>(reader.next().metadata).number == 0);
-    CHECK(pipeline.report().lost == 2);
+    Bench bench(false);
+    CHECK(bench.add(0xFFFFFFFD, 0));
+    CHECK(bench.pipeline.report().no_clock == 1);
+    bench.exchange(bench.begin);
+    bench.add(0xFFFFFFFE, 1);
+    bench.add(1, 4);
+    bench.add(2, 5, {}, wire::imu_check_failed);
+    const auto items = bench.published();
+    REQUIRE(items.size() == 3);
+    CHECK(unpack<ImuMetadata>(items[0].metadata).number == 0xFFFFFFFEU);
+    CHECK(unpack<ImuMetadata>(items[1].metadata).number == 0x100000001U);
+    CHECK((unpack<ImuMetadata>(items[2].metadata).flags & flag_sensor_error) != 0);
+    CHECK(bench.pipeline.report().lost == 2);
+    CHECK(bench.pipeline.report().faulty == 1);
+    bench.pipeline.board_restarted();
+    bench.add(0, 6);
+    CHECK(unpack<ImuMetadata>(bench.published().at(0).metadata).number == 0);
+    CHECK(bench.pipeline.report().lost == 2);
+}
+
+TEST_CASE("imu_pipeline: a sample from the future is withheld, and those after it are not") {
+    Bench bench;
+    const Duration lie = GENERATE(seconds(1000), milliseconds(20), Duration{INT64_MAX / 2});
+    bench.run(0, 20);
+    CHECK_FALSE(bench.add(20, 20, lie));
+    bench.run(21, 30);
+    const auto items = bench.published();
+    REQUIRE(items.size() == 29);
+    for (std::size_t i = 0; i < items.size(); ++i) {
+        const auto metadata = unpack<ImuMetadata>(items[i].metadata);
+        CHECK(metadata.flags == 0);
+        CHECK(absolute(metadata.host_time - bench.instant(static_cast<int>(metadata.number))) <=
+              microseconds(1));
+    }
+    CHECK(bench.pipeline.report().doubted == 1);
+    CHECK(bench.pipeline.report().lost == 1);
+    const auto event = unpack<EventMetadata>(bench.reader("events").next().metadata);
+    CHECK(event.kind == EventKind::message_doubted);
+    CHECK(event.value == (test::Pipelines::to_board(bench.instant(20)) + lie).ns);
+}
+
+TEST_CASE("imu_pipeline: a sample that lies by less than a period, or by number, is withheld") {
+    Bench bench;
+    bench.run(0, 40);
+    CHECK_FALSE(bench.add(40, 40, GENERATE(microseconds(100), -microseconds(100))));
+    CHECK_FALSE(bench.add(40 + (1U << 31U), 41));
+    CHECK_FALSE(bench.add(45, 42));
+    CHECK(bench.add(43, 43));
+    CHECK(bench.pipeline.report().lost == 3);
+}
+
+TEST_CASE("imu_pipeline: held stamps and those of a clock without contact say so") {
+    Bench bench;
+    bench.run(0, 2);
+    const std::int64_t later = 4000 / 5;  // four seconds without contact
+    bench.add(later, later);
+    const auto items = bench.published();
+    REQUIRE(items.size() == 3);
+    CHECK((unpack<ImuMetadata>(items[1].metadata).flags & flag_holdover) == 0);
+    CHECK((unpack<ImuMetadata>(items[2].metadata).flags & flag_holdover) != 0);
+}
+
+TEST_CASE("imu_pipeline: samples that agree in a new phase are taken once the clock agrees, too") {
+    Bench bench;
+    bench.run(0, 20);
+    const auto before = bench.published();
+    const Duration phase = milliseconds(2);
+    for (std::uint32_t i = 20; i < 30; ++i) CHECK_FALSE(bench.add(i, i, -phase));
+    for (int i = 20; i < 23; ++i) bench.exchange(bench.instant(i));
+    bench.run(30, 40, -phase);
+    const auto after = bench.published();
+    REQUIRE(after.size() == 10);
+    CHECK(unpack<ImuMetadata>(after[0].metadata).epoch ==
+          unpack<ImuMetadata>(before[0].metadata).epoch + 1);
+}
+
+TEST_CASE("imu_pipeline: when the clock begins anew, so do numbers and times") {
+    Bench bench;
+    bench.run(0, 20);
+    bench.published();
+    const Duration step = -milliseconds(50);
+    for (std::uint32_t i = 20; i < 23; ++i) {
+        CHECK_FALSE(bench.add(i, i, step));
+        const BoardTime board = test::Pipelines::to_board(bench.instant(i)) + step;
+        bench.translator.add({bench.instant(i) - microseconds(10), board, board,
+                              bench.instant(i) + microseconds(10)});
+    }
+    bench.run(23, 30, step);
+    const auto items = bench.published();
+    REQUIRE(items.size() == 7);
+    CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(23)) <=
+          microseconds(20));
 }

@@ -29,9 +29,8 @@ struct StreamOfStamps {
 
     Published publish(HostTime host) {
         const clock::Stamp stamp = translator.translate(host, {});
-        std::uint32_t flags = 0;
-        const OutputTime time = guard.guard(stamp, flags);
-        return {time, stamp.epoch, flags};
+        const auto guarded = guard.guard(stamp, 50'000).value();
+        return {guarded.time, stamp.epoch, guarded.flags};
     }
     HostTime now() const { return {clocks->value_ns(clock::SystemClock::monotonic_raw)}; }
 
@@ -45,16 +44,43 @@ struct StreamOfStamps {
 
 TEST_CASE("stamp_guard: stamps never go backwards within an epoch, and say when they were held") {
     StampGuard guard;
-    std::uint32_t flags = 0;
-    CHECK(guard.guard(stamp(100, 1), flags).ns == 100);
-    CHECK(flags == 0);
-    CHECK(guard.guard(stamp(90, 1), flags).ns == 101);
-    CHECK(flags == flag_clamped);
-    flags = 0;
-    CHECK(guard.guard(stamp(50, 2), flags).ns == 50);
-    CHECK(flags == 0);
-    CHECK(guard.guard(stamp(60, 2, clock::ClockState::holdover), flags).ns == 60);
-    CHECK(flags == flag_holdover);
+    CHECK(guard.guard(stamp(100, 1), 10)->time.ns == 100);
+    const auto held = guard.guard(stamp(90, 1), 10);
+    REQUIRE(held);
+    CHECK(held->time.ns == 101);
+    CHECK(held->flags == flag_clamped);
+    CHECK(guard.guard(stamp(50, 2), 10)->time.ns == 50);
+    const auto late = guard.guard(stamp(60, 2, clock::ClockState::holdover), 10);
+    CHECK(late->time.ns == 60);
+    CHECK(late->flags == flag_holdover);
+}
+
+TEST_CASE("stamp_guard: sigma of a stamp that was held contains the hold") {
+    StampGuard guard;
+    guard.guard(stamp(100, 1), 30);
+    CHECK(guard.guard(stamp(61, 1), 30)->sigma_ns == 50);
+    CHECK(guard.guard(stamp(61, 1), sigma_unknown)->sigma_ns == sigma_unknown);
+}
+
+TEST_CASE(
+    "stamp_guard: what sigma cannot explain is refused, until three in a row doubt the last") {
+    StampGuard guard;
+    guard.guard(stamp(1'000'000, 1), 30);
+    for (int i = 0; i < 3; ++i) {
+        CHECK_FALSE(guard.stuck());
+        CHECK_FALSE(guard.guard(stamp(1000 + i, 1), 30));
+    }
+    CHECK(guard.stuck());
+    CHECK(guard.guard(stamp(1003, 2), 30)->time.ns == 1003);
+    CHECK_FALSE(guard.stuck());
+}
+
+TEST_CASE("stamp_guard: a suspect stamp neither holds others up nor is held") {
+    StampGuard guard;
+    guard.guard(stamp(100, 1), 30);
+    CHECK(guard.guard(stamp(50, 1), sigma_unknown, true)->time.ns == 50);
+    CHECK(guard.guard(stamp(9000, 1), sigma_unknown, true)->flags == 0);
+    CHECK(guard.guard(stamp(200, 1), 30)->time.ns == 200);
 }
 
 TEST_CASE("stamp_guard: a clock that is set back begins a new epoch, with its own time at once") {
@@ -85,7 +111,7 @@ TEST_CASE("stamp_guard: a clock that is slewed back is held within its epoch") {
     CHECK(free.flags == 0);
 }
 
-TEST_CASE("stamp_guard: an estimate that goes back is held within its epoch") {
+TEST_CASE("stamp_guard: an estimate that goes back further than its sigma explains is refused") {
     StreamOfStamps stream;
     // The board's clock is the host's; the first exchange is lopsided by 2 ms.
     const auto exchange = [&](std::int64_t at_ns, std::int64_t up_ns) {
@@ -95,16 +121,12 @@ TEST_CASE("stamp_guard: an estimate that goes back is held within its epoch") {
     const auto publish = [&](BoardTime board) {
         const auto stamp = stream.translator.translate(board);
         REQUIRE(stamp);
-        std::uint32_t flags = 0;
-        const OutputTime time = stream.guard.guard(*stamp, flags);
-        return StreamOfStamps::Published{time, stamp->epoch, flags};
+        return stream.guard.guard(*stamp, stamp->sigma_ns);
     };
     const std::int64_t begin_ns = stream.now().ns;
     exchange(begin_ns, 2'000'000);
-    const auto before = publish({begin_ns + 300'000'000});
+    REQUIRE(publish({begin_ns + 300'000'000}));
     for (int i = 1; i <= 20; ++i) exchange(begin_ns + i * 10'000'000, 0);
-    const auto held = publish({begin_ns + 300'100'000});
-    CHECK(held.epoch == before.epoch);
-    CHECK(held.time == before.time + nanoseconds(1));
-    CHECK(held.flags == flag_clamped);
+    CHECK_FALSE(publish({begin_ns + 300'100'000}));
+    CHECK(publish({begin_ns + 302'000'000})->flags == 0);
 }

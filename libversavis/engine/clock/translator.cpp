@@ -52,6 +52,16 @@ void Translator::board_restarted() {
     newest_ = {};
 }
 
+void Translator::begin_epoch() {
+    const std::lock_guard lock(mutex_);
+    ++jumps_;
+}
+
+ClockContact Translator::contact() const {
+    const std::lock_guard lock(mutex_);
+    return {clock_life(), filter_.exchanges()};
+}
+
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
     filter_.add(exchange);
@@ -100,8 +110,7 @@ std::optional<OutputEstimate> Translator::by_pps(BoardTime board, OutputTime by_
     newest_ = std::max(newest_, board);
     const auto estimate = pps_.translate(board, newest_);
     if (estimate) pps_minus_link_ = estimate->time - by_link;
-    if (estimate.has_value() != pps_used_ && absolute(pps_minus_link_) > largest_jump)
-        ++source_jumps_;
+    if (estimate.has_value() != pps_used_ && absolute(pps_minus_link_) > largest_jump) ++jumps_;
     pps_used_ = estimate.has_value();
     return estimate;
 }

@@ -66,6 +66,12 @@ struct ClockReport {
     Asymmetry asymmetry;
 };
 
+/// How far the estimate of the board's clock has come.
+struct ClockContact {
+    std::uint32_t life = 0;       ///< estimates before this one
+    std::uint64_t exchanges = 0;  ///< of all estimates
+};
+
 /// Output clock against host clock at one moment, and the epoch of stamps that are made by it.
 struct OutputRelation {
     HostTime host;
@@ -83,8 +89,12 @@ class Translator {
     /// The board began a new life: what was known of its clock is void, and a new epoch begins.
     void board_restarted();
 
+    /// What was stamped in this epoch may be off from what comes: a new one begins.
+    void begin_epoch();
+
     void add(const Exchange& exchange);
     void add(const OneWay& message);
+    ClockContact contact() const;
 
     /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse
     /// began.
@@ -113,8 +123,10 @@ class Translator {
  private:
     /// Epoch of stamps that are made by `output`.
     std::uint32_t epoch(const OutputReading& output) const {
-        return board_lives_ + source_jumps_ + output.steps +
-               static_cast<std::uint32_t>(filter_.restarts());
+        return clock_life() + jumps_ + output.steps;
+    }
+    std::uint32_t clock_life() const {
+        return board_lives_ + static_cast<std::uint32_t>(filter_.restarts());
     }
     void correct_link();
     std::optional<OutputEstimate> by_pps(BoardTime board, OutputTime by_link);
@@ -129,8 +141,8 @@ class Translator {
     AsymmetrySource asymmetry_source_ = AsymmetrySource::none;
     Asymmetry asymmetry_;
     std::uint32_t board_lives_ = 0;
-    std::uint32_t source_jumps_ =
-        0;  ///< PPS took over from the link, or the other way, and they disagreed
+    /// PPS took over from the link, or the other way, and they disagreed; or a stream was off.
+    std::uint32_t jumps_ = 0;
 };
 
 }  // namespace versavis::clock

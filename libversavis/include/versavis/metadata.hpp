@@ -92,27 +92,36 @@ enum class EventKind : std::uint32_t {
     imu_failed = 19,            ///< the part is not the one configured; value: what it answered
     imu_silent = 20,            ///< no data-ready edge, end of transfer or bytes arrived
     utc_label = 21,  ///< the PPS pulse at this time was labelled; value: UTC seconds since 1970
+    message_doubted = 22,  ///< its witnesses contradict a message of the board: it was not used
+    stream_stepped = 23,   ///< several messages agree against all before: a new epoch begins
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
 enum class EventReason : std::uint32_t {
     none = 0,
-    frame_incomplete = 1,  ///< packets were lost on the way
-    frame_missing = 2,     ///< nothing arrived in time
-    exposure_missing = 3,  ///< the board's record did not arrive in time
-    unproved = 4,          ///< pairing was not locked, and could not prove it
-    mismatch = 5,          ///< the evidence contradicts the pairing
-    no_clock = 7,          ///< board time could not be translated
-    wrong_size = 8,        ///< the frame is not of the size the camera announced
-    reset = 9,             ///< camera or board restarted in between
-    trigger_ignored = 10,  ///< the camera did not expose
-    camera_busy = 11,      ///< it was, or would have been, still exposing
-    too_late = 12,         ///< the instant had passed before the board got to it
-    queue_full = 13,       ///< too many pulses waited on the board
-    out_of_order = 14,     ///< this frame, or a newer one, was published before
-    no_buffer = 15,        ///< no slot was free: too many frames were waiting
-    camera_silent = 16,    ///< nothing at all arrived from the camera
-    wrong_exposure = 17,   ///< the exposure line shows another exposure than the camera reports
+    frame_incomplete = 1,     ///< packets were lost on the way
+    frame_missing = 2,        ///< nothing arrived in time
+    exposure_missing = 3,     ///< the board's record did not arrive in time
+    unproved = 4,             ///< pairing was not locked, and could not prove it
+    mismatch = 5,             ///< the evidence contradicts the pairing
+    no_clock = 7,             ///< board time could not be translated
+    wrong_size = 8,           ///< the frame is not of the size the camera announced
+    reset = 9,                ///< camera or board restarted in between
+    trigger_ignored = 10,     ///< the camera did not expose
+    camera_busy = 11,         ///< it was, or would have been, still exposing
+    too_late = 12,            ///< the instant had passed before the board got to it
+    queue_full = 13,          ///< too many pulses waited on the board
+    out_of_order = 14,        ///< this frame, or a newer one, was published before
+    no_buffer = 15,           ///< no slot was free: too many frames were waiting
+    camera_silent = 16,       ///< nothing at all arrived from the camera
+    wrong_exposure = 17,      ///< the exposure line shows another exposure than the camera reports
+    implausible_number = 18,  ///< a number does not follow from those before
+    implausible_time = 19,    ///< a time does not follow from number, trigger or those before
+    implausible_length = 20,  ///< an exposure does not last as long as those before
+    implausible_flags = 21,   ///< flags and times of a message contradict each other
+    not_yet = 22,             ///< a time that had not come when the message arrived
+    too_old = 23,             ///< a time long before the message arrived
+    went_back = 24,           ///< its stamp lies before the one before, by more than sigma explains
 };
 
 struct EventMetadata {
@@ -125,8 +134,9 @@ struct EventMetadata {
     HostTime host_time;
     std::uint32_t sigma_ns;
     std::uint32_t epoch;
-    char source_name[32];  ///< zero-terminated
-    std::uint64_t reserved[2];
+    char source_name[32];   ///< zero-terminated
+    std::int64_t expected;  ///< of a message that was doubted: what its witnesses say
+    std::uint64_t reserved;
 };
 
 static_assert(sizeof(FrameMetadata) == ring::metadata_size, "96 bytes of inline metadata");

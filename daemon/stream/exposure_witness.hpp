@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Holds each exposure record of a camera against its own fields, its grid and its neighbours.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "configuration/configuration.hpp"
+#include "stream/doubt.hpp"
+#include "stream/steady_value.hpp"
+#include "stream/witness.hpp"
+#include "wire/messages.hpp"
+
+namespace versavis::daemon {
+
+/// What no honest record of this camera says, whatever came before it. The board's times of a
+/// record that passes can be subtracted from each other without overflow.
+std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
+                                        const CameraConfiguration& configuration);
+
+/// A record and the exposure that the camera keeps to at that time; 0: it varies, or is unknown.
+struct WitnessedExposure {
+    const wire::Exposure& record;
+    Duration told;
+};
+
+/// The records that were believed. The board places each trigger half an expected exposure before
+/// its grid point, so triggers follow from ticks; starts follow from triggers, by the camera's
+/// latency; and ends from starts, while the camera's exposure is known.
+class ExposureHistory {
+ public:
+    explicit ExposureHistory(const CameraConfiguration& configuration);
+
+    std::optional<Doubt> doubt(const WitnessedExposure& exposure) const;
+    void learn(const WitnessedExposure& exposure);
+
+    /// The grid may have moved: the next record is held against latency and exposure alone.
+    void forget_grid() { newest_.reset(); }
+
+    /// True when the newest one was of the same trigger, and told something else.
+    bool disputes_newest(const wire::Exposure& record) const;
+
+ private:
+    /// Exposures that the expected one of a trigger may be among. At half, a change of exposure
+    /// that takes effect late looks like a trigger off its grid; at twice, the allowance for it
+    /// lasts twice as long.
+    static constexpr std::size_t remembered_lengths = 8;
+
+    std::optional<Doubt> number_doubt(const wire::Exposure& record) const;
+    std::optional<Doubt> trigger_doubt(const wire::Exposure& record) const;
+    std::optional<Doubt> start_doubt(const wire::Exposure& record) const;
+    std::optional<Doubt> end_doubt(const WitnessedExposure& exposure) const;
+    Duration compensation(const wire::Exposure& record) const;
+
+    Duration period_;
+    Duration lengths_[remembered_lengths];
+    std::size_t length_count_ = 0;
+    std::optional<wire::Exposure> newest_;
+    SteadyValue pace_;  ///< from one grid point to the next
+    SteadyValue latency_;
+    SteadyValue length_;
+    Duration told_;
+};
+
+using ExposureWitness = Witness<ExposureHistory>;
+
+}  // namespace versavis::daemon

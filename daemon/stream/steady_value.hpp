@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Follows a value that hardly changes from one message to the next, and how far it scatters.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/rounding.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::daemon {
+
+/// Not thread-safe.
+class SteadyValue {
+ public:
+    /// Until the scatter is known, values within `first_tolerance` of the first are believed.
+    explicit SteadyValue(Duration first_tolerance)
+        : deviation_ns_(static_cast<double>(first_tolerance.ns) / deviations) {}
+
+    SteadyValue(Duration expected, Duration first_tolerance) : SteadyValue(first_tolerance) {
+        mean_ns_ = static_cast<double>(expected.ns);
+        count_ = 1;
+    }
+
+    bool known() const { return count_ > 0; }
+    Duration value() const { return rounded(mean_ns_); }
+
+    /// How far off an honest value can be.
+    Duration tolerance() const { return floor + rounded(deviations * deviation_ns_); }
+
+    bool fits(Duration value, Duration allowance = {}) const {
+        return !known() || absolute(value - this->value()) <= tolerance() + allowance;
+    }
+
+    void learn(Duration value) {
+        if (!known()) mean_ns_ = static_cast<double>(value.ns);
+        const double off = static_cast<double>(value.ns) - mean_ns_;
+        count_ = std::min(count_ + 1, memory);
+        mean_ns_ += off / count_;
+        // What was supposed at first counts as one more value.
+        deviation_ns_ += (std::abs(off) - deviation_ns_) / (count_ + 1);
+    }
+
+ private:
+    /// Mean deviations that an honest value stays within: 6.4 sigma of a bell. At half, one frame
+    /// in 700 is doubted for nothing; at twice, lies twice as large pass.
+    static constexpr double deviations = 8;
+
+    /// What is never doubted: the noise of edges and interrupts on a quiet line. At half, values
+    /// that never scattered are doubted for a bus that was busy once; at twice, stamps that are off
+    /// by 20 us pass as good.
+    static constexpr Duration floor = microseconds(10);
+
+    /// Values that mean and scatter are taken of. At half, the scatter itself scatters, and honest
+    /// values are doubted; at twice, a drift is followed late.
+    static constexpr double memory = 16;
+
+    double mean_ns_ = 0;
+    double deviation_ns_;
+    double count_ = 0;
+};
+
+}  // namespace versavis::daemon

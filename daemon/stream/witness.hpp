@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Believes a message when it agrees with those before it, and a change when several messages agree.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "stream/doubt.hpp"
+
+namespace versavis::daemon {
+
+/// History: what messages were believed. It has `std::optional<Doubt> doubt(message) const` and
+/// `void learn(message)`; one that has learned nothing doubts nothing. Not thread-safe.
+template <class History>
+class Witness {
+ public:
+    explicit Witness(History blank) : blank_(std::move(blank)), believed_(blank_), rival_(blank_) {}
+
+    /// None: the message is believed, and remembered. `exchanges`: of the clock until now.
+    template <class Message>
+    std::optional<Doubt> judge(const Message& message, std::uint64_t exchanges) {
+        const auto doubt = believed_.doubt(message);
+        if (!doubt) {
+            believed_.learn(message);
+            rivals_ = 0;
+            return std::nullopt;
+        }
+        if (rivals_ > 0 && rival_.doubt(message)) rivals_ = 0;
+        if (rivals_++ == 0) {
+            rival_ = blank_;
+            rival_since_ = exchanges;
+        }
+        rival_.learn(message);
+        return doubt;
+    }
+
+    /// So many doubted messages in a row agree among themselves that it is no accident, and the
+    /// clock has been compared often enough since to know that it was not its own step.
+    bool stepped(std::uint64_t exchanges) const {
+        return rivals_ >= rivals_to_step && exchanges - rival_since_ >= exchanges_to_confirm;
+    }
+
+    /// From now on those are believed.
+    void adopt() {
+        believed_ = rival_;
+        rivals_ = 0;
+    }
+
+    /// The next message is believed as it is.
+    void forget() {
+        believed_ = blank_;
+        rivals_ = 0;
+    }
+
+    History& believed() { return believed_; }
+
+ private:
+    /// Messages that must agree among themselves against all before. At half, two equal accidents
+    /// pass; at twice, a true step costs twice as many messages.
+    static constexpr int rivals_to_step = 3;
+
+    /// An estimate that is contradicted begins anew with the third exchange. At half, a step of the
+    /// board's clock passes for one of the stream; at twice, a true one costs 0.3 s more.
+    static constexpr std::uint64_t exchanges_to_confirm = 3;
+
+    History blank_;
+    History believed_;
+    History rival_;
+    int rivals_ = 0;
+    std::uint64_t rival_since_ = 0;
+};
+
+}  // namespace versavis::daemon

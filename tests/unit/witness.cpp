@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/witness.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+/// Believes that each number is the one before and one.
+struct Counting {
+    std::optional<int> newest;
+
+    std::optional<Doubt> doubt(int number) const {
+        if (!newest || number == *newest + 1) return std::nullopt;
+        return Doubt{EventReason::implausible_number, number, *newest + 1};
+    }
+    void learn(int number) { newest = number; }
+};
+
+}  // namespace
+
+TEST_CASE("witness: what does not follow is doubted and not remembered") {
+    Witness<Counting> witness{Counting{}};
+    CHECK_FALSE(witness.judge(1, 0));
+    const auto doubt = witness.judge(7, 0);
+    REQUIRE(doubt);
+    CHECK(doubt->said == 7);
+    CHECK(doubt->expected == 2);
+    CHECK_FALSE(witness.judge(2, 0));
+}
+
+TEST_CASE("witness: three in a row that agree are a step, once the clock was compared again") {
+    Witness<Counting> witness{Counting{}};
+    witness.judge(1, 10);
+    for (const int number : {50, 51, 52}) CHECK(witness.judge(number, 10));
+    CHECK_FALSE(witness.stepped(12));
+    CHECK(witness.stepped(13));
+    witness.adopt();
+    CHECK_FALSE(witness.judge(53, 13));
+    CHECK_FALSE(witness.stepped(99));
+}
+
+TEST_CASE("witness: accidents that do not agree, or not in a row, are no step") {
+    Witness<Counting> witness{Counting{}};
+    witness.judge(1, 0);
+    for (const int number : {50, 60, 70, 80}) CHECK(witness.judge(number, 0));
+    CHECK_FALSE(witness.stepped(9));
+    for (const int number : {50, 51}) CHECK(witness.judge(number, 0));
+    CHECK_FALSE(witness.judge(2, 0));
+    CHECK(witness.judge(52, 0));
+    CHECK_FALSE(witness.stepped(9));
+}
