@@ -114,6 +114,10 @@ std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostT
     return unit != nullptr ? unit->pipeline->add(record, received) : std::nullopt;
 }
 
+void CameraGroup::trigger_skipped(unsigned output) {
+    if (const Unit* unit = at_output(output)) unit->pipeline->trigger_skipped();
+}
+
 void CameraGroup::name_source(JournalEntry& entry) const {
     const Unit* unit = at_output(entry.source);
     entry.source = unit != nullptr ? static_cast<std::uint32_t>(unit - units_.data()) : 0U;

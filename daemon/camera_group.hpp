@@ -37,6 +37,9 @@ class CameraGroup {
     /// Stamp of the middle; none: of no camera here, or board time cannot be translated yet.
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
+    /// The board said that this output got no trigger.
+    void trigger_skipped(unsigned output);
+
     /// Names an event of the camera at output `entry.source`, which becomes the camera's number.
     void name_source(JournalEntry& entry) const;
 

@@ -26,6 +26,11 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
     return "";
 }
 
+/// Seconds since 1970 that nanoseconds can tell: until 2116, with room for sums.
+bool label_in_range(std::int64_t utc_s) {
+    return utc_s >= 0 && utc_s < (std::int64_t{1} << 62U) / 1'000'000'000;
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -143,13 +148,19 @@ void Service::exchange_doubted(const Doubt& doubt) {
         {EventKind::message_doubted, doubt.reason, 0, "board", doubt.said, {}, doubt.expected});
 }
 
-void Service::board_event(const wire::Event& event) {
-    if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
-    if (event.kind == wire::EventKind::utc_label)
-        translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
+/// An event that is doubted is told, but nothing is made of its time.
+void Service::board_event(const wire::Event& event, HostTime received) {
+    const auto doubt = event_witness_.judge(event, received);
+    if (!doubt) use_pps(event);
     auto entry = journal_entry(event);
     if (!entry) return;
+    if (doubt) {
+        entry->suspect = true;
+        entry->reason = doubt->reason;
+        entry->expected = doubt->expected;
+    }
     const EventSource source = source_of(event.kind);
+    if (event.kind == wire::EventKind::trigger_skipped) cameras_->trigger_skipped(event.source);
     if (source == EventSource::camera) cameras_->name_source(*entry);
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
@@ -159,6 +170,12 @@ void Service::board_event(const wire::Event& event) {
             to_string(entry->kind), event.detail, event.value);
     }
     events_->add(*entry);
+}
+
+void Service::use_pps(const wire::Event& event) {
+    if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
+    if (event.kind == wire::EventKind::utc_label && label_in_range(event.value))
+        translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
 }
 
 void Service::tick() {

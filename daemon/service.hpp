@@ -14,6 +14,7 @@
 #include "engine/ring/directory.hpp"
 #include "stream/clock_recorder.hpp"
 #include "stream/event_journal.hpp"
+#include "stream/event_witness.hpp"
 #include "stream/imu_pipeline.hpp"
 #include "stream/status_publisher.hpp"
 
@@ -46,6 +47,7 @@ class Service final : private BoardListener {
     Expected<> make_cameras();
     bool board_needed() const { return !imus_.empty() || cameras_->any_triggered(); }
     void align_grid(HostTime now);
+    void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
 
     // On the link's thread.
@@ -56,7 +58,7 @@ class Service final : private BoardListener {
     void exposure(const wire::Exposure& record, HostTime received) override;
     bool imu_sample(const wire::ImuSample& sample, HostTime received) override;
     void exchange_doubted(const Doubt& doubt) override;
-    void board_event(const wire::Event& event) override;
+    void board_event(const wire::Event& event, HostTime received) override;
 
     Configuration configuration_;
     ring::OwnedDirectory directory_;
@@ -65,6 +67,7 @@ class Service final : private BoardListener {
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     std::unique_ptr<EventJournal> events_;
+    EventWitness event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
     std::unique_ptr<BoardLink> board_;

@@ -298,7 +298,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         if (listener_.imu_sample(sample, received)) clock_.take(sample, received);
         return;
     }
-    if (packet.read(event)) return listener_.board_event(event);
+    if (packet.read(event)) return listener_.board_event(event, received);
     if (packet.read(answer)) return note(clock_.take(answer, received));
     if (packet.read(follow_up)) return note(clock_.take(follow_up));
     if (packet.read(line))

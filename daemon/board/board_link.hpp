@@ -35,7 +35,7 @@ class BoardListener {
     /// False: the sample is doubted, and nothing may be made of its times.
     virtual bool imu_sample(const wire::ImuSample& sample, HostTime received) = 0;
     virtual void exchange_doubted(const Doubt& doubt) = 0;
-    virtual void board_event(const wire::Event& event) = 0;
+    virtual void board_event(const wire::Event& event, HostTime received) = 0;
 };
 
 enum class BoardState { absent, handshake, running, incompatible, refused };

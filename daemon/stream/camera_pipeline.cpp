@@ -125,9 +125,11 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
     follow_clock(contact.life);
     const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
     if (const auto doubt = contradicts_arrival(newest, received, translator_)) return doubt;
-    const auto doubt =
-        witness_.judge(WitnessedExposure{record, check_.told_at(received)}, contact.exchanges);
+    const WitnessedExposure exposure{record, check_.told_at(received)};
+    const auto doubt = witness_.judge(exposure, contact.exchanges);
+    if (!doubt) translator_.clock_continues();
     if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
+    witness_.adopt(exposure);
     adopt_step(record, *doubt);
     return std::nullopt;
 }
@@ -141,7 +143,6 @@ void CameraPipeline::follow_clock(std::uint32_t life) {
 }
 
 void CameraPipeline::adopt_step(const wire::Exposure& record, const Doubt& doubt) {
-    witness_.adopt();
     begin_anew();
     translator_.begin_epoch();
     events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
@@ -159,6 +160,11 @@ void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
                  doubt.expected});
     // Two accounts of one exposure: neither is believed.
     if (witness_.believed().disputes_newest(record)) middles_.erase(record.trigger);
+}
+
+void CameraPipeline::trigger_skipped() {
+    const std::lock_guard lock(mutex_);
+    witness_.believed().trigger_skipped();
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {

@@ -71,6 +71,9 @@ class CameraPipeline final : private pairing::Outcome {
     /// is doubted.
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
+    /// The board sent no trigger for one grid point, and said so.
+    void trigger_skipped();
+
     /// Camera or board began a new life.
     void reset();
 

@@ -5,8 +5,8 @@ namespace versavis::daemon {
 
 void EventJournal::add(const JournalEntry& entry) {
     std::optional<clock::Stamp> stamp;
-    if (entry.board_time) stamp = translator_.translate(*entry.board_time);
-    // The clock is not known yet: the moment of its report is all there is.
+    if (entry.board_time && !entry.suspect) stamp = translator_.translate(*entry.board_time);
+    // The clock is not known, or the time is doubted: the moment of its report is all there is.
     if (!stamp) stamp = translator_.translate(host_now(), microseconds(100));
     EventMetadata metadata{};
     metadata.kind = entry.kind;
@@ -16,7 +16,8 @@ void EventJournal::add(const JournalEntry& entry) {
     metadata.expected = entry.expected;
     metadata.board_time = entry.board_time.value_or(BoardTime{});
     metadata.host_time = stamp->host;
-    metadata.sigma_ns = stamp->sigma_ns;
+    metadata.sigma_ns = entry.suspect ? sigma_unknown : stamp->sigma_ns;
+    if (entry.suspect) metadata.flags |= flag_suspect;
     metadata.epoch = stamp->epoch;
     entry.source_name.copy(metadata.source_name, sizeof metadata.source_name - 1);
     const std::lock_guard lock(mutex_);

@@ -19,6 +19,7 @@ struct JournalEntry {
     std::int64_t value = 0;
     std::optional<BoardTime> board_time{};  ///< none: it happened on the host, now
     std::int64_t expected = 0;              ///< of a message that was doubted
+    bool suspect = false;                   ///< its board time is doubted
 };
 
 /// Thread-safe.

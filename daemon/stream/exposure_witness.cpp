@@ -81,6 +81,7 @@ std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
 
 ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
     : period_(period_of(configuration)),
+      slave_(!configuration.master.empty()),
       pace_(period_, period_ / largest_slew_parts),
       latency_(first_tolerance),
       length_(first_tolerance) {
@@ -89,21 +90,31 @@ ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
 
 std::optional<Doubt> ExposureHistory::doubt(const WitnessedExposure& exposure) const {
     const wire::Exposure& record = exposure.record;
-    if (newest_) {
+    if (newest_)
         if (auto doubt = number_doubt(record)) return doubt;
+    if (newest_ && grid_known_)
         if (auto doubt = trigger_doubt(record)) return doubt;
-    }
     if (auto doubt = start_doubt(record)) return doubt;
     return end_doubt(exposure);
 }
 
-/// Each trigger has a grid point of its own, in order.
+/// Each trigger has a grid point of its own, in order, and each grid point a trigger, but for those
+/// that the board leaves out.
 std::optional<Doubt> ExposureHistory::number_doubt(const wire::Exposure& record) const {
     const std::uint64_t ticks = record.tick - newest_->tick;
     const std::uint64_t triggers = record.trigger - newest_->trigger;
-    if (record.tick > newest_->tick && triggers >= 1 && triggers <= ticks) return std::nullopt;
+    const bool counted = record.trigger > newest_->trigger;
+    if (!grid_known_ && counted) return std::nullopt;
+    if (counted && record.tick > newest_->tick && triggers <= ticks &&
+        may_skip(record, ticks - triggers))
+        return std::nullopt;
     return Doubt{EventReason::implausible_number, static_cast<std::int64_t>(record.trigger),
                  static_cast<std::int64_t>(newest_->trigger + 1)};
+}
+
+bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t points) const {
+    constexpr unsigned sparse = wire::exposure_pattern | wire::exposure_slow;
+    return points <= skips_ || slave_ || has(record, sparse) || has(*newest_, sparse);
 }
 
 std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
@@ -156,12 +167,14 @@ std::optional<Doubt> ExposureHistory::end_doubt(const WitnessedExposure& exposur
 
 void ExposureHistory::learn(const WitnessedExposure& exposure) {
     const wire::Exposure& record = exposure.record;
-    if (newest_ && !has(record, wire::exposure_late) && !has(*newest_, wire::exposure_late) &&
+    if (grid_known_ && !has(record, wire::exposure_late) && !has(*newest_, wire::exposure_late) &&
         compensation(record) * 2 < equal_exposures) {
         const auto ticks = static_cast<std::int64_t>(record.tick - newest_->tick);
         pace_.learn({(record.trigger_ns - newest_->trigger_ns) / ticks});
     }
     newest_ = record;
+    grid_known_ = true;
+    skips_ = 0;
     if (!has_start(record)) return;
     latency_.learn({record.start_ns - record.trigger_ns});
     if (!has_end(record)) return;

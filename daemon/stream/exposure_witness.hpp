@@ -34,8 +34,17 @@ class ExposureHistory {
     std::optional<Doubt> doubt(const WitnessedExposure& exposure) const;
     void learn(const WitnessedExposure& exposure);
 
-    /// The grid may have moved: the next record is held against latency and exposure alone.
-    void forget_grid() { newest_.reset(); }
+    /// All may have moved: the next record is held against latency and exposure alone.
+    void rebase() {
+        newest_.reset();
+        grid_known_ = false;
+    }
+
+    /// The grid may have moved; triggers are counted as before.
+    void forget_grid() { grid_known_ = false; }
+
+    /// The board said that the next grid point has no trigger.
+    void trigger_skipped() { ++skips_; }
 
     /// True when the newest one was of the same trigger, and told something else.
     bool disputes_newest(const wire::Exposure& record) const;
@@ -47,16 +56,20 @@ class ExposureHistory {
     static constexpr std::size_t remembered_lengths = 8;
 
     std::optional<Doubt> number_doubt(const wire::Exposure& record) const;
+    bool may_skip(const wire::Exposure& record, std::uint64_t points) const;
     std::optional<Doubt> trigger_doubt(const wire::Exposure& record) const;
     std::optional<Doubt> start_doubt(const wire::Exposure& record) const;
     std::optional<Doubt> end_doubt(const WitnessedExposure& exposure) const;
     Duration compensation(const wire::Exposure& record) const;
 
     Duration period_;
+    bool slave_;
     Duration lengths_[remembered_lengths];
     std::size_t length_count_ = 0;
     std::optional<wire::Exposure> newest_;
-    SteadyValue pace_;  ///< from one grid point to the next
+    bool grid_known_ = false;  ///< the next tick can be told from the newest record's
+    std::uint64_t skips_ = 0;  ///< told since the newest record
+    SteadyValue pace_;         ///< from one grid point to the next
     SteadyValue latency_;
     SteadyValue length_;
     Duration told_;

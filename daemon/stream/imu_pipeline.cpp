@@ -5,6 +5,23 @@
 
 namespace versavis::daemon {
 
+namespace {
+
+/// A part keeps its rate within this part of the configured one. At half, parts that are an eighth
+/// slower are doubted at their first samples; at twice, the second sample may be half a period off.
+constexpr std::int64_t rate_parts = 4;
+
+/// Over lost samples a part's pace may wander by one part in so many. At half, the first sample
+/// after a second's gap may be off by 4 ms; at twice, parts that warm up are doubted after a gap.
+constexpr std::int64_t wander_parts = 500;
+
+PulseHistory history(const ImuConfiguration& configuration) {
+    const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
+    return {period, period / rate_parts, wander_parts};
+}
+
+}  // namespace
+
 ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
                          clock::Translator& translator, EventJournal& events)
     : model_(*configuration.model),
@@ -12,7 +29,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
-      witness_(SampleHistory(configuration)) {
+      witness_(history(configuration)) {
     report_.name = configuration.name;
     report_.model = model_.name;
 }
@@ -48,16 +65,18 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
 }
 
 std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
-    if (const auto doubt = contradicts_itself(sample)) return doubt;
+    const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
+    if (const auto doubt = contradicts_itself(pulse)) return doubt;
     const clock::ClockContact contact = translator_.contact();
     if (contact.life != clock_life_) witness_.forget();
     clock_life_ = contact.life;
-    const BoardTime departed = BoardTime{sample.time_ns} + Duration{sample.departure_ns};
+    const BoardTime departed = pulse.at + Duration{sample.departure_ns};
     if (const auto doubt = contradicts_arrival(departed, received, translator_)) return doubt;
-    const auto doubt = witness_.judge(sample, contact.exchanges);
+    const auto doubt = witness_.judge(pulse, contact.exchanges);
+    if (!doubt) translator_.clock_continues();
     if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
     // The part was set up anew, or the board lost count.
-    witness_.adopt();
+    witness_.adopt(pulse);
     last_number_.reset();
     translator_.begin_epoch();
     journal(EventKind::stream_stepped, sample, *doubt);

@@ -9,8 +9,9 @@
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
 #include "stream/event_journal.hpp"
-#include "stream/imu_witness.hpp"
+#include "stream/pulse_history.hpp"
 #include "stream/stamp_guard.hpp"
+#include "stream/witness.hpp"
 
 namespace versavis::daemon {
 
@@ -51,7 +52,7 @@ class ImuPipeline {
     ring::Writer ring_;
     clock::Translator& translator_;
     EventJournal& events_;
-    ImuWitness witness_;
+    Witness<PulseHistory> witness_;
     std::uint32_t clock_life_ = 0;
     StampGuard guard_;
     std::optional<std::uint64_t> last_number_;

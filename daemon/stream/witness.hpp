@@ -10,8 +10,9 @@
 
 namespace versavis::daemon {
 
-/// History: what messages were believed. It has `std::optional<Doubt> doubt(message) const` and
-/// `void learn(message)`; one that has learned nothing doubts nothing. Not thread-safe.
+/// History: what messages were believed. It has `std::optional<Doubt> doubt(message) const`,
+/// `void learn(message)`, and `void rebase()`, after which it knows what is usual but not where the
+/// next message belongs; one that has learned nothing doubts nothing. Not thread-safe.
 template <class History>
 class Witness {
  public:
@@ -41,15 +42,19 @@ class Witness {
         return rivals_ >= rivals_to_step && exchanges - rival_since_ >= exchanges_to_confirm;
     }
 
-    /// From now on those are believed.
-    void adopt() {
-        believed_ = rival_;
-        rivals_ = 0;
+    /// From now on those are believed, of which `message` is the newest.
+    template <class Message>
+    void adopt(const Message& message) {
+        forget();
+        if (believed_.doubt(message))
+            believed_ = rival_;
+        else
+            believed_.learn(message);
     }
 
-    /// The next message is believed as it is.
+    /// The next message may belong anywhere.
     void forget() {
-        believed_ = blank_;
+        believed_.rebase();
         rivals_ = 0;
     }
 

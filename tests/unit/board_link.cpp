@@ -98,7 +98,7 @@ struct Listener final : BoardListener {
         return true;
     }
     void exchange_doubted(const Doubt& /*doubt*/) override {}
-    void board_event(const wire::Event& /*event*/) override {}
+    void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 };
 
 struct Clock {

@@ -22,7 +22,7 @@ class NoBoard final : public BoardListener {
         return true;
     }
     void exchange_doubted(const Doubt& /*doubt*/) override {}
-    void board_event(const wire::Event& /*event*/) override {}
+    void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 };
 
 struct Bench : test::Pipelines {

@@ -37,7 +37,8 @@ class Bench : public test::Pipelines {
         wire::Exposure record{};
         record.trigger = ++triggers;
         record.tick = tick;
-        record.flags = flags;
+        // Grid points are left out in the pattern alone.
+        record.flags = static_cast<std::uint16_t>(flags | (tick < 20 ? wire::exposure_pattern : 0));
         record.trigger_ns = at.ns;
         record.start_ns = (flags & wire::exposure_no_start) != 0 ? wire::no_time : at.ns + 20'000;
         record.end_ns = (flags & wire::exposure_measured) != 0 ? at.ns + 4'020'000 : wire::no_time;

@@ -58,6 +58,11 @@ constexpr double contradicting = 6.0;
 // Six: a step is followed 0.3 s later.
 constexpr int contradictions_to_restart = 3;
 
+// The same while the board's other messages go on as before, so that its clock cannot have stepped:
+// then the exchanges are wrong, or the estimate was. Half: lies that last 1.5 s are followed.
+// Twice: an estimate that began wrong is doubted for 6 s.
+constexpr int contradictions_against_witnesses = 30;
+
 // In ns/s; no two clocks differ by 1000 ppm. Half or twice is as far from any crystal.
 constexpr double largest_skew = 1e6;
 
@@ -127,11 +132,18 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     last_residual_ = rounded((delay_ns(up, up_) - delay_ns(down, down_)) / 2);
     const bool old = goes_back(std::min(exchange.received, exchange.answered));
     if (contradicts(up, up_) || contradicts(down, down_)) {
-        if (old || ++contradictions_ >= contradictions_to_restart) restart(exchange, round_trip);
+        ++contradictions_;
+        // A young estimate may itself be what is wrong.
+        if (!continued_ || slots_ < slots_to_lock) ++unwitnessed_contradictions_;
+        continued_ = false;
+        if (unwitnessed_contradictions_ >= contradictions_to_restart ||
+            contradictions_ >= contradictions_against_witnesses)
+            restart(exchange, round_trip);
         return;
     }
     if (old) return;  // it was held up on its way
-    contradictions_ = 0;
+    contradictions_ = unwitnessed_contradictions_ = 0;
+    continued_ = false;
     contradiction_ = {};
     remember_round_trip(now, round_trip);
     down_.offer(down, delay_ns(down, down_));
@@ -167,7 +179,8 @@ void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     }
     begun_ = true;
     reset_ = false;
-    contradictions_ = 0;
+    contradictions_ = unwitnessed_contradictions_ = 0;
+    continued_ = false;
     contradiction_ = {};
     const double scale = start_scale_of_round_trip * static_cast<double>(round_trip.ns);
     up_.begin(scale);

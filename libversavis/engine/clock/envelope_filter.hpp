@@ -42,6 +42,9 @@ class EnvelopeFilter {
     /// The board began a new life: its clock starts anew, with the crystal and the link it had.
     void board_restarted();
 
+    /// A message that is no exchange shows that the board's clock did not step.
+    void clock_continues() { continued_ = true; }
+
     /// A measured asymmetry takes the place of the presumed one, and of the allowance for it.
     void set_asymmetry(const std::optional<Asymmetry>& asymmetry) { asymmetry_ = asymmetry; }
 
@@ -107,7 +110,9 @@ class EnvelopeFilter {
     bool down_in_slot_ = false;
     double recent_surprises_ = 0;  ///< fading
     int contradictions_ = 0;       ///< exchanges in a row
-    Duration contradiction_;       ///< by which the newest was impossible
+    int unwitnessed_contradictions_ = 0;
+    bool continued_ = false;  ///< since the newest exchange
+    Duration contradiction_;  ///< by which the newest was impossible
     std::uint64_t slots_ = 0;
     std::uint64_t exchanges_ = 0;
     std::uint64_t one_way_messages_ = 0;

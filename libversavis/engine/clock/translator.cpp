@@ -62,6 +62,11 @@ ClockContact Translator::contact() const {
     return {clock_life(), filter_.exchanges()};
 }
 
+void Translator::clock_continues() {
+    const std::lock_guard lock(mutex_);
+    filter_.clock_continues();
+}
+
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
     filter_.add(exchange);

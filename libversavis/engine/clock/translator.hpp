@@ -96,6 +96,9 @@ class Translator {
     void add(const OneWay& message);
     ClockContact contact() const;
 
+    /// A message that its own stream confirms shows that the board's clock did not step.
+    void clock_continues();
+
     /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse
     /// began.
     void pps_pulse(BoardTime at);

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/event_witness.hpp"
+
+#include "stream/arrival_check.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// How far the second pulse may be off a second from the first: the board's crystal, a receiver
+/// that settles. At half, receivers that settle slowly lose pulses; at twice, such a lie may pass.
+constexpr Duration first_pps_tolerance = milliseconds(1);
+
+/// Over lost pulses the board's crystal drifts by no more than 10 ppm. At half, one that warms up
+/// is doubted after a gap; at twice, such a pulse may be off by 20 us per second of the gap.
+constexpr std::int64_t crystal_parts = 100'000;
+
+}  // namespace
+
+EventWitness::EventWitness(const clock::Translator& translator)
+    : translator_(translator), pps_(PulseHistory(seconds(1), first_pps_tolerance, crystal_parts)) {}
+
+std::optional<Doubt> EventWitness::judge(const wire::Event& event, HostTime received) {
+    const Pulse pulse{static_cast<std::uint32_t>(event.value), BoardTime{event.time_ns}};
+    if (const auto doubt = contradicts_itself(pulse)) return doubt;
+    if (const auto doubt = contradicts_arrival(pulse.at, received, translator_)) return doubt;
+    if (event.kind != wire::EventKind::pps) return std::nullopt;
+    const clock::ClockContact contact = translator_.contact();
+    if (contact.life != clock_life_) pps_.forget();
+    clock_life_ = contact.life;
+    const auto doubt = pps_.judge(pulse, contact.exchanges);
+    if (!doubt || !pps_.stepped(contact.exchanges)) return doubt;
+    pps_.adopt(pulse);
+    return std::nullopt;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/pulse_history.hpp"
+
+namespace versavis::daemon {
+
+std::optional<Doubt> contradicts_itself(const Pulse& pulse) {
+    if (in_life(pulse.at.ns)) return std::nullopt;
+    return Doubt{EventReason::implausible_time, pulse.at.ns, 0};
+}
+
+std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
+    if (!newest_) return std::nullopt;
+    const auto pulses = static_cast<std::int32_t>(pulse.number - newest_->number);
+    if (pulses <= 0)
+        return Doubt{EventReason::implausible_number, pulse.number, newest_->number + 1};
+    const Duration off = pulse.at - newest_->at - pace_.value() * pulses;
+    const Duration wander = pace_.value() * (pulses - 1) / wander_parts_;
+    if (absolute(off) <= pace_.tolerance() + wander) return std::nullopt;
+    return Doubt{EventReason::implausible_time, pulse.at.ns, (pulse.at - off).ns};
+}
+
+void PulseHistory::learn(const Pulse& pulse) {
+    if (newest_)
+        pace_.learn((pulse.at - newest_->at) /
+                    static_cast<std::int32_t>(pulse.number - newest_->number));
+    newest_ = pulse;
+}
+
+}  // namespace versavis::daemon
