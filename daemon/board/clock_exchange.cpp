@@ -41,7 +41,7 @@ wire::ClockRequest ClockExchange::request() {
     wire::ClockRequest request{};
     request.id = ++request_id_;
     plan_next_request();
-    request_sent_ = host_now();
+    leaves();
     return request;
 }
 
