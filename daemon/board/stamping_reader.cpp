@@ -20,6 +20,11 @@ constexpr int realtime_priority = 20;
 /// for nothing; at twice, it ends later.
 constexpr Duration longest_read = milliseconds(100);
 
+/// Times that the thread may be woken for nothing, beyond those for something: then it gives
+/// real-time priority back. At half, a burst of writes may cost it; at twice, a stream that never
+/// sleeps holds all others up for twice as long.
+constexpr int most_idle_wakes = 100;
+
 void ask_for_realtime() {
     const sched_param wanted{realtime_priority};
     const int error = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &wanted);
@@ -27,6 +32,13 @@ void ask_for_realtime() {
         log(LogLevel::debug, "board",
             "its bytes are stamped at ordinary priority: {}; LimitRTPRIO={} allows more",
             std::strerror(error), realtime_priority);
+}
+
+void give_realtime_back() {
+    const sched_param ordinary{};
+    ::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &ordinary);
+    log(LogLevel::debug, "board",
+        "its link never sleeps: its bytes are stamped at ordinary priority");
 }
 
 }  // namespace
@@ -47,14 +59,20 @@ StampingReader::~StampingReader() {
 
 void StampingReader::run() {
     ask_for_realtime();
+    int idle_wakes = 0;
     std::array<std::uint8_t, largest_chunk> buffer{};
     while (!stop_) {
+        const HostTime begin = host_now();
         const auto chunk = stream_.read(buffer, longest_read);
         if (!chunk) {
             error_ = chunk.error();
             break;
         }
+        if (chunk->size == 0 && host_now() - begin < longest_read &&
+            ++idle_wakes == most_idle_wakes)
+            give_realtime_back();
         if (chunk->size == 0) continue;
+        if (idle_wakes > 0 && idle_wakes < most_idle_wakes) --idle_wakes;
         keep(std::span(buffer).first(chunk->size), chunk->received);
         consumer_.signal();
     }

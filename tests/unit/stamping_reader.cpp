@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/stamping_reader.hpp"
 
+#include <sched.h>
+
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <deque>
@@ -22,6 +24,8 @@ class PlayedStream final : public ByteStream {
     };
 
     Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
+        policy_ = ::sched_getscheduler(0);
+        if (restless_) return Chunk{};
         std::unique_lock lock(mutex_);
         idle_ = given_.empty();
         changed_.notify_all();
@@ -42,6 +46,8 @@ class PlayedStream final : public ByteStream {
         idle_ = false;
         changed_.notify_all();
     }
+    void never_sleep() { restless_ = true; }
+    int policy() const { return policy_; }
     void end() {
         const std::lock_guard lock(mutex_);
         ended_ = true;
@@ -59,6 +65,8 @@ class PlayedStream final : public ByteStream {
     std::deque<Given> given_;
     bool ended_ = false;
     bool idle_ = false;
+    std::atomic<bool> restless_{false};
+    std::atomic<int> policy_{-1};  ///< of the thread that reads
 };
 
 struct Bench {
@@ -140,4 +148,13 @@ TEST_CASE("stamping_reader: what finds no room is counted, and what follows is t
     bench.stream.wait_until_read();
     REQUIRE(bench.drain());
     CHECK(bench.bytes.back() == 8);
+}
+
+TEST_CASE("stamping_reader: a stream that never sleeps does not keep real-time priority") {
+    Bench bench;
+    bench.stream.never_sleep();
+    bench.stream.give({HostTime{1}, {1}});
+    const HostTime deadline = host_now() + seconds(10);
+    while (bench.stream.policy() != SCHED_OTHER && host_now() < deadline) std::this_thread::yield();
+    CHECK(bench.stream.policy() == SCHED_OTHER);
 }
