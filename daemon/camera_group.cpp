@@ -160,8 +160,13 @@ std::vector<CameraStatus> CameraGroup::status(HostTime now) const {
 
 std::vector<StreamStatus> CameraGroup::streams() const {
     std::vector<StreamStatus> streams;
-    for (const Unit& unit : units_)
-        streams.push_back({unit.configuration.name, "frames", unit.pipeline->items()});
+    for (const Unit& unit : units_) {
+        const std::string& name = unit.configuration.name;
+        streams.push_back({name, "frames", unit.pipeline->items()});
+        if (unit.pipeline->triggered())
+            streams.push_back(
+                {name + evidence_suffix, "evidence", unit.pipeline->evidence_items()});
+    }
     return streams;
 }
 

@@ -26,11 +26,6 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
     return "";
 }
 
-/// Seconds since 1970 that nanoseconds can tell: until 2116, with room for sums.
-bool label_in_range(std::int64_t utc_s) {
-    return utc_s >= 0 && utc_s < (std::int64_t{1} << 62U) / 1'000'000'000;
-}
-
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -174,7 +169,7 @@ void Service::board_event(const wire::Event& event, HostTime received) {
 
 void Service::use_pps(const wire::Event& event) {
     if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
-    if (event.kind == wire::EventKind::utc_label && label_in_range(event.value))
+    if (event.kind == wire::EventKind::utc_label)
         translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
 }
 

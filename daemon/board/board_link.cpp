@@ -29,9 +29,9 @@ constexpr Duration answer_timeout = milliseconds(1000);
 constexpr int hello_attempts = 5;
 constexpr Duration hello_timeout = milliseconds(250);
 
-/// The board reports its health every second: so long without a packet, it is gone. At half, two
-/// lost packets end the connection; at twice, a dead board is noticed later.
-constexpr Duration silence_limit = seconds(3);
+/// The board reports its health every second: one that is silent for so long may have begun a new
+/// life, and is greeted again. At half, all boards are; at twice, a lost board is noticed later.
+constexpr Duration silence_limit = milliseconds(1500);
 
 /// Exchanges before cameras may start, so that the first frame can be stamped. At half, the first
 /// stamps are worse; at twice, the first frame comes 0.1 s later.
@@ -41,18 +41,22 @@ constexpr unsigned exchanges_to_start = 4;
 /// link are lost; at twice, a link without any starts 0.2 s later.
 constexpr Duration follow_up_patience = milliseconds(50);
 
-/// Longest wait for bytes, and so for the end of the thread. At half, it wakes up twice as often
-/// for nothing; at twice, it ends later.
-constexpr Duration longest_read = milliseconds(100);
+/// Longest wait for bytes and commands. At half, the thread wakes up twice as often for nothing; at
+/// twice, silence is noticed later.
+constexpr Duration longest_wait = milliseconds(100);
 
 /// Shortest wait for bytes: a request that is due may be late by so much. At half, it hardly wakes
 /// more often; at twice, neither.
-constexpr Duration shortest_read = microseconds(100);
+constexpr Duration shortest_wait = microseconds(100);
 
 /// A board whose clock is off by more than this is in another life, whatever its nonce says. At
 /// half, a stalled link begins a new epoch for nothing; at twice, a restart with an equal nonce
 /// within a second of the last one is missed.
 constexpr Duration largest_clock_surprise = milliseconds(500);
+
+/// Packets in a row with one and the same unknown nonce that are a new life of the board. At half,
+/// a single damaged one is; at twice, a new life is noticed three packets later.
+constexpr int strangers_to_believe = 3;
 
 constexpr std::uint8_t all_cameras = 0xFF;
 
@@ -90,6 +94,7 @@ void BoardLink::start() {
 
 void BoardLink::stop() {
     stop_ = true;
+    wake_.signal();
     if (thread_.joinable()) thread_.join();
 }
 
@@ -121,29 +126,28 @@ BoardReport BoardLink::report() const {
 
 void BoardLink::run() {
     set_state(BoardState::absent, "looking for it");
-    do {
+    for (bool go_on = true; go_on;) {
         auto stream = open_();
         if (!stream) {
             set_state(BoardState::absent, stream.error().message());
+            go_on = pause(retry_interval);
             continue;
         }
-        {
-            const std::lock_guard lock(send_mutex_);
-            stream_ = std::move(*stream);
-            host_nonce_ = std::random_device{}();
-            host_sequence_ = 0;
-        }
+        stream_ = std::move(*stream);
+        reader_.emplace(*stream_, wake_);
+        host_nonce_ = std::random_device{}();
+        host_sequence_ = 0;
+        decoder_ = {};
+        dropped_bytes_ = 0;
         const auto ended = serve();
-        accepting_ = false;
-        if (connected_) listener_.board_lost();
-        connected_ = false;
-        if (ended) stop_cameras(all_cameras);
-        {
-            const std::lock_guard lock(send_mutex_);
-            stream_.reset();
-        }
+        const bool was_running = report().state == BoardState::running;
+        if (ended) static_cast<void>(send(wire::Stop{all_cameras, {}}));
+        reader_.reset();
+        stream_.reset();
         if (!ended && !explained()) set_state(BoardState::absent, ended.error().message());
-    } while (pause(explained() ? retry_refused : retry_interval));
+        // A link that worked is tried again at once.
+        go_on = was_running ? !stop_ : pause(explained() ? retry_refused : retry_interval);
+    }
 }
 
 /// True when the board is there, but of no use until the user changes something.
@@ -152,35 +156,54 @@ bool BoardLink::explained() const {
     return state == BoardState::incompatible || state == BoardState::refused;
 }
 
-/// One connection, from hello to its end. A value: the link was asked to stop.
+/// One connection, to its end. A value: the link was asked to stop.
 Expected<> BoardLink::serve() {
+    for (;;) {
+        auto ended = converse();
+        const bool was_connected = std::exchange(connected_, false);
+        accepting_ = false;
+        forget_commands();
+        if (was_connected) listener_.board_lost();
+        // A board that does not get as far as to run is given a pause.
+        if (ended || !anew_ || !was_connected) return ended;
+        log(LogLevel::warning, "board", "{}: greeting it again", ended.error().message());
+    }
+}
+
+/// One conversation, from hello to its end.
+Expected<> BoardLink::converse() {
     if (!explained()) set_state(BoardState::handshake, "");
     if (auto done = handshake(); !done) return done;
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;
     set_state(BoardState::running, "");
+    {
+        const std::lock_guard lock(command_mutex_);
+        takes_commands_ = true;
+    }
     listener_.board_synchronised();
+    if (auto sent = send_commands(); !sent) return sent;
     connected_ = true;
     accepting_ = true;
     listener_.board_connected();
     while (!stop_) {
-        const HostTime now = host_now();
-        if (now - last_packet_ > silence_limit)
-            return failure("board", "the board went silent", "check cable and power");
-        if (now >= clock_.next_request())
+        if (auto sent = send_commands(); !sent) return sent;
+        if (host_now() >= clock_.next_request())
             if (auto sent = send(clock_.request()); !sent) return sent;
-        if (auto done = read(std::min(longest_read,
-                                      std::max(clock_.next_request() - host_now(), shortest_read)));
+        if (auto done = read(std::min(longest_wait,
+                                      std::max(clock_.next_request() - host_now(), shortest_wait)));
             !done)
             return done;
-        if (!greeted_) return failure("board", "the board was reset");
+        anew_ = host_now() - last_packet_ > silence_limit;
+        if (anew_) return failure("board", "went silent", "check cable and power");
     }
     return {};
 }
 
 Expected<> BoardLink::handshake() {
-    decoder_ = {};
     greeted_ = false;
+    anew_ = false;
+    strangers_ = 0;
     // A delimiter first: whatever an earlier connection left unfinished ends here.
     const std::uint8_t delimiter = 0;
     if (auto sent = stream_->write({&delimiter, 1}); !sent) return sent;
@@ -249,73 +272,98 @@ Expected<> BoardLink::read_until(const std::function<bool()>& done, Duration tim
     while (!done()) {
         const Duration left = deadline - host_now();
         if (left.ns <= 0 || stop_) return failure("board", what, "check cable, power and firmware");
-        if (auto result = read(std::min(left, longest_read)); !result) return result;
+        if (auto result = read(std::min(left, longest_wait)); !result) return result;
     }
     return {};
 }
 
 Expected<> BoardLink::read(Duration timeout) {
-    auto chunk = stream_->read(timeout);
-    if (!chunk) return Unexpected(chunk.error());
-    if (chunk->bytes.empty()) return {};
-    decoder_.feed(chunk->bytes.data(), chunk->bytes.size(),
-                  [&](const wire::Packet& packet) { take(packet, chunk->received); });
+    wake_.wait(timeout);
+    const auto drained =
+        reader_->drain([&](std::span<const std::uint8_t> bytes, HostTime received) {
+            decoder_.feed(bytes.data(), bytes.size(),
+                          [&](const wire::Packet& packet) { take(packet, received); });
+        });
+    if (!drained) return drained;
+    if (anew_) return failure("board", "was reset");
+    const std::uint64_t dropped = reader_->dropped();
+    if (dropped > dropped_bytes_)
+        log(LogLevel::warning, "board", "{} bytes came faster than they were taken, and are lost",
+            dropped - dropped_bytes_);
     const std::lock_guard lock(report_mutex_);
     report_.malformed = decoder_.errors();
+    report_.dropped_bytes += dropped - std::exchange(dropped_bytes_, dropped);
     return {};
 }
 
 void BoardLink::take(const wire::Packet& packet, HostTime received) {
+    wire::BoardHello hello{};
+    if (packet.read(hello)) return take(hello, packet.header, received);
+    if (!greeted_ || anew_ || !of_this_life(packet.header)) return;
     last_packet_ = received;
-    if (packet.read(hello_)) {
-        greeted_ = true;
-        clock_.abandon();
-        nonce_ = packet.header.nonce;
-        next_sequence_ = packet.header.sequence + 1;
-        if (!same_life(packet.header, received)) {
-            listener_.board_restarted();
-            clock_.board_restarted(nonce_);
-        }
-        last_life_ = nonce_;
-        return;
-    }
-    if (!greeted_) return;
-    if (packet.header.nonce != nonce_) {
-        greeted_ = false;
-        return;
-    }
-    count_losses(packet.header);
-    wire::Exposure exposure{};
-    wire::ImuSample sample{};
-    wire::Event event{};
-    wire::ClockAnswer answer{};
-    wire::ClockFollowUp follow_up{};
+    const bool used =
+        use<wire::Exposure>(packet,
+                            [&](const auto& record) { listener_.exposure(record, received); }) ||
+        use<wire::ImuSample>(packet,
+                             [&](const auto& sample) {
+                                 if (listener_.imu_sample(sample, received))
+                                     clock_.take(sample, received);
+                             }) ||
+        use<wire::Event>(packet,
+                         [&](const auto& event) { listener_.board_event(event, received); }) ||
+        use<wire::ClockAnswer>(packet,
+                               [&](const auto& answer) { note(clock_.take(answer, received)); }) ||
+        use<wire::ClockFollowUp>(packet, [&](const auto& told) { note(clock_.take(told)); });
+    if (!used) take_answer(packet);
+}
+
+/// True: it is a T, and if what it says can be, it was used.
+template <class T, class Use>
+bool BoardLink::use(const wire::Packet& packet, Use&& use) {
+    T message{};
+    if (!packet.read(message)) return false;
+    if (possible(message))
+        use(message);
+    else
+        count_impossible();
+    return true;
+}
+
+void BoardLink::take_answer(const wire::Packet& packet) {
     wire::Health health{};
     wire::Log line{};
     wire::Refusal refusal{};
-    if (packet.read(exposure)) return listener_.exposure(exposure, received);
-    if (packet.read(sample)) {
-        if (listener_.imu_sample(sample, received)) clock_.take(sample, received);
-        return;
-    }
-    if (packet.read(event)) return listener_.board_event(event, received);
-    if (packet.read(answer)) return note(clock_.take(answer, received));
-    if (packet.read(follow_up)) return note(clock_.take(follow_up));
     if (packet.read(line))
-        return log(static_cast<LogLevel>(line.level), "board", "{}",
-                   text(line.text, sizeof line.text));
-    if (packet.read(refusal)) {
-        if (refusal.id == configuration_.id) refusals_.push_back(describe(refusal));
+        log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
+    if (packet.read(refusal) && refusal.id == configuration_.id)
+        refusals_.push_back(describe(refusal));
+    if (packet.read(answer_)) answered_ = answer_.id == configuration_.id;
+    if (!packet.read(health)) return;
+    const std::lock_guard lock(report_mutex_);
+    report_.health = counters_.since_start(health);
+}
+
+/// The answer to ours, or one that nobody asked for: then the board begins a new life.
+void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, HostTime received) {
+    if (!possible(hello)) return count_impossible();
+    const bool same = same_life(hello, header.nonce, received);
+    if (greeted_) {
+        anew_ = anew_ || !same;  // else the second answer to two hellos
+        if (same) of_this_life(header);
         return;
     }
-    if (packet.read(answer_)) {
-        answered_ = answer_.id == configuration_.id;
-        return;
+    last_packet_ = received;
+    greeted_ = true;
+    hello_ = hello;
+    clock_.abandon();
+    nonce_ = header.nonce;
+    sequence_.begin(header.sequence);
+    if (!same) {
+        listener_.board_restarted();
+        clock_.board_restarted(nonce_);
+        counters_.board_restarted();
     }
-    if (packet.read(health)) {
-        const std::lock_guard lock(report_mutex_);
-        report_.health = health;
-    }
+    last_life_ = nonce_;
 }
 
 void BoardLink::note(const std::optional<Doubt>& doubt) {
@@ -328,27 +376,70 @@ void BoardLink::note(const std::optional<Doubt>& doubt) {
 }
 
 /// The nonce says so, and the clock must agree: a nonce could be drawn twice.
-bool BoardLink::same_life(const wire::Header& header, HostTime received) const {
-    if (header.nonce != last_life_) return false;
-    const auto expected = translator_.to_host(BoardTime{hello_.board_time_ns});
+bool BoardLink::same_life(const wire::BoardHello& hello, std::uint32_t nonce,
+                          HostTime received) const {
+    if (nonce != last_life_) return false;
+    const auto expected = translator_.to_host(BoardTime{hello.board_time_ns});
     return !expected || absolute(received - expected->time) < largest_clock_surprise;
 }
 
-void BoardLink::count_losses(const wire::Header& header) {
-    const std::uint32_t lost = header.sequence - next_sequence_;
-    next_sequence_ = header.sequence + 1;
+/// False: its nonce is another. One such packet is an error, a few that agree are a new life.
+bool BoardLink::of_this_life(const wire::Header& header) {
+    if (header.nonce != nonce_) {
+        strangers_ = header.nonce == stranger_ ? strangers_ + 1 : 1;
+        stranger_ = header.nonce;
+        anew_ = strangers_ >= strangers_to_believe;
+        count_impossible();
+        return false;
+    }
+    strangers_ = 0;
+    const std::uint64_t lost_before = sequence_.lost();
+    if (!sequence_.add(header.sequence)) count_impossible();
     const std::lock_guard lock(report_mutex_);
     ++report_.packets;
-    report_.lost_packets += lost;
+    report_.lost_packets += sequence_.lost() - lost_before;
+    return true;
+}
+
+void BoardLink::count_impossible() {
+    const std::lock_guard lock(report_mutex_);
+    ++report_.impossible;
 }
 
 template <class T>
 Expected<> BoardLink::send(const T& message) {
-    const std::lock_guard lock(send_mutex_);
-    if (!stream_) return failure("board", "is not connected");
     wire::Frame frame{};
     wire::encode(message, host_nonce_, host_sequence_++, frame);
+    if constexpr (std::is_same_v<T, wire::ClockRequest>) clock_.leaves();
     return stream_->write({frame.bytes, frame.size});
+}
+
+void BoardLink::give(const Command& command) {
+    {
+        const std::lock_guard lock(command_mutex_);
+        if (!takes_commands_) return;
+        commands_.push_back(command);
+    }
+    wake_.signal();
+}
+
+void BoardLink::forget_commands() {
+    const std::lock_guard lock(command_mutex_);
+    takes_commands_ = false;
+    commands_.clear();
+}
+
+Expected<> BoardLink::send_commands() {
+    std::vector<Command> commands;
+    {
+        const std::lock_guard lock(command_mutex_);
+        commands.swap(commands_);
+    }
+    for (const Command& command : commands)
+        if (auto sent = std::visit([this](const auto& message) { return send(message); }, command);
+            !sent)
+            return sent;
+    return {};
 }
 
 void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
@@ -357,20 +448,19 @@ void BoardLink::start_cameras(std::uint8_t mask, pairing::Start how) {
     message.cameras = mask;
     if (how == pairing::Start::pattern) message.flags = wire::start_pattern;
     if (how == pairing::Start::slow) message.flags = wire::start_slow;
-    // A failed write shows in the link's own thread, too, which then begins anew.
-    static_cast<void>(send(message));
+    give(message);
 }
 
-void BoardLink::stop_cameras(std::uint8_t mask) { static_cast<void>(send(wire::Stop{mask, {}})); }
+void BoardLink::stop_cameras(std::uint8_t mask) { give(wire::Stop{mask, {}}); }
 
-void BoardLink::align_grid(const wire::AlignGrid& message) { static_cast<void>(send(message)); }
+void BoardLink::align_grid(const wire::AlignGrid& message) { give(message); }
 
 void BoardLink::announce_exposure(unsigned output, std::uint64_t trigger, Duration exposure) {
     wire::ExpectedExposure message{};
     message.camera = static_cast<std::uint8_t>(output);
     message.trigger = trigger;
     message.exposure_ns = exposure.ns;
-    static_cast<void>(send(message));
+    give(message);
 }
 
 }  // namespace versavis::daemon

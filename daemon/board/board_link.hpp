@@ -9,12 +9,18 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
+#include "board/board_counters.hpp"
 #include "board/byte_stream.hpp"
 #include "board/clock_exchange.hpp"
+#include "board/packet_check.hpp"
+#include "board/stamping_reader.hpp"
+#include "board/wake_up.hpp"
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/pairing.hpp"
@@ -55,7 +61,9 @@ struct BoardReport {
     std::uint64_t lost_packets = 0;
     std::uint64_t malformed = 0;
     std::uint64_t exchanges_doubted = 0;  ///< answers to clock requests that cannot be true
-    wire::Health health{};
+    std::uint64_t impossible = 0;         ///< packets with a number, nonce or time that cannot be
+    std::uint64_t dropped_bytes = 0;      ///< the service did not take them in time
+    wire::Health health{};                ///< its counters began with the service
 };
 
 class BoardLink {
@@ -85,20 +93,31 @@ class BoardLink {
     bool running() const { return accepting_; }
 
  private:
+    using Command = std::variant<wire::Start, wire::Stop, wire::ExpectedExposure, wire::AlignGrid>;
+
     void run();
     bool explained() const;
     Expected<> serve();
+    Expected<> converse();
     Expected<> handshake();
     Expected<> configure();
     Expected<> synchronise();
     Expected<> read(Duration timeout);
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
-    bool same_life(const wire::Header& header, HostTime received) const;
+    void take(const wire::BoardHello& hello, const wire::Header& header, HostTime received);
+    void take_answer(const wire::Packet& packet);
+    bool same_life(const wire::BoardHello& hello, std::uint32_t nonce, HostTime received) const;
+    bool of_this_life(const wire::Header& header);
     void note(const std::optional<Doubt>& doubt);
-    void count_losses(const wire::Header& header);
+    void count_impossible();
+    template <class T, class Use>
+    bool use(const wire::Packet& packet, Use&& use);
     template <class T>
     Expected<> send(const T& message);
+    void give(const Command& command);
+    void forget_commands();
+    Expected<> send_commands();
     void set_state(BoardState state, const std::string& hint);
     bool pause(Duration duration) const;
 
@@ -107,19 +126,28 @@ class BoardLink {
     clock::Translator& translator_;
     BoardListener& listener_;
 
-    std::mutex send_mutex_;  ///< guards stream_ against senders, and the sequence
-    std::unique_ptr<ByteStream> stream_;
-    std::uint32_t host_nonce_ = 0;
-    std::uint32_t host_sequence_ = 0;
+    WakeUp wake_;  ///< of the link's thread: bytes or commands came
+    std::mutex command_mutex_;
+    std::vector<Command> commands_;  ///< to be sent by the link's thread, so that no other waits
+    bool takes_commands_ = false;
 
     // Of the link's thread.
+    std::unique_ptr<ByteStream> stream_;
+    std::optional<StampingReader> reader_;
+    std::uint32_t host_nonce_ = 0;
+    std::uint32_t host_sequence_ = 0;
     ClockExchange clock_;
     wire::Decoder decoder_;
+    SequenceWatch sequence_;
+    BoardCounters counters_;
     bool greeted_ = false;
     bool connected_ = false;
+    std::uint64_t dropped_bytes_ = 0;  ///< of this connection, told so far
+    bool anew_ = false;  ///< the board began a new life, or seems to: greet it at once
     wire::BoardHello hello_{};
     std::uint32_t nonce_ = 0;
-    std::uint32_t next_sequence_ = 0;
+    std::uint32_t stranger_ = 0;  ///< nonce of the last packets that are of no known life
+    int strangers_ = 0;           ///< how many of them came in a row
     std::uint32_t last_life_ = 0;
     bool answered_ = false;
     wire::ConfigurationAnswer answer_{};

@@ -2,11 +2,11 @@
 // Bytes to and from the board, whatever carries them.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "configuration/configuration.hpp"
 #include "versavis/error.hpp"
@@ -14,21 +14,26 @@
 
 namespace versavis::daemon {
 
-/// Bytes that came together, and when.
+/// How many bytes came together, and when.
 struct Chunk {
     HostTime received;
-    std::vector<std::uint8_t> bytes;  ///< empty: nothing came in time
+    std::size_t size = 0;  ///< 0: nothing came in time
 };
 
-/// read() belongs to one thread, write() may be called by any other.
+/// Most bytes that come together: some 40 packets of the board. At half, a burst takes twice the
+/// reads; at twice, nothing gains, since a short USB packet ends a read.
+inline constexpr std::size_t largest_chunk = 4096;
+
+/// read() belongs to one thread, write() to one other.
 class ByteStream {
  public:
     virtual ~ByteStream() = default;
 
-    /// Waits up to `timeout` for bytes. Error: the board is gone.
-    virtual Expected<Chunk> read(Duration timeout) = 0;
+    /// Waits up to `timeout` for bytes; `into` has room for the largest chunk. Error: the board is
+    /// gone.
+    virtual Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) = 0;
 
-    /// Writes all or fails; waits for a slow board a bounded time.
+    /// Writes all or fails; waits for a slow board a bounded time. Somebody must be reading.
     virtual Expected<> write(std::span<const std::uint8_t> bytes) = 0;
 
     /// Names the place that the board is plugged in at, the same each time.

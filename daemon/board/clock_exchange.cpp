@@ -49,7 +49,7 @@ wire::ClockRequest ClockExchange::request() {
     wire::ClockRequest request{};
     request.id = ++request_id_;
     plan_next_request();
-    request_sent_ = host_now();
+    leaves();
     return request;
 }
 
@@ -65,8 +65,6 @@ std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTi
         return std::nullopt;
     request_open_ = false;
     ++answers_;
-    if (!in_life(answer.received_ns) || !in_life(answer.sent_ns))
-        return Doubt{EventReason::implausible_time, answer.received_ns, 0};
     const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
     if (const auto doubt = contradicts_causality(exchange)) return doubt;
     exchange_ = exchange;
@@ -78,7 +76,7 @@ std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTi
 std::optional<Doubt> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
     if (!exchange_ || follow_up.id != request_id_) return std::nullopt;
     clock::Exchange exchange = *exchange_;
-    if (follow_up.sent_ns < exchange.answered.ns || !in_life(follow_up.sent_ns))
+    if (follow_up.sent_ns < exchange.answered.ns)
         return Doubt{EventReason::implausible_time, follow_up.sent_ns, exchange.answered.ns};
     exchange.answered.ns = follow_up.sent_ns;
     if (const auto doubt = contradicts_causality(exchange)) return doubt;

@@ -27,8 +27,10 @@ class ClockExchange {
     /// The board's clock began anew, and with it the nonce of its life.
     void board_restarted(std::uint32_t nonce);
 
-    /// Stamps the request: it must be sent at once.
     wire::ClockRequest request();
+
+    /// The request leaves now: it must be written at once.
+    void leaves() { request_sent_ = host_now(); }
     HostTime next_request() const { return next_request_; }
 
     /// Doubted: what contradicts causality is not used.

@@ -29,25 +29,23 @@ class UnixStream final : public ByteStream {
 
     std::string port() const override { return "unix:" + path_; }
 
-    Expected<Chunk> read(Duration timeout) override {
+    Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
         Chunk chunk;
         const std::int64_t wait_ns = std::max<std::int64_t>(timeout.ns, 0);
         const timespec limit{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
         pollfd readable{socket_, POLLIN, 0};
         if (::ppoll(&readable, 1, &limit, nullptr) <= 0) return chunk;
-        chunk.bytes.resize(4096);
-        const ssize_t size = ::recv(socket_, chunk.bytes.data(), chunk.bytes.size(), MSG_DONTWAIT);
+        const ssize_t size = ::recv(socket_, into.data(), into.size(), 0);
         chunk.received = host_now();
         if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR))
             return failure(path_, "the board closed the link");
-        chunk.bytes.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+        chunk.size = static_cast<std::size_t>(std::max<ssize_t>(size, 0));
         return chunk;
     }
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
         while (!bytes.empty()) {
-            const ssize_t size =
-                ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+            const ssize_t size = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
             if (size > 0) {
                 bytes = bytes.subspan(static_cast<std::size_t>(size));
                 continue;
@@ -72,11 +70,16 @@ Expected<std::unique_ptr<ByteStream>> open_unix_stream(const std::string& path) 
     if (path.size() >= sizeof peer.sun_path)
         return failure("board.link", "the path of the socket is too long");
     std::memcpy(peer.sun_path, path.c_str(), path.size() + 1);
-    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    // A socket that blocks would wait here for as long as the board's queue is full.
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (::connect(socket, reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0) {
-        const std::string reason = std::generic_category().message(errno);
+        const int error = errno;
         ::close(socket);
-        return failure(path, fmt::format("cannot connect: {}", reason),
+        if (error == EAGAIN)
+            return failure(path, "the board's process does not accept the connection",
+                           "another program may hold it: stop that, or restart the process");
+        return failure(path,
+                       fmt::format("cannot connect: {}", std::generic_category().message(error)),
                        "is the board's process (versavis-rig) running?");
     }
     return std::make_unique<UnixStream>(path, socket);

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <libusb.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
-#include <deque>
+#include <boost/container/static_vector.hpp>
+#include <condition_variable>
 #include <mutex>
 #include <optional>
 
@@ -17,10 +19,6 @@ namespace {
 /// Reads that are always under way, so that the host controller never waits for the service. At
 /// half, a late thread loses a USB frame; at twice, 16 KiB more are locked.
 constexpr std::size_t transfer_count = 4;
-
-/// Bytes of one read: some 40 packets of the board. At half, a burst takes twice the reads; at
-/// twice, nothing gains, since a short packet ends a read.
-constexpr std::size_t transfer_size = 4096;
 
 /// A board that does not take data for so long is gone. At half, one that erases its flash is lost;
 /// at twice, those who wait to send wait longer.
@@ -71,12 +69,14 @@ class UsbStream final : public ByteStream {
     ~UsbStream() override {
         for (Slot& slot : slots_)
             if (slot.pending) libusb_cancel_transfer(slot.transfer.get());
+        if (writing_.pending) libusb_cancel_transfer(writing_.transfer.get());
         timeval limit{0, 100'000};
         for (int tries = 0; tries < 20 && pending() > 0; ++tries)
             libusb_handle_events_timeout_completed(context_.get(), &limit, nullptr);
         // A transfer that never came back still points here: leaking it is safer than freeing it.
         for (Slot& slot : slots_)
             if (slot.pending) static_cast<void>(slot.transfer.release());
+        if (writing_.pending) static_cast<void>(writing_.transfer.release());
         libusb_release_interface(handle_.get(), function_.data_interface);
         libusb_release_interface(handle_.get(), function_.control_interface);
     }
@@ -85,15 +85,12 @@ class UsbStream final : public ByteStream {
 
     Expected<> start() {
         for (Slot& slot : slots_) {
-            slot.owner = this;
-            slot.transfer.reset(libusb_alloc_transfer(0));
-            libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), function_.endpoint_in,
-                                      slot.buffer.data(), static_cast<int>(slot.buffer.size()),
-                                      &UsbStream::completed, &slot, 0);
+            prepare(slot, function_.endpoint_in, &UsbStream::read_completed, 0);
             if (const int code = libusb_submit_transfer(slot.transfer.get()); code != 0)
                 return usb_failure("cannot read", code);
             slot.pending = true;
         }
+        prepare(writing_, function_.endpoint_out, &UsbStream::write_completed, write_timeout_ms);
         return {};
     }
 
@@ -109,21 +106,34 @@ class UsbStream final : public ByteStream {
         return name;
     }
 
-    Expected<Chunk> read(Duration timeout) override {
-        if (auto chunk = pop()) return std::move(*chunk);
+    /// Only here are events handled, so what completes is seen, and stamped, by this thread: none
+    /// of it can complete between the look and the wait.
+    Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
+        if (completed_.empty() && !gone_) {
+            timeval limit{timeout.ns / 1'000'000'000, timeout.ns % 1'000'000'000 / 1000};
+            libusb_handle_events_timeout_completed(context_.get(), &limit, nullptr);
+        }
+        if (!completed_.empty()) return take_first(into);
         if (gone_) return failure("USB board", "the board was unplugged or reset");
-        timeval limit{timeout.ns / 1'000'000'000, timeout.ns % 1'000'000'000 / 1000};
-        libusb_handle_events_timeout_completed(context_.get(), &limit, nullptr);
-        return pop().value_or(Chunk{});
+        return Chunk{};
     }
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
-        int done = 0;
-        const int code = libusb_bulk_transfer(
-            handle_.get(), function_.endpoint_out, const_cast<std::uint8_t*>(bytes.data()),
-            static_cast<int>(bytes.size()), &done, write_timeout_ms);
-        if (code != 0 || done != static_cast<int>(bytes.size()))
+        std::unique_lock lock(write_mutex_);
+        if (writing_.pending || gone_ || bytes.size() > writing_.buffer.size())
+            return usb_failure("the board does not accept data", LIBUSB_ERROR_BUSY);
+        libusb_transfer& transfer = *writing_.transfer;
+        std::copy(bytes.begin(), bytes.end(), writing_.buffer.begin());
+        transfer.length = static_cast<int>(bytes.size());
+        if (const int code = libusb_submit_transfer(&transfer); code != 0)
             return usb_failure("the board does not accept data", code);
+        writing_.pending = true;
+        // libusb ends it at its time-out: twice that is only waited for when nobody reads.
+        written_.wait_for(lock, std::chrono::milliseconds(2 * write_timeout_ms),
+                          [this] { return !writing_.pending; });
+        if (writing_.pending || transfer.status != LIBUSB_TRANSFER_COMPLETED ||
+            transfer.actual_length != transfer.length)
+            return usb_failure("the board does not accept data", LIBUSB_ERROR_TIMEOUT);
         return {};
     }
 
@@ -131,40 +141,56 @@ class UsbStream final : public ByteStream {
     struct Slot {
         UsbStream* owner = nullptr;
         std::unique_ptr<libusb_transfer, TransferDeleter> transfer;
-        std::array<std::uint8_t, transfer_size> buffer{};
+        std::array<std::uint8_t, largest_chunk> buffer{};
+        HostTime received;
         std::atomic<bool> pending{false};
     };
 
-    /// May run on a writing thread, too: libusb lets whichever thread waits handle events, under
-    /// its own lock.
-    static void LIBUSB_CALL completed(libusb_transfer* transfer) {
+    void prepare(Slot& slot, std::uint8_t endpoint, libusb_transfer_cb_fn completed,
+                 unsigned timeout_ms) {
+        slot.owner = this;
+        slot.transfer.reset(libusb_alloc_transfer(0));
+        libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), endpoint, slot.buffer.data(),
+                                  static_cast<int>(slot.buffer.size()), completed, &slot,
+                                  timeout_ms);
+    }
+
+    static void LIBUSB_CALL read_completed(libusb_transfer* transfer) {
         auto& slot = *static_cast<Slot*>(transfer->user_data);
-        slot.owner->take(slot, *transfer);
+        slot.received = host_now();
+        UsbStream& stream = *slot.owner;
+        slot.pending = false;
+        if (transfer->status == LIBUSB_TRANSFER_COMPLETED && transfer->actual_length > 0)
+            stream.completed_.push_back(&slot);
+        else if (transfer->status == LIBUSB_TRANSFER_COMPLETED)
+            stream.submit(slot);
+        else
+            stream.gone_ = true;
     }
 
-    void take(Slot& slot, libusb_transfer& transfer) {
-        const HostTime received = host_now();
-        if (transfer.status == LIBUSB_TRANSFER_COMPLETED && transfer.actual_length > 0) {
-            const std::lock_guard lock(chunks_mutex_);
-            chunks_.push_back(
-                {received, {transfer.buffer, transfer.buffer + transfer.actual_length}});
-        }
-        const bool usable = transfer.status == LIBUSB_TRANSFER_COMPLETED ||
-                            transfer.status == LIBUSB_TRANSFER_TIMED_OUT;
-        slot.pending = usable && libusb_submit_transfer(&transfer) == 0;
-        if (!slot.pending) gone_ = true;
+    static void LIBUSB_CALL write_completed(libusb_transfer* transfer) {
+        auto& slot = *static_cast<Slot*>(transfer->user_data);
+        const std::lock_guard lock(slot.owner->write_mutex_);
+        slot.pending = false;
+        slot.owner->written_.notify_one();
     }
 
-    std::optional<Chunk> pop() {
-        const std::lock_guard lock(chunks_mutex_);
-        if (chunks_.empty()) return std::nullopt;
-        Chunk chunk = std::move(chunks_.front());
-        chunks_.pop_front();
+    Chunk take_first(std::span<std::uint8_t> into) {
+        Slot& slot = *completed_.front();
+        completed_.erase(completed_.begin());
+        const Chunk chunk{slot.received, static_cast<std::size_t>(slot.transfer->actual_length)};
+        std::copy_n(slot.buffer.begin(), chunk.size, into.begin());
+        submit(slot);
         return chunk;
     }
 
+    void submit(Slot& slot) {
+        slot.pending = libusb_submit_transfer(slot.transfer.get()) == 0;
+        if (!slot.pending) gone_ = true;
+    }
+
     int pending() const {
-        int count = 0;
+        int count = writing_.pending ? 1 : 0;
         for (const Slot& slot : slots_) count += slot.pending ? 1 : 0;
         return count;
     }
@@ -173,8 +199,10 @@ class UsbStream final : public ByteStream {
     Handle handle_;
     CdcFunction function_;
     std::array<Slot, transfer_count> slots_;
-    std::mutex chunks_mutex_;  ///< never held while libusb is called
-    std::deque<Chunk> chunks_;
+    boost::container::static_vector<Slot*, transfer_count> completed_;  ///< of the reading thread
+    Slot writing_;
+    std::mutex write_mutex_;  ///< guards writing_.pending
+    std::condition_variable written_;
     std::atomic<bool> gone_{false};
 };
 

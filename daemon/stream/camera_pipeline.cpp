@@ -55,16 +55,29 @@ void CameraPipeline::begin_anew() {
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
                                    std::uint64_t payload_size, bool has_clock) {
+    // Rings are made, and end, outside the lock that all threads wait for: that takes long. Only
+    // the camera's thread does so, and what the ring before still waits for is published first.
+    if (triggered() && !evidence_.recording()) {
+        auto ring = EvidenceRecorder::make_ring(directory, configuration_.name);
+        if (!ring) return Unexpected(ring.error());
+        const std::lock_guard lock(mutex_);
+        evidence_.use(std::move(*ring));
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        witness_.forget();
+        begin_anew();
+    }
+    auto ring = frames_.make_ring(directory, payload_size);
+    if (!ring) return Unexpected(ring.error());
+    std::optional<ring::Writer> before;
     const std::lock_guard lock(mutex_);
-    if (triggered())
-        if (auto opened = evidence_.open(directory, configuration_.name); !opened) return opened;
-    witness_.forget();
-    begin_anew();
+    if (*ring) before = frames_.use(std::move(**ring));
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     pairing_.set_limits(limits_);
     tell(limits_);
     report_.last_proof = host_now();
-    return frames_.prepare(directory, payload_size);
+    return {};
 }
 
 std::optional<std::uint32_t> CameraPipeline::acquire() {
@@ -171,11 +184,14 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
     const auto middle = middles_.find(exposure.trigger);
     if (middle == middles_.end()) {
         frame_unpaired(arrival, EventReason::mismatch, nullptr);
+        announce_unpaired(exposure, EventReason::mismatch);
     } else if (check_.contradicts(arrival, exposure)) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
+        announce_unpaired(exposure, EventReason::wrong_exposure);
     } else if (!frames_.publish_proved(arrival, exposure, middle->second)) {
         if (frames_.stuck()) translator_.begin_epoch();
         frame_unpaired(arrival, EventReason::went_back, nullptr);
+        announce_unpaired(exposure, EventReason::went_back);
     } else {
         report_.last_proof = arrival.arrived;
         ++report_.published;
@@ -216,16 +232,18 @@ void CameraPipeline::announce_unpaired(const pairing::Exposure& exposure, EventR
 
 void CameraPipeline::locked(const pairing::Exposure& first) {
     ++report_.locks;
-    log(LogLevel::info, configuration_.name, "paired: frames are verified from trigger {} on",
-        first.trigger);
+    unsaid_.push_back({LogLevel::info, fmt::format("paired: frames are verified from trigger {} on",
+                                                   first.trigger)});
     journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger),
             first.start);
 }
 
 void CameraPipeline::slipped(const pairing::Arrival& at) {
     ++report_.slips;
-    log(LogLevel::warning, configuration_.name,
-        "pairing slipped at block {}: frames are withheld until it is proved again", at.block_id);
+    unsaid_.push_back(
+        {LogLevel::warning,
+         fmt::format("pairing slipped at block {}: frames are withheld until it is proved again",
+                     at.block_id)});
     journal(EventKind::pairing_slipped, EventReason::mismatch,
             static_cast<std::int64_t>(at.block_id));
 }
@@ -243,7 +261,17 @@ void CameraPipeline::reset() {
 }
 
 std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
-    const std::lock_guard lock(mutex_);
+    std::vector<Line> lines;
+    const auto wanted = [&] {
+        const std::lock_guard lock(mutex_);
+        lines.swap(unsaid_);
+        return advance_locked(now);
+    }();
+    for (const auto& [level, text] : lines) log(level, configuration_.name, "{}", text);
+    return wanted;
+}
+
+std::optional<pairing::Start> CameraPipeline::advance_locked(HostTime now) {
     frames_.heartbeat(now);
     if (!triggered()) return std::nullopt;
     evidence_.heartbeat(now);
@@ -298,6 +326,11 @@ PipelineReport CameraPipeline::report() {
 std::uint64_t CameraPipeline::items() {
     const std::lock_guard lock(mutex_);
     return frames_.items();
+}
+
+std::uint64_t CameraPipeline::evidence_items() {
+    const std::lock_guard lock(mutex_);
+    return evidence_.items();
 }
 
 }  // namespace versavis::daemon

@@ -6,10 +6,12 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
+#include "log.hpp"
 #include "stream/event_journal.hpp"
 #include "stream/evidence_recorder.hpp"
 #include "stream/exposure_check.hpp"
@@ -95,8 +97,14 @@ class CameraPipeline final : private pairing::Outcome {
     std::uint64_t unanswered_triggers();
     PipelineReport report();
     std::uint64_t items();
+    std::uint64_t evidence_items();
 
  private:
+    struct Line {
+        LogLevel level;
+        std::string text;
+    };
+
     void paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) override;
     void frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
                         const pairing::Exposure* guess) override;
@@ -110,6 +118,7 @@ class CameraPipeline final : private pairing::Outcome {
     void note(const wire::Exposure& record, const Doubt& doubt);
     void adopt_step(const wire::Exposure& record, const Doubt& doubt);
     void follow_clock(std::uint32_t life);
+    std::optional<pairing::Start> advance_locked(HostTime now);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
@@ -134,6 +143,7 @@ class CameraPipeline final : private pairing::Outcome {
     /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
     PipelineReport report_;
+    std::vector<Line> unsaid_;  ///< advance() logs it: nothing is written under the lock
 };
 
 }  // namespace versavis::daemon

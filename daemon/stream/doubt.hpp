@@ -14,9 +14,4 @@ struct Doubt {
     std::int64_t expected = 0;  ///< by its witnesses
 };
 
-/// The board has run for less than 146 years: differences of such times do not overflow.
-inline bool in_life(std::int64_t board_ns) {
-    return board_ns >= 0 && board_ns < std::int64_t{1} << 62U;
-}
-
 }  // namespace versavis::daemon

@@ -22,7 +22,6 @@ EventWitness::EventWitness(const clock::Translator& translator)
 
 std::optional<Doubt> EventWitness::judge(const wire::Event& event, HostTime received) {
     const Pulse pulse{static_cast<std::uint32_t>(event.value), BoardTime{event.time_ns}};
-    if (const auto doubt = contradicts_itself(pulse)) return doubt;
     if (const auto doubt = contradicts_arrival(pulse.at, received, translator_)) return doubt;
     if (event.kind != wire::EventKind::pps) return std::nullopt;
     const clock::ClockContact contact = translator_.contact();

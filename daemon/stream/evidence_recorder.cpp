@@ -13,14 +13,10 @@ constexpr std::uint32_t evidence_items = 16384;
 
 }  // namespace
 
-Expected<> EvidenceRecorder::open(const std::filesystem::path& directory,
-                                  const std::string& camera) {
-    if (ring_) return {};
-    auto ring = ring::Writer::create(
+Expected<ring::Writer> EvidenceRecorder::make_ring(const std::filesystem::path& directory,
+                                                   const std::string& camera) {
+    return ring::Writer::create(
         directory, {camera + evidence_suffix, ring::StreamKind::evidence, evidence_items});
-    if (!ring) return Unexpected(ring.error());
-    ring_.emplace(std::move(*ring));
-    return {};
 }
 
 void EvidenceRecorder::record(const pairing::Evidence& evidence) {

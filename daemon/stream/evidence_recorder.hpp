@@ -17,12 +17,17 @@ class EvidenceRecorder {
  public:
     explicit EvidenceRecorder(clock::Translator& translator) : translator_(translator) {}
 
-    /// Makes the ring, once. Error: it cannot be made.
-    Expected<> open(const std::filesystem::path& directory, const std::string& camera);
+    /// Takes long. Error: the ring cannot be made.
+    static Expected<ring::Writer> make_ring(const std::filesystem::path& directory,
+                                            const std::string& camera);
 
-    /// Nothing is recorded before open().
+    /// Nothing is recorded before.
+    void use(ring::Writer ring) { ring_.emplace(std::move(ring)); }
+    bool recording() const { return ring_.has_value(); }
+
     void record(const pairing::Evidence& evidence);
     void heartbeat(HostTime now);
+    std::uint64_t items() const { return ring_ ? ring_->head() : 0; }
 
  private:
     clock::Translator& translator_;

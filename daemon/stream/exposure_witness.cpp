@@ -63,18 +63,14 @@ std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
                                         const CameraConfiguration& configuration) {
     if (!flags_agree(record, configuration))
         return Doubt{EventReason::implausible_flags, record.flags, 0};
-    if (!in_life(record.trigger_ns))
-        return Doubt{EventReason::implausible_time, record.trigger_ns, 0};
     if (!has_start(record)) return std::nullopt;
     const Duration latest = from_us(configuration.latency_us) + period_of(configuration) +
                             shortest_patience + overlong_slack;
-    if (!in_life(record.start_ns) || record.start_ns < record.trigger_ns ||
-        record.start_ns - record.trigger_ns > latest.ns)
+    if (record.start_ns < record.trigger_ns || record.start_ns - record.trigger_ns > latest.ns)
         return Doubt{EventReason::implausible_time, record.start_ns, record.trigger_ns};
     if (!has_end(record)) return std::nullopt;
     const Duration longest = from_us(configuration.max_exposure_us) + overlong_slack;
-    if (!in_life(record.end_ns) || record.end_ns < record.start_ns ||
-        record.end_ns - record.start_ns > longest.ns)
+    if (record.end_ns < record.start_ns || record.end_ns - record.start_ns > longest.ns)
         return Doubt{EventReason::implausible_length, record.end_ns, record.start_ns + longest.ns};
     return std::nullopt;
 }

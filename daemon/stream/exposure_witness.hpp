@@ -13,8 +13,7 @@
 
 namespace versavis::daemon {
 
-/// What no honest record of this camera says, whatever came before it. The board's times of a
-/// record that passes can be subtracted from each other without overflow.
+/// What no honest record of this camera says, whatever came before it.
 std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
                                         const CameraConfiguration& configuration);
 

@@ -41,9 +41,9 @@ std::uint32_t total_sigma_ns(std::uint32_t clock_ns, Duration kind) {
 FramePublisher::FramePublisher(const CameraConfiguration& configuration)
     : name_(configuration.name), slots_(configuration.slots) {}
 
-Expected<> FramePublisher::prepare(const std::filesystem::path& directory,
-                                   std::uint64_t payload_size) {
-    if (ring_ && ring_->slot_size() >= payload_size) return {};
+Expected<std::optional<ring::Writer>> FramePublisher::make_ring(
+    const std::filesystem::path& directory, std::uint64_t payload_size) const {
+    if (ring_ && ring_->slot_size() >= payload_size) return std::nullopt;
     ring::Shape shape;
     shape.name = name_;
     shape.kind = ring::StreamKind::frames;
@@ -52,8 +52,7 @@ Expected<> FramePublisher::prepare(const std::filesystem::path& directory,
     shape.descriptor_count = power_of_two(2 * slots_);
     auto ring = ring::Writer::create(directory, shape);
     if (!ring) return Unexpected(ring.error());
-    ring_.emplace(std::move(*ring));
-    return {};
+    return std::move(*ring);
 }
 
 bool FramePublisher::publish_proved(const pairing::Arrival& arrival,

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
@@ -13,14 +14,20 @@
 
 namespace versavis::daemon {
 
-/// Not thread-safe. Slots are those of Writer; none can be had before prepare().
+/// Not thread-safe. Slots are those of Writer; none can be had before use().
 class FramePublisher {
  public:
     explicit FramePublisher(const CameraConfiguration& configuration);
 
-    /// Makes the ring, or one with larger slots when `payload_size` bytes do not fit: slots that
-    /// were acquired are void then. Error: the ring cannot be made.
-    Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size);
+    /// A ring for payloads of that size; none: the one in use has room. Takes long, and changes
+    /// nothing here. Error: the ring cannot be made.
+    Expected<std::optional<ring::Writer>> make_ring(const std::filesystem::path& directory,
+                                                    std::uint64_t payload_size) const;
+
+    /// Slots that were acquired are void. Returns the ring before, which takes long to end.
+    std::optional<ring::Writer> use(ring::Writer ring) {
+        return std::exchange(ring_, std::move(ring));
+    }
 
     std::optional<std::uint32_t> acquire() { return ring_->acquire(); }
     std::byte* slot_data(std::uint32_t slot) { return ring_->slot_data(slot); }

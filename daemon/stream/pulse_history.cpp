@@ -3,11 +3,6 @@
 
 namespace versavis::daemon {
 
-std::optional<Doubt> contradicts_itself(const Pulse& pulse) {
-    if (in_life(pulse.at.ns)) return std::nullopt;
-    return Doubt{EventReason::implausible_time, pulse.at.ns, 0};
-}
-
 std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
     if (!newest_) return std::nullopt;
     const auto pulses = static_cast<std::int32_t>(pulse.number - newest_->number);

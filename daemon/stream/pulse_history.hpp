@@ -17,10 +17,6 @@ struct Pulse {
     BoardTime at;
 };
 
-/// What no honest message says, whatever came before it. Board times of pulses that pass can be
-/// subtracted from each other without overflow.
-std::optional<Doubt> contradicts_itself(const Pulse& pulse);
-
 /// The pulses that were believed: times follow from numbers.
 class PulseHistory {
  public:

@@ -88,6 +88,8 @@ json board_json(const BoardReport& board, bool needed) {
             {"packets", board.packets},
             {"lost_packets", board.lost_packets},
             {"malformed_packets", board.malformed},
+            {"impossible_packets", board.impossible},
+            {"dropped_bytes", board.dropped_bytes},
             {"dropped_by_board", health.dropped_exposures + health.dropped_clock_answers +
                                      health.dropped_events + health.dropped_imu_samples +
                                      health.dropped_logs},

@@ -110,7 +110,8 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     wire::AlignGrid alignment;
     wire::Reboot reboot;
     if (packet.read(hello)) return greet(hello);
-    if (!greeted_) return;
+    // A host that speaks to another life of this board learns of this one at once.
+    if (!greeted_) return transmitter_.send(introduction());
     if (packet.read(request)) return send(wire::ClockAnswer{request.id, 0, received, 0});
     if (packet.read(configuration)) return configure(configuration);
     if (packet.read(begin)) return start(begin);
@@ -133,6 +134,12 @@ void Board::greet(const wire::HostHello& hello) {
     configuring_ = false;
     stop(0xFF);
     transmitter_.begin();
+    send(introduction());
+    if (hello.major != wire::protocol_major) greeted_ = false;
+    next_health_ = hal_.clock.now() + health_interval;
+}
+
+wire::BoardHello Board::introduction() const {
     wire::BoardHello answer{};
     answer.major = wire::protocol_major;
     answer.minor = wire::protocol_minor;
@@ -144,9 +151,7 @@ void Board::greet(const wire::HostHello& hello) {
     const char version[] = "versavis " VERSAVIS_VERSION;
     static_assert(sizeof version <= sizeof answer.firmware);
     std::memcpy(answer.firmware, version, sizeof version);
-    send(answer);
-    if (hello.major != wire::protocol_major) greeted_ = false;
-    next_health_ = hal_.clock.now() + health_interval;
+    return answer;
 }
 
 void Board::configure(const wire::Configuration& configuration) {

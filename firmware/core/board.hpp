@@ -56,6 +56,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void take_pulse(wire::PulseInput input, Nanoseconds at);
     void handle(const wire::Packet& packet, Nanoseconds received);
     void greet(const wire::HostHello& hello);
+    wire::BoardHello introduction() const;
     void configure(const wire::Configuration& configuration);
     void apply(const wire::Configuration& configuration, Nanoseconds now);
     void apply_imus(const wire::Configuration& configuration, Nanoseconds now);

@@ -3,12 +3,14 @@
 #include "board/board_link.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <deque>
 #include <future>
 
 #include "../support/temporary_directory.hpp"
+#include "native_board.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;
@@ -25,29 +27,57 @@ class PlayedBoard final : public ByteStream {
     PlayedBoard(std::uint8_t minor, bool follows_up, std::vector<wire::Type>* heard = nullptr)
         : minor_(minor), follows_up_(follows_up), heard_(heard) {}
 
-    Expected<Chunk> read(Duration timeout) override {
+    Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
         std::unique_lock lock(mutex_);
-        const auto any = [this] { return !chunks_.empty(); };
-        if (!came_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), any))
-            return Chunk{host_now(), {}};
-        Chunk chunk = std::move(chunks_.front());
-        chunks_.pop_front();
-        return chunk;
+        const auto any = [this] { return !packets_.empty(); };
+        if (!came_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), any)) return Chunk{};
+        const Arriving packet = packets_.front();
+        packets_.pop_front();
+        std::copy_n(packet.frame.bytes, packet.frame.size, into.begin());
+        return Chunk{packet.at, packet.frame.size};
     }
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
+        {
+            std::unique_lock lock(mutex_);
+            came_.wait(lock, [this] { return !writes_held_; });
+        }
         decoder_.feed(bytes.data(), bytes.size(),
                       [this](const wire::Packet& packet) { answer(packet); });
         return {};
     }
 
+    /// From now on writes wait, or no longer.
+    void hold_writes(bool held) {
+        const std::lock_guard lock(mutex_);
+        writes_held_ = held;
+        came_.notify_all();
+    }
+
+    void set_nonce(std::uint32_t nonce) { nonce_ = nonce; }
+    /// It answers nothing until it is greeted.
+    void mute() { mute_ = true; }
+    void skip_numbers(std::uint32_t count) { sequence_ += count; }
+
+    template <class T>
+    void send(const T& message) {
+        send(message, host_now());
+    }
+
  private:
+    struct Arriving {
+        HostTime at;
+        wire::Frame frame;
+    };
+
     void answer(const wire::Packet& packet) {
         wire::HostHello hello{};
         wire::Configuration configuration{};
         wire::ClockRequest request{};
         const HostTime now = host_now();
         if (heard_ != nullptr) heard_->push_back(packet.header.type);
+        if (mute_ && packet.header.type != wire::Type::host_hello) return;
+        mute_ = false;
         if (packet.read(hello)) {
             wire::BoardHello message{};
             message.major = wire::protocol_major;
@@ -70,9 +100,9 @@ class PlayedBoard final : public ByteStream {
     template <class T>
     void send(const T& message, HostTime arrives) {
         wire::Frame frame{};
-        wire::encode(message, 7, sequence_++, frame);
         const std::lock_guard lock(mutex_);
-        chunks_.push_back({arrives, {frame.bytes, frame.bytes + frame.size}});
+        wire::encode(message, nonce_, sequence_++, frame);
+        packets_.push_back({arrives, frame});
         came_.notify_one();
     }
 
@@ -80,25 +110,61 @@ class PlayedBoard final : public ByteStream {
     bool follows_up_;
     std::vector<wire::Type>* heard_;
     wire::Decoder decoder_;
-    std::uint32_t sequence_ = 0;
+    std::atomic<std::uint32_t> nonce_{7};
+    std::atomic<std::uint32_t> sequence_{0};
+    std::atomic<bool> mute_{false};
+    bool writes_held_ = false;
     std::mutex mutex_;
     std::condition_variable came_;
-    std::deque<Chunk> chunks_;
+    std::deque<Arriving> packets_;
 };
 
-struct Listener final : BoardListener {
-    std::promise<void> connected;
+/// Counts what it is told; the test waits for counts.
+class Listener final : public BoardListener {
+ public:
+    struct Counts {
+        unsigned restarted = 0;
+        unsigned connected = 0;
+        unsigned lost = 0;
+        unsigned samples = 0;
+        unsigned exposures = 0;
+    };
+
     std::function<void()> synchronised = [] {};
-    void board_restarted() override {}
+    void board_restarted() override { count(&Counts::restarted); }
     void board_synchronised() override { synchronised(); }
-    void board_connected() override { connected.set_value(); }
-    void board_lost() override {}
-    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
+    void board_connected() override { count(&Counts::connected); }
+    void board_lost() override { count(&Counts::lost); }
+    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {
+        count(&Counts::exposures);
+    }
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
+        count(&Counts::samples);
         return true;
     }
     void exchange_doubted(const Doubt& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
+
+    Counts counts() {
+        const std::lock_guard lock(mutex_);
+        return counts_;
+    }
+    bool wait(unsigned Counts::*counter, unsigned value) {
+        std::unique_lock lock(mutex_);
+        return changed_.wait_for(lock, std::chrono::seconds(10),
+                                 [&] { return counts_.*counter >= value; });
+    }
+
+ private:
+    void count(unsigned Counts::*counter) {
+        const std::lock_guard lock(mutex_);
+        ++(counts_.*counter);
+        changed_.notify_all();
+    }
+
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    Counts counts_;
 };
 
 struct Clock {
@@ -120,9 +186,91 @@ clock::ClockReport connect(std::uint8_t minor, bool follows_up) {
         },
         {}, 1, clock.translator, clock.recorder, listener);
     link.start();
-    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) ==
-            std::future_status::ready);
+    REQUIRE(listener.wait(&Listener::Counts::connected, 1));
     return clock.translator.report();
+}
+
+/// A link to a board that the test plays, while it runs.
+struct Running {
+    Running() {
+        link.start();
+        REQUIRE(listener.wait(&Listener::Counts::connected, 1));
+    }
+    ~Running() { board.load()->hold_writes(false); }
+
+    /// What was sent until now was taken.
+    void settle() {
+        const unsigned before = listener.counts().samples;
+        board.load()->send(wire::ImuSample{});
+        REQUIRE(listener.wait(&Listener::Counts::samples, before + 1));
+    }
+
+    Clock clock;
+    Listener listener;
+    std::atomic<PlayedBoard*> board{nullptr};
+    BoardLink link{[&]() -> Expected<std::unique_ptr<ByteStream>> {
+                       auto made = std::make_unique<PlayedBoard>(std::uint8_t{2}, true);
+                       board = made.get();
+                       return made;
+                   },
+                   {},
+                   10,
+                   clock.translator,
+                   clock.recorder,
+                   listener};
+};
+
+/// The board's own program, on a link that stays open whatever happens to the board.
+class NativeStream final : public ByteStream {
+ public:
+    NativeStream() { boot(); }
+
+    Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
+        const HostTime end = host_now() + timeout;
+        for (;;) {
+            {
+                const std::lock_guard lock(mutex_);
+                board_->run_until(board_now());
+                const auto out = board_->transmitted();
+                const std::size_t size = std::min(out.size(), into.size());
+                std::copy_n(out.begin(), size, into.begin());
+                board_->consume(size, board_now());
+                if (size > 0) return Chunk{host_now(), size};
+            }
+            if (host_now() > end) return Chunk{};
+            const timespec step{0, 1'000'000};
+            nanosleep(&step, nullptr);
+        }
+    }
+    Expected<> write(std::span<const std::uint8_t> bytes) override {
+        const std::lock_guard lock(mutex_);
+        board_->receive(bytes, board_now());
+        board_->run_until(board_now());
+        return {};
+    }
+    std::string port() const override { return "native"; }
+
+    /// A new life, of which the link tells nothing.
+    void boot() {
+        const std::lock_guard lock(mutex_);
+        booted_ = host_now();
+        board_.emplace(firmware::Identity{++nonce_, wire::ResetCause::watchdog, {}},
+                       firmware::Environment{});
+    }
+
+ private:
+    firmware::Nanoseconds board_now() const { return (host_now() - booted_).ns; }
+
+    std::mutex mutex_;
+    std::uint32_t nonce_ = 0;
+    HostTime booted_;
+    std::optional<firmware::NativeBoard> board_;
+};
+
+wire::ImuSample sample_at(std::int64_t ns) {
+    wire::ImuSample sample{};
+    sample.time_ns = ns;
+    return sample;
 }
 
 }  // namespace
@@ -157,10 +305,106 @@ TEST_CASE("board_link: the grid is aligned before any camera can be started") {
         link.align_grid({1, 2, 3});
     };
     link.start();
-    REQUIRE(listener.connected.get_future().wait_for(std::chrono::seconds(10)) ==
-            std::future_status::ready);
+    REQUIRE(listener.wait(&Listener::Counts::connected, 1));
     CHECK((link.report().capabilities & wire::capability_host_grid) != 0);
     link.stop();
     CHECK(std::count(heard.begin(), heard.end(), wire::Type::align_grid) == 1);
     CHECK(std::count(heard.begin(), heard.end(), wire::Type::start) == 0);
+}
+
+TEST_CASE("board_link: a board that reboots while the link stays open is back within a second") {
+    Clock clock;
+    Listener listener;
+    std::atomic<NativeStream*> board{nullptr};
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            auto made = std::make_unique<NativeStream>();
+            board = made.get();
+            return made;
+        },
+        {}, 10, clock.translator, clock.recorder, listener);
+    link.start();
+    for (unsigned life = 1; life <= 3; ++life) {
+        REQUIRE(listener.wait(&Listener::Counts::connected, life));
+        const HostTime rebooted = host_now();
+        board.load()->boot();
+        REQUIRE(listener.wait(&Listener::Counts::connected, life + 1));
+        CHECK(host_now() - rebooted < seconds(1));
+        CHECK(listener.counts().restarted == life + 1);
+        CHECK(listener.counts().lost == life);
+    }
+}
+
+TEST_CASE("board_link: a board that falls silent is greeted again on the same link") {
+    Running running;
+    PlayedBoard* board = running.board;
+    board->mute();
+    REQUIRE(running.listener.wait(&Listener::Counts::connected, 2));
+    CHECK(running.board == board);
+    CHECK(running.listener.counts().restarted == 1);  // it is the same life
+}
+
+TEST_CASE("board_link: packets of an unknown nonce are a new life when some agree") {
+    Running running;
+    PlayedBoard& board = *running.board;
+    board.set_nonce(8);
+    board.send(sample_at(1));
+    board.set_nonce(7);
+    running.settle();
+    CHECK(running.listener.counts().samples == 1);
+    CHECK(running.link.report().impossible == 1);
+    CHECK(running.listener.counts().connected == 1);
+    board.set_nonce(9);
+    const HostTime begin = host_now();
+    for (int i = 0; i < 3; ++i) board.send(sample_at(1));
+    REQUIRE(running.listener.wait(&Listener::Counts::connected, 2));
+    CHECK(host_now() - begin < seconds(1));
+    CHECK(running.listener.counts().restarted == 2);
+    CHECK(running.listener.counts().samples == 1);
+}
+
+TEST_CASE("board_link: a wrong packet number is an error and no loss") {
+    Running running;
+    running.board.load()->skip_numbers(0xFFFFFFF0U);
+    running.settle();
+    running.settle();  // goes on from there
+    running.board.load()->skip_numbers(3);
+    running.settle();
+    const BoardReport report = running.link.report();
+    CHECK(report.impossible == 1);
+    CHECK(report.lost_packets == 3);
+}
+
+TEST_CASE("board_link: times that cannot be reach nobody") {
+    Running running;
+    PlayedBoard& board = *running.board;
+    board.send(sample_at(std::numeric_limits<std::int64_t>::max()));
+    board.send(sample_at(-1));
+    wire::Exposure record{};
+    record.trigger_ns = std::numeric_limits<std::int64_t>::min();
+    board.send(record);
+    wire::BoardHello hello{};
+    hello.board_time_ns = std::numeric_limits<std::int64_t>::max();
+    board.send(hello);
+    running.settle();
+    CHECK(running.link.report().impossible == 4);
+    CHECK(running.listener.counts().samples == 1);
+    CHECK(running.listener.counts().exposures == 0);
+    CHECK(running.listener.counts().connected == 1);
+}
+
+TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
+    Running running;
+    running.board.load()->hold_writes(true);
+    auto given = std::async(std::launch::async, [&] {
+        running.link.stop_cameras(1);
+        running.link.start_cameras(1, pairing::Start::pattern);
+        running.link.announce_exposure(0, 1, milliseconds(1));
+        running.link.align_grid({});
+        return running.link.report().state;
+    });
+    const bool at_once = given.wait_for(std::chrono::seconds(5)) == std::future_status::ready;
+    running.board.load()->hold_writes(false);
+    CHECK(at_once);
+    CHECK(given.get() == BoardState::running);
 }

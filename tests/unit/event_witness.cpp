@@ -26,6 +26,5 @@ TEST_CASE("event_witness: pulses of PPS are a second apart, and no event comes f
     CHECK(doubted(wire::EventKind::pps, 21, -microseconds(200)));
     CHECK_FALSE(doubted(wire::EventKind::pps, 22, {}));
     CHECK(doubted(wire::EventKind::aux_pulse, 23, seconds(1000)));
-    CHECK(doubted(wire::EventKind::aux_pulse, 23, Duration{INT64_MIN / 2}));
     CHECK_FALSE(doubted(wire::EventKind::aux_pulse, 23, {}));
 }

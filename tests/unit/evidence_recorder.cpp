@@ -8,12 +8,14 @@
 using namespace versavis;
 using namespace versavis::daemon;
 
-TEST_CASE("evidence_recorder: what was recorded is read back, in order, from open() on") {
+TEST_CASE("evidence_recorder: what was recorded is read back, in order, from its ring on") {
     test::Pipelines bench;
     EvidenceRecorder recorder(bench.translator);
     recorder.record(pairing::Reset{});  // no ring yet
-    REQUIRE(recorder.open(bench.directory.path(), "cam0"));
-    REQUIRE(recorder.open(bench.directory.path(), "cam0"));  // once is enough
+    CHECK(recorder.items() == 0);
+    auto ring = EvidenceRecorder::make_ring(bench.directory.path(), "cam0");
+    REQUIRE(ring);
+    recorder.use(std::move(*ring));
     recorder.record(pairing::Shortfall{42, EventReason::frame_incomplete});
     recorder.record(pairing::Advance{HostTime{7}});
     auto reader = bench.reader("cam0-evidence");
@@ -23,4 +25,5 @@ TEST_CASE("evidence_recorder: what was recorded is read back, in order, from ope
     CHECK(std::get<pairing::Shortfall>(evidence()).block_id == 42);
     CHECK(std::get<pairing::Advance>(evidence()).now.ns == 7);
     CHECK(reader.next().found == ring::Found::nothing);
+    CHECK(recorder.items() == 2);
 }

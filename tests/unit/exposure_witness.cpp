@@ -113,9 +113,12 @@ TEST_CASE("exposure_witness: no field of a record overflows anything") {
         wire::Exposure made = record(20, milliseconds(4), milliseconds(4));
         if (*rc::gen::arbitrary<bool>()) made.trigger = *rc::gen::arbitrary<std::uint64_t>();
         if (*rc::gen::arbitrary<bool>()) made.tick = *rc::gen::arbitrary<std::uint64_t>();
-        if (*rc::gen::arbitrary<bool>()) made.trigger_ns = *rc::gen::arbitrary<std::int64_t>();
-        if (*rc::gen::arbitrary<bool>()) made.start_ns = *rc::gen::arbitrary<std::int64_t>();
-        if (*rc::gen::arbitrary<bool>()) made.end_ns = *rc::gen::arbitrary<std::int64_t>();
+        if (*rc::gen::arbitrary<bool>())
+            made.trigger_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
+        if (*rc::gen::arbitrary<bool>())
+            made.start_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
+        if (*rc::gen::arbitrary<bool>())
+            made.end_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
         const wire::Exposure honest = record(20, milliseconds(4), milliseconds(4));
         const bool damaged = made.trigger != honest.trigger || made.tick != honest.tick ||
                              made.trigger_ns != honest.trigger_ns ||

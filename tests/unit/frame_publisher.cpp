@@ -16,7 +16,13 @@ struct Bench : test::Pipelines {
         configuration.name = "cam0";
         configuration.slots = 9;
         frames.emplace(configuration);
-        REQUIRE(frames->prepare(directory.path(), 4096));
+        make_room(4096);
+    }
+
+    void make_room(std::uint64_t payload_size) {
+        auto ring = frames->make_ring(directory.path(), payload_size);
+        REQUIRE(ring);
+        if (*ring) frames->use(std::move(**ring));
     }
 
     pairing::Arrival arrival() {
@@ -88,10 +94,10 @@ TEST_CASE("frame_publisher: what is not proved has no sigma, and says so") {
 TEST_CASE("frame_publisher: larger frames get a new ring, smaller ones do not") {
     Bench bench;
     auto reader = bench.reader("cam0");
-    REQUIRE(bench.frames->prepare(bench.directory.path(), 100));
+    bench.make_room(100);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
     CHECK(reader.next().found == ring::Found::item);
-    REQUIRE(bench.frames->prepare(bench.directory.path(), 5000));
+    bench.make_room(5000);
     CHECK(reader.next().found == ring::Found::restarted);
     CHECK(bench.frames->items() == 0);
 }

@@ -82,7 +82,7 @@ TEST_CASE(
 
 TEST_CASE("imu_pipeline: a sample from the future is withheld, and those after it are not") {
     Bench bench;
-    const Duration lie = GENERATE(seconds(1000), milliseconds(20), Duration{INT64_MAX / 2});
+    const Duration lie = GENERATE(seconds(1000), milliseconds(20));
     bench.run(0, 20);
     CHECK_FALSE(bench.add(20, 20, lie));
     bench.run(21, 30);

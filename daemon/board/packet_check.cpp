@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/packet_check.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// More packets in a row are not lost: a link carries some 20,000 in the longest silence before
+/// the board is greeted anew. At half, such a gap counts as an error; at twice, more wrong numbers
+/// pass for losses.
+constexpr std::uint32_t largest_loss = 32768;
+
+/// No board runs for 36 years. At half, none does either; at twice, differences of three such
+/// times could overflow.
+constexpr std::int64_t latest_ns = std::int64_t{1} << 60U;
+
+/// The year 2200. At half, labels end in 2085; at twice, they do not fit int64 in nanoseconds.
+constexpr std::int64_t latest_label_s = 7'258'118'400;
+
+bool in_life(std::int64_t ns) { return ns >= 0 && ns <= latest_ns; }
+
+}  // namespace
+
+bool SequenceWatch::add(std::uint32_t sequence) {
+    const std::uint32_t gap = sequence - next_;
+    const bool follows = gap <= largest_loss || sequence == after_error_;
+    if (gap <= largest_loss) lost_ += gap;
+    if (!follows) after_error_ = sequence + 1;
+    next_ = (follows ? sequence : next_) + 1;
+    return follows;
+}
+
+bool possible(const wire::BoardHello& message) { return in_life(message.board_time_ns); }
+
+bool possible(const wire::Exposure& message) {
+    const auto edge = [](std::int64_t ns) { return ns == wire::no_time || in_life(ns); };
+    return in_life(message.trigger_ns) && edge(message.start_ns) && edge(message.end_ns);
+}
+
+bool possible(const wire::ImuSample& message) { return in_life(message.time_ns); }
+
+bool possible(const wire::Event& message) {
+    const bool label = message.kind == wire::EventKind::utc_label;
+    return in_life(message.time_ns) &&
+           (!label || (message.value >= 0 && message.value <= latest_label_s));
+}
+
+bool possible(const wire::ClockAnswer& message) {
+    return in_life(message.received_ns) && in_life(message.sent_ns);
+}
+
+bool possible(const wire::ClockFollowUp& message) { return in_life(message.sent_ns); }
+
+}  // namespace versavis::daemon

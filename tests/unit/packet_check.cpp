@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/packet_check.hpp"
+
+#include <catch2/catch.hpp>
+#include <limits>
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+TEST_CASE("packet_check: gaps are losses, also where the number wraps") {
+    SequenceWatch watch;
+    watch.begin(0xFFFFFFFD);
+    CHECK(watch.add(0xFFFFFFFE));
+    CHECK(watch.add(1));
+    CHECK(watch.add(2));
+    CHECK(watch.lost() == 2);
+}
+
+TEST_CASE("packet_check: one wrong number is an error and no loss") {
+    for (const std::uint32_t wrong : {3U, 0U, 0x80000000U, 0xFFFFFFFFU, 100'000U}) {
+        SequenceWatch watch;
+        watch.begin(9);
+        CHECK(watch.add(10));
+        CHECK_FALSE(watch.add(wrong));
+        CHECK(watch.add(12));
+        CHECK(watch.lost() == 0);
+    }
+}
+
+TEST_CASE("packet_check: numbers that go on from a wrong one are believed") {
+    SequenceWatch watch;
+    watch.begin(9);
+    CHECK_FALSE(watch.add(1'000'000));
+    CHECK(watch.add(1'000'001));
+    CHECK(watch.add(1'000'003));
+    CHECK(watch.lost() == 1);
+}
+
+TEST_CASE("packet_check: times before the boot or beyond any life cannot be") {
+    constexpr auto largest = std::numeric_limits<std::int64_t>::max();
+    for (const std::int64_t ns : {std::int64_t{-1}, wire::no_time, largest}) {
+        wire::Exposure exposure{};
+        exposure.trigger_ns = ns;
+        CHECK_FALSE(possible(exposure));
+        exposure.trigger_ns = 0;
+        exposure.start_ns = ns;
+        CHECK(possible(exposure) == (ns == wire::no_time));
+        wire::ImuSample sample{};
+        sample.time_ns = ns;
+        CHECK_FALSE(possible(sample));
+        wire::Event event{};
+        event.time_ns = ns;
+        CHECK_FALSE(possible(event));
+        wire::BoardHello hello{};
+        hello.board_time_ns = ns;
+        CHECK_FALSE(possible(hello));
+        CHECK_FALSE(possible(wire::ClockAnswer{1, 0, ns, 0}));
+        CHECK_FALSE(possible(wire::ClockAnswer{1, 0, 0, ns}));
+        CHECK_FALSE(possible(wire::ClockFollowUp{1, 0, ns}));
+    }
+}
+
+TEST_CASE("packet_check: a sentence of the year 2300 labels nothing") {
+    wire::Event event{};
+    event.kind = wire::EventKind::utc_label;
+    event.value = 10'413'792'000;  // 2300-01-01
+    CHECK_FALSE(possible(event));
+    event.value = 1'900'000'000;
+    CHECK(possible(event));
+    event.value = -1;
+    CHECK_FALSE(possible(event));
+    event.kind = wire::EventKind::pps;  // its value is no time
+    CHECK(possible(event));
+}
