@@ -73,11 +73,12 @@ const char* to_string(BoardState state) {
     return "unknown";
 }
 
-BoardLink::BoardLink(OpenStream open, const wire::Configuration& configuration,
-                     double exchange_rate_hz, clock::Translator& translator,
-                     ClockRecorder& recorder, BoardListener& listener)
+BoardLink::BoardLink(OpenStream open, const Configuration& configuration, double exchange_rate_hz,
+                     clock::Translator& translator, ClockRecorder& recorder,
+                     BoardListener& listener)
     : open_(std::move(open)),
-      configuration_(configuration),
+      file_(configuration),
+      configuration_(board_configuration(configuration)),
       translator_(translator),
       listener_(listener),
       clock_(exchange_rate_hz, translator, recorder) {}
@@ -305,7 +306,7 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
         return log(static_cast<LogLevel>(line.level), "board", "{}",
                    text(line.text, sizeof line.text));
     if (packet.read(refusal)) {
-        if (refusal.id == configuration_.id) refusals_.push_back(describe(refusal));
+        if (refusal.id == configuration_.id) refusals_.push_back(describe(file_, refusal));
         return;
     }
     if (packet.read(answer_)) {
