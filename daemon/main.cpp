@@ -9,6 +9,7 @@
 #include <cerrno>
 
 #include "configuration/configuration.hpp"
+#include "configuration/problem_report.hpp"
 #include "log.hpp"
 #include "service.hpp"
 
@@ -47,18 +48,31 @@ int serve(Service& service, const sigset_t& signals) {
     }
 }
 
-int run(const std::string& path, bool check_only) {
+void log_problems(const TomlProblems& problems) {
+    for (const TomlProblem& problem : problems)
+        log(LogLevel::error, "configuration", "{}", problem.message());
+}
+
+int check(const std::string& path, bool as_json) {
+    const auto configuration = load_configuration(path);
+    const TomlProblems problems = configuration ? TomlProblems{} : configuration.error();
+    if (as_json)
+        fmt::print("{}\n", to_json(path, problems));
+    else if (problems.empty())
+        fmt::print("{}: ok\n", path);
+    else
+        log_problems(problems);
+    return problems.empty() ? EX_OK : EX_CONFIG;
+}
+
+int run(const std::string& path) {
     const sigset_t signals = block_signals();
     auto configuration = load_configuration(path);
     if (!configuration) {
-        log(LogLevel::error, "configuration", "{}", configuration.error().message());
+        log_problems(configuration.error());
         return EX_CONFIG;
     }
     set_log_level(configuration->log_level);
-    if (check_only) {
-        fmt::print("{}: ok\n", path);
-        return EX_OK;
-    }
     auto service = Service::create(*configuration);
     if (!service) {
         log(LogLevel::error, "service", "{}", service.error().message());
@@ -81,14 +95,17 @@ int main(int argc, char** argv) {
         "VersaVIS service: hardware-stamped camera frames and IMU samples in shared memory"};
     std::string path = default_configuration;
     bool check_only = false;
+    bool as_json = false;
     app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
         ->capture_default_str();
-    app.add_flag("--check-config", check_only, "Check the configuration file and exit");
+    CLI::Option* check_config =
+        app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
+    app.add_flag("--json", as_json, "Tell it in JSON")->needs(check_config);
     app.set_version_flag("--version", VERSAVIS_VERSION);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
-    return run(path, check_only);
+    return check_only ? check(path, as_json) : run(path);
 }

@@ -78,9 +78,8 @@ Expected<> Service::make_cameras() {
     if (!presets) return Unexpected(presets.error());
     BoardListener& self = *this;
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         board_configuration(configuration_),
-                                         configuration_.clock.exchange_rate_hz, translator_,
-                                         *clock_recorder_, self);
+                                         configuration_, configuration_.clock.exchange_rate_hz,
+                                         translator_, *clock_recorder_, self);
     cameras_ = std::make_unique<CameraGroup>(directory_.path(), std::move(*presets), translator_,
                                              *events_, *board_);
     for (const CameraConfiguration& camera : configuration_.cameras) cameras_->add(camera);

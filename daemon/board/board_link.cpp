@@ -77,11 +77,12 @@ const char* to_string(BoardState state) {
     return "unknown";
 }
 
-BoardLink::BoardLink(OpenStream open, const wire::Configuration& configuration,
-                     double exchange_rate_hz, clock::Translator& translator,
-                     ClockRecorder& recorder, BoardListener& listener)
+BoardLink::BoardLink(OpenStream open, const Configuration& configuration, double exchange_rate_hz,
+                     clock::Translator& translator, ClockRecorder& recorder,
+                     BoardListener& listener)
     : open_(std::move(open)),
-      configuration_(configuration),
+      file_(configuration),
+      configuration_(board_configuration(configuration)),
       translator_(translator),
       listener_(listener),
       clock_(exchange_rate_hz, translator, recorder) {}
@@ -336,7 +337,7 @@ void BoardLink::take_answer(const wire::Packet& packet) {
     if (packet.read(line))
         log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
     if (packet.read(refusal) && refusal.id == configuration_.id)
-        refusals_.push_back(describe(refusal));
+        refusals_.push_back(describe(file_, refusal));
     if (packet.read(answer_)) answered_ = answer_.id == configuration_.id;
     if (!packet.read(health)) return;
     const std::lock_guard lock(report_mutex_);

@@ -70,7 +70,7 @@ class BoardLink {
  public:
     using OpenStream = std::function<Expected<std::unique_ptr<ByteStream>>()>;
 
-    BoardLink(OpenStream open, const wire::Configuration& configuration, double exchange_rate_hz,
+    BoardLink(OpenStream open, const Configuration& configuration, double exchange_rate_hz,
               clock::Translator& translator, ClockRecorder& recorder, BoardListener& listener);
     ~BoardLink();
     BoardLink(const BoardLink&) = delete;
@@ -122,6 +122,7 @@ class BoardLink {
     bool pause(Duration duration) const;
 
     OpenStream open_;
+    Configuration file_;  ///< for the words of a refusal
     wire::Configuration configuration_;
     clock::Translator& translator_;
     BoardListener& listener_;

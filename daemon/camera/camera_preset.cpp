@@ -56,7 +56,7 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
             preset.groups[group].push_back(std::move(step));
         }
     reader.finish();
-    if (!file.result) return Unexpected(file.result.error());
+    if (auto read = file.result(); !read) return Unexpected(read.error());
     return preset;
 }
 

@@ -2,6 +2,7 @@
 #include "configuration/board_configuration.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,21 @@
 namespace versavis::daemon {
 
 namespace {
+
+/// A period in nanoseconds times its rate in micro-hertz.
+constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
+
+/// Longest latency of a camera that boards take. At half, slow cameras would be told too short a
+/// latency; at twice, boards would refuse it.
+constexpr std::int64_t longest_latency_ns = 100'000'000;
+
+/// Longest that 32 bits of nanoseconds hold. At half, phases of slow cameras do not fit; twice does
+/// not fit.
+constexpr std::int64_t longest_ns = 4'000'000'000;
+
+/// Shortest time that the light is on beside its lead, as boards have it. At half, rounding could
+/// make a configuration that they refuse; at twice, short lights are longer than asked for.
+constexpr std::uint32_t shortest_light_ns = 10'000;
 
 std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
     unsigned mask = 0;
@@ -21,9 +37,10 @@ std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
 std::uint32_t micro_hertz(double hertz) {
     return static_cast<std::uint32_t>(std::llround(hertz * 1e6));
 }
-/// The wire has 32 bits for it: 4 s at most.
-std::uint32_t short_ns(double us) {
-    return static_cast<std::uint32_t>(std::llround(std::min(us * 1e3, 4e9)));
+/// The wire has 32 bits for it. Rounding to whole nanoseconds, here and of the period,
+/// must not carry it beyond what the board takes.
+std::uint32_t short_ns(double us, std::int64_t maximum = longest_ns) {
+    return static_cast<std::uint32_t>(std::min<std::int64_t>(std::llround(us * 1e3), maximum));
 }
 
 wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
@@ -33,46 +50,122 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     if (camera.strobe == Strobe::active_low) out.flags |= wire::camera_strobe_inverted;
     if (camera.strobe == Strobe::none) out.flags |= wire::camera_no_strobe;
     out.rate_uhz = micro_hertz(camera.rate_hz);
-    // Rounded to whole nanoseconds, the phase must still be below the period.
-    out.phase_ns = std::min(short_ns(camera.phase_us),
-                            static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
-    out.pulse_ns = short_ns(camera.pulse_us);
-    out.latency_ns = short_ns(camera.latency_us);
-    out.gap_ns = short_ns(camera.gap_us);
+    const std::int64_t period_ns = uhz_ns / out.rate_uhz;
+    out.phase_ns = short_ns(camera.phase_us, period_ns - 1);
+    out.pulse_ns = short_ns(camera.pulse_us, period_ns / 2);
+    out.latency_ns = short_ns(camera.latency_us, std::min(period_ns - 1, longest_latency_ns));
+    out.gap_ns = short_ns(camera.gap_us, period_ns - 1);
     out.exposure_ns = std::llround(camera.exposure_us * 1e3);
     out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);
     return out;
 }
 
-/// Key of the configuration file, and the unit in which the board has it.
-std::pair<const char*, const char*> field_name(wire::ConfigurationField field) {
+/// Half the period of what the test output shows.
+std::int64_t longest_test_pulse_ns(const wire::Configuration& board) {
+    const std::uint8_t test = board.ports.test;
+    if (test == wire::test_none) return longest_ns;
+    if (test >= wire::test_imu0)
+        return 1'000'000'000'000 / board.imus[test - wire::test_imu0].rate_millihertz / 2;
+    return uhz_ns / board.cameras[test - wire::test_camera0].rate_uhz / 2;
+}
+
+/// A key of the file, and what one of its unit is on the board; 0: it holds names.
+struct Words {
+    const char* key;
+    double board_units;
+};
+
+Words words(wire::ConfigurationField field) {
     using Field = wire::ConfigurationField;
     switch (field) {
-        case Field::rate: return {"rate_hz", "micro-hertz"};
-        case Field::pulse: return {"pulse_us", "ns"};
-        case Field::latency: return {"latency_us", "ns"};
-        case Field::gap: return {"gap_us", "ns"};
-        case Field::exposure: return {"exposure_us", "ns"};
-        case Field::max_exposure: return {"max_exposure_us", "ns"};
-        case Field::phase: return {"phase_us", "ns"};
-        case Field::imu_kind: return {"model", "by number"};
-        case Field::imu_rate: return {"rate_hz", "milli-hertz"};
-        case Field::master: return {"master", "output of a camera"};
-        case Field::imu_filter: return {"filter", "strength"};
-        case Field::imu_options: return {"data_ready", "bits"};
-        case Field::cameras: return {"cameras", "bits"};
-        case Field::lead: return {"lead_us", "ns"};
-        case Field::max_on: return {"max_on_us", "ns"};
-        case Field::duty: return {"duty_percent", "ppm"};
-        case Field::inputs: return {"inputs", "bits"};
-        case Field::test: return {"test", "source"};
-        case Field::sync_rate: return {"sync_rate_hz", "micro-hertz"};
-        case Field::port_options:
-            return {"imu_output' or 'nmea",
-                    "bits; the one needs an IMU on the SPI port, the other none on the UART"};
-        case Field::nmea_baud: return {"nmea_baud", "baud"};
+        case Field::rate: return {"rate_hz", 1e6};
+        case Field::pulse: return {"pulse_us", 1e3};
+        case Field::latency: return {"latency_us", 1e3};
+        case Field::gap: return {"gap_us", 1e3};
+        case Field::exposure: return {"exposure_us", 1e3};
+        case Field::max_exposure: return {"max_exposure_us", 1e3};
+        case Field::phase: return {"phase_us", 1e3};
+        case Field::imu_kind: return {"model", 0};
+        case Field::imu_rate: return {"rate_hz", 1e3};
+        case Field::master: return {"master", 0};
+        case Field::imu_filter: return {"filter", 1};
+        case Field::imu_options: return {"data_ready", 0};
+        case Field::cameras: return {"cameras", 0};
+        case Field::lead: return {"lead_us", 1e3};
+        case Field::max_on: return {"max_on_us", 1e3};
+        case Field::duty: return {"duty_percent", 1e4};
+        case Field::inputs: return {"inputs", 0};
+        case Field::test: return {"test", 0};
+        case Field::sync_rate: return {"sync_rate_hz", 1e6};
+        case Field::port_options: return {"imu_output' or 'nmea", 0};
+        case Field::nmea_baud: return {"nmea_baud", 1};
     }
-    return {"an unknown field", "?"};
+    return {"an unknown key", 0};
+}
+
+const CameraConfiguration* camera_at(const Configuration& configuration, std::int64_t output) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.trigger == TriggerSource::board && camera.output == output) return &camera;
+    return nullptr;
+}
+
+const ImuConfiguration* imu_at(const Configuration& configuration, std::int64_t port) {
+    for (const ImuConfiguration& imu : configuration.imus)
+        if (imu.port() == port) return &imu;
+    return nullptr;
+}
+
+/// The table that is refused; null: the file has none.
+const TomlEntry* refused_entry(const Configuration& configuration, const wire::Refusal& refusal) {
+    switch (refusal.part) {
+        case wire::ConfigurationPart::camera: {
+            const CameraConfiguration* camera = camera_at(configuration, refusal.index);
+            return camera == nullptr ? nullptr : &camera->entry;
+        }
+        case wire::ConfigurationPart::imu: {
+            const ImuConfiguration* imu = imu_at(configuration, refusal.index);
+            return imu == nullptr ? nullptr : &imu->entry;
+        }
+        case wire::ConfigurationPart::illumination: return &configuration.illumination.entry;
+        case wire::ConfigurationPart::ports: return &configuration.ports.entry;
+    }
+    return nullptr;
+}
+
+/// What the file calls a value that is a name there; empty: nothing.
+std::string named(const Configuration& configuration, wire::ConfigurationField field,
+                  std::int64_t value) {
+    const auto camera_name = [&](std::int64_t output) {
+        const CameraConfiguration* camera = camera_at(configuration, output);
+        return camera == nullptr ? "" : camera->name;
+    };
+    if (field == wire::ConfigurationField::master) return camera_name(value);
+    if (field == wire::ConfigurationField::imu_kind) {
+        const imu::ImuModel* model = imu::find_model(static_cast<wire::ImuKind>(value));
+        return model == nullptr ? "" : model->name;
+    }
+    if (field != wire::ConfigurationField::test) return "";
+    if (value < wire::test_imu0) return camera_name(value - wire::test_camera0);
+    const ImuConfiguration* imu = imu_at(configuration, value - wire::test_imu0);
+    return imu == nullptr ? "" : imu->name;
+}
+
+/// Most names that a field can hold. At half, some that are allowed are not told; at twice, nothing
+/// is gained.
+constexpr std::int64_t most_names = 16;
+
+std::string allowed(const Configuration& configuration, const wire::Refusal& refusal) {
+    const auto [key, board_units] = words(refusal.field);
+    if (refusal.minimum > refusal.maximum) return "no value";
+    if (board_units != 0)
+        return fmt::format("{:.10g} to {}", static_cast<double>(refusal.minimum) / board_units,
+                           quantity(key, static_cast<double>(refusal.maximum) / board_units));
+    std::vector<std::string> names;
+    for (std::int64_t i = 0; i < most_names && i <= refusal.maximum - refusal.minimum; ++i)
+        if (std::string name = named(configuration, refusal.field, refusal.minimum + i);
+            !name.empty())
+            names.push_back(std::move(name));
+    return names.empty() ? "no such value" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 }  // namespace
@@ -101,7 +194,8 @@ wire::Configuration board_configuration(const Configuration& configuration) {
             static_cast<std::uint8_t>(1U << find_triggered_camera(configuration, name)->output);
     if (configuration.illumination.inverted) out.illumination.flags |= wire::illumination_inverted;
     out.illumination.lead_ns = short_ns(configuration.illumination.lead_us);
-    out.illumination.max_on_ns = short_ns(configuration.illumination.max_on_us);
+    out.illumination.max_on_ns = std::max(short_ns(configuration.illumination.max_on_us),
+                                          out.illumination.lead_ns + shortest_light_ns);
     out.illumination.duty_ppm =
         static_cast<std::uint32_t>(std::llround(configuration.illumination.duty_percent * 1e4));
     out.ports.inputs = pulse_inputs(configuration.ports.inputs);
@@ -113,25 +207,23 @@ wire::Configuration board_configuration(const Configuration& configuration) {
     }
     out.ports.test = test_source(configuration).value_or(wire::test_none);
     out.ports.sync_rate_uhz = micro_hertz(configuration.ports.sync_rate_hz);
-    out.ports.pulse_ns = short_ns(configuration.ports.pulse_us);
+    out.ports.pulse_ns = short_ns(configuration.ports.pulse_us, longest_test_pulse_ns(out));
     if (configuration.board.keep_configuration) out.flags |= wire::configuration_store;
     return out;
 }
 
-std::string describe(const wire::Refusal& refusal) {
-    const char* table = "[ports]";
-    switch (refusal.part) {
-        case wire::ConfigurationPart::camera: table = "the camera at output"; break;
-        case wire::ConfigurationPart::imu: table = "the IMU at port"; break;
-        case wire::ConfigurationPart::illumination: table = "[illumination]"; break;
-        case wire::ConfigurationPart::ports: break;
-    }
-    const bool numbered = refusal.part == wire::ConfigurationPart::camera ||
-                          refusal.part == wire::ConfigurationPart::imu;
-    const auto [key, unit] = field_name(refusal.field);
-    return fmt::format("'{}' of {}{} is {}: allowed are {} to {} ({})", key, table,
-                       numbered ? fmt::format(" {}", refusal.index) : "", refusal.value,
-                       refusal.minimum, refusal.maximum, unit);
+std::string describe(const Configuration& configuration, const wire::Refusal& refusal) {
+    const auto [key, board_units] = words(refusal.field);
+    const std::string name = named(configuration, refusal.field, refusal.value);
+    const std::string value = board_units != 0
+                                  ? quantity(key, static_cast<double>(refusal.value) / board_units)
+                              : name.empty() ? "not known to it"
+                                             : fmt::format("\"{}\"", name);
+    const TomlEntry* entry = refused_entry(configuration, refusal);
+    const bool written = entry != nullptr && !entry->title.empty();
+    return fmt::format(
+        "{}'{}'{} is {}: the board takes {}", written ? entry->place_of(key).text() + ": " : "",
+        key, written ? " of " + entry->title : "", value, allowed(configuration, refusal));
 }
 
 }  // namespace versavis::daemon

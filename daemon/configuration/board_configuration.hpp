@@ -11,7 +11,8 @@ namespace versavis::daemon {
 /// What the board is told.
 wire::Configuration board_configuration(const Configuration& configuration);
 
-/// Which key the board refuses, its value and what is allowed.
-std::string describe(const wire::Refusal& refusal);
+/// Place, table and key that the board refuses, its value and what is allowed, in the unit of the
+/// key.
+std::string describe(const Configuration& configuration, const wire::Refusal& refusal);
 
 }  // namespace versavis::daemon

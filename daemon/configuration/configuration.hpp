@@ -11,6 +11,7 @@
 #include "engine/clock/output_clock.hpp"
 #include "engine/clock/pps_reference.hpp"
 #include "engine/imu/imu_model.hpp"
+#include "engine/toml/problem.hpp"
 #include "log.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
@@ -21,7 +22,10 @@ namespace versavis::daemon {
 /// The ring of what the pairing of a camera was told is named after the camera.
 inline const std::string evidence_suffix = "-evidence";
 
+// Each table knows its place in the file, for what is found out after reading, and by the board.
+
 struct BoardConfiguration {
+    TomlEntry entry;
     std::string link = "usb";  ///< "usb" or "unix:PATH"
     std::string serial;        ///< empty: any
     std::uint16_t usb_vendor = 0x1209;
@@ -30,6 +34,7 @@ struct BoardConfiguration {
 };
 
 struct ClockConfiguration {
+    TomlEntry entry;
     clock::OutputClockKind output = clock::OutputClockKind::realtime;
     bool force_tai = false;  ///< take CLOCK_TAI although the kernel does not know its offset
     double exchange_rate_hz = 10;
@@ -44,16 +49,18 @@ enum class ReceiveMode { socket, packet };
 enum class OnUnproved { withhold, flag };
 
 struct AutoExposureConfiguration {
+    TomlEntry entry;
     bool enabled = false;
     double target = 0.4;    ///< brightness, 0 black to 1 saturated
     double percentile = 0;  ///< of the pixels whose brightness counts; 0: the mean of all
     double min_us = 50;
-    double max_us = 0;          ///< 0: max_exposure_us
+    double max_us = 0;          ///< from max_exposure_us, if not given
     double largest_step = 1.5;  ///< factor from one exposure to the next
     unsigned delay_frames = 1;  ///< frames between setting an exposure and the first that has it
 };
 
 struct CameraConfiguration {
+    TomlEntry entry;
     std::string name;
     std::string device;  ///< what Aravis finds it by: address, serial number or full name
     TriggerSource trigger = TriggerSource::board;
@@ -62,7 +69,7 @@ struct CameraConfiguration {
     double rate_hz = 20;
     double phase_us = 0;
     double exposure_us = 3000;
-    double max_exposure_us = 0;  ///< 0: the period
+    double max_exposure_us = 0;  ///< from the period, if not given
     double latency_us = 0;
     double gap_us = 0;
     double pulse_us = 100;
@@ -96,6 +103,7 @@ Duration from_us(double us);
 Duration period_of(const CameraConfiguration& camera);
 
 struct ImuConfiguration {
+    TomlEntry entry;
     std::string name = "imu0";
     const imu::ImuModel* model = nullptr;
     double rate_hz = 200;
@@ -107,6 +115,7 @@ struct ImuConfiguration {
 };
 
 struct IlluminationConfiguration {
+    TomlEntry entry;
     std::vector<std::string> cameras;  ///< names; empty: no light
     double lead_us = 100;
     double max_on_us = 10000;
@@ -118,6 +127,7 @@ struct IlluminationConfiguration {
 inline const std::vector<std::string> pulse_input_names{"pps", "aux0", "aux1", "sync"};
 
 struct PortConfiguration {
+    TomlEntry entry;
     std::vector<std::string> inputs;   ///< of pulse_input_names
     std::vector<std::string> falling;  ///< those whose falling edge counts
     bool imu_output = false;
@@ -129,6 +139,7 @@ struct PortConfiguration {
 };
 
 struct Configuration {
+    TomlEntry entry;
     std::string instance = "default";
     LogLevel log_level = LogLevel::info;
     std::string preset_directory;  ///< empty: that of the installation
@@ -141,8 +152,9 @@ struct Configuration {
     PortConfiguration ports;
 };
 
-/// Errors name file, line and column, and the cure.
-Expected<Configuration> load_configuration(const std::string& path);
+/// Errors: all that is wrong in the file, as far as it can be known without devices, in the order
+/// of its lines.
+Expected<Configuration, TomlProblems> load_configuration(const std::string& path);
 
 /// The camera of this name, if the board triggers it; else null.
 const CameraConfiguration* find_triggered_camera(const Configuration& configuration,

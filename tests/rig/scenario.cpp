@@ -93,7 +93,7 @@ Expected<Scenario> load_scenario(const std::string& path) {
         reader.finish();
     }
     top.finish();
-    if (!file.result) return Unexpected(file.result.error());
+    if (auto read = file.result(); !read) return Unexpected(read.error());
     return scenario;
 }
 

@@ -390,9 +390,14 @@ TEST_CASE("end to end: a bad configuration ends with 78 and its place, a good on
               stack.log_path("bad.log"), &output) == 78);
     CHECK_THAT(output,
                Catch::Contains("versavis.toml:11:1: unknown key 'rate'; did you mean 'rate_hz'?"));
+    CHECK(run({program("versavisd"), "--check-config", "--json", "--config",
+               stack.configuration_path()},
+              stack.log_path("bad.json"), &output) == 78);
+    CHECK(nlohmann::json::parse(output)["problems"][0]["line"] == 11);
     Stack good({"config2", 21, 1, 20, "", "", ""});
     CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()},
               good.log_path("ok.log"), &output) == 0);
+    CHECK(run({program("versavisd"), "--json"}, good.log_path("usage.log"), &output) == 64);
     CHECK(run({program("versavisd"), "--nonsense"}, good.log_path("usage.log"), &output) == 64);
 }
 

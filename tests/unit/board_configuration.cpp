@@ -3,42 +3,78 @@
 
 #include <catch2/catch.hpp>
 
+#include "../support/temporary_directory.hpp"
+
 using namespace versavis;
 using namespace versavis::daemon;
 
 namespace {
 
-wire::Refusal refusal(wire::ConfigurationPart part, wire::ConfigurationField field) {
+using Field = wire::ConfigurationField;
+using Part = wire::ConfigurationPart;
+
+wire::Refusal refusal(Part part, unsigned index, Field field, std::int64_t value,
+                      std::int64_t minimum, std::int64_t maximum) {
     wire::Refusal made{};
     made.part = part;
+    made.index = static_cast<std::uint8_t>(index);
     made.field = field;
-    made.index = 2;
-    made.value = 70;
-    made.minimum = 10;
-    made.maximum = 60;
+    made.value = value;
+    made.minimum = minimum;
+    made.maximum = maximum;
     return made;
+}
+
+/// What is said of a refusal, for a file with all tables.
+std::string told(const wire::Refusal& refused) {
+    static const test::TemporaryDirectory directory;
+    const auto configuration = load_configuration(directory.write(
+        "versavis.toml",
+        "[[camera]]\nname = \"left\"\ndevice = \"a\"\noutput = 2\npulse_us = 70\n"
+        "[[camera]]\nname = \"right\"\ndevice = \"b\"\noutput = 3\nmaster = \"left\"\n"
+        "[[imu]]\nname = \"inertial\"\nmodel = \"bmi088\"\nrate_hz = 400\n"
+        "[illumination]\ncameras = [\"left\"]\nduty_percent = 50\n"
+        "[ports]\ntest = \"left\"\nsync_rate_hz = 10\n"));
+    return describe(*configuration, refused).substr(directory.path().string().size() + 1);
 }
 
 }  // namespace
 
-TEST_CASE("board_configuration: a refusal names key, table, value and range") {
-    using Field = wire::ConfigurationField;
-    using Part = wire::ConfigurationPart;
-    const std::string camera = describe(refusal(Part::camera, Field::pulse));
-    for (const char* part : {"'pulse_us'", "camera at output 2", "70", "10 to 60", "ns"})
-        CHECK_THAT(camera, Catch::Contains(part));
-    CHECK_THAT(describe(refusal(Part::imu, Field::imu_kind)), Catch::Contains("IMU at port 2"));
-    CHECK_THAT(describe(refusal(Part::ports, Field::test)), Catch::Contains("[ports]"));
-    CHECK_THAT(describe(refusal(Part::illumination, Field::lead)),
-               Catch::Contains("[illumination]"));
+TEST_CASE("board_configuration: a refusal names place, key, table, value and range of the file") {
+    CHECK(told(refusal(Part::camera, 2, Field::pulse, 70'000, 1'000, 60'500)) ==
+          "versavis.toml:5:12: 'pulse_us' of [[camera]] \"left\" is 70 us: the board takes 1 to "
+          "60.5 us");
+    CHECK(told(refusal(Part::imu, 0, Field::imu_rate, 400'000, 1'000, 200'000)) ==
+          "versavis.toml:14:11: 'rate_hz' of [[imu]] \"inertial\" is 400 Hz: the board takes 1 to "
+          "200 Hz");
+    CHECK(told(refusal(Part::camera, 3, Field::rate, 29'970'000, 100'000, 10'000'000)) ==
+          "versavis.toml:6:1: 'rate_hz' of [[camera]] \"right\" is 29.97 Hz: the board takes 0.1 "
+          "to 10 Hz");
+    CHECK(told(refusal(Part::illumination, 0, Field::duty, 500'000, 1, 200'000)) ==
+          "versavis.toml:17:16: 'duty_percent' of [illumination] is 50 %: the board takes 0.0001 "
+          "to 20 %");
+    CHECK(told(refusal(Part::ports, 0, Field::sync_rate, 10'000'000, 100'000, 1'000'000)) ==
+          "versavis.toml:20:16: 'sync_rate_hz' of [ports] is 10 Hz: the board takes 0.1 to 1 Hz");
 }
 
-TEST_CASE("board_configuration: each field that a board can refuse has a key") {
+TEST_CASE("board_configuration: a refused name is told by name, and what would do") {
+    CHECK(told(refusal(Part::camera, 3, Field::master, 2, 0, -1)) ==
+          "versavis.toml:10:10: 'master' of [[camera]] \"right\" is \"left\": the board takes no "
+          "value");
+    CHECK(told(refusal(Part::imu, 0, Field::imu_kind,
+                       static_cast<std::int64_t>(wire::ImuKind::bmi088), 1, 2)) ==
+          "versavis.toml:13:9: 'model' of [[imu]] \"inertial\" is \"bmi088\": the board takes "
+          "adis16448b, adis16448a");
+    CHECK(told(refusal(Part::ports, 0, Field::test, wire::test_camera0 + 2, wire::test_imu0,
+                       wire::test_imu0)) ==
+          "versavis.toml:19:8: 'test' of [ports] is \"left\": the board takes inertial");
+}
+
+TEST_CASE("board_configuration: each field that a board can refuse has a key, in any file") {
+    const auto key_of = [](int field) {
+        return describe({}, refusal(Part::camera, 0, static_cast<Field>(field), 70, 10, 60));
+    };
     for (int field = 1; field <= 21; ++field)
-        CHECK_THAT(describe(refusal(wire::ConfigurationPart::camera,
-                                    static_cast<wire::ConfigurationField>(field))),
-                   !Catch::Contains("unknown field"));
-    CHECK_THAT(describe(refusal(wire::ConfigurationPart::camera,
-                                static_cast<wire::ConfigurationField>(250))),
-               Catch::Contains("unknown field"));
+        CHECK_THAT(key_of(field), !Catch::Contains("unknown key"));
+    CHECK_THAT(key_of(250), Catch::Contains("unknown key"));
 }

@@ -10,6 +10,7 @@
 #include <future>
 
 #include "../support/temporary_directory.hpp"
+#include "configuration_check.hpp"
 #include "native_board.hpp"
 
 using namespace versavis;
@@ -47,6 +48,9 @@ class PlayedBoard final : public ByteStream {
         return {};
     }
 
+    ~PlayedBoard() override { closed(); }
+    std::function<void()> closed = [] {};
+
     /// From now on writes wait, or no longer.
     void hold_writes(bool held) {
         const std::lock_guard lock(mutex_);
@@ -70,6 +74,20 @@ class PlayedBoard final : public ByteStream {
         wire::Frame frame;
     };
 
+    /// Refuses what real boards refuse.
+    struct Judge final : firmware::RefusalSink {
+        Judge(PlayedBoard& played, std::uint32_t about) : board(played), id(about) {}
+        void refuse(const wire::Refusal& refusal) override {
+            wire::Refusal message = refusal;
+            message.id = id;
+            board.send(message, host_now());
+            refused = true;
+        }
+        PlayedBoard& board;
+        std::uint32_t id;
+        bool refused = false;
+    };
+
     void answer(const wire::Packet& packet) {
         wire::HostHello hello{};
         wire::Configuration configuration{};
@@ -86,8 +104,11 @@ class PlayedBoard final : public ByteStream {
             message.board_time_ns = now.ns;
             send(message, now);
         } else if (packet.read(configuration)) {
+            Judge judge(*this, configuration.id);
+            firmware::check(configuration, judge);
             wire::ConfigurationAnswer message{};
             message.id = configuration.id;
+            if (judge.refused) message.status = wire::ConfigurationStatus::refused;
             send(message, now);
         } else if (packet.read(request)) {
             send(wire::ClockAnswer{request.id, 0, now.ns, now.ns}, now + on_the_way);
@@ -407,4 +428,32 @@ TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
     running.board.load()->hold_writes(false);
     CHECK(at_once);
     CHECK(given.get() == BoardState::running);
+TEST_CASE("board_link: what the board refuses is told in the words of the file") {
+    Clock clock;
+    Listener listener;
+    const std::string path = clock.directory.write(
+        "v.toml", "[[camera]]\nname = \"left\"\ndevice = \"x\"\nrate_hz = 50\nlatency_us = 60\n");
+    Configuration configuration = *load_configuration(path);
+    configuration.cameras[0].rate_hz = 2000;  // past the check of the file
+    std::promise<BoardReport> closed;
+    std::once_flag first;
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            auto board = std::make_unique<PlayedBoard>(2, true);
+            board->closed = [&] {
+                std::call_once(first, [&] { closed.set_value(link.report()); });
+            };
+            return board;
+        },
+        configuration, 1, clock.translator, clock.recorder, listener);
+    link.start();
+    auto end = closed.get_future();
+    REQUIRE(end.wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    const BoardReport report = end.get();
+    CHECK(report.state == BoardState::refused);
+    CHECK(report.hint ==
+          path +
+              ":4:11: 'rate_hz' of [[camera]] \"left\" is 2000 Hz: the board takes 0.1 to 1000 Hz; "
+              "change the configuration");
+    link.stop();
 }

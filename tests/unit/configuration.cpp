@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <random>
 #include <regex>
 #include <sstream>
 
@@ -14,32 +15,82 @@ using namespace versavis::daemon;
 
 namespace {
 
-Expected<Configuration> load(const std::string& text) {
+Expected<Configuration, TomlProblems> load(const std::string& text) {
     const test::TemporaryDirectory directory;
     return load_configuration(directory.write("versavis.toml", text));
 }
 
-std::string error_of(const std::string& text) {
+/// All messages, one a line.
+std::string errors_of(const std::string& text) {
     const auto configuration = load(text);
-    return configuration ? "no error" : configuration.error().message();
+    if (configuration) return "no error";
+    std::string all;
+    for (const TomlProblem& problem : configuration.error()) all += problem.message() + "\n";
+    return all;
 }
 
 const std::string camera = "[[camera]]\nname = \"cam0\"\ndevice = \"10.0.0.2\"\n";
 
+/// The example of the manual, which has every key.
+std::string manual() {
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/configuration.md");
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+std::string example() {
+    const std::string text = manual();
+    const auto begin = text.find("```toml\n") + 8;
+    return text.substr(begin, text.find("```", begin) - begin);
+}
+
 }  // namespace
 
-TEST_CASE("configuration: an empty file is a service without cameras") {
-    const auto configuration = load("");
+TEST_CASE("configuration: a file without cameras and IMUs serves nothing, and says what to write") {
+    for (const char* text : {"", "\n\n", "# nothing yet\n", "[ports]\ninputs = [\"pps\"]\n"}) {
+        CHECK_THAT(errors_of(text), Catch::Contains("nothing to serve; write a table [[camera]]"));
+        CHECK_THAT(errors_of(text), Catch::Contains("versavis.toml:1:1: "));
+    }
+}
+
+TEST_CASE("configuration: defaults") {
+    const auto configuration = load(camera);
     REQUIRE(configuration);
     CHECK(configuration->instance == "default");
     CHECK(configuration->board.link == "usb");
-    CHECK(configuration->cameras.empty());
+    CHECK(configuration->imus.empty());
+    CHECK(configuration->cameras[0].max_exposure_us == 50000);
+    CHECK(configuration->cameras[0].slots == 17);
+}
+
+TEST_CASE("configuration: defaults follow the rate, so that a fast camera needs no more keys") {
+    const auto configuration = load(camera + "rate_hz = 1000\ngap_us = 300\n");
+    REQUIRE(configuration);
+    const CameraConfiguration& fast = configuration->cameras[0];
+    CHECK(fast.max_exposure_us == 1000);
+    CHECK(fast.exposure_us == 700);
+    CHECK(fast.pulse_us == 100);
+    CHECK(fast.latest_arrival_ms == 128);
+    CHECK(fast.slots == 6 + 8 + 120);
+}
+
+TEST_CASE("configuration: a slave has rate, phase and longest exposure of its master") {
+    const auto configuration =
+        load("[[camera]]\nname = \"s\"\ndevice = \"s\"\noutput = 1\nmaster = \"cam0\"\n" + camera +
+             "rate_hz = 200\nphase_us = 10\nmax_exposure_us = 2000\n");
+    REQUIRE(configuration);
+    const CameraConfiguration& slave = configuration->cameras[0];
+    CHECK(slave.rate_hz == 200);
+    CHECK(slave.phase_us == 10);
+    CHECK(slave.max_exposure_us == 2000);
+    CHECK(slave.exposure_us == 2000);
 }
 
 TEST_CASE("configuration: the output clock") {
-    CHECK(load("")->clock.output == clock::OutputClockKind::realtime);
-    CHECK_FALSE(load("")->clock.force_tai);
-    const auto configuration = load("[clock]\noutput = \"tai\"\nforce_tai = true\n");
+    CHECK(load(camera)->clock.output == clock::OutputClockKind::realtime);
+    CHECK_FALSE(load(camera)->clock.force_tai);
+    const auto configuration = load(camera + "[clock]\noutput = \"tai\"\nforce_tai = true\n");
     REQUIRE(configuration);
     CHECK(configuration->clock.output == clock::OutputClockKind::tai);
     CHECK(configuration->clock.force_tai);
@@ -98,7 +149,7 @@ TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is to
 
 TEST_CASE("configuration: a GNSS receiver at the UART") {
     const auto configuration =
-        load("[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
+        load(camera + "[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
     REQUIRE(configuration);
     const wire::Configuration board = board_configuration(*configuration);
     CHECK(board.ports.options == wire::port_nmea);
@@ -122,69 +173,99 @@ TEST_CASE("configuration: features are kept in text, in their own types") {
     CHECK(value("Bin") == "2");
 }
 
-TEST_CASE("configuration: errors name line, column and cure") {
-    CHECK_THAT(error_of("instance = \n"), Catch::Contains("versavis.toml:1:"));
-    CHECK_THAT(
-        error_of(camera + "rate_hzz = 20\n"),
-        Catch::Contains("versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"));
-    CHECK_THAT(error_of(camera + "rate_hz = 2000\n"),
-               Catch::Contains("versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000"));
-    CHECK_THAT(error_of(camera + "rate_hz = \"20\"\n"), Catch::Contains("must be a number"));
-    CHECK_THAT(error_of(camera + "output = 4\n"), Catch::Contains("from 0 to 3"));
-    CHECK_THAT(error_of(camera + "trigger = \"bord\"\n"),
-               Catch::Contains("must be one of: board, free"));
-    CHECK_THAT(error_of("[[camera]]\nname = \"cam0\"\n"), Catch::Contains("needs a 'device'"));
-    CHECK_THAT(error_of(camera + camera + "output = 1\n"),
-               Catch::Contains("the name 'cam0' is taken"));
-    CHECK_THAT(error_of(camera + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n"),
-               Catch::Contains("uses output 0, which is taken"));
-    CHECK_THAT(error_of("[[camera]]\nname = \"../x\"\ndevice = \"y\"\n"),
-               Catch::Contains("is not a valid name"));
-    CHECK_THAT(error_of("[[camera]]\nname = \"status\"\ndevice = \"y\"\n"),
-               Catch::Contains("is taken"));
-    CHECK_THAT(error_of("[[imu]]\nname = \"clock\"\n"), Catch::Contains("is taken"));
-    CHECK_THAT(error_of("[[imu]]\nmodel = \"mpu\"\n"),
-               Catch::Contains("must be one of: adis16448b"));
-    CHECK_THAT(error_of("[[imu]]\n[[imu]]\nname = \"b\"\n"), Catch::Contains("one SPI port"));
-    CHECK_THAT(error_of("[[imu]]\nrate_hz = 2000\n"), Catch::Contains("from 1 to 1000"));
-    CHECK_THAT(error_of(camera + "master = \"cam9\"\n"),
-               Catch::Contains("cannot have 'cam9' as its master"));
-    CHECK_THAT(error_of(camera + "master = \"cam0\"\n"), Catch::Contains("as its master"));
-    CHECK_THAT(error_of(camera + "master = \"cam9\"\nrate_hz = 5\n"),
-               Catch::Contains("its master's rate"));
-    CHECK_THAT(error_of("[illumination]\ncameras = [\"cam0\"]\n"),
-               Catch::Contains("is not a camera"));
-    CHECK_THAT(error_of("[illumination]\ncameras = \"cam0\"\n"),
-               Catch::Contains("list of strings"));
-    CHECK_THAT(error_of("[ports]\ninputs = [\"gps\"]\n"), Catch::Contains("'gps' is not an input"));
-    CHECK_THAT(error_of("[ports]\ntest = \"nobody\"\n"), Catch::Contains("'test' names 'nobody'"));
-    CHECK_THAT(error_of("[ports]\nsync_rate_hz = 0.01\n"), Catch::Contains("0.1 to 10"));
-    CHECK_THAT(error_of("[ports]\nnmea = true\n"), Catch::Contains("add \"pps\" to 'inputs'"));
-    CHECK_THAT(error_of("[[imu]]\nmodel = \"vn100\"\n[ports]\ninputs = [\"pps\"]\nnmea = true\n"),
-               Catch::Contains("needs the UART"));
-    CHECK_THAT(error_of("[clock]\nmax_slew_ppm = 0\n"), Catch::Contains("from 0.1 to 500"));
-    CHECK_THAT(error_of("[board]\nlink = \"tty\"\n"), Catch::Contains("unix:/path"));
-    CHECK_THAT(error_of("camera = 3\n"), Catch::Contains("array of tables"));
-    CHECK_THAT(load_configuration("/nowhere/versavis.toml").error().message(),
-               Catch::Contains("/nowhere/versavis.toml"));
+TEST_CASE("configuration: errors name line, column, key, value, range, unit and cure") {
+    const auto check = [](const std::string& text, const std::string& expected) {
+        INFO(text);
+        CHECK_THAT(errors_of(text), Catch::Contains(expected));
+    };
+    check("instance = \n", "versavis.toml:1:");
+    check(camera + "rate_hzz = 20\n",
+          "versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?");
+    check(camera + "rate_hz = 2000\n",
+          "versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is 2000; see");
+    check(camera + "rate_hz = \"20\"\n", "must be a number from 0.1 to 1000 Hz, and is '20'");
+    check(camera + "rate_hz = nan\n", "must be a number from 0.1 to 1000 Hz, and is nan");
+    check(camera + "output = 4\n", "'output' must be a whole number from 0 to 3, and is 4");
+    check(camera + "packet_size = 20\n", "from 576 to 16000 bytes, and is 20");
+    check(camera + "trigger = \"bord\"\n",
+          "must be one of board, free, and is 'bord'; did you mean \"board\"?");
+    check(camera + "strobe = 1\n", "must be one of active_high, active_low, none, and is 1");
+    check(camera + "slots = 10\n", "'slots' must be a whole number from 14 to 1024, and is 10");
+    check(camera + "[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
+          "versavis.toml:6:16: 'largest_step' must be a number from 1.01 to 10, and is 1;");
+    check(camera + "[camera.features]\nGain = [1]\n", "feature 'Gain' must be a text");
+    check(camera + "[camera.features]\nGain = nan\n", "feature 'Gain' must be a text");
+    check(camera + "[camera.features]\nGain = 1\nGain = 2\n", "versavis.toml:6:");
+    check("[[imu]]\nmodel = \"mpu\"\n", "must be one of adis16448b");
+    check("[illumination]\ncameras = \"cam0\"\n", "list of strings");
+    check("[clock]\nmax_slew_ppm = 0\n", "from 0.1 to 500 ppm");
+    check("camera = 3\n", "array of tables: [[camera]], and is 3");
+    check("[[board]]\n", "'board' must be a table: [board], and is a list");
+}
+
+TEST_CASE("configuration: all errors are told at once, in the order of the file") {
+    const auto configuration = load("instance = \"a b\"\n" + camera +
+                                    "rate_hzz = 1\npulse_us = 0\n[ports]\ntest = \"x\"\n");
+    REQUIRE_FALSE(configuration);
+    std::vector<std::uint32_t> lines;
+    for (const TomlProblem& problem : configuration.error()) lines.push_back(problem.place.line);
+    CHECK(lines == std::vector<std::uint32_t>{1, 5, 6, 8});
+}
+
+TEST_CASE("configuration: windows line ends and a byte order mark change nothing") {
+    std::string text = "\xEF\xBB\xBF" + camera + "rate_hz = 2000\n";
+    for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2)
+        text.insert(at, "\r");
+    CHECK_THAT(errors_of(text), Catch::Contains("versavis.toml:4:11: 'rate_hz' must be"));
 }
 
 TEST_CASE("configuration: every key of the manual is known, and its example loads") {
-    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/configuration.md");
-    REQUIRE(file);
-    std::stringstream text;
-    text << file.rdbuf();
-    const std::string manual = text.str();
-    const auto begin = manual.find("```toml\n") + 8;
-    const std::string example = manual.substr(begin, manual.find("```", begin) - begin);
-    CHECK(error_of(example) == "no error");
+    const std::string text = manual();
+    const std::string all_keys = example();
+    CHECK(errors_of(all_keys) == "no error");
     // The example shows every key of the tables below it, and only those.
     const std::regex row("\\| `([a-z_]+)` \\|");
     std::size_t rows = 0;
-    for (std::sregex_iterator it(manual.begin(), manual.end(), row), end; it != end; ++it, ++rows)
-        CHECK_THAT(example, Catch::Contains((*it)[1].str() + " = "));
+    for (std::sregex_iterator it(text.begin(), text.end(), row), end; it != end; ++it, ++rows)
+        CHECK_THAT(all_keys, Catch::Contains((*it)[1].str() + " = "));
     CHECK(rows > 30);
     const std::regex key("(?:^|\n)([a-z_]+) = ");
-    for (std::sregex_iterator it(example.begin(), example.end(), key), end; it != end; ++it)
-        CHECK_THAT(manual, Catch::Contains("| `" + (*it)[1].str() + "` |"));
+    for (std::sregex_iterator it(all_keys.begin(), all_keys.end(), key), end; it != end; ++it)
+        CHECK_THAT(text, Catch::Contains("| `" + (*it)[1].str() + "` |"));
+}
+
+TEST_CASE("configuration: whatever is damaged in a file, it loads or each error names its place") {
+    const std::string whole = example();
+    const test::TemporaryDirectory directory;
+    std::mt19937 random(1);
+    const auto below = [&](std::size_t end) {
+        return std::uniform_int_distribution<std::size_t>(0, end - 1)(random);
+    };
+    const std::string marks = "\"'[]{}=.,#\n\r\t\\0-_9e\x80\xFF";
+    unsigned refused = 0;
+    for (int round = 0; round < 2000; ++round) {
+        std::string text = whole;
+        for (std::size_t damages = 1 + below(4); damages > 0 && !text.empty(); --damages) {
+            const std::size_t at = below(text.size());
+            switch (below(5)) {
+                case 0: text[at] = static_cast<char>(below(256)); break;
+                case 1: text[at] = marks[below(marks.size())]; break;
+                case 2: text.insert(at, 1 + below(20), marks[below(marks.size())]); break;
+                case 3: text.erase(at, 1 + below(40)); break;
+                default: text.insert(at, text.substr(below(text.size()), 1 + below(200))); break;
+            }
+        }
+        const std::string path = directory.write("versavis.toml", text);
+        const auto configuration = load_configuration(path);
+        if (configuration) continue;
+        ++refused;
+        REQUIRE_FALSE(configuration.error().empty());
+        for (const TomlProblem& problem : configuration.error()) {
+            REQUIRE_THAT(problem.message(), Catch::StartsWith(path + ":"));
+            REQUIRE(problem.place.line > 0);
+            REQUIRE(problem.place.column > 0);
+            REQUIRE_FALSE(problem.cure.empty());
+        }
+    }
+    CHECK(refused > 1000);
 }

@@ -11,14 +11,14 @@ namespace versavis::imu {
 namespace {
 
 constexpr std::array<ImuModel, 8> models{{
-    {"adis16448b", wire::ImuKind::adis16448b},
-    {"adis16448a", wire::ImuKind::adis16448a},
-    {"adis16445", wire::ImuKind::adis16445},
-    {"adis16460", wire::ImuKind::adis16460},
-    {"adis16470", wire::ImuKind::adis16470},
-    {"icm42688p", wire::ImuKind::icm42688p},
-    {"bmi088", wire::ImuKind::bmi088},
-    {"vn100", wire::ImuKind::vn100},
+    {"adis16448b", wire::ImuKind::adis16448b, 819.2, 6},
+    {"adis16448a", wire::ImuKind::adis16448a, 819.2, 6},
+    {"adis16445", wire::ImuKind::adis16445, 819.2, 6},
+    {"adis16460", wire::ImuKind::adis16460, 2048, 6},
+    {"adis16470", wire::ImuKind::adis16470, 2000, 6},
+    {"icm42688p", wire::ImuKind::icm42688p, 8000, 7},
+    {"bmi088", wire::ImuKind::bmi088, 2000, 2},
+    {"vn100", wire::ImuKind::vn100, 800, 0},
 }};
 
 template <class Matches>

@@ -15,6 +15,8 @@ namespace versavis::imu {
 struct ImuModel {
     const char* name = "none";
     wire::ImuKind kind = wire::ImuKind::none;
+    double fastest_hz = 0;          ///< with the data-ready line
+    unsigned strongest_filter = 0;  ///< as the configuration numbers them, from 0
 };
 
 /// Names of all models, as the configuration has them.

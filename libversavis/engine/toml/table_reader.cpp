@@ -5,11 +5,23 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <numeric>
+#include <optional>
+#include <sstream>
 
 namespace versavis {
 
 namespace {
+
+/// Largest file that is read: 1 MiB. At half or twice, nothing that anybody writes by hand changes
+/// sides.
+constexpr std::size_t largest_file = 1U << 20;
+
+/// Most dots on one line. At half, paths with many dots may be refused; at twice, nested values
+/// need twice the stack.
+constexpr std::ptrdiff_t most_dots = 64;
 
 /// Levenshtein distance: insertions, deletions and substitutions that turn `a` into `b`.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -27,25 +39,87 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-std::string place(const std::string& path, const toml::source_region& source) {
-    return fmt::format("{}:{}:{}", path, source.begin.line, source.begin.column);
+/// The one of `names` that was probably meant; whoever left out the unit meant the name that
+/// begins the same.
+std::string nearest(std::string_view meant, const std::vector<std::string>& names) {
+    const std::string text = clipped(meant);
+    const auto distance = [&](const std::string& name) {
+        return name.rfind(text, 0) == 0 ? 0 : edit_distance(text, name);
+    };
+    const auto closer = [&](const std::string& a, const std::string& b) {
+        return distance(a) < distance(b);
+    };
+    return *std::min_element(names.begin(), names.end(), closer);
+}
+
+TomlPlace place(const std::string& path, const toml::source_region& source) {
+    return {path, source.begin.line, source.begin.column};
+}
+
+/// The value as the file has it.
+std::string text_of(const toml::node& node) {
+    if (node.is_table()) return "a table";
+    if (node.is_array()) return "a list";
+    std::ostringstream text;
+    text << toml::node_view(node);
+    return clipped(text.str());
+}
+
+Expected<std::string, TomlProblem> read_file(const std::string& path) {
+    const auto refuse = [&](const std::string& what, const char* cure) {
+        return Unexpected(TomlProblem{{path}, "", "", what, cure});
+    };
+    const char* give = "give the path of a readable file";
+    std::error_code error;
+    const auto status = std::filesystem::status(path, error);
+    if (!std::filesystem::exists(status)) return refuse("there is no such file", give);
+    // Devices and pipes may have no end.
+    if (!std::filesystem::is_regular_file(status)) return refuse("is not a regular file", give);
+    std::ifstream file(path, std::ios::binary);
+    std::string text(largest_file + 1, '\0');
+    if (!file) return refuse("cannot be opened", give);
+    file.read(text.data(), static_cast<std::streamsize>(text.size()));
+    if (file.bad()) return refuse("cannot be read", give);
+    text.resize(static_cast<std::size_t>(file.gcount()));
+    if (text.size() > largest_file)
+        return refuse(fmt::format("is larger than {} bytes", largest_file),
+                      "is it the right file?");
+    return text;
+}
+
+/// The parser calls itself for each level of a key. Comments may hold as many dots as they like.
+std::optional<TomlPlace> too_deep(const std::string& path, const std::string& text) {
+    std::istringstream lines(text);
+    std::uint32_t number = 1;
+    for (std::string line; std::getline(lines, line); ++number) {
+        const auto comment = line.find('#');
+        if (line.find_first_of("\"'") > comment) line.resize(comment);
+        if (std::count(line.begin(), line.end(), '.') > most_dots)
+            return TomlPlace{path, number, 1};
+    }
+    return std::nullopt;
 }
 
 }  // namespace
 
-void TomlFile::fail(const toml::node& node, const std::string& what, const std::string& cure) {
-    if (result)
-        result = failure(place(path, node.source()), what, cure.empty() ? "see " + manual : cure);
+Expected<> TomlFile::result() const {
+    if (problems.empty()) return {};
+    return Unexpected<Error>(problems.front());
 }
 
-Expected<toml::table> parse_toml(const std::string& path) {
+Expected<toml::table, TomlProblem> parse_toml(const std::string& path) {
+    const auto text = read_file(path);
+    if (!text) return Unexpected(text.error());
+    if (const auto deep = too_deep(path, *text))
+        return Unexpected(TomlProblem{*deep, "", "",
+                                      fmt::format("more than {} dots on one line", most_dots),
+                                      "no key is nested so deeply"});
     try {
-        return toml::parse_file(path);
+        return toml::parse(*text, path);
     } catch (const toml::parse_error& error) {
-        const bool readable = error.source().begin.line != 0;
-        return failure(readable ? place(path, error.source()) : path,
-                       std::string(error.description()),
-                       readable ? "" : "give the path of a readable file");
+        return Unexpected(TomlProblem{place(path, error.source()), "", "",
+                                      std::string(error.description()),
+                                      "the file must be TOML in UTF-8: https://toml.io"});
     }
 }
 
@@ -56,7 +130,16 @@ const toml::node* TableReader::find(std::string_view key) {
 
 void TableReader::fail(std::string_view key, const std::string& what, const std::string& cure) {
     const toml::node* node = table_.get(key);
-    file_.fail(node != nullptr ? *node : static_cast<const toml::node&>(table_), what, cure);
+    const toml::source_region& source = node != nullptr ? node->source() : table_.source();
+    file_.problems.push_back({place(file_.path, source), title_, std::string(key), what,
+                              cure.empty() ? "see " + file_.manual : cure});
+}
+
+/// The value of the key is not as expected.
+void TableReader::refuse(std::string_view key, const std::string& expected,
+                         std::optional<TomlRange> range) {
+    fail(key, fmt::format("'{}' must be {}, and is {}", key, expected, text_of(*table_.get(key))));
+    file_.problems.back().range = range;
 }
 
 void TableReader::read(std::string_view key, std::string& value) {
@@ -65,7 +148,7 @@ void TableReader::read(std::string_view key, std::string& value) {
     if (const auto text = node->value_exact<std::string>())
         value = *text;
     else
-        fail(key, fmt::format("'{}' must be a string in quotes", key));
+        refuse(key, "a string in quotes");
 }
 
 void TableReader::read(std::string_view key, bool& value) {
@@ -74,7 +157,7 @@ void TableReader::read(std::string_view key, bool& value) {
     if (const auto truth = node->value_exact<bool>())
         value = *truth;
     else
-        fail(key, fmt::format("'{}' must be true or false", key));
+        refuse(key, "true or false");
 }
 
 void TableReader::read(std::string_view key, double& value, double minimum, double maximum) {
@@ -84,7 +167,8 @@ void TableReader::read(std::string_view key, double& value, double minimum, doub
     if (number && *number >= minimum && *number <= maximum)
         value = *number;
     else
-        fail(key, fmt::format("'{}' must be a number from {} to {}", key, minimum, maximum));
+        refuse(key, fmt::format("a number from {:.10g} to {}", minimum, quantity(key, maximum)),
+               TomlRange{minimum, maximum});
 }
 
 void TableReader::read(std::string_view key, std::vector<std::string>& values) {
@@ -92,8 +176,7 @@ void TableReader::read(std::string_view key, std::vector<std::string>& values) {
     if (node == nullptr) return;
     const toml::array* array = node->as_array();
     if (array == nullptr || !(array->empty() || array->is_homogeneous(toml::node_type::string)))
-        return fail(
-            key, fmt::format("'{}' must be a list of strings in quotes: [\"...\", \"...\"]", key));
+        return refuse(key, "a list of strings in quotes: [\"...\", \"...\"]");
     values.clear();
     for (const toml::node& entry : *array) values.push_back(*entry.value_exact<std::string>());
 }
@@ -106,7 +189,10 @@ void TableReader::read_integer(std::string_view key, std::int64_t& value, std::i
     if (number && *number >= minimum && *number <= maximum)
         value = *number;
     else
-        fail(key, fmt::format("'{}' must be a whole number from {} to {}", key, minimum, maximum));
+        refuse(key,
+               fmt::format("a whole number from {} to {}{}{}", minimum, maximum,
+                           unit_of(key).empty() ? "" : " ", unit_of(key)),
+               TomlRange{static_cast<double>(minimum), static_cast<double>(maximum)});
 }
 
 std::optional<std::size_t> TableReader::find_choice(std::string_view key,
@@ -116,14 +202,15 @@ std::optional<std::size_t> TableReader::find_choice(std::string_view key,
     const auto text = node->value_exact<std::string>();
     const auto found = text ? std::find(names.begin(), names.end(), *text) : names.end();
     if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-    fail(key, fmt::format("'{}' must be one of: {}", key, fmt::join(names, ", ")));
+    refuse(key, fmt::format("one of {}", fmt::join(names, ", ")));
+    if (text)
+        file_.problems.back().cure = fmt::format("did you mean \"{}\"?", nearest(*text, names));
     return std::nullopt;
 }
 
 const toml::table* TableReader::table(std::string_view key) {
     const toml::node* node = find(key);
-    if (node != nullptr && !node->is_table())
-        fail(key, fmt::format("'{}' must be a table: [{}]", key, key));
+    if (node != nullptr && !node->is_table()) refuse(key, fmt::format("a table: [{}]", key));
     return node == nullptr ? nullptr : node->as_table();
 }
 
@@ -133,32 +220,27 @@ std::vector<const toml::table*> TableReader::tables(std::string_view key) {
     if (node == nullptr) return found;
     const toml::array* array = node->as_array();
     if (array == nullptr || !array->is_homogeneous(toml::node_type::table)) {
-        fail(key, fmt::format("'{}' must be an array of tables: [[{}]]", key, key));
+        refuse(key, fmt::format("an array of tables: [[{}]]", key));
         return found;
     }
     for (const toml::node& entry : *array) found.push_back(entry.as_table());
     return found;
 }
 
-std::string TableReader::nearest(std::string_view key) const {
-    // Whoever left out the unit meant the key that begins the same.
-    const auto distance = [key](const std::string& known) {
-        return known.rfind(key, 0) == 0 ? 0 : edit_distance(key, known);
-    };
-    const auto closer = [&](const std::string& a, const std::string& b) {
-        return distance(a) < distance(b);
-    };
-    return *std::min_element(known_.begin(), known_.end(), closer);
-}
-
 void TableReader::finish() {
     for (const auto& [key, node] : table_)
         if (std::find(known_.begin(), known_.end(), key.str()) == known_.end())
-            file_.result = file_.result
-                               ? failure(place(file_.path, key.source()),
-                                         fmt::format("unknown key '{}'", key.str()),
-                                         fmt::format("did you mean '{}'?", nearest(key.str())))
-                               : file_.result;
+            file_.problems.push_back(
+                {place(file_.path, key.source()), title_, std::string(key.str()),
+                 fmt::format("unknown key '{}'", clipped(key.str())),
+                 fmt::format("did you mean '{}'?", nearest(key.str(), known_))});
+}
+
+TomlEntry TableReader::entry() const {
+    TomlEntry entry{title_, place(file_.path, table_.source()), {}};
+    for (const auto& [key, node] : table_)
+        entry.keys.emplace(key.str(), place(file_.path, node.source()));
+    return entry;
 }
 
 }  // namespace versavis

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Reads the keys of TOML tables with types, ranges and choices; errors name line, column and the
-// nearest key.
+// Reads the keys of TOML tables with types, ranges and choices; problems are collected, and name
+// line, column and the nearest key.
 #pragma once
 
 #include <toml++/toml.h>
@@ -9,26 +9,30 @@
 #include <utility>
 #include <vector>
 
+#include "engine/toml/problem.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis {
 
-/// The file that is being read; the first error wins.
+/// The file that is being read, and all that is wrong in it.
 struct TomlFile {
     std::string path;
     std::string manual;  ///< where the keys are documented
-    Expected<> result{};
+    TomlProblems problems{};
 
-    void fail(const toml::node& node, const std::string& what, const std::string& cure = {});
+    /// The first of its problems, for who needs no more.
+    Expected<> result() const;
 };
 
-/// Parses `path`. Errors: it cannot be read, or is not valid TOML.
-Expected<toml::table> parse_toml(const std::string& path);
+/// Parses `path`. Errors: it is no regular file, too large, too deep, or not valid TOML.
+Expected<toml::table, TomlProblem> parse_toml(const std::string& path);
 
 /// A key that is absent leaves its value as it is. finish() refuses keys that nobody asked for.
 class TableReader {
  public:
-    TableReader(TomlFile& file, const toml::table& table) : file_(file), table_(table) {}
+    /// `title` is what messages call the table, such as `[[camera]] "cam0"`.
+    TableReader(TomlFile& file, const toml::table& table, std::string title = {})
+        : file_(file), table_(table), title_(std::move(title)) {}
 
     void read(std::string_view key, std::string& value);
     void read(std::string_view key, bool& value);
@@ -63,16 +67,21 @@ class TableReader {
     void fail(std::string_view key, const std::string& what, const std::string& cure = {});
     void finish();
 
+    /// Where the table and its keys are.
+    TomlEntry entry() const;
+
  private:
     const toml::node* find(std::string_view key);
+    void refuse(std::string_view key, const std::string& expected,
+                std::optional<TomlRange> range = {});
     void read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
                       std::int64_t maximum);
     std::optional<std::size_t> find_choice(std::string_view key,
                                            const std::vector<std::string>& names);
-    std::string nearest(std::string_view key) const;
 
     TomlFile& file_;
     const toml::table& table_;
+    std::string title_;
     std::vector<std::string> known_;
 };
 

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "configuration/configuration_check.hpp"
+
+#include <fmt/format.h>
+
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "../support/temporary_directory.hpp"
+#include "configuration/board_configuration.hpp"
+#include "configuration_check.hpp"
+#include "imu/imu_part.hpp"
+#include "imu/vn100.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+/// All messages without the directory, one a line.
+std::string errors_of(const std::string& text) {
+    const test::TemporaryDirectory directory;
+    const auto configuration = load_configuration(directory.write("c.toml", text));
+    if (configuration) return "no error";
+    std::string all;
+    for (const TomlProblem& problem : configuration.error())
+        all += problem.message().substr(directory.path().string().size() + 1) + "\n";
+    return all;
+}
+
+/// The file is refused for this and nothing else.
+void refused(const std::string& text, const std::string& message) {
+    INFO(text);
+    const std::string errors = errors_of(text);
+    CHECK_THAT(errors, Catch::Contains(message));
+    CHECK(std::count(errors.begin(), errors.end(), '\n') == 1);
+}
+
+std::string camera(const std::string& name, unsigned output, const std::string& more = "") {
+    return fmt::format("[[camera]]\nname = \"{0}\"\ndevice = \"of {0}\"\noutput = {1}\n{2}", name,
+                       output, more);
+}
+const std::string cam0 = camera("cam0", 0);
+
+class Refusals : public firmware::RefusalSink {
+ public:
+    void refuse(const wire::Refusal& refusal) override { all.push_back(refusal); }
+    std::vector<wire::Refusal> all;
+};
+
+}  // namespace
+
+TEST_CASE("configuration_check: an exposure must fit its limit and the period") {
+    refused(camera("a", 0, "rate_hz = 20\nexposure_us = 60000\n"),
+            "c.toml:6:15: 'exposure_us' is 60000 us, and must be at most 50000 us (");
+    refused(camera("a", 0, "exposure_us = 3000\nmax_exposure_us = 2000\n"),
+            "c.toml:5:15: 'exposure_us' is 3000 us, and must be at most 2000 us "
+            "('max_exposure_us'); lower it, or raise 'max_exposure_us'");
+    refused(camera("a", 0, "rate_hz = 100\nexposure_us = 8000\nlatency_us = 50\ngap_us = 2000\n"),
+            "at most 7950 us");
+    CHECK(errors_of(camera("a", 0, "rate_hz = 100\nexposure_us = 8000\ngap_us = 2000\n")) ==
+          "no error");
+    CHECK(errors_of(camera("a", 0, "trigger = \"free\"\nexposure_us = 60000\n")) == "no error");
+}
+
+TEST_CASE("configuration_check: times must fit the period") {
+    refused(camera("a", 0, "phase_us = 50000\n"),
+            "c.toml:5:12: 'phase_us' is 50000 us, and must be at most 49999.999 us (less than the "
+            "period); lower it, or 'rate_hz'");
+    refused(camera("a", 0, "rate_hz = 500\nlatency_us = 2000\nexposure_us = 0\n"), "'latency_us'");
+    refused(camera("a", 0, "gap_us = 50000\nexposure_us = 0\n"), "'gap_us' is 50000 us");
+    refused(camera("a", 0, "rate_hz = 500\npulse_us = 1001\n"),
+            "at most 1000 us (half the period)");
+}
+
+TEST_CASE("configuration_check: one device, output and name belong to one table, the second") {
+    refused(cam0 + "[[camera]]\nname = \"cam1\"\ndevice = \"OF cam0\"\noutput = 1\n",
+            "c.toml:7:10: 'OF cam0' is the device of [[camera]] \"cam0\" in line 1;");
+    refused(cam0 + camera("cam1", 0),
+            "c.toml:8:10: output 0 is taken by [[camera]] \"cam0\" in line 1; free: 1, 2, 3");
+    refused(cam0 + "[[camera]]\nname = \"cam1\"\ndevice = \"x\"\n",
+            "c.toml:5:1: output 0 is taken");
+    refused(cam0 + camera("b", 1) + camera("c", 2) + camera("d", 3) + camera("e", 3),
+            "the board triggers four cameras at most");
+    refused(
+        cam0 + "[[imu]]\nname = \"cam0\"\n",
+        "c.toml:6:8: the name 'cam0' is taken by [[camera]] \"cam0\" in line 1; choose another");
+    CHECK(errors_of(cam0 + camera("cam1", 0, "trigger = \"free\"\n")) == "no error");
+}
+
+TEST_CASE("configuration_check: names are those of files, and not those of the service") {
+    for (const char* name : {"clock", "events", "status", "cam0-evidence"})
+        refused(camera(name, 0),
+                fmt::format("c.toml:2:8: the name '{}' is taken by a stream of the service", name));
+    refused(camera("../x", 0), "c.toml:2:8: '../x' is not a valid name; use up to 31 letters");
+    refused("[[camera]]\ndevice = \"x\"\n", "c.toml:1:1: a 'name' is needed");
+    refused("instance = \"a/b\"\n" + cam0, "c.toml:1:12: 'a/b' is not a valid name");
+    refused(cam0 + "[[imu]]\nname = \"a\\u001b[31m\"\n", "'a?[31m' is not a valid name");
+}
+
+TEST_CASE("configuration_check: a device is given, and an address is one") {
+    const auto with_device = [](const std::string& device) {
+        return "[[camera]]\nname = \"a\"\ndevice = \"" + device + "\"\n";
+    };
+    refused(with_device(""), "c.toml:3:10: a camera needs a 'device'; give its IP address");
+    refused("[[camera]]\nname = \"a\"\n", "c.toml:1:1: a camera needs a 'device'");
+    for (const char* device : {"192.168.1.300", "192.168.1", "1.2.3.4.5", "1..2.3"})
+        refused(with_device(device), fmt::format("'{}' is not an IP address; an IP", device));
+    for (const char* device : {"192.168.1.20", "21098765", "Basler-21.5.3", "00:11:1c:aa:bb:cc"})
+        CHECK(errors_of(with_device(device)) == "no error");
+}
+
+TEST_CASE("configuration_check: a preset is a file, and can do what is asked of it") {
+    refused(camera("a", 0, "preset = \"flirr\"\n"),
+            "c.toml:5:10: there is no preset 'flirr'; use one of: auto, alvium, basler-ace2");
+    refused(camera("a", 0, "preset = \"basler-dart\"\nptp = true\n"),
+            "c.toml:6:7: cameras of preset 'basler-dart' have no 'ptp'");
+    refused("preset_directory = \"/nowhere\"\n" + cam0,
+            "c.toml:1:20: /nowhere: there are no camera presets");
+    CHECK(errors_of(camera("a", 0, "preset = \"flir\"\nptp = true\n")) == "no error");
+}
+
+TEST_CASE("configuration_check: limits of auto exposure agree with each other") {
+    const std::string table = "[camera.auto_exposure]\n";
+    refused(camera("a", 0, table + "min_us = 30000\nmax_us = 20000\n"),
+            "c.toml:6:10: 'min_us' is 30000 us, and must be at most 20000 us ('max_us')");
+    refused(camera("a", 0, table + "min_us = 60000\n"), "must be at most 50000 us ('max_us')");
+    refused(camera("a", 0, "max_exposure_us = 9000\n" + table + "max_us = 9001\n"),
+            "'max_us' is 9001 us, and must be at most 9000 us ('max_exposure_us' of the camera)");
+    refused(camera("a", 0, "exposure = \"pulse\"\n" + table), "auto exposure cannot");
+    CHECK(errors_of(camera("a", 0, "max_exposure_us = 20\n" + table)) == "no error");
+}
+
+TEST_CASE("configuration_check: who can be a master") {
+    const auto slave = [](const std::string& master, const std::string& more = "") {
+        return camera("slave", 1, "master = \"" + master + "\"\n" + more);
+    };
+    refused(cam0 + slave("cam9"),
+            "c.toml:9:10: 'cam9' cannot be the master: there is no camera of that name; possible: "
+            "cam0");
+    refused(cam0 + slave("slave"), "it is this camera itself; possible: cam0");
+    refused(cam0 + slave("cam0") + camera("third", 2, "master = \"slave\"\n"),
+            "c.toml:14:10: 'slave' cannot be the master: it has a master itself");
+    refused(camera("cam0", 0, "trigger = \"free\"\n") + slave("cam0"),
+            "the board does not trigger it; no other camera has an exposure line");
+    refused(camera("cam0", 0, "strobe = \"none\"\n") + slave("cam0"), "it has no exposure line");
+    refused(cam0 + slave("cam0", "trigger = \"free\"\n"),
+            "c.toml:9:10: a camera with trigger = \"free\" has no 'master'");
+    for (const char* key : {"rate_hz", "phase_us", "max_exposure_us"})
+        refused(cam0 + slave("cam0", fmt::format("{} = 10\n", key)),
+                fmt::format("c.toml:10:{}: a slave has the '{}' of its master",
+                            std::string(key).size() + 4, key));
+    CHECK(errors_of(slave("cam0") + cam0) == "no error");
+}
+
+TEST_CASE("configuration_check: a frame can be waited for no longer than exposures are known") {
+    refused(camera("a", 0, "latest_arrival_ms = 6401\n"),
+            "c.toml:5:21: 'latest_arrival_ms' is 6401 ms, and must be at most 6400 ms");
+    refused(camera("a", 0, "rate_hz = 1000\nlatest_arrival_ms = 500\n"), "must be at most 128 ms");
+    refused(camera("a", 0, "camera_clock = false\nlatest_arrival_ms = 901\n"),
+            "must be at most 900 ms (without 'camera_clock'");
+    CHECK(errors_of(camera("a", 0, "latest_arrival_ms = 6400\n")) == "no error");
+}
+
+TEST_CASE("configuration_check: rate and filter are those of the IMU's part") {
+    refused("[[imu]]\nrate_hz = 900\ndata_ready = true\n",
+            "c.toml:2:11: 'rate_hz' is 900 Hz, and must be at most 819.2 Hz (the fastest of the "
+            "adis16448b); lower it");
+    refused("[[imu]]\nmodel = \"icm42688p\"\nrate_hz = 2000\n",
+            "must be at most 1000 Hz (faster only with the data-ready line)");
+    refused("[[imu]]\nmodel = \"bmi088\"\nfilter = 3\n",
+            "c.toml:3:10: 'filter' is 3, and must be at most 2 (the strongest of the bmi088)");
+    refused("[[imu]]\n[[imu]]\nname = \"b\"\n",
+            "c.toml:2:1: the board has one SPI port for IMUs, taken by [[imu]] in line 1");
+}
+
+TEST_CASE("configuration_check: a link has a path that fits a socket") {
+    refused(cam0 + "[board]\nlink = \"unix:\"\n",
+            "c.toml:6:8: 'unix:' is not a valid link; use \"usb\" or \"unix:/path/of/socket\"");
+    refused(cam0 + "[board]\nlink = \"tty\"\n", "'tty' is not a valid link");
+    refused(cam0 + "[board]\nlink = \"unix:" + std::string(108, 'a') + "\"\n", "107 characters");
+    CHECK(errors_of(cam0 + "[board]\nlink = \"unix:" + std::string(107, 'a') + "\"\n") ==
+          "no error");
+}
+
+TEST_CASE("configuration_check: PPS needs its input, and what names its pulses") {
+    refused(cam0 + "[clock]\npps = \"host\"\n",
+            "c.toml:6:7: 'pps' needs the PPS input, which is not enabled; add \"pps\" to 'inputs'");
+    refused(cam0 + "[clock]\npps = \"nmea\"\n[ports]\ninputs = [\"pps\"]\n",
+            "nmea = true in [ports]");
+    refused(cam0 +
+                "[clock]\npps = \"host\"\noutput = \"monotonic_raw\"\n[ports]\n"
+                "inputs = [\"pps\"]\n",
+            "PPS cannot label CLOCK_MONOTONIC_RAW");
+    refused(cam0 + "[ports]\nnmea = true\n",
+            "c.toml:6:8: 'nmea' names the pulses of the PPS input");
+    refused("[[imu]]\nmodel = \"vn100\"\n[ports]\ninputs = [\"pps\"]\nnmea = true\n",
+            "'nmea' needs the UART, which the vn100 has");
+}
+
+TEST_CASE("configuration_check: light and ports name what is there") {
+    refused(cam0 + "[illumination]\ncameras = [\"cam1\"]\n",
+            "c.toml:6:11: 'cam1' is not a camera that the board triggers");
+    refused(cam0 + "[ports]\ninputs = [\"gps\"]\n",
+            "c.toml:6:10: 'gps' is not an input; use some of: pps, aux0, aux1, sync");
+    refused(cam0 + "[ports]\nfalling = [\"aux0\"]\n", "c.toml:6:11: 'aux0' is not enabled");
+    refused(cam0 + "[ports]\ntest = \"nobody\"\n",
+            "c.toml:6:8: 'nobody' is neither a triggered camera nor an IMU");
+    refused("[[imu]]\nmodel = \"vn100\"\n[ports]\ntest = \"imu0\"\n", "data_ready = true");
+    refused(cam0 + "[ports]\nimu_output = true\n", "'imu_output' needs an IMU on the SPI");
+    refused(cam0 + "[ports]\nsync_rate_hz = 0.01\n", "must be 0 (no pulses), or 0.1 to 10 Hz");
+    refused(camera("cam0", 0, "rate_hz = 1000\n") + "[ports]\ntest = \"cam0\"\npulse_us = 501\n",
+            "'pulse_us' is 501 us, and must be at most 500 us (half the period of 'cam0'");
+}
+
+TEST_CASE("configuration_check: what is wrong already is not told again in other words") {
+    refused(cam0 + camera("cam1", 4), "'output' must be a whole number from 0 to 3, and is 4");
+    refused("camera = 1\n", "'camera' must be an array of tables");
+}
+
+TEST_CASE("configuration_check: what a model of IMU can do is what its part does on the board") {
+    for (const std::string& name : imu::model_names()) {
+        const imu::ImuModel& model = *imu::find_model(name);
+        INFO(name);
+        const firmware::ImuPart* part = firmware::find_part(model.kind);
+        const bool serial = model.kind == wire::ImuKind::vn100;
+        REQUIRE((part != nullptr || serial));
+        CHECK(std::llround(model.fastest_hz * 1e3) ==
+              (serial ? firmware::vn100::fastest_millihertz : part->fastest_millihertz()));
+        CHECK(model.strongest_filter == (serial ? 0 : part->strongest_filter()));
+    }
+}
+
+TEST_CASE("configuration_check: whatever is accepted, the board takes") {
+    const test::TemporaryDirectory directory;
+    directory.write("any.toml", "");
+    std::mt19937 random(7);
+    const auto any = [&](std::size_t count) {
+        return std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
+    };
+    const auto real = [&](double from, double to) {
+        return std::uniform_real_distribution<double>(from, to)(random);
+    };
+    // At and around the limits, where a rounding more or less decides.
+    const auto near = [&](double limit) {
+        const double parts[]{0, 1e-4, 0.25, 0.5, 0.5, 1, 1, real(0, 1.1)};
+        const double shifts[]{0, 0, 0.0004, 0.0005, 0.001, -0.0004, -0.0005, -0.001};
+        return limit * parts[any(8)] + shifts[any(8)];
+    };
+    const auto line = [&](const char* key, double value) {
+        return any(8) == 0 ? fmt::format("{} = {:.17g}\n", key, value) : std::string();
+    };
+    const auto flag = [&](const char* text) { return any(8) == 0 ? std::string(text) : ""; };
+    const auto rate = [&] {
+        const double usual[]{0.1, 1, 20, 29.97, 333.333333, 999.9999, 1000};
+        return any(2) == 0 ? usual[any(7)] : std::pow(10, real(-1, 3));
+    };
+    const auto cameras = [&] {
+        std::string text;
+        for (unsigned i = 0, count = static_cast<unsigned>(any(4)); i < count; ++i) {
+            const double hz = rate();
+            const double period = 1e6 / hz;
+            text += camera(fmt::format("cam{}", i), i) + fmt::format("rate_hz = {:.17g}\n", hz) +
+                    line("phase_us", near(period)) + line("latency_us", near(period)) +
+                    line("gap_us", near(period)) + line("pulse_us", near(period)) +
+                    line("exposure_us", near(period)) + line("max_exposure_us", near(period)) +
+                    flag("strobe = \"none\"\n");
+        }
+        if (any(4) == 0) text += camera("last", 3, "master = \"cam0\"\n");
+        return text;
+    };
+    const auto imus = [&] {
+        std::string text;
+        for (const char* name : {"imu0", "imu1"})
+            if (any(3) == 0)
+                text += fmt::format(
+                    "[[imu]]\nname = \"{}\"\nmodel = \"{}\"\n{}{}{}", name,
+                    imu::model_names()[any(8)], line("filter", static_cast<double>(any(9))),
+                    line("rate_hz", near(any(2) == 0 ? 2000 : 819.2)), flag("data_ready = true\n"));
+        return text;
+    };
+    const auto ports = [&] {
+        const char* tests[]{"cam0", "cam1", "last", "imu0", "imu1", "", "", "", "", "", ""};
+        const double lead = near(1000);
+        return "[illumination]\n" + flag("cameras = [\"cam0\", \"last\"]\n") +
+               fmt::format("lead_us = {:.17g}\n", lead) + line("max_on_us", lead + 10 + near(0)) +
+               line("duty_percent", near(100)) + "[ports]\n" + flag("inputs = [\"pps\"]\n") +
+               flag("nmea = true\n") + flag("imu_output = true\n") +
+               line("pulse_us", near(1e6 / rate())) + line("sync_rate_hz", near(10)) +
+               fmt::format("test = \"{}\"\n", tests[any(11)]);
+    };
+    unsigned accepted = 0;
+    for (int round = 0; round < 3000; ++round) {
+        const std::string text = "preset_directory = \"" + directory.path().string() + "\"\n" +
+                                 cameras() + imus() + ports();
+        const auto configuration = load_configuration(directory.write("c", text));
+        if (!configuration) continue;
+        ++accepted;
+        Refusals refusals;
+        firmware::check(board_configuration(*configuration), refusals);
+        INFO(text);
+        for (const wire::Refusal& refusal : refusals.all) FAIL(describe(*configuration, refusal));
+    }
+    CHECK(accepted > 500);
+}

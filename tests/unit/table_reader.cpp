@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/toml/table_reader.hpp"
+
+#include <sys/stat.h>
+
+#include <catch2/catch.hpp>
+
+#include "../support/temporary_directory.hpp"
+
+using namespace versavis;
+
+namespace {
+
+std::string parse_error(const std::string& text) {
+    const test::TemporaryDirectory directory;
+    const auto root = parse_toml(directory.write("t.toml", text));
+    return root ? "no error" : root.error().message().substr(directory.path().string().size() + 1);
+}
+
+std::string repeated(const std::string& text, unsigned count) {
+    std::string all;
+    for (unsigned i = 0; i < count; ++i) all += text;
+    return all;
+}
+
+}  // namespace
+
+TEST_CASE("table_reader: what is no file is not read") {
+    const test::TemporaryDirectory directory;
+    const std::string pipe = (directory.path() / "pipe").string();
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    for (const std::string& path : {directory.path().string(), pipe, std::string("/dev/zero")}) {
+        const auto root = parse_toml(path);
+        REQUIRE_FALSE(root);
+        CHECK(root.error().message() ==
+              path + ": is not a regular file; give the path of a readable file");
+    }
+    CHECK(parse_toml("/nowhere/t.toml").error().message() ==
+          "/nowhere/t.toml: there is no such file; give the path of a readable file");
+}
+
+TEST_CASE("table_reader: a file that is too large or too deep is refused before it is parsed") {
+    CHECK(parse_error(std::string((1U << 20U) + 1, '#')) ==
+          "t.toml: is larger than 1048576 bytes; is it the right file?");
+    CHECK(parse_error(std::string(1U << 20U, '#')) == "no error");
+    CHECK(parse_error("# " + std::string(200, '.') + "\nx = 1 # " + std::string(200, '.')) ==
+          "no error");
+    for (const std::string& deep :
+         {repeated("a.", 40'000) + "a = 1", "[" + repeated("a.", 40'000) + "a]",
+          "\"#\"" + repeated(".a", 40'000) + " = 1"})
+        CHECK(parse_error("x = 1\n" + deep) ==
+              "t.toml:2:1: more than 64 dots on one line; no key is nested so deeply");
+    CHECK_THAT(parse_error("x = " + std::string(100'000, '[')), Catch::Contains("t.toml:1:"));
+    // As deep as it can be built of short lines.
+    const std::string level = "[\n{" + repeated("a.", 60) + "a=";
+    CHECK_THAT(parse_error("x = " + repeated(level, 2'000)), Catch::Contains("t.toml:"));
+    CHECK(parse_error("x = " + repeated(level, 120) + "1" + repeated("}\n]", 120)) == "no error");
+}
+
+TEST_CASE("table_reader: what is not TOML is refused with its place") {
+    const std::string bytes("a = 1\nb = \"\xC3\x28\"\n");
+    CHECK_THAT(parse_error(bytes), Catch::StartsWith("t.toml:2:"));
+    CHECK_THAT(parse_error(bytes), Catch::Contains("must be TOML in UTF-8"));
+    CHECK_THAT(parse_error(std::string("\x7F\x45LF\x02\x01\x00\x00", 8)),
+               Catch::StartsWith("t.toml:1:1: "));
+    CHECK_THAT(parse_error("a = 1\na = 2\n"), Catch::StartsWith("t.toml:2:"));
+}
+
+TEST_CASE("table_reader: problems are collected with place, table and key") {
+    const toml::table root = toml::parse("[t]\nwidth_us = 3\nhight = 1\nkind = \"rond\"\n");
+    TomlFile file{"t.toml", "manual"};
+    TableReader reader(file, *root["t"].as_table(), "[t]");
+    double width = 1;
+    int height = 1;
+    bool kind = false;
+    reader.read("width_us", width, 0, 2);
+    reader.read("height", height, 0, 9);
+    reader.choose<bool>("kind", kind, {{"round", true}, {"flat", false}});
+    reader.finish();
+    REQUIRE(file.problems.size() == 3);
+    CHECK(width == 1);
+    CHECK(file.problems[0].message() ==
+          "t.toml:2:12: 'width_us' must be a number from 0 to 2 us, and is 3; see manual");
+    CHECK(file.problems[0].key == "width_us");
+    CHECK(file.problems[0].range->maximum == 2);
+    CHECK(file.problems[1].cure == "did you mean \"round\"?");
+    CHECK(file.problems[2].message() == "t.toml:3:1: unknown key 'hight'; did you mean 'height'?");
+    CHECK(file.problems[2].table == "[t]");
+    CHECK(file.result().error().message() == file.problems[0].message());
+    const TomlEntry entry = reader.entry();
+    CHECK(entry.has("kind"));
+    CHECK_FALSE(entry.has("height"));
+    CHECK(entry.place_of("kind").text() == "t.toml:4:8");
+    CHECK(entry.place_of("height").text() == "t.toml:1:1");
+}
