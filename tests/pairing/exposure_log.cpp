@@ -23,8 +23,7 @@ Exposure exposure(std::uint64_t trigger, std::int64_t start_ms, bool exposed = t
 TEST_CASE("exposure_log: the nearest within the tolerance, on either timeline") {
     ExposureLog log(milliseconds(50));
     CHECK(log.near(Instant::start, 0, 1'000'000'000) == nullptr);
-    for (int i = 0; i < 5; ++i)
-        log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i));
+    for (int i = 0; i < 5; ++i) log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i));
     CHECK(log.near(Instant::start, 101'000'000, 5'000'000)->exposure.trigger == 3);
     CHECK(log.near(Instant::start, 124'000'000, 100'000'000)->exposure.trigger == 3);
     CHECK(log.near(Instant::start, 126'000'000, 100'000'000)->exposure.trigger == 4);

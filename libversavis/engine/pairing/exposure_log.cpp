@@ -15,7 +15,7 @@ std::int64_t Record::instant_ns(Instant instant) const {
     }
 }
 
-void ExposureLog::add(const Exposure& exposure) {
+void ExposureLog::add(const Exposure& exposure, bool prompt) {
     ++recorded_;
     if (!exposure.exposed) ++silent_;
     const Duration told = exposure.end - exposure.start;
@@ -25,7 +25,7 @@ void ExposureLog::add(const Exposure& exposure) {
     if (exposure.kind == StampKind::predicted_middle && last_length_.ns != 0)
         length = std::min(told, last_length_);
     records_.push_back({exposure, exposure.start + length, exposure.end_on_host - (told - length),
-                        false, recorded_, silent_});
+                        false, recorded_, silent_, prompt});
     measure();
 }
 

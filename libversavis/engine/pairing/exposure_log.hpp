@@ -22,6 +22,8 @@ struct Record {
     std::uint64_t recorded = 0;  ///< records until this one, itself included
     std::uint64_t silent = 0;    ///< those of them without an exposure
 
+    bool prompt = true;  ///< reached the host as soon as others did
+
     std::int64_t instant_ns(Instant instant) const;
 };
 
@@ -30,7 +32,7 @@ class ExposureLog {
     explicit ExposureLog(Duration period) : period_(period), smallest_gap_(period) {}
 
     /// Comes after the one before in number and in start.
-    void add(const Exposure& exposure);
+    void add(const Exposure& exposure, bool prompt = true);
 
     bool empty() const { return records_.empty(); }
     std::size_t size() const { return records_.size(); }

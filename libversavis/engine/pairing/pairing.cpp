@@ -197,7 +197,7 @@ void Pairing::add(const Exposure& exposure) {
 
 void Pairing::accept(const Exposure& exposure) {
     gate_.take(exposure);
-    exposures_.add(exposure);
+    exposures_.add(exposure, gate_.prompt());
     const auto in_flight = static_cast<std::size_t>(
         (limits_.latest_arrival + limits_.exposure_wait).ns / limits_.period.ns);
     const std::size_t kept =
@@ -331,11 +331,11 @@ bool Pairing::verified(const Arrival& arrival, const Record& record) const {
     return !record.used && record.exposure.exposed &&
            arrival_possible(limits_, arrival, record.exposure) && ids_agree(arrival, record) &&
            !length_contradicts(arrival, record.exposure) &&
-           (by_clock_ || ids_exact(arrival, record));
+           ((by_clock_ && record.prompt) || ids_exact(arrival, record));
 }
 
-/// Were a trigger left out of the count, a frame of the exposure before would do as well, only
-/// late.
+/// Were a trigger left out of the count, a frame of the exposure before would do as well: it would
+/// only be late, or the board's time was set back, and the record is late.
 bool Pairing::ids_exact(const Arrival& arrival, const Record& record) const {
     return arrival.block_id - proved_->arrival.block_id ==
            record.exposure.trigger - proved_->record.exposure.trigger;
@@ -471,9 +471,8 @@ bool Pairing::decide_checking() {
         return true;
     }
     const Record* clocked = by_clock(arrival);
-    // Records that come late may be those of a board whose time was set back: then clock and
-    // arrival have stepped, and not the ids.
-    const bool ids_may_have_stepped = clocked != nullptr && clocked == late && gate_.prompt() &&
+    // A late record may be of a board whose time was set back: then clock and arrival have stepped.
+    const bool ids_may_have_stepped = clocked != nullptr && clocked == late && clocked->prompt &&
                                       !clocked->used && clocked->exposure.exposed;
     // A clock that steps does not hit another exposure to some microseconds. When it fits so well,
     // it is ids and arrivals that have stepped together.
