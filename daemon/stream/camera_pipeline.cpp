@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
 
+#include <utility>
+
 namespace versavis::daemon {
 
 namespace {
@@ -51,12 +53,14 @@ void CameraPipeline::begin_anew() {
 }
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
-                                   std::uint64_t payload_size, bool has_clock) {
+                                   std::uint64_t payload_size, bool has_clock,
+                                   pairing::Instant stamp_instant) {
     const std::lock_guard lock(mutex_);
     if (triggered())
         if (auto opened = evidence_.open(directory, configuration_.name); !opened) return opened;
     begin_anew();
     limits_.camera_clock = configuration_.camera_clock && has_clock;
+    limits_.stamped = stamp_instant;
     pairing_.set_limits(limits_);
     tell(limits_);
     report_.last_proof = host_now();
@@ -120,7 +124,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
         frames_.publish_proved(arrival, exposure, middles_.at(exposure.trigger));
     }
     // The newest used record may still be the guess for a suspect frame.
-    middles_.erase(middles_.begin(), middles_.lower_bound(exposure.trigger));
+    middles_.erase(std::exchange(last_used_, exposure.trigger));
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -226,6 +230,7 @@ std::uint64_t CameraPipeline::unanswered_triggers() {
 PipelineReport CameraPipeline::report() {
     const std::lock_guard lock(mutex_);
     report_.pairing = pairing_.state();
+    report_.stamp_instant = pairing_.stamped();
     report_.exposure = check_.measured();
     report_.camera_exposure = check_.told();
     report_.exposure_contradicted = check_.contradicted();

@@ -55,3 +55,40 @@ TEST_CASE("exposure_log: gaps are as small as the closest exposures, at most the
     log.add(exposure(3, 1040));
     CHECK(log.smallest_gap_ns() == 40'000'000);
 }
+
+TEST_CASE("exposure_log: an end that nobody saw is likelier after as long as last time") {
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 5; ++i) {
+        Exposure next = exposure(static_cast<std::uint64_t>(i) + 1, 50 * i);
+        if (i == 2) {  // told as late as it may be, three periods on
+            next.kind = StampKind::predicted_middle;
+            next.end = next.start + milliseconds(150);
+            next.end_on_host = HostTime{next.end.ns + 5'000'000'000};
+        }
+        log.add(next);
+    }
+    for (int i = 0; i < 5; ++i) {
+        const std::int64_t end_ns = (50 * i + 2) * 1'000'000LL;
+        for (const auto& [instant, at_ns] : {std::pair(Instant::end, end_ns),
+                                             std::pair(Instant::arrival, end_ns + 5'000'000'000)}) {
+            const Record* record = log.near(instant, at_ns, 5'000'000);
+            REQUIRE(record != nullptr);
+            CHECK(record->exposure.trigger == static_cast<std::uint64_t>(i) + 1);
+        }
+    }
+}
+
+TEST_CASE("exposure_log: an exposure that outlasts the next ones is found by its end") {
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 5; ++i) {
+        Exposure next = exposure(static_cast<std::uint64_t>(i) + 1, 50 * i);
+        if (i == 1) {
+            next.end = next.start + milliseconds(130);
+            next.end_on_host = HostTime{next.end.ns + 5'000'000'000};
+        }
+        log.add(next);
+    }
+    CHECK(log.near(Instant::end, 180'000'000, 5'000'000)->exposure.trigger == 2);
+    CHECK(log.near(Instant::arrival, 5'180'000'000, 5'000'000)->exposure.trigger == 2);
+    CHECK(log.near(Instant::arrival, 5'102'000'000, 5'000'000)->exposure.trigger == 3);
+}

@@ -84,6 +84,7 @@ class Search {
     /// cannot be.
     std::optional<Alignment> explain(std::int64_t difference_ns) const {
         Alignment alignment;
+        const Record* first = nullptr;
         const Record* last = nullptr;
         const Arrival* last_frame = nullptr;
         for (const Arrival& frame : frames_) {
@@ -101,11 +102,14 @@ class Search {
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
+            if (first == nullptr) first = record;
             last = record;
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
         }
-        if (alignment.triggers.empty()) return std::nullopt;
+        if (first == nullptr) return std::nullopt;
+        // The board's time may have been set back among them: the same time came twice.
+        alignment.unknown = alignment.unknown || (first->prompt && !last->prompt);
         return alignment;
     }
 
@@ -171,8 +175,10 @@ class Search {
  private:
     std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
 
+    /// Arrivals alone prove nothing while the board's time may have been set back.
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
+               (instant_ != Instant::arrival || record.prompt) &&
                arrival_possible(limits_, frame, record.exposure) &&
                !length_contradicts(frame, record.exposure);
     }

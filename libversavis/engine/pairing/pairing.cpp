@@ -214,7 +214,11 @@ void Pairing::set_aside(const Exposure& exposure) {
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     if (state_ != State::searching) search_anew();
     gate_ = RecordGate(limits_);
-    for (const Exposure& stepped : std::exchange(odd_, {})) accept(stepped);
+    for (const Exposure& stepped : std::exchange(odd_, {}))
+        if (gate_.accepts(stepped))
+            accept(stepped);
+        else  // the board is ahead of its clock's estimate: nothing can be proved by that
+            outcome_.exposure_unpaired(stepped, EventReason::mismatch);
     process();
 }
 
@@ -330,8 +334,8 @@ bool Pairing::ids_agree(const Arrival& arrival, const Record& record) const {
 bool Pairing::verified(const Arrival& arrival, const Record& record) const {
     return !record.used && record.exposure.exposed &&
            arrival_possible(limits_, arrival, record.exposure) && ids_agree(arrival, record) &&
-           !length_contradicts(arrival, record.exposure) &&
-           ((by_clock_ && record.prompt) || ids_exact(arrival, record));
+           !length_contradicts(arrival, record.exposure) && (record.prompt || by_clock_) &&
+           ((record.prompt && by_clock_) || ids_exact(arrival, record));
 }
 
 /// Were a trigger left out of the count, a frame of the exposure before would do as well: it would

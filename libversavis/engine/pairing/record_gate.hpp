@@ -12,11 +12,13 @@ namespace versavis::pairing {
 
 /// A record has three witnesses: its grid point says how much time has passed since the record
 /// before, its number cannot have grown by more than the grid, and it cannot reach the host before
-/// its exposure has ended.
+/// its exposure has ended, nor sooner after that than any other.
 class RecordGate {
  public:
     explicit RecordGate(const Limits& limits)
-        : period_(limits.period), earliest_(limits.earliest_arrival) {}
+        : period_(limits.period),
+          earliest_(limits.earliest_arrival),
+          latest_(limits.exposure_wait) {}
 
     bool accepts(const Exposure& exposure) const;
 
@@ -31,13 +33,20 @@ class RecordGate {
     bool prompt() const { return prompt_; }
 
     /// How soon records reach the host is learned anew.
-    void forget_delay() { least_delay_ns_.reset(); }
+    void forget_delay() {
+        least_delay_ns_.reset();
+        confirmed_ = 0;
+    }
 
  private:
+    bool too_early(const Exposure& exposure) const;
+
     Duration period_;
     Duration earliest_;
+    Duration latest_;
     std::optional<Exposure> newest_;
-    std::optional<std::int64_t> least_delay_ns_;
+    std::optional<std::int64_t> least_delay_ns_;  ///< on the way to the host
+    int confirmed_ = 0;                           ///< records that took no less, in a row
     bool prompt_ = true;
 };
 
