@@ -140,7 +140,8 @@ void Camera::lose() {
 CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
                               const std::atomic<bool>& control_lost) {
     const auto failed = [](const Error& error) { return problem(CameraState::failed, error); };
-    if (auto done = pipeline_.prepare(environment_.ring_directory, setup.payload, setup.has_clock);
+    if (auto done = pipeline_.prepare(environment_.ring_directory, setup.payload, setup.has_clock,
+                                      setup.stamp_instant);
         !done)
         return failed(done.error());
     ArvDevice* device = arv_camera_get_device(camera);

@@ -42,6 +42,10 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     reader.read("trigger_line", preset.trigger_line);
     reader.read("strobe_line", preset.strobe_line);
     reader.read("exposure_time", preset.exposure_time);
+    reader.choose<pairing::Instant>("stamp_instant", preset.stamp_instant,
+                                    {{"start", pairing::Instant::start},
+                                     {"middle", pairing::Instant::middle},
+                                     {"end", pairing::Instant::end}});
     for (const std::string& group : preset_groups)
         for (const toml::table* table : reader.tables(group)) {
             TableReader step_reader(file, *table);

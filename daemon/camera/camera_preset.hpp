@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/pairing/evidence.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::daemon {
@@ -29,7 +30,8 @@ struct CameraPreset {
     std::string strobe_line;
     std::vector<std::string>
         exposure_time;  ///< feature in microseconds: the first that the camera has
-    std::map<std::string, std::vector<PresetStep>> groups;  ///< by preset_groups
+    pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< what its stamps are of
+    std::map<std::string, std::vector<PresetStep>> groups;       ///< by preset_groups
 };
 
 /// trigger: by a line; strobe: the exposure on a line; free_run: without triggers; pulse_width: the

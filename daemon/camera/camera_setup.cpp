@@ -88,6 +88,9 @@ Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration
     auto preset = choose_preset(presets, configuration.preset, setup.vendor, setup.model);
     if (!preset) return Unexpected(preset.error());
     setup.preset = preset->name;
+    setup.stamp_instant = configuration.stamp_instant == pairing::Instant::unknown
+                              ? preset->stamp_instant
+                              : configuration.stamp_instant;
     const auto exposure =
         std::find_if(preset->exposure_time.begin(), preset->exposure_time.end(),
                      [&](const std::string& name) { return has_feature(device, name); });

@@ -19,6 +19,7 @@ struct CameraSetup {
     std::uint64_t payload = 0;     ///< bytes of a frame, chunks included
     bool chunks = false;           ///< frames carry their exposure time
     bool has_clock = true;         ///< its time stamps are its own, not the host's
+    pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by configuration or preset
 };
 
 /// Errors name the feature and what the camera allows, or all that the preset expects and the

@@ -125,6 +125,11 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     reader.read("latest_arrival_ms", camera.latest_arrival_ms, 1, 60000);
     reader.choose<OnUnproved>("on_unproved", camera.on_unproved,
                               {{"withhold", OnUnproved::withhold}, {"flag", OnUnproved::flag}});
+    reader.choose<pairing::Instant>("stamp_instant", camera.stamp_instant,
+                                    {{"auto", pairing::Instant::unknown},
+                                     {"start", pairing::Instant::start},
+                                     {"middle", pairing::Instant::middle},
+                                     {"end", pairing::Instant::end}});
     reader.read("camera_clock", camera.camera_clock);
     reader.read("chunks", camera.chunks);
     reader.read("ptp", camera.ptp);

@@ -11,6 +11,7 @@
 #include "engine/clock/output_clock.hpp"
 #include "engine/clock/pps_reference.hpp"
 #include "engine/imu/imu_model.hpp"
+#include "engine/pairing/evidence.hpp"
 #include "engine/toml/problem.hpp"
 #include "log.hpp"
 #include "versavis/error.hpp"
@@ -91,6 +92,7 @@ struct CameraConfiguration {
     ReceiveMode receive = ReceiveMode::socket;
     double latest_arrival_ms = 500;
     OnUnproved on_unproved = OnUnproved::withhold;
+    pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by preset, or found out
     bool camera_clock = true;    ///< its time stamps are evidence; false: they are worthless
     bool check_exposure = true;  ///< the camera's exposure time against the measured one
     std::vector<std::pair<std::string, std::string>> features;  ///< set in this order

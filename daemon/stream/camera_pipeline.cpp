@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
 
+#include <utility>
+
 #include "stream/arrival_check.hpp"
 
 namespace versavis::daemon {
@@ -54,7 +56,8 @@ void CameraPipeline::begin_anew() {
 }
 
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
-                                   std::uint64_t payload_size, bool has_clock) {
+                                   std::uint64_t payload_size, bool has_clock,
+                                   pairing::Instant stamp_instant) {
     // Rings are made, and end, outside the lock that all threads wait for: that takes long. Only
     // the camera's thread does so, and what the ring before still waits for is published first.
     if (triggered() && !evidence_.recording()) {
@@ -74,6 +77,7 @@ Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
     const std::lock_guard lock(mutex_);
     if (*ring) before = frames_.use(std::move(**ring));
     limits_.camera_clock = configuration_.camera_clock && has_clock;
+    limits_.stamped = stamp_instant;
     pairing_.set_limits(limits_);
     tell(limits_);
     report_.last_proof = host_now();
@@ -197,7 +201,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
         ++report_.published;
     }
     // The newest used record may still be the guess for a suspect frame.
-    middles_.erase(middles_.begin(), middles_.lower_bound(exposure.trigger));
+    middles_.erase(std::exchange(last_used_, exposure.trigger));
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -317,6 +321,7 @@ std::uint64_t CameraPipeline::unanswered_triggers() {
 PipelineReport CameraPipeline::report() {
     const std::lock_guard lock(mutex_);
     report_.pairing = pairing_.state();
+    report_.stamp_instant = pairing_.stamped();
     report_.exposure = check_.measured();
     report_.camera_exposure = check_.told();
     report_.exposure_contradicted = check_.contradicted();

@@ -38,6 +38,7 @@ struct PipelineReport {
     std::uint64_t suspect = 0;  ///< published although not proved
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
+    pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
     HostTime last_frame;
     HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
     Duration exposure;                   ///< measured, of the newest frame; 0: unknown
@@ -53,8 +54,9 @@ class CameraPipeline final : private pairing::Outcome {
 
     /// Makes the rings, or one with larger slots: called by the camera once it knows its payload.
     /// Slots are void then. `has_clock`: its stamps are its own.
+    /// `stamp_instant`: what they are of; unknown: it is found out.
     Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size,
-                       bool has_clock);
+                       bool has_clock, pairing::Instant stamp_instant = pairing::Instant::unknown);
 
     std::optional<std::uint32_t> acquire();
     std::byte* slot_data(std::uint32_t slot);
@@ -142,6 +144,7 @@ class CameraPipeline final : private pairing::Outcome {
     /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,
     /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
+    std::uint64_t last_used_ = 0;  ///< trigger
     PipelineReport report_;
     std::vector<Line> unsaid_;  ///< advance() logs it: nothing is written under the lock
 };

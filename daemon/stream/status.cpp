@@ -156,6 +156,7 @@ json camera_json(const CameraStatus& status) {
             {"hint", hint(status)},
             {"trigger", triggered ? "board" : "free"},
             {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
+            {"stamp_instant", pairing::to_string(pipeline.stamp_instant)},
             {"vendor", camera.vendor},
             {"preset", camera.preset},
             {"temperature_c", camera.temperature_c},

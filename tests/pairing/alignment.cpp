@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/pairing/alignment.hpp"
 
+#include <array>
 #include <catch2/catch.hpp>
 
 using namespace versavis;
@@ -33,8 +34,8 @@ class Bench {
         frames.push_back(arrival);
     }
 
-    std::vector<std::uint64_t> align(Timeline timeline = Timeline::camera) const {
-        return pairing::align(frames, exposures, timeline, Limits{});
+    std::vector<std::uint64_t> align(Instant instant = Instant::start) const {
+        return pairing::align(frames, exposures, std::array{instant}, Limits{});
     }
 
     ExposureLog exposures;
@@ -81,9 +82,9 @@ TEST_CASE("alignment: by arrival alone triggers must be further apart than frame
         near.frame(trigger);
         far.frame(trigger);
     }
-    CHECK(near.align(Timeline::arrival).empty());
-    CHECK(far.align(Timeline::arrival) == Triggers{1, 2, 3, 4});
-    CHECK(far.align(Timeline::camera).empty());
+    CHECK(near.align(Instant::arrival).empty());
+    CHECK(far.align(Instant::arrival) == Triggers{1, 2, 3, 4});
+    CHECK(far.align(Instant::start).empty());
 }
 
 TEST_CASE("alignment: a missing record leaves it open") {

@@ -26,6 +26,13 @@ WorldSettings variation(std::uint64_t seed) {
     settings.chunks = seed % 3 == 0;
     if (seed % 5 == 4) settings.readout = milliseconds(60);
     if (seed % 4 == 3) settings.late_frames = 0;
+    settings.stamped = static_cast<pairing::Instant>(1 + seed % 7 % 3);
+    if (seed % 7 == 2) settings.readout_start = milliseconds(1);
+    settings.reset_with_clock = seed / 4 % 2 != 0;
+    if (seed % 11 != 0) return settings;
+    settings.exposure = microseconds(500);
+    settings.other_exposure = milliseconds(3);
+    settings.switched_every = 1 + seed % 40;
     return settings;
 }
 
@@ -49,17 +56,19 @@ WorldSettings cell(FaultKind kind, CameraClock clock, bool wide_ids, double rate
 }  // namespace
 
 void Totals::add(const WorldSettings& settings, const Verdict& verdict) {
+    const std::uint64_t before = wrong;
     ++runs;
     faults += settings.faults.size();
     frames += verdict.frames;
     published += verdict.published;
     wrong += verdict.wrong;
+    if (settings.clock != CameraClock::absent) wrong += verdict.lies_published;
     withheld += verdict.withheld;
     withheld_needlessly += verdict.withheld_needlessly;
     slips += verdict.slips;
     const Duration ten_periods{std::llround(1e10 / settings.rate_hz)};
     if (verdict.unproved_at_end > seconds(1) + ten_periods) ++not_locked;
-    if (verdict.wrong != 0) wrong_seeds.push_back(settings.seed);
+    if (wrong != before) wrong_seeds.push_back(settings.seed);
     if (settings.rate_hz != 20) return;
     if (verdict.published != 0 && settings.late_frames == 0)
         first_published.push_back(verdict.first_published);

@@ -22,31 +22,28 @@ Exposure exposure(std::uint64_t trigger, std::int64_t start_ms, bool exposed = t
 
 TEST_CASE("exposure_log: the nearest within the tolerance, on either timeline") {
     ExposureLog log(milliseconds(50));
-    CHECK(log.near(Timeline::camera, 0, 1'000'000'000) == nullptr);
-    for (int i = 0; i < 5; ++i)
-        REQUIRE(log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i)));
-    CHECK(log.near(Timeline::camera, 101'000'000, 5'000'000)->exposure.trigger == 3);
-    CHECK(log.near(Timeline::camera, 124'000'000, 100'000'000)->exposure.trigger == 3);
-    CHECK(log.near(Timeline::camera, 126'000'000, 100'000'000)->exposure.trigger == 4);
-    CHECK(log.near(Timeline::camera, 125'000'000, 10'000'000) == nullptr);
-    CHECK(log.near(Timeline::camera, -3'000'000, 5'000'000)->exposure.trigger == 1);
-    CHECK(log.near(Timeline::arrival, 5'102'500'000, 5'000'000)->exposure.trigger == 3);
+    CHECK(log.near(Instant::start, 0, 1'000'000'000) == nullptr);
+    for (int i = 0; i < 5; ++i) log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i));
+    CHECK(log.near(Instant::start, 101'000'000, 5'000'000)->exposure.trigger == 3);
+    CHECK(log.near(Instant::start, 124'000'000, 100'000'000)->exposure.trigger == 3);
+    CHECK(log.near(Instant::start, 126'000'000, 100'000'000)->exposure.trigger == 4);
+    CHECK(log.near(Instant::start, 125'000'000, 10'000'000) == nullptr);
+    CHECK(log.near(Instant::start, -3'000'000, 5'000'000)->exposure.trigger == 1);
+    CHECK(log.near(Instant::arrival, 5'102'500'000, 5'000'000)->exposure.trigger == 3);
 }
 
-TEST_CASE("exposure_log: records that are missing, and those that belong elsewhere") {
+TEST_CASE("exposure_log: records that are missing") {
     ExposureLog log(milliseconds(50));
-    REQUIRE(log.add(exposure(1, 0)));
-    REQUIRE(log.add(exposure(3, 100, false)));
-    CHECK_FALSE(log.add(exposure(3, 150)));
-    CHECK_FALSE(log.add(exposure(4, 100)));
-    CHECK(log.lost_near(Timeline::camera, 50'000'000, 0));
-    CHECK_FALSE(log.lost_near(Timeline::camera, 150'000'000, 0));  // nothing is known of later ones
-    CHECK_FALSE(log.lost_near(Timeline::camera, -50'000'000, 0));
+    log.add(exposure(1, 0));
+    log.add(exposure(3, 100, false));
+    CHECK(log.lost_near(Instant::start, 50'000'000, 0));
+    CHECK_FALSE(log.lost_near(Instant::start, 150'000'000, 0));  // nothing is known of later ones
+    CHECK_FALSE(log.lost_near(Instant::start, -50'000'000, 0));
     CHECK(log.back().recorded == 2);
     CHECK(log.back().silent == 1);
     log.pop_front();
-    CHECK(log.lost_near(Timeline::camera, 50'000'000, 1));
-    CHECK_FALSE(log.lost_near(Timeline::camera, 50'000'000, 2));
+    CHECK(log.lost_near(Instant::start, 50'000'000, 1));
+    CHECK_FALSE(log.lost_near(Instant::start, 50'000'000, 2));
 }
 
 TEST_CASE("exposure_log: gaps are as small as the closest exposures, at most the period") {
@@ -57,4 +54,41 @@ TEST_CASE("exposure_log: gaps are as small as the closest exposures, at most the
     CHECK(log.smallest_gap_ns() == 50'000'000);
     log.add(exposure(3, 1040));
     CHECK(log.smallest_gap_ns() == 40'000'000);
+}
+
+TEST_CASE("exposure_log: an end that nobody saw is likelier after as long as last time") {
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 5; ++i) {
+        Exposure next = exposure(static_cast<std::uint64_t>(i) + 1, 50 * i);
+        if (i == 2) {  // told as late as it may be, three periods on
+            next.kind = StampKind::predicted_middle;
+            next.end = next.start + milliseconds(150);
+            next.end_on_host = HostTime{next.end.ns + 5'000'000'000};
+        }
+        log.add(next);
+    }
+    for (int i = 0; i < 5; ++i) {
+        const std::int64_t end_ns = (50 * i + 2) * 1'000'000LL;
+        for (const auto& [instant, at_ns] : {std::pair(Instant::end, end_ns),
+                                             std::pair(Instant::arrival, end_ns + 5'000'000'000)}) {
+            const Record* record = log.near(instant, at_ns, 5'000'000);
+            REQUIRE(record != nullptr);
+            CHECK(record->exposure.trigger == static_cast<std::uint64_t>(i) + 1);
+        }
+    }
+}
+
+TEST_CASE("exposure_log: an exposure that outlasts the next ones is found by its end") {
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 5; ++i) {
+        Exposure next = exposure(static_cast<std::uint64_t>(i) + 1, 50 * i);
+        if (i == 1) {
+            next.end = next.start + milliseconds(130);
+            next.end_on_host = HostTime{next.end.ns + 5'000'000'000};
+        }
+        log.add(next);
+    }
+    CHECK(log.near(Instant::end, 180'000'000, 5'000'000)->exposure.trigger == 2);
+    CHECK(log.near(Instant::arrival, 5'180'000'000, 5'000'000)->exposure.trigger == 2);
+    CHECK(log.near(Instant::arrival, 5'102'000'000, 5'000'000)->exposure.trigger == 3);
 }

@@ -7,6 +7,7 @@
 
 using namespace versavis;
 using namespace versavis::test;
+using pairing::Instant;
 using pairing::State;
 
 namespace {
@@ -177,6 +178,62 @@ TEST_CASE("pairing: swapped cameras are never proved") {
     CHECK(verdict.published == 0);
     CHECK(verdict.final_state == State::searching);
     CHECK(verdict.starts > 3);  // it goes on trying
+}
+
+TEST_CASE("pairing: whatever instant a camera stamps, exposures that change cost no frame") {
+    WorldSettings settings = world();
+    settings.stamped = GENERATE(Instant::start, Instant::middle, Instant::end);
+    settings.readout_start = settings.stamped == Instant::end
+                                 ? GENERATE(milliseconds(0), milliseconds(1))
+                                 : milliseconds(0);
+    settings.pulses = 600;
+    settings.exposure = milliseconds(2);
+    settings.other_exposure = milliseconds(30);
+    settings.switched_every = GENERATE(1U, 7U, 66U);
+    const Verdict verdict = run(settings);
+    CHECK(verdict.slips == 0);
+    CHECK(verdict.withheld == 0);
+    CHECK(verdict.stamped == settings.stamped);
+}
+
+TEST_CASE("pairing: what a camera stamps stays unknown while its exposures do, and costs nothing") {
+    WorldSettings settings = world();
+    settings.stamped = Instant::end;
+    settings.exposure = settings.other_exposure = milliseconds(5);
+    const Verdict verdict = run(settings);
+    CHECK(verdict.stamped == Instant::unknown);
+    CHECK(verdict.withheld == 0);
+}
+
+TEST_CASE("pairing: a board whose time steps is never followed to other triggers") {
+    WorldSettings settings =
+        with(GENERATE(FaultKind::board_time_step, FaultKind::board_time_step_grid));
+    settings.seed = GENERATE(range(1, 30));
+    settings.clock = GENERATE(CameraClock::good, CameraClock::absent);
+    settings.reset_with_clock = GENERATE(false, true);
+    settings.pulses = 400;
+    CHECK(run(settings).lies_published == 0);
+}
+
+TEST_CASE("pairing: one record that lies costs few frames, and none is published by it") {
+    WorldSettings settings = with(FaultKind::lying_record);
+    settings.seed = GENERATE(range(1, 60));
+    const Verdict verdict = run(settings);
+    CHECK(verdict.lies_published == 0);
+    CHECK(verdict.withheld <= 6);
+    CHECK(verdict.starts == 0);
+}
+
+TEST_CASE("pairing: the exposures that are kept reach as far back as frames may be late") {
+    CHECK(pairing::longest_latest_arrival(milliseconds(50)) > seconds(49));
+    CHECK(pairing::longest_latest_arrival(milliseconds(1)) > milliseconds(700));
+    WorldSettings settings = world();
+    settings.rate_hz = 1000;
+    settings.jitter = microseconds(100);
+    settings.readout = milliseconds(300);  // of 300 exposures, beyond what was once kept
+    settings.pulses = 2000;
+    const Verdict verdict = run(settings);
+    CHECK(verdict.withheld == 0);
 }
 
 TEST_CASE("pairing: the same world has the same verdict") {

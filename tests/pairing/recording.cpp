@@ -25,12 +25,14 @@ TEST_CASE("recording: evidence comes back from an item of the ring as it was") {
     exposure.end_on_host = HostTime{2'000};
     exposure.kind = StampKind::trigger_edge;
     exposure.exposed = false;
+    exposure.recorded = HostTime{3'000};
     const Exposure same = there_and_back(exposure);
     CHECK(same.trigger == 7);
     CHECK(same.start == exposure.start);
     CHECK(same.end_on_host == exposure.end_on_host);
     CHECK(same.kind == StampKind::trigger_edge);
     CHECK_FALSE(same.exposed);
+    CHECK(same.recorded == exposure.recorded);
 
     Arrival arrival;
     arrival.block_id = 65'536;
@@ -43,7 +45,9 @@ TEST_CASE("recording: evidence comes back from an item of the ring as it was") {
     Limits limits;
     limits.period = milliseconds(7);
     limits.camera_clock = false;
+    limits.stamped = Instant::end;
     CHECK(there_and_back(limits).period == milliseconds(7));
+    CHECK(there_and_back(limits).stamped == Instant::end);
     CHECK_FALSE(there_and_back(limits).camera_clock);
     CHECK(there_and_back(Shortfall{5, EventReason::no_buffer}).reason == EventReason::no_buffer);
     CHECK(there_and_back(StartRequest{Start::slow, HostTime{4}}).start == Start::slow);

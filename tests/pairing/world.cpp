@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <set>
+#include <utility>
 
 #include "wire/messages.hpp"
 
@@ -14,6 +15,7 @@ namespace {
 
 using pairing::Arrival;
 using pairing::Exposure;
+using pairing::Instant;
 using pairing::Shortfall;
 using pairing::Start;
 
@@ -25,14 +27,15 @@ constexpr double board_drift = 20e-6;
 constexpr double camera_drift = 100e-6;
 constexpr int frames_in_camera = 3;
 constexpr std::uint64_t frames_of_grace = 5;
-constexpr std::uint64_t frames_of_pattern = 20;
+constexpr std::int64_t frames_of_pattern = 20;
 
 class World final : private pairing::Outcome {
  public:
     explicit World(const WorldSettings& settings)
         : settings_(settings),
           period_{std::llround(1e9 / settings.rate_hz)},
-          exposure_{std::min(milliseconds(2), period_ / 3)},
+          exposure_{settings.exposure.ns != 0 ? settings.exposure
+                                              : std::min(milliseconds(2), period_ / 3)},
           random_(settings.seed),
           pairing_(limits(), *this),
           next_id_(settings.first_id) {
@@ -54,6 +57,7 @@ class World final : private pairing::Outcome {
             event.happen();
         }
         verdict_.final_state = pairing_.state();
+        verdict_.stamped = pairing_.stamped();
         verdict_.unproved_at_end = last_arrival_ - last_published_;
         judge_withheld();
         return verdict_;
@@ -73,6 +77,7 @@ class World final : private pairing::Outcome {
         std::uint64_t trigger = 0;
         std::uint64_t pulse = 0;
         bool recorded = false;
+        BoardTime stamped;
     };
 
     pairing::Limits limits() const {
@@ -80,6 +85,7 @@ class World final : private pairing::Outcome {
         limits.period = period_;
         limits.camera_clock =
             settings_.clock != CameraClock::absent || !settings_.clock_known_absent;
+        limits.stamped = settings_.told_stamped;
         limits.pattern_duration = period_ * (wire::start_pattern_length + 2);
         limits.frames_held = 8 + static_cast<std::uint32_t>(settings_.rate_hz * 0.12);
         return limits;
@@ -141,11 +147,11 @@ class World final : private pairing::Outcome {
             end_ = now_ + seconds(4);
             return;
         }
-        at(now_ + period_, [this] { tick(); });
+        at(now_ + period_ + std::exchange(grid_waits_, {}), [this] { tick(); });
         if (++idle_ticks_ > 100'000) end_ = now_;
         if (!board_alive_ || !running_) return;
         if (wanted(0)) pulse();
-        if (swapped_ && wanted(1)) expose(now_, {life_, 0, 0, false}, false);
+        if (swapped_ && wanted(1)) expose(now_, {life_, 0, 0, false, {}}, false);
         ++ticks_;
     }
 
@@ -161,21 +167,26 @@ class World final : private pairing::Outcome {
             link_busy_ - now_ > frame_on_link() * (frames_in_camera - 1) && settings_.link_load > 0;
         const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored && !crowded;
         const bool lost = fault_ == FaultKind::record_lost;
-        const Truth truth{life_, trigger_, pulses_, !lost};
         const HostTime start = now_ + microseconds(20);
+        const Truth truth{life_, trigger_, pulses_, !lost,
+                          to_board(stamped(start, start + exposure_))};
         Exposure exposure;
         exposure.trigger = trigger_;
         exposure.tick = life_ << 32U | ticks_;
         exposure.start = to_board(start);
         exposure.end = to_board(start + exposure_);
-        exposure.end_on_host = start + exposure_ + between(-microseconds(30), microseconds(30));
-        exposure.earliest_on_host = exposure.end_on_host;
         if (!settings_.strobe) exposure.kind = StampKind::trigger_edge;
         exposure.exposed =
             takes || !settings_.strobe || swapped_ || (crowded && settings_.drops_after_exposure);
-        if (!lost) send_record(exposure);
+        const HostTime sent = start + exposure_;
+        if (fault_ == FaultKind::lying_record) lie(exposure);
+        if (!lost) send_record(exposure, sent);
         if (!swapped_) expose(start, truth, takes);
+        if (settings_.switched_every != 0 && pulses_ % settings_.switched_every == 0)
+            exposure_ = pulses_ / settings_.switched_every % 2 != 0 ? settings_.other_exposure
+                                                                    : settings_.exposure;
         // It follows the light.
+        if (settings_.exposure.ns != 0) return;
         exposure_ = std::clamp(exposure_ + between(-exposure_ / 10, exposure_ / 10), period_ / 50,
                                period_ / 3);
     }
@@ -184,14 +195,60 @@ class World final : private pairing::Outcome {
         return {board_offset_ + std::llround(static_cast<double>(host.ns) * (1 + board_drift))};
     }
 
-    void send_record(const Exposure& exposure) {
+    void send_record(Exposure exposure, HostTime sent) {
         if (fault_ == FaultKind::usb_stall) link_free_ = now_ + seconds(2);
         const Duration delay =
             fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
-        link_free_ = std::max(link_free_, exposure.end_on_host + delay);
-        at(link_free_, [this, exposure, life = life_] {
-            if (life == life_) pairing_.add(exposure);
+        link_free_ = std::max(link_free_, sent + delay);
+        const Duration noise = between(-microseconds(30), microseconds(30));
+        at(link_free_, [this, exposure, noise, life = life_]() mutable {
+            if (life != life_) return;
+            exposure.recorded = now_;
+            exposure.end_on_host = exposure.earliest_on_host = to_host(exposure.end) + noise;
+            pairing_.add(exposure);
         });
+    }
+
+    /// By the estimate of the board's clock, which notices a step some time after it.
+    HostTime to_host(BoardTime board) const {
+        return {
+            std::llround(static_cast<double>(board.ns - estimated_offset_) / (1 + board_drift))};
+    }
+
+    /// The board's time in all that it says. When its grid goes by that time, it skips the grid
+    /// points that have passed, or waits for the next.
+    void step_board_time(bool grid_follows) {
+        Duration step = clock_step();
+        if (grid_follows) {
+            const std::int64_t ticks = std::uniform_int_distribution<>(1, 3)(random_);
+            const bool forward = chance(0.5);
+            step = period_ * (forward ? ticks : -ticks);
+            if (forward)
+                ticks_ += static_cast<std::uint64_t>(ticks);
+            else
+                grid_waits_ = -step;
+        }
+        board_offset_ += step.ns;
+        at(now_ + between(milliseconds(300), seconds(3)), [this, life = life_] {
+            if (life != life_) return;
+            estimated_offset_ = board_offset_;
+            recovers();
+            if (settings_.reset_with_clock) pairing_.reset();
+        });
+    }
+
+    /// One number is wrong, as after a torn read or by ill will.
+    void lie(Exposure& exposure) {
+        const double size = std::pow(10, uniform(6, 12));
+        const Duration shift{std::llround(chance(0.5) ? size : -size)};
+        switch (std::uniform_int_distribution<>(0, 5)(random_)) {
+            case 0: exposure.start = exposure.start + shift; break;
+            case 1: exposure.end = exposure.end + shift; break;
+            case 2: exposure.trigger += 1000; break;
+            case 3: exposure.tick += random_() % 1000; break;
+            case 4: exposure.start.ns += std::int64_t{1} << 32U; [[fallthrough]];
+            default: exposure.start = exposure.start + shift; exposure.end = exposure.end + shift;
+        }
     }
 
     // --- the camera
@@ -228,10 +285,20 @@ class World final : private pairing::Outcome {
         deliver(id, start, arrives, truth);
     }
 
+    /// What the camera stamps of this exposure, in any time.
+    template <class Time>
+    Time stamped(Time start, Time end) const {
+        const Instant instant = settings_.stamped;
+        const Time by_exposure = instant == Instant::middle ? middle(start, end)
+                                 : instant == Instant::end  ? end
+                                                            : start;
+        return by_exposure + settings_.readout_start;
+    }
+
     void deliver(std::uint64_t id, HostTime start, HostTime arrives, const Truth& truth) {
         Arrival frame;
         frame.slot = static_cast<std::uint32_t>(truths_.size());
-        frame.camera_time = camera_time(start);
+        frame.camera_time = camera_time(stamped(start, start + exposure_));
         if (settings_.chunks) frame.exposure = exposure_;
         truths_.push_back(truth);
         at(arrives, [this, frame, id, power = camera_power_]() mutable {
@@ -279,11 +346,20 @@ class World final : private pairing::Outcome {
                 camera_offset_ += step.ns;
                 // Only the pattern can tell that it is the clock: the others could have stepped
                 // together.
-                if (step.ns % period_.ns == 0) grace_.back().second += frames_of_pattern;
+                if (step.ns % period_.ns == 0)
+                    grace_.back().second += std::uint64_t{frames_of_pattern};
                 break;
             }
             case FaultKind::camera_reboot: reboot_camera(); break;
             case FaultKind::board_reset: reset_board(); break;
+            case FaultKind::board_time_step:
+            case FaultKind::board_time_step_grid: {
+                step_board_time(kind == FaultKind::board_time_step_grid);
+                // Nothing can be proved until its clock is estimated anew.
+                const Duration lasts = seconds(3) + period_ * frames_of_pattern;
+                grace_.back().second += static_cast<std::uint64_t>(lasts.ns / period_.ns);
+                break;
+            }
             case FaultKind::usb_stall:
                 grace_.back().second += static_cast<std::uint64_t>(seconds(2).ns / period_.ns);
                 break;
@@ -323,7 +399,7 @@ class World final : private pairing::Outcome {
         trigger_ = 0;
         at(now_ + milliseconds(400), [this] {
             board_alive_ = true;
-            board_offset_ = between({}, seconds(100)).ns - now_.ns;
+            board_offset_ = estimated_offset_ = between({}, seconds(100)).ns - now_.ns;
             recovers();
             start_anew();
         });
@@ -355,6 +431,9 @@ class World final : private pairing::Outcome {
         if (verdict_.published++ == 0) verdict_.first_published = now_ - started_;
         if (truth.trigger != exposure.trigger || truth.life != exposure.tick >> 32U)
             ++verdict_.wrong;
+        else if (pairing_.stamped() != Instant::unknown &&
+                 absolute(stamped(exposure.start, exposure.end) - truth.stamped) > period_ / 20)
+            ++verdict_.lies_published;
         if (recovering_since_) verdict_.recoveries.push_back(now_ - *recovering_since_);
         recovering_since_.reset();
         if (slipped_)
@@ -417,6 +496,8 @@ class World final : private pairing::Outcome {
     std::uint64_t trigger_ = 0;
     std::uint64_t pulses_ = 0;
     std::int64_t board_offset_ = 77'000'000'000;
+    std::int64_t estimated_offset_ = board_offset_;
+    Duration grid_waits_;
     HostTime link_free_;
 
     bool camera_dead_ = false;
@@ -457,6 +538,9 @@ const char* to_string(FaultKind kind) {
         case FaultKind::usb_stall: return "USB stall 2 s";
         case FaultKind::stale_frame: return "first frame stale";
         case FaultKind::cameras_swapped: return "two cameras swapped";
+        case FaultKind::board_time_step: return "board time step";
+        case FaultKind::board_time_step_grid: return "board time step with grid";
+        case FaultKind::lying_record: return "lying exposure record";
     }
     return "unknown";
 }

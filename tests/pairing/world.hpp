@@ -32,8 +32,11 @@ enum class FaultKind {
     usb_stall,
     stale_frame,
     cameras_swapped,
+    board_time_step,       ///< by whole periods or not, in all that the board says, ...
+    board_time_step_grid,  ///< ... and its grid follows
+    lying_record,          ///< one number of one record is wrong
 };
-inline constexpr std::size_t fault_kinds = 16;
+inline constexpr std::size_t fault_kinds = 19;
 const char* to_string(FaultKind kind);
 
 enum class CameraClock { good, drifting, absent };
@@ -49,6 +52,14 @@ struct WorldSettings {
     bool strobe = true;              ///< the exposure line is wired
     bool ids_count_ignored = false;  ///< the camera numbers triggers that it ignores
     bool chunks = false;             ///< frames carry their exposure time, which varies
+    pairing::Instant stamped = pairing::Instant::start;  ///< by the camera
+    Duration readout_start;                              ///< the stamp is so much later than that
+    pairing::Instant told_stamped = pairing::Instant::unknown;  ///< to pairing
+    Duration exposure;        ///< 0: 2 ms or a third of the period, and it follows the light
+    Duration other_exposure;  ///< from `switched_every` to the same number of pulses later ...
+    std::uint64_t switched_every = 0;  ///< ... and so on; 0: never
+    bool reset_with_clock = false;     ///< the service resets pairing when the board's clock is
+                                       ///< estimated anew
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames =
@@ -68,9 +79,12 @@ struct Verdict {
     std::uint64_t withheld_needlessly =
         0;                             ///< ... more than five frames after the last fault had ended
     std::uint64_t suspects_wrong = 0;  ///< guesses that are not the true exposure
+    std::uint64_t lies_published = 0;  ///< with the right trigger, but another instant than the
+                                       ///< camera stamped, although it was known which one that is
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
-    std::uint64_t starts = 0;  ///< after the first
+    pairing::Instant stamped = pairing::Instant::unknown;  ///< found out in the end
+    std::uint64_t starts = 0;                              ///< after the first
     std::map<EventReason, std::uint64_t> frame_reasons;
     std::map<EventReason, std::uint64_t> exposure_reasons;
     Duration first_published;          ///< since the start was asked for

@@ -450,8 +450,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         return Interval{truth.start, truth.end};
     }
     frame.extended_id = settings_.extended_ids;
-    frame.camera_time_ns =
-        static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
+    frame.camera_time_ns = static_cast<std::uint64_t>(
+        clock_.device_ns(stamped(settings_, truth.start, truth.end)) + clock_step_ns_);
     frame.width = settings_.width;
     frame.height = settings_.height;
     frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));

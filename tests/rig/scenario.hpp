@@ -17,6 +17,9 @@ struct BoardScenario {
     bool gnss = false;  ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
 };
 
+/// What a camera stamps: an instant of the exposure, or when its frame begins to leave.
+enum class Stamped { start, middle, end, readout };
+
 struct CameraScenario {
     std::string name;
     std::string address;  ///< loopback address that the camera answers on
@@ -30,6 +33,7 @@ struct CameraScenario {
         0;  ///< auto exposure follows a brightness that varies by this fraction ...
     double exposure_swing_s = 7;  ///< ... with this period
     double trigger_latency_us = 20;
+    Stamped stamps = Stamped::start;
     double readout_us = 2000;        ///< end of exposure to first packet
     double link_mbps = 1000;         ///< packets leave at this pace; 0: as fast as they can
     double packet_loss = 0;          ///< fraction

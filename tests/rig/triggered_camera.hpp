@@ -2,6 +2,7 @@
 // A camera as seen from the board's wires, whatever bus its frames take.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -17,6 +18,16 @@ struct TriggerPulse {
     std::uint64_t trigger = 0;
     HostTime at;
 };
+
+/// What its clock shows when it stamps the frame of this exposure.
+inline HostTime stamped(const CameraScenario& camera, HostTime start, HostTime end) {
+    switch (camera.stamps) {
+        case Stamped::middle: return middle(start, end);
+        case Stamped::end: return end;
+        case Stamped::readout: return end + Duration{std::llround(camera.readout_us * 1e3)};
+        default: return start;
+    }
+}
 
 class TriggeredCamera {
  public:

@@ -24,7 +24,8 @@ std::optional<RigU3vCamera::Interval> RigU3vCamera::expose(const rig::TriggerPul
     exposure.end =
         exposure.start + Duration{std::llround(static_cast<double>(camera_->exposure_us()) * 1e3)};
     U3vCamera::Shot shot;
-    shot.timestamp_ns = static_cast<std::uint64_t>(clock_.device_ns(exposure.start));
+    shot.timestamp_ns = static_cast<std::uint64_t>(
+        clock_.device_ns(rig::stamped(settings_, exposure.start, exposure.end)));
     const HostTime due = exposure.end + Duration{std::llround(settings_.readout_us * 1e3)};
     shot.until_sent = std::chrono::nanoseconds{(due - host_now()).ns};
     shot.pixels = wall_.view(motion_.pitch_rad(middle(exposure.start, exposure.end)));

@@ -18,7 +18,8 @@ json describe(const Limits& limits) {
             {"exposure_wait_ns", limits.exposure_wait.ns},
             {"pattern_duration_ns", limits.pattern_duration.ns},
             {"frames_held", limits.frames_held},
-            {"camera_clock", limits.camera_clock}};
+            {"camera_clock", limits.camera_clock},
+            {"stamp_instant", static_cast<std::uint32_t>(limits.stamped)}};
 }
 
 json describe(const Exposure& exposure) {
@@ -30,7 +31,8 @@ json describe(const Exposure& exposure) {
             {"end_on_host_ns", exposure.end_on_host.ns},
             {"earliest_on_host_ns", exposure.earliest_on_host.ns},
             {"stamp", static_cast<std::uint32_t>(exposure.kind)},
-            {"exposed", exposure.exposed}};
+            {"exposed", exposure.exposed},
+            {"recorded_ns", exposure.recorded.ns}};
 }
 
 json describe(const Arrival& arrival) {
@@ -69,6 +71,7 @@ Limits limits(const json& line) {
     limits.pattern_duration.ns = line.at("pattern_duration_ns");
     limits.frames_held = line.at("frames_held");
     limits.camera_clock = line.at("camera_clock");
+    limits.stamped = static_cast<Instant>(line.value("stamp_instant", 0U));  // older: not recorded
     return limits;
 }
 
@@ -82,6 +85,7 @@ Exposure exposure(const json& line) {
     exposure.earliest_on_host.ns = line.at("earliest_on_host_ns");
     exposure.kind = static_cast<StampKind>(line.at("stamp").get<std::uint32_t>());
     exposure.exposed = line.at("exposed");
+    exposure.recorded.ns = line.value("recorded_ns", std::int64_t{0});
     return exposure;
 }
 

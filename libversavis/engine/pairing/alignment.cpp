@@ -49,17 +49,17 @@ struct Alignment {
     bool unknown = false;  ///< a frame falls where a record was lost: neither proved nor refuted
 };
 
-std::int64_t time_ns(const Arrival& frame, Timeline timeline) {
-    return timeline == Timeline::camera ? frame.camera_time.ns : frame.arrived.ns;
+std::int64_t time_ns(const Arrival& frame, Instant instant) {
+    return instant == Instant::arrival ? frame.arrived.ns : frame.camera_time.ns;
 }
 
 class Search {
  public:
-    Search(const std::vector<Arrival>& frames, const ExposureLog& exposures, Timeline timeline,
+    Search(const std::vector<Arrival>& frames, const ExposureLog& exposures, Instant instant,
            const Limits& limits)
         : frames_(frames),
           exposures_(exposures),
-          timeline_(timeline),
+          instant_(instant),
           limits_(limits),
           gap_ns_(exposures.smallest_gap_ns()) {}
 
@@ -69,8 +69,8 @@ class Search {
         for (const Arrival& frame : frames_)
             for (std::size_t i = 0; i < exposures_.size(); ++i)
                 if (arrival_possible(limits_, frame, exposures_[i].exposure))
-                    differences.push_back(time_ns(frame, timeline_) -
-                                          exposures_[i].instant_ns(timeline_));
+                    differences.push_back(time_ns(frame, instant_) -
+                                          exposures_[i].instant_ns(instant_));
         std::sort(differences.begin(), differences.end());
         const auto same = [this](std::int64_t a, std::int64_t b) {
             return b - a < part_of(gap_ns_, same_difference);
@@ -84,13 +84,14 @@ class Search {
     /// cannot be.
     std::optional<Alignment> explain(std::int64_t difference_ns) const {
         Alignment alignment;
+        const Record* first = nullptr;
         const Record* last = nullptr;
         const Arrival* last_frame = nullptr;
         for (const Arrival& frame : frames_) {
-            const std::int64_t instant = time_ns(frame, timeline_) - difference_ns;
-            const Record* record = exposures_.near(timeline_, instant, tolerance_ns());
+            const std::int64_t at_ns = time_ns(frame, instant_) - difference_ns;
+            const Record* record = exposures_.near(instant_, at_ns, tolerance_ns());
             if (record == nullptr) {
-                if (!exposures_.lost_near(timeline_, instant, 0))
+                if (!exposures_.lost_near(instant_, at_ns, 0))
                     return std::nullopt;  // no pulse then
                 alignment.unknown = true;
                 continue;
@@ -101,11 +102,14 @@ class Search {
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
+            if (first == nullptr) first = record;
             last = record;
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
         }
-        if (alignment.triggers.empty()) return std::nullopt;
+        if (first == nullptr) return std::nullopt;
+        // The board's time may have been set back among them: the same time came twice.
+        alignment.unknown = alignment.unknown || (first->prompt && !last->prompt);
         return alignment;
     }
 
@@ -153,7 +157,7 @@ class Search {
                 ++i;
                 continue;
             }
-            late.push_back((frames_[late.size()].arrived - exposure.end_on_host).ns);
+            late.push_back((frames_[late.size()].arrived - exposures_[i].end_on_host).ns);
         }
         const std::int64_t least = *std::min_element(late.begin(), late.end());
         std::vector<std::uint64_t> kept;
@@ -163,23 +167,25 @@ class Search {
             else
                 kept.push_back(triggers[i]);
         }
-        const bool proof = kept.size() >= frames_for_proof(timeline_) &&
-                           (timeline_ == Timeline::camera ? irregular(kept) : separated(kept));
+        const bool proof = kept.size() >= frames_for_proof(instant_ != Instant::arrival) &&
+                           (instant_ != Instant::arrival ? irregular(kept) : separated(kept));
         return proof ? triggers : std::vector<std::uint64_t>{};
     }
 
  private:
     std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
 
+    /// Arrivals alone prove nothing while the board's time may have been set back.
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
+               (instant_ != Instant::arrival || record.prompt) &&
                arrival_possible(limits_, frame, record.exposure) &&
                !length_contradicts(frame, record.exposure);
     }
 
     const std::vector<Arrival>& frames_;
     const ExposureLog& exposures_;
-    Timeline timeline_;
+    Instant instant_;
     const Limits& limits_;
     std::int64_t gap_ns_;
 };
@@ -218,24 +224,28 @@ bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {
     return lengths_differ(arrival.exposure, exposure.end - exposure.start);
 }
 
-std::size_t frames_for_proof(Timeline timeline) {
-    return timeline == Timeline::camera ? frames_by_clock : frames_by_arrival;
+std::size_t frames_for_proof(bool by_clock) {
+    return by_clock ? frames_by_clock : frames_by_arrival;
 }
 
 std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
-                                 Timeline timeline, const Limits& limits) {
-    if (frames.size() < frames_for_proof(timeline) || exposures.size() < frames.size()) return {};
-    const Search search(frames, exposures, timeline, limits);
+                                 std::span<const Instant> instants, const Limits& limits) {
+    const bool by_clock = instants.front() != Instant::arrival;
+    if (frames.size() < frames_for_proof(by_clock) || exposures.size() < frames.size()) return {};
     std::optional<Alignment> found;
-    for (const std::int64_t difference : search.candidates()) {
-        auto alignment = search.explain(difference);
-        if (!alignment || alignment->faults >= faults_to_refute) continue;
-        if (alignment->faults > 0 || alignment->unknown) return {};
-        // Neighbouring differences may lead to the same.
-        if (found && found->triggers != alignment->triggers) return {};
-        found = std::move(alignment);
+    for (const Instant instant : instants) {
+        const Search search(frames, exposures, instant, limits);
+        for (const std::int64_t difference : search.candidates()) {
+            auto alignment = search.explain(difference);
+            if (!alignment || alignment->faults >= faults_to_refute) continue;
+            if (alignment->faults > 0 || alignment->unknown) return {};
+            // Neighbouring differences may lead to the same, and so may the instants.
+            if (found && found->triggers != alignment->triggers) return {};
+            found = std::move(alignment);
+        }
     }
-    return found ? search.proved(found->triggers) : std::vector<std::uint64_t>{};
+    return found ? Search(frames, exposures, instants.front(), limits).proved(found->triggers)
+                 : std::vector<std::uint64_t>{};
 }
 
 }  // namespace versavis::pairing

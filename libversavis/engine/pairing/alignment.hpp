@@ -4,7 +4,7 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
+#include <span>
 #include <vector>
 
 #include "engine/pairing/exposure_log.hpp"
@@ -31,7 +31,8 @@ struct Limits {
     Duration exposure_wait = usual_exposure_wait;    ///< of a frame for its exposure's record
     Duration pattern_duration = seconds(1);          ///< how long the board's start pattern takes
     std::uint32_t frames_held = 8;                   ///< most frames that wait for proof
-    bool camera_clock = true;  ///< false: pair by arrival, whatever the frames say
+    bool camera_clock = true;            ///< false: pair by arrival, whatever the frames say
+    Instant stamped = Instant::unknown;  ///< by the camera; unknown: it is found out
 };
 
 // An alignment that takes so many faults is ruled out. At half (1) one fault that nobody saw can
@@ -56,14 +57,15 @@ bool lengths_differ(Duration told, Duration measured);
 bool length_contradicts(const Arrival& arrival, const Exposure& exposure);
 
 /// The triggers of the frames, one each, if there is proof, else nothing: one alignment of the two
-/// sequences takes no fault to explain it, and each other one at least two. By the camera's clock
+/// sequences takes no fault to explain it, and each other one at least two, whichever of `instants`
+/// the frames' times are of: what the camera may stamp, or the arrival alone. By the camera's clock
 /// the triggers must be irregular within them; by arrival alone they must be further apart than a
 /// frame may be late. A zero stands for a frame that is not proved with the others, because it came
 /// late.
 std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
-                                 Timeline timeline, const Limits& limits);
+                                 std::span<const Instant> instants, const Limits& limits);
 
-/// Least number of frames that can prove anything on this timeline.
-std::size_t frames_for_proof(Timeline timeline);
+/// Least number of frames that can prove anything by the camera's clock, or by arrival alone.
+std::size_t frames_for_proof(bool by_clock);
 
 }  // namespace versavis::pairing

@@ -9,6 +9,17 @@
 
 namespace versavis::pairing {
 
+/// An instant of an exposure that the time of its frame is held against. A camera stamps one of the
+/// first three, or a readout that begins a constant time after the end, which is the same here.
+enum class Instant : std::uint32_t {
+    unknown = 0,
+    start = 1,
+    middle = 2,
+    end = 3,
+    arrival = 4,  ///< the end on the host, against which the arrival is held
+};
+const char* to_string(Instant instant);
+
 /// One trigger of the camera, as the board recorded it.
 struct Exposure {
     std::uint64_t trigger = 0;  ///< consecutive: one per pulse
@@ -20,6 +31,7 @@ struct Exposure {
                                 ///< can arrive earlier
     StampKind kind = StampKind::measured_middle;
     bool exposed = true;  ///< false: the exposure line is wired and stayed silent
+    HostTime recorded;    ///< when its record reached the host; 0: unknown
 };
 
 /// One complete frame.

@@ -6,21 +6,46 @@
 
 namespace versavis::pairing {
 
-bool ExposureLog::add(const Exposure& exposure) {
-    if (!records_.empty()) {
-        const Exposure& before = records_.back().exposure;
-        if (exposure.trigger <= before.trigger || exposure.start <= before.start) return false;
+std::int64_t Record::instant_ns(Instant instant) const {
+    switch (instant) {
+        case Instant::middle: return middle(exposure.start, end).ns;
+        case Instant::end: return end.ns;
+        case Instant::arrival: return end_on_host.ns;
+        default: return exposure.start.ns;
     }
+}
+
+void ExposureLog::add(const Exposure& exposure, bool prompt) {
     ++recorded_;
     if (!exposure.exposed) ++silent_;
-    records_.push_back({exposure, false, recorded_, silent_});
-    return true;
+    const Duration told = exposure.end - exposure.start;
+    Duration length = told;
+    if (exposure.kind == StampKind::measured_middle) last_length_ = told;
+    // An end that nobody saw is told as late as it may be.
+    if (exposure.kind == StampKind::predicted_middle && last_length_.ns != 0)
+        length = std::min(told, last_length_);
+    records_.push_back({exposure, exposure.start + length, exposure.end_on_host - (told - length),
+                        false, recorded_, silent_, prompt});
+    measure();
 }
 
 Record ExposureLog::pop_front() {
     const Record record = records_.front();
     records_.pop_front();
+    measure();
     return record;
+}
+
+void ExposureLog::measure() {
+    smallest_gap_ = period_;
+    longest_ = {};
+    for (std::size_t i = 0; i < records_.size(); ++i) {
+        const Record& record = records_[i];
+        longest_ = std::max(longest_, record.end - record.exposure.start);
+        if (i != 0)
+            smallest_gap_ =
+                std::min(smallest_gap_, record.exposure.start - records_[i - 1].exposure.start);
+    }
 }
 
 Record* ExposureLog::find(std::uint64_t trigger) {
@@ -30,41 +55,39 @@ Record* ExposureLog::find(std::uint64_t trigger) {
     return found == records_.end() ? nullptr : &*found;
 }
 
-std::size_t ExposureLog::first_after(Timeline timeline, std::int64_t instant_ns) const {
-    const auto later = [&](std::int64_t instant, const Record& record) {
-        return instant < record.instant_ns(timeline);
-    };
-    return static_cast<std::size_t>(
-        std::upper_bound(records_.begin(), records_.end(), instant_ns, later) - records_.begin());
-}
-
-const Record* ExposureLog::near(Timeline timeline, std::int64_t instant_ns,
+/// Exposures are in order of their starts, and of no other instant: a long one may end after the
+/// next.
+const Record* ExposureLog::near(Instant instant, std::int64_t instant_ns,
                                 std::int64_t tolerance_ns) const {
-    const std::size_t after = first_after(timeline, instant_ns);
+    const auto start_ns = [instant](const Record& record) {
+        const Duration length = record.end - record.exposure.start;
+        return instant == Instant::arrival ? (record.end_on_host - length).ns
+                                           : record.exposure.start.ns;
+    };
+    const std::int64_t last_start_ns = instant_ns + tolerance_ns;
+    auto record =
+        std::partition_point(records_.begin(), records_.end(), [&](const Record& candidate) {
+            return start_ns(candidate) < instant_ns - tolerance_ns - longest_.ns;
+        });
     const Record* nearest = nullptr;
-    for (std::size_t i = after == 0 ? 0 : after - 1; i <= after && i < records_.size(); ++i) {
-        const std::int64_t distance = std::abs(records_[i].instant_ns(timeline) - instant_ns);
+    for (; record != records_.end() && start_ns(*record) <= last_start_ns; ++record) {
+        const std::int64_t distance = std::abs(record->instant_ns(instant) - instant_ns);
         if (distance > tolerance_ns) continue;
         tolerance_ns = distance;
-        nearest = &records_[i];
+        nearest = &*record;
     }
     return nearest;
 }
 
-bool ExposureLog::lost_near(Timeline timeline, std::int64_t instant_ns,
+bool ExposureLog::lost_near(Instant instant, std::int64_t instant_ns,
                             std::uint64_t before_first) const {
-    const std::size_t after = first_after(timeline, instant_ns);
-    if (after == records_.size()) return false;
-    const std::uint64_t before = after > 0 ? records_[after - 1].exposure.trigger : before_first;
-    return before != 0 && records_[after].exposure.trigger > before + 1;
-}
-
-std::int64_t ExposureLog::smallest_gap_ns() const {
-    std::int64_t smallest = period_.ns;
-    for (std::size_t i = 1; i < records_.size(); ++i)
-        smallest =
-            std::min(smallest, (records_[i].exposure.start - records_[i - 1].exposure.start).ns);
-    return smallest;
+    std::uint64_t before = before_first;
+    for (const Record& record : records_) {
+        if (record.instant_ns(instant) > instant_ns)
+            return before != 0 && record.exposure.trigger > before + 1;
+        before = record.exposure.trigger;
+    }
+    return false;
 }
 
 }  // namespace versavis::pairing

@@ -9,10 +9,6 @@
 
 namespace versavis::pairing {
 
-/// Which instant of an exposure a frame's time is held against: by the camera's clock its start, by
-/// the arrival its end on the host.
-enum class Timeline { camera, arrival };
-
 /// A share of a gap between exposures, as all tolerances are stated.
 inline std::int64_t part_of(std::int64_t ns, double share) {
     return static_cast<std::int64_t>(share * static_cast<double>(ns));
@@ -20,21 +16,23 @@ inline std::int64_t part_of(std::int64_t ns, double share) {
 
 struct Record {
     Exposure exposure;
+    BoardTime end;               ///< of the exposure, as likely as can be said when nobody saw it
+    HostTime end_on_host;        ///< the same
     bool used = false;           ///< a frame of it was published
     std::uint64_t recorded = 0;  ///< records until this one, itself included
     std::uint64_t silent = 0;    ///< those of them without an exposure
 
-    std::int64_t instant_ns(Timeline timeline) const {
-        return timeline == Timeline::camera ? exposure.start.ns : exposure.end_on_host.ns;
-    }
+    bool prompt = true;  ///< reached the host as soon as others did
+
+    std::int64_t instant_ns(Instant instant) const;
 };
 
 class ExposureLog {
  public:
-    explicit ExposureLog(Duration period) : period_(period) {}
+    explicit ExposureLog(Duration period) : period_(period), smallest_gap_(period) {}
 
-    /// False when it does not come after the one before: it is of another life of the board.
-    bool add(const Exposure& exposure);
+    /// Comes after the one before in number and in start.
+    void add(const Exposure& exposure, bool prompt = true);
 
     bool empty() const { return records_.empty(); }
     std::size_t size() const { return records_.size(); }
@@ -46,19 +44,22 @@ class ExposureLog {
     Record* find(std::uint64_t trigger);
 
     /// The exposure closest to `instant_ns`, if it is within the tolerance; else null.
-    const Record* near(Timeline timeline, std::int64_t instant_ns, std::int64_t tolerance_ns) const;
+    const Record* near(Instant instant, std::int64_t instant_ns, std::int64_t tolerance_ns) const;
 
     /// True when an exposure whose record never came may lie about there. `before_first`: the
     /// newest trigger that is known from before the log begins.
-    bool lost_near(Timeline timeline, std::int64_t instant_ns, std::uint64_t before_first) const;
+    bool lost_near(Instant instant, std::int64_t instant_ns, std::uint64_t before_first) const;
 
     /// Smallest distance of neighbouring exposures, at most the period. Always above zero.
-    std::int64_t smallest_gap_ns() const;
+    std::int64_t smallest_gap_ns() const { return smallest_gap_.ns; }
 
  private:
-    std::size_t first_after(Timeline timeline, std::int64_t instant_ns) const;
+    void measure();
 
     Duration period_;
+    Duration smallest_gap_;
+    Duration longest_;      ///< of the exposures here
+    Duration last_length_;  ///< of the newest that was measured
     std::deque<Record> records_;
     std::uint64_t recorded_ = 0;
     std::uint64_t silent_ = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 namespace versavis::pairing {
 
@@ -12,9 +13,17 @@ namespace {
 // half a stale frame at the start costs another pattern; at twice each search takes longer.
 constexpr std::size_t frames_in_search = 12;
 
-// Exposures remembered. At half a fast camera that waits for records loses some; at twice a search
-// looks at more that are too old to matter.
-constexpr std::size_t exposures_kept = 128;
+// Fewest exposures remembered. At half a fast camera that waits for records loses some; at twice a
+// search looks at more that are too old to matter.
+constexpr std::size_t fewest_exposures = 128;
+
+// Most exposures remembered, however late frames may come. At half a camera of 1 kHz may be 0.2 s
+// late at most; at twice a search there takes four times as long.
+constexpr std::size_t most_exposures = 1024;
+
+// Odd records in a row that make a step of the board's time when they follow each other. At half
+// (1) a single lie costs a start; at twice a step costs twice as many frames before the start.
+constexpr std::size_t odd_to_step = 3;
 
 // Exposures that a search keeps even when no frame of them can arrive any more. At half slow
 // patterns may lose their beginning; at twice more old ones compete.
@@ -76,9 +85,13 @@ constexpr std::int64_t step_tolerance_ns = 30'000;
 // stepped; at twice it matters only for frames seconds apart.
 constexpr double step_tolerance_rate = 500e-6;
 
-// How close a frame must come to an exposure by the camera's clock while locked, in smallest gaps.
-// At half frames after a long silence slip; at twice, every time is close to some exposure.
+// How close a frame must come to an exposure by the camera's clock to name it, in smallest gaps. At
+// half frames after a long silence slip; at twice, every time is close to some exposure.
 constexpr double close_by_clock = 0.25;
+
+// How close it must come to be published, in smallest gaps, if it was not closer before. At half
+// clocks that jitter slip; at twice a record that is wrong by 2 ms at 20 Hz passes.
+constexpr double steady_clock = 0.02;
 
 // How far from its usual lateness a frame may arrive and still say which exposure it is of, in
 // smallest gaps. At half jitter makes arrival silent; at twice (2/3) two exposures would do.
@@ -119,41 +132,107 @@ const char* to_string(State state) {
     return "unknown";
 }
 
+Duration longest_latest_arrival(Duration period) {
+    return period * static_cast<std::int64_t>(most_exposures - exposures_for_search) -
+           usual_exposure_wait;
+}
+
 Pairing::Pairing(const Limits& limits, Outcome& outcome)
     : limits_(limits),
       outcome_(outcome),
-      timeline_(limits.camera_clock ? Timeline::camera : Timeline::arrival),
-      exposures_(limits.period) {}
+      by_clock_(limits.camera_clock),
+      exposures_(limits.period),
+      gate_(limits),
+      clock_(limits.stamped) {}
 
 std::int64_t Pairing::loose_ns() const {
-    return part_of(exposures_.smallest_gap_ns(),
-                   timeline_ == Timeline::camera ? close_by_clock : close_by_arrival);
+    return part_of(exposures_.smallest_gap_ns(), by_clock_ ? close_by_clock : close_by_arrival);
 }
 
-std::int64_t Pairing::frame_ns(const Arrival& arrival) const {
-    return timeline_ == Timeline::camera ? arrival.camera_time.ns : arrival.arrived.ns;
+std::span<const Instant> Pairing::instants() const {
+    static constexpr Instant arrival[] = {Instant::arrival};
+    return by_clock_ ? clock_.possible() : arrival;
 }
 
-std::int64_t Pairing::expected_instant_ns(const Arrival& arrival) const {
-    const Relation& relation = timeline_ == Timeline::camera ? clock_ : latency_;
-    return relation.expected_instant_ns(frame_ns(arrival));
+std::int64_t Pairing::expected_ns(Instant instant, const Arrival& arrival) const {
+    return instant == Instant::arrival ? latency_.expected_instant_ns(arrival.arrived.ns)
+                                       : clock_.expected_instant_ns(instant, arrival.camera_time);
+}
+
+std::int64_t Pairing::tolerance_ns(Instant instant, const Arrival& arrival) const {
+    return std::min(loose_ns(), clock_.tolerance_ns(instant, arrival.camera_time));
+}
+
+/// While it is unknown what the camera stamps, that is taken by which ids and arrival agree.
+Pairing::Reading Pairing::read(const Arrival& arrival) const {
+    Reading best;
+    for (const Instant instant : instants()) {
+        Reading reading{instant, expected_ns(instant, arrival)};
+        reading.record = exposures_.near(instant, reading.instant_ns, loose_ns());
+        reading.verified = reading.record != nullptr && verified(arrival, *reading.record);
+        if (best.instant == Instant::unknown || (reading.verified && !best.verified))
+            best = reading;
+        else if (reading.verified && reading.record != best.record)
+            best.ambiguous = true;
+        else if (reading.verified && !steady(arrival, best))
+            best = reading;
+    }
+    return best;
+}
+
+/// The camera's clock fits as well as it did so far: neither it nor the record is off.
+bool Pairing::steady(const Arrival& arrival, const Reading& reading) const {
+    if (!by_clock_ || !seen(reading.record->exposure, reading.instant)) return true;
+    const std::int64_t off_ns = reading.instant_ns - reading.record->instant_ns(reading.instant);
+    return std::abs(off_ns) <= std::max(part_of(exposures_.smallest_gap_ns(), steady_clock),
+                                        tolerance_ns(reading.instant, arrival));
 }
 
 void Pairing::add(const Exposure& exposure) {
-    if (!exposures_.add(exposure))
-        return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
-    if (exposures_.size() > exposures_kept) drop_oldest_exposure(EventReason::frame_missing);
+    if (!gate_.accepts(exposure)) return set_aside(exposure);
+    refuse_odd(EventReason::mismatch);
+    accept(exposure);
     process();
+}
+
+void Pairing::accept(const Exposure& exposure) {
+    gate_.take(exposure);
+    exposures_.add(exposure, gate_.prompt());
+    const auto in_flight = static_cast<std::size_t>(
+        (limits_.latest_arrival + limits_.exposure_wait).ns / limits_.period.ns);
+    const std::size_t kept =
+        std::clamp(in_flight + exposures_for_search, fewest_exposures, most_exposures);
+    if (exposures_.size() > kept) drop_oldest_exposure(EventReason::frame_missing);
+}
+
+/// It lies, or the board's time has stepped, which others after it will show. All that was learned
+/// by that time is void then.
+void Pairing::set_aside(const Exposure& exposure) {
+    if (!odd_.empty() && !gate_.in_order(odd_.back(), exposure)) refuse_odd(EventReason::mismatch);
+    odd_.push_back(exposure);
+    if (odd_.size() < odd_to_step) return;
+    while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
+    if (state_ != State::searching) search_anew();
+    gate_ = RecordGate(limits_);
+    for (const Exposure& stepped : std::exchange(odd_, {}))
+        if (gate_.accepts(stepped))
+            accept(stepped);
+        else  // the board is ahead of its clock's estimate: nothing can be proved by that
+            outcome_.exposure_unpaired(stepped, EventReason::mismatch);
+    process();
+}
+
+void Pairing::refuse_odd(EventReason reason) {
+    for (const Exposure& odd : std::exchange(odd_, {})) outcome_.exposure_unpaired(odd, reason);
 }
 
 void Pairing::add(const Arrival& arrival) {
     last_arrival_ = arrival.arrived;
     ++frames_since_start_;
     if (state_ == State::searching) {
-        const bool clock = limits_.camera_clock && arrival.camera_time.ns != 0;
-        const Timeline timeline = clock ? Timeline::camera : Timeline::arrival;
-        while (timeline != timeline_ && !arrivals_.empty()) drop_front(EventReason::unproved);
-        timeline_ = timeline;
+        const bool by_clock = limits_.camera_clock && arrival.camera_time.ns != 0;
+        while (by_clock != by_clock_ && !arrivals_.empty()) drop_front(EventReason::unproved);
+        by_clock_ = by_clock;
     }
     if (arrivals_.size() >= limits_.frames_held) expire_front();
     arrivals_.push_back(arrival);
@@ -184,8 +263,7 @@ bool Pairing::records_complete(const Arrival& arrival) const {
 /// The oldest frames may be of another life of camera or board: they need no place in the
 /// alignment.
 void Pairing::search() {
-    const std::size_t enough =
-        frames_for_proof(start_ == Start::slow ? Timeline::arrival : timeline_);
+    const std::size_t enough = frames_for_proof(by_clock_ && start_ != Start::slow);
     if (arrivals_.size() < enough || !records_complete(arrivals_.back())) return;
     const std::size_t oldest = arrivals_.size() - std::min(arrivals_.size(), frames_in_search);
     for (std::size_t first = oldest; first + enough <= arrivals_.size(); ++first) {
@@ -194,24 +272,24 @@ void Pairing::search() {
         const auto triggers = find_alignment(frames);
         if (triggers.empty()) continue;
         for (std::size_t i = 0; i < first; ++i) drop_front(EventReason::unproved);
-        return accept(triggers);
+        return lock(triggers);
     }
 }
 
 std::vector<std::uint64_t> Pairing::find_alignment(const std::vector<Arrival>& frames) const {
-    auto found = align(frames, exposures_, timeline_, limits_);
+    auto found = align(frames, exposures_, instants(), limits_);
     // Slow triggers are regular, but so far apart that arrivals alone prove it.
     if (found.empty() && start_ == Start::slow)
-        found = align(frames, exposures_, Timeline::arrival, limits_);
+        found = align(frames, exposures_, std::array{Instant::arrival}, limits_);
     return found;
 }
 
-void Pairing::accept(const std::vector<std::uint64_t>& triggers) {
+void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
     const std::uint64_t first =
         *std::find_if(triggers.begin(), triggers.end(), [](auto t) { return t != 0; });
     forget_exposures_before(first);
     state_ = State::locked;
-    clock_ = Relation(true);
+    clock_.forget();
     latency_ = Relation(false);
     proved_.reset();
     shortest_delay_ns_ = INT64_MAX;
@@ -226,14 +304,13 @@ void Pairing::accept(const std::vector<std::uint64_t>& triggers) {
             drop_front(EventReason::unproved);
 }
 
-/// False while the record of the exposure at `instant_ns` may come: unless the frame would have
-/// arrived before it was exposed.
-bool Pairing::may_still_be_recorded(const Arrival& arrival, std::int64_t instant_ns) const {
+/// False while the record of the exposure there may come: unless the frame would have arrived
+/// before it was exposed.
+bool Pairing::may_still_be_recorded(const Arrival& arrival, const Reading& reading) const {
     const Record& newest = exposures_.back();
-    if (instant_ns - newest.instant_ns(timeline_) <= loose_ns()) return false;
-    if (timeline_ == Timeline::arrival) return true;
-    const HostTime on_host =
-        newest.exposure.earliest_on_host + Duration{instant_ns - newest.exposure.end.ns};
+    if (reading.instant_ns - newest.instant_ns(reading.instant) <= loose_ns()) return false;
+    if (!by_clock_) return true;
+    const HostTime on_host = newest.end_on_host + (BoardTime{reading.instant_ns} - newest.end);
     return arrival.arrived - on_host >= limits_.earliest_arrival;
 }
 
@@ -241,10 +318,13 @@ bool Pairing::may_still_be_recorded(const Arrival& arrival, std::int64_t instant
 bool Pairing::out_of_order(const Arrival& arrival) const {
     const std::uint64_t newest = proved_->arrival.block_id;
     if (arrival.block_id > newest || arrival.block_id + ids_back < newest) return false;
-    if (timeline_ == Timeline::arrival) return true;
-    const std::int64_t behind =
-        proved_->record.instant_ns(timeline_) - expected_instant_ns(arrival);
-    return behind >= -loose_ns() && behind <= limits_.latest_arrival.ns;
+    if (!by_clock_) return true;
+    const auto is_behind = [&](Instant instant) {
+        const std::int64_t behind =
+            proved_->record.instant_ns(instant) - expected_ns(instant, arrival);
+        return behind >= -loose_ns() && behind <= limits_.latest_arrival.ns;
+    };
+    return std::any_of(instants().begin(), instants().end(), is_behind);
 }
 
 bool Pairing::ids_agree(const Arrival& arrival, const Record& record) const {
@@ -254,12 +334,12 @@ bool Pairing::ids_agree(const Arrival& arrival, const Record& record) const {
 bool Pairing::verified(const Arrival& arrival, const Record& record) const {
     return !record.used && record.exposure.exposed &&
            arrival_possible(limits_, arrival, record.exposure) && ids_agree(arrival, record) &&
-           !length_contradicts(arrival, record.exposure) &&
-           (timeline_ == Timeline::camera || ids_exact(arrival, record));
+           !length_contradicts(arrival, record.exposure) && (record.prompt || by_clock_) &&
+           ((record.prompt && by_clock_) || ids_exact(arrival, record));
 }
 
-/// Were a trigger left out of the count, a frame of the exposure before would do as well, only
-/// late.
+/// Were a trigger left out of the count, a frame of the exposure before would do as well: it would
+/// only be late, or the board's time was set back, and the record is late.
 bool Pairing::ids_exact(const Arrival& arrival, const Record& record) const {
     return arrival.block_id - proved_->arrival.block_id ==
            record.exposure.trigger - proved_->record.exposure.trigger;
@@ -269,18 +349,20 @@ bool Pairing::ids_exact(const Arrival& arrival, const Record& record) const {
 bool Pairing::decide_locked() {
     const Arrival arrival = arrivals_.front();
     if (exposures_.empty()) return false;
-    const std::int64_t instant = expected_instant_ns(arrival);
-    if (may_still_be_recorded(arrival, instant)) return false;
-    const Record* record = exposures_.near(timeline_, instant, loose_ns());
+    const Reading reading = read(arrival);
+    const Record* record = reading.record;
+    if (!reading.verified && may_still_be_recorded(arrival, reading)) return false;
     if (out_of_order(arrival)) {
         drop_front(EventReason::out_of_order);
-    } else if (record == nullptr && instant > proved_->record.instant_ns(timeline_) &&
-               exposures_.lost_near(timeline_, instant, proved_->record.exposure.trigger)) {
+    } else if (record == nullptr &&
+               reading.instant_ns > proved_->record.instant_ns(reading.instant) &&
+               exposures_.lost_near(reading.instant, reading.instant_ns,
+                                    proved_->record.exposure.trigger)) {
         drop_front(EventReason::exposure_missing);
     } else if (record != nullptr && !record->exposure.exposed) {
         drop_front(EventReason::trigger_ignored);  // the exposure line says that there was none
-    } else if (record != nullptr && verified(arrival, *record) && !early(arrival, *record) &&
-               (timeline_ == Timeline::camera || latency_trusted())) {
+    } else if (reading.verified && !reading.ambiguous && steady(arrival, reading) &&
+               !early(arrival, *record) && (by_clock_ || latency_trusted())) {
         waits_for_witness_ = needs_witness(arrival, *record) && !has_witness();
         if (waits_for_witness_) return false;
         pair_front(record->exposure.trigger);
@@ -292,12 +374,12 @@ bool Pairing::decide_locked() {
 
 /// Against when a frame of this exposure usually arrives.
 std::int64_t Pairing::lateness_ns(const Arrival& arrival, const Record& record) const {
-    return latency_.expected_instant_ns(arrival.arrived.ns) - record.exposure.end_on_host.ns;
+    return latency_.expected_instant_ns(arrival.arrived.ns) - record.end_on_host.ns;
 }
 
 /// A frame may be late, but not earlier than the quickest ever was.
 bool Pairing::early(const Arrival& arrival, const Record& record) const {
-    const std::int64_t delay = (arrival.arrived - record.exposure.end_on_host).ns;
+    const std::int64_t delay = (arrival.arrived - record.end_on_host).ns;
     return in_gaps(delay - shortest_delay_ns_, exposures_.smallest_gap_ns()) < -early_part;
 }
 
@@ -326,17 +408,15 @@ bool Pairing::needs_witness(const Arrival& arrival, const Record& record) const 
     const bool all_taken = record.exposure.kind != StampKind::trigger_edge &&
                            record.exposure.trigger > proved_->record.exposure.trigger &&
                            perhaps_not_taken(proved_->record, record) == 0;
-    return timeline_ == Timeline::camera && !all_taken &&
-           (late(arrival, record) || !latency_trusted());
+    return by_clock_ && !all_taken && (late(arrival, record) || !latency_trusted());
 }
 
 /// A later frame for which all three kinds of evidence agree: then the two did not step before it
 /// either.
 bool Pairing::has_witness() const {
     return std::any_of(arrivals_.begin() + 1, arrivals_.end(), [this](const Arrival& later) {
-        const Record* record = by_clock(later, loose_ns());
-        return record != nullptr && latency_trusted() && verified(later, *record) &&
-               punctual(later, *record);
+        const Reading reading = read(later);
+        return reading.verified && latency_trusted() && punctual(later, *reading.record);
     });
 }
 
@@ -349,16 +429,22 @@ void Pairing::slip(const Arrival& arrival) {
     outcome_.slipped(arrival);
 }
 
-const Record* Pairing::by_clock(const Arrival& arrival, std::int64_t tolerance_ns) const {
-    if (timeline_ != Timeline::camera || arrival.camera_time.ns == 0) return nullptr;
-    return exposures_.near(Timeline::camera, clock_.expected_instant_ns(arrival.camera_time.ns),
-                           tolerance_ns);
+/// The exposure that the camera's clock fits as well as it ever did.
+const Record* Pairing::by_clock(const Arrival& arrival) const {
+    const Record* found = nullptr;
+    if (!by_clock_ || arrival.camera_time.ns == 0) return found;
+    for (const Instant instant : instants()) {
+        const Record* record =
+            exposures_.near(instant, expected_ns(instant, arrival), tolerance_ns(instant, arrival));
+        if (found == nullptr || (record != nullptr && verified(arrival, *record))) found = record;
+    }
+    return found;
 }
 
 /// None as well when frames come too irregularly to tell.
 const Record* Pairing::by_latency(const Arrival& arrival) const {
     if (!latency_trusted()) return nullptr;
-    return exposures_.near(Timeline::arrival, latency_.expected_instant_ns(arrival.arrived.ns),
+    return exposures_.near(Instant::arrival, latency_.expected_instant_ns(arrival.arrived.ns),
                            part_of(exposures_.smallest_gap_ns(), close_by_arrival));
 }
 
@@ -383,19 +469,19 @@ bool Pairing::decide_checking() {
         return true;
     }
     const Record* late = by_latency(arrival);
-    const Record* likely = timeline_ == Timeline::camera ? by_clock(arrival, loose_ns()) : late;
-    if (likely != nullptr && likely == late && verified(arrival, *likely)) {
-        relock(*likely);  // all agree: nothing stepped after all
+    const Reading reading = read(arrival);
+    if (reading.verified && reading.record == late && steady(arrival, reading)) {
+        relock(*late);  // all agree: nothing stepped after all
         return true;
     }
-    const Record* clocked =
-        by_clock(arrival, std::min(loose_ns(), clock_.tolerance_ns(expected_instant_ns(arrival))));
-    const bool free = clocked != nullptr && !clocked->used && clocked->exposure.exposed;
+    const Record* clocked = by_clock(arrival);
+    // A late record may be of a board whose time was set back: then clock and arrival have stepped.
+    const bool ids_may_have_stepped = clocked != nullptr && clocked == late && clocked->prompt &&
+                                      !clocked->used && clocked->exposure.exposed;
     // A clock that steps does not hit another exposure to some microseconds. When it fits so well,
     // it is ids and arrivals that have stepped together.
-    const bool may_have_stepped = timeline_ == Timeline::camera && clocked == nullptr;
-    const Record* counted = may_have_stepped ? by_ids(arrival) : nullptr;
-    if (!suspect(Stepped::ids, arrival, free && clocked == late ? clocked : nullptr) &&
+    const Record* counted = by_clock_ && clocked == nullptr ? by_ids(arrival) : nullptr;
+    if (!suspect(Stepped::ids, arrival, ids_may_have_stepped ? clocked : nullptr) &&
         !suspect(Stepped::clock, arrival, counted == late ? counted : nullptr))
         give_up_front();
     return true;
@@ -413,7 +499,7 @@ bool Pairing::suspect(Stepped kind, const Arrival& arrival, const Record* record
         suspicion.frames > 0 && consistent(kind, suspicion.last, now) ? suspicion.frames + 1 : 1;
     suspicion.last = now;
     if (suspicion.frames < frames_to_relock) return false;
-    if (kind == Stepped::clock) clock_.move(arrival.camera_time.ns, record->exposure.start.ns);
+    if (kind == Stepped::clock) clock_.move(arrival.camera_time, *record);
     relock(*record);
     return true;
 }
@@ -425,34 +511,44 @@ void Pairing::relock(const Record& record) {
 }
 
 /// What stepped must be steady since.
-bool Pairing::consistent(Stepped kind, const Pair& before, const Pair& now) {
+bool Pairing::consistent(Stepped kind, const Pair& before, const Pair& now) const {
     if (step_faults(now.arrival.block_id - before.arrival.block_id, before.record, now.record) != 0)
         return false;
     if (kind != Stepped::clock) return true;
-    const std::int64_t elapsed = (now.record.exposure.start - before.record.exposure.start).ns;
     const std::int64_t step = (now.arrival.camera_time - before.arrival.camera_time).ns;
-    return std::abs(step - elapsed) <= step_tolerance_ns + part_of(elapsed, step_tolerance_rate);
+    return std::any_of(instants().begin(), instants().end(), [&](Instant instant) {
+        const std::int64_t elapsed =
+            now.record.instant_ns(instant) - before.record.instant_ns(instant);
+        return std::abs(step - elapsed) <=
+               step_tolerance_ns + part_of(elapsed, step_tolerance_rate);
+    });
 }
 
 void Pairing::give_up_front() {
     const Duration since = arrivals_.front().arrived - slipped_;
-    const Duration shortest =
-        timeline_ == Timeline::camera ? shortest_check : shortest_check_by_arrival;
+    const Duration shortest = by_clock_ ? shortest_check : shortest_check_by_arrival;
     if (++undecided_ < frames_to_give_up || since < shortest)
         return drop_front(EventReason::unproved);
     drop_front(EventReason::mismatch);
+    search_anew();
+}
+
+/// The start is wanted at once.
+void Pairing::search_anew() {
     state_ = State::searching;
-    frames_since_start_ = static_cast<int>(frames_for_proof(timeline_));
+    waits_for_witness_ = false;
+    gate_.forget_delay();
+    frames_since_start_ = static_cast<int>(frames_for_proof(by_clock_));
 }
 
 std::optional<Start> Pairing::wanted_start(HostTime now) const {
     if (state_ == State::locked && start_ == Start::slow) return Start::steady;
     if (state_ != State::searching) return std::nullopt;
-    const bool futile = timeline_ == Timeline::arrival && start_ == Start::pattern;
+    const bool futile = !by_clock_ && start_ == Start::pattern;
     if (!futile && now <= start_ends_) return std::nullopt;
-    if (frames_since_start_ < static_cast<int>(frames_for_proof(timeline_))) return std::nullopt;
-    const bool slow = timeline_ == Timeline::arrival ||
-                      fruitless_starts_ % (patterns_before_slow + 1) == patterns_before_slow;
+    if (frames_since_start_ < static_cast<int>(frames_for_proof(by_clock_))) return std::nullopt;
+    const bool slow =
+        !by_clock_ || fruitless_starts_ % (patterns_before_slow + 1) == patterns_before_slow;
     return slow ? Start::slow : Start::pattern;
 }
 
@@ -473,11 +569,10 @@ void Pairing::pair_front(std::uint64_t trigger) {
     forget_exposures_before(trigger);
     Record& record = *exposures_.find(trigger);
     record.used = true;
-    if (arrival.camera_time.ns != 0) clock_.track(arrival.camera_time.ns, record.exposure.start.ns);
-    shortest_delay_ns_ =
-        std::min(shortest_delay_ns_, (arrival.arrived - record.exposure.end_on_host).ns);
+    if (arrival.camera_time.ns != 0) clock_.track(arrival.camera_time, record);
+    shortest_delay_ns_ = std::min(shortest_delay_ns_, (arrival.arrived - record.end_on_host).ns);
     if (!latency_.known() || punctual(arrival, record))
-        latency_.track(arrival.arrived.ns, record.exposure.end_on_host.ns);
+        latency_.track(arrival.arrived.ns, record.end_on_host.ns);
     proved_ = Pair{arrival, record};
     outcome_.paired(arrival, record.exposure);
 }
@@ -496,8 +591,7 @@ void Pairing::drop_front(EventReason reason) {
     arrivals_.pop_front();
     if (reason != EventReason::out_of_order) note({arrival.block_id, reason});
     const Record* guess = nullptr;
-    if (proved_ && state_ != State::searching)
-        guess = exposures_.near(timeline_, expected_instant_ns(arrival), loose_ns());
+    if (proved_ && state_ != State::searching) guess = read(arrival).record;
     outcome_.frame_unpaired(arrival, reason, guess == nullptr ? nullptr : &guess->exposure);
 }
 
@@ -557,15 +651,20 @@ void Pairing::advance(HostTime now) {
 
 void Pairing::set_limits(const Limits& limits) {
     limits_ = limits;
-    timeline_ = limits.camera_clock ? Timeline::camera : Timeline::arrival;
+    by_clock_ = limits.camera_clock;
     exposures_ = ExposureLog(limits.period);
+    gate_ = RecordGate(limits);
+    clock_ = CameraClock(limits.stamped);
 }
 
 void Pairing::reset() {
     while (!arrivals_.empty()) drop_front(EventReason::reset);
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
+    refuse_odd(EventReason::reset);
     state_ = State::searching;
     exposures_ = ExposureLog(limits_.period);
+    gate_ = RecordGate(limits_);
+    clock_.forget();
     shortfalls_.clear();
     proved_.reset();
     waits_for_witness_ = false;

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "engine/pairing/alignment.hpp"
+#include "engine/pairing/camera_clock.hpp"
+#include "engine/pairing/record_gate.hpp"
 #include "engine/pairing/relation.hpp"
 
 namespace versavis::pairing {
@@ -43,6 +45,10 @@ enum class Start : std::uint32_t {
     steady = 3,   ///< all
 };
 
+/// The longest `latest_arrival` that has any effect for a camera of this period: so many exposures
+/// are remembered.
+Duration longest_latest_arrival(Duration period);
+
 /// Method. Three kinds of evidence count triggers, each in its own way: the camera's clock,
 /// followed against the board's; block ids, from the newest published frame; and the time from the
 /// end of the exposure to the arrival, whose usual value is learned and which has hard limits. A
@@ -75,15 +81,16 @@ class Pairing {
 
     State state() const { return state_; }
 
+    /// What the camera stamps, by what was said or found out.
+    Instant stamped() const { return clock_.stamped(); }
+
     /// What the board should do for this camera now; none: go on. Say start_requested() when it was
     /// told so.
     std::optional<Start> wanted_start(HostTime now) const;
     void start_requested(Start start, HostTime now);
 
     /// How the first start should be, before anything is known.
-    Start first_start() const {
-        return timeline_ == Timeline::arrival ? Start::slow : Start::pattern;
-    }
+    Start first_start() const { return by_clock_ ? Start::pattern : Start::slow; }
 
  private:
     /// What may have stepped at a slip, so that the other kinds of evidence still agree.
@@ -98,18 +105,35 @@ class Pairing {
         Pair last;
     };
 
-    std::int64_t frame_ns(const Arrival& arrival) const;
-    std::int64_t expected_instant_ns(const Arrival& arrival) const;
+    /// What the time of a frame says of its exposure.
+    struct Reading {
+        Instant instant{};  ///< by which it is read
+        std::int64_t instant_ns = 0;
+        const Record* record = nullptr;  ///< the exposure there
+        bool verified = false;           ///< ids and arrival agree
+        bool ambiguous = false;          ///< they do with another one, by another instant
+    };
+
+    std::span<const Instant> instants() const;
+    std::int64_t expected_ns(Instant instant, const Arrival& arrival) const;
+    std::int64_t tolerance_ns(Instant instant, const Arrival& arrival) const;
     std::int64_t loose_ns() const;
+    Reading read(const Arrival& arrival) const;
+    bool steady(const Arrival& arrival, const Reading& reading) const;
+
+    void accept(const Exposure& exposure);
+    void set_aside(const Exposure& exposure);
+    void refuse_odd(EventReason reason);
+    void search_anew();
 
     void process();
     bool records_complete(const Arrival& arrival) const;
     void search();
     std::vector<std::uint64_t> find_alignment(const std::vector<Arrival>& frames) const;
-    void accept(const std::vector<std::uint64_t>& triggers);
+    void lock(const std::vector<std::uint64_t>& triggers);
 
     bool decide_locked();
-    bool may_still_be_recorded(const Arrival& arrival, std::int64_t instant_ns) const;
+    bool may_still_be_recorded(const Arrival& arrival, const Reading& reading) const;
     bool out_of_order(const Arrival& arrival) const;
     bool verified(const Arrival& arrival, const Record& record) const;
     bool ids_agree(const Arrival& arrival, const Record& record) const;
@@ -121,7 +145,7 @@ class Pairing {
     bool early(const Arrival& arrival, const Record& record) const;
     bool needs_witness(const Arrival& arrival, const Record& record) const;
     bool has_witness() const;
-    const Record* by_clock(const Arrival& arrival, std::int64_t tolerance_ns) const;
+    const Record* by_clock(const Arrival& arrival) const;
     const Record* by_latency(const Arrival& arrival) const;
     const Record* by_ids(const Arrival& arrival) const;
 
@@ -129,7 +153,7 @@ class Pairing {
     bool decide_checking();
     bool suspect(Stepped kind, const Arrival& arrival, const Record* record);
     void relock(const Record& record);
-    static bool consistent(Stepped kind, const Pair& before, const Pair& now);
+    bool consistent(Stepped kind, const Pair& before, const Pair& now) const;
     void give_up_front();
 
     void pair_front(std::uint64_t trigger);
@@ -145,11 +169,13 @@ class Pairing {
     Limits limits_;
     Outcome& outcome_;
     State state_ = State::searching;
-    Timeline timeline_ = Timeline::camera;
+    bool by_clock_ = true;  ///< of the camera, else by arrival
     ExposureLog exposures_;
+    RecordGate gate_;
+    std::vector<Exposure> odd_;     ///< records that contradict the newest good one
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::deque<Shortfall> shortfalls_;
-    Relation clock_{true};                   ///< camera time against the start of the exposure
+    CameraClock clock_;
     std::int64_t shortest_delay_ns_ = 0;     ///< from end of exposure to arrival, since the lock
     Relation latency_{false};                ///< arrival against its end on the host
     std::optional<Pair> proved_;             ///< the newest that was published

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Holds the record of an exposure against the one before it, its grid point and its way to the
+// host.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "engine/pairing/alignment.hpp"
+
+namespace versavis::pairing {
+
+/// A record has three witnesses: its grid point says how much time has passed since the record
+/// before, its number cannot have grown by more than the grid, and it cannot reach the host before
+/// its exposure has ended, nor sooner after that than any other.
+class RecordGate {
+ public:
+    explicit RecordGate(const Limits& limits)
+        : period_(limits.period),
+          earliest_(limits.earliest_arrival),
+          latest_(limits.exposure_wait) {}
+
+    bool accepts(const Exposure& exposure) const;
+
+    /// The newest good record from here on.
+    void take(const Exposure& exposure);
+
+    /// These are one after the other, by one clock.
+    bool in_order(const Exposure& before, const Exposure& after) const;
+
+    /// The newest record reached the host as soon as others did. When it did not, the link stalls
+    /// or the board's time was set back: nobody can tell.
+    bool prompt() const { return prompt_; }
+
+    /// How soon records reach the host is learned anew.
+    void forget_delay() {
+        least_delay_ns_.reset();
+        confirmed_ = 0;
+    }
+
+ private:
+    bool too_early(const Exposure& exposure) const;
+
+    Duration period_;
+    Duration earliest_;
+    Duration latest_;
+    std::optional<Exposure> newest_;
+    std::optional<std::int64_t> least_delay_ns_;  ///< on the way to the host
+    int confirmed_ = 0;                           ///< records that took no less, in a row
+    bool prompt_ = true;
+};
+
+}  // namespace versavis::pairing
