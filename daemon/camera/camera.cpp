@@ -224,7 +224,8 @@ CameraResult<> Camera::set_up_and_stream(ArvCamera* camera, const std::atomic<bo
         return problem(CameraState::silent,
                        {configuration_.device, "disappeared while it was being set up", ""});
     if (!setup) return problem(CameraState::misconfigured, setup.error());
-    setup->has_clock = setup->has_clock && !clock_stands_;
+    without_clock_ = clock_stands_;
+    setup->has_clock = setup->has_clock && !without_clock_;
     describe(*setup);
     return stream(camera, *setup, control_lost);
 }
@@ -412,6 +413,8 @@ void Camera::do_housekeeping(ArvCamera* camera) {
     else if (temperature > configuration_.max_temperature_c)
         hint = fmt::format("the camera is at {:.0f} degrees: cool it, or raise 'max_temperature_c'",
                            temperature);
+    else if (without_clock_)
+        hint = "its clock stood still: it is paired without it; power the camera off and on";
     else if (meter_ && !meter_->usable())
         hint =
             "auto exposure cannot meter this pixel format: use Mono or Bayer of 8 to 16 bits, "

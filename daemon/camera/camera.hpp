@@ -139,6 +139,7 @@ class Camera {
     std::optional<NetworkDevice> device_;  ///< where it was last seen
     HostTime held_since_;                  ///< somebody else has control since; 0: nobody
     bool clock_stands_ = false;            ///< found out while it streamed last
+    bool without_clock_ = false;           ///< for that reason
 
     std::thread thread_;
 };
