@@ -45,7 +45,7 @@ struct Bench : test::Pipelines {
                    translator,
                    recorder,
                    listener};
-    CameraGroup group{directory.path(), {}, translator, events, link};
+    CameraGroup group{directory.path(), {}, directory.path(), translator, events, link};
 };
 
 }  // namespace
