@@ -28,12 +28,13 @@ CameraStatus describe(const CameraConfiguration& configuration, bool triggered,
 }  // namespace
 
 CameraGroup::CameraGroup(const std::filesystem::path& ring_directory,
-                         std::vector<CameraPreset> presets, clock::Translator& translator,
-                         EventJournal& events, BoardLink& board)
-    : translator_(translator), events_(events), board_(board) {
-    environment_.ring_directory = ring_directory;
-    environment_.presets = std::move(presets);
-}
+                         std::vector<CameraPreset> presets,
+                         const std::filesystem::path& state_directory,
+                         clock::Translator& translator, EventJournal& events, BoardLink& board)
+    : environment_(ring_directory, std::move(presets), state_directory),
+      translator_(translator),
+      events_(events),
+      board_(board) {}
 
 void CameraGroup::add(const CameraConfiguration& configuration) {
     const auto index = static_cast<std::uint32_t>(units_.size());
@@ -73,9 +74,11 @@ void CameraGroup::start() {
     for (const Unit& unit : units_) unit.camera->start();
 }
 
-void CameraGroup::stop() {
+bool CameraGroup::stop(HostTime deadline) {
     for (const Unit& unit : units_) unit.camera->request_stop();  // each may take its time
-    for (const Unit& unit : units_) unit.camera->stop();
+    bool all = true;
+    for (const Unit& unit : units_) all = unit.camera->ended_by(deadline) && all;
+    return all && environment_.patient.unfinished() == 0;
 }
 
 void CameraGroup::start(CameraPipeline& pipeline, pairing::Start how) {

@@ -19,11 +19,15 @@ namespace versavis::daemon {
 class CameraGroup {
  public:
     CameraGroup(const std::filesystem::path& ring_directory, std::vector<CameraPreset> presets,
-                clock::Translator& translator, EventJournal& events, BoardLink& board);
+                const std::filesystem::path& state_directory, clock::Translator& translator,
+                EventJournal& events, BoardLink& board);
 
     void add(const CameraConfiguration& configuration);
     void start();
-    void stop();  ///< waits for the end of all
+
+    /// Waits for the end of all. False: some device still keeps the service waiting, whose camera
+    /// and all that it uses must be left as they are until the process ends.
+    bool stop(HostTime deadline);
 
     /// Bounded waits, heartbeats, and starts that the pairing asks for.
     void tick(HostTime now);

@@ -4,12 +4,15 @@
 #include <signal.h>
 #include <sysexits.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
 
+#include "camera/description_check.hpp"
 #include "configuration/configuration.hpp"
 #include "configuration/problem_report.hpp"
+#include "library_log.hpp"
 #include "log.hpp"
 #include "service.hpp"
 
@@ -40,6 +43,7 @@ int serve(Service& service, const sigset_t& signals) {
             log(LogLevel::warning, "service",
                 "SIGHUP does not reload the configuration: restart the service");
         service.tick();
+        report_suppressed_library_lines(host_now());
         sd_notify(0, "WATCHDOG=1");
         if (health == service.health()) continue;
         health = service.health();
@@ -73,6 +77,7 @@ int run(const std::string& path) {
         return EX_CONFIG;
     }
     set_log_level(configuration->log_level);
+    route_library_log();
     auto service = Service::create(*configuration);
     if (!service) {
         log(LogLevel::error, "service", "{}", service.error().message());
@@ -85,7 +90,9 @@ int run(const std::string& path) {
     const int signal = serve(**service, signals);
     sd_notify(0, "STOPPING=1");
     log(LogLevel::info, "service", "stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
-    return EX_OK;
+    if ((*service)->stop()) return EX_OK;
+    log(LogLevel::warning, "service", "a device still does not answer: it is left as it is");
+    ::_exit(EX_OK);  // its thread uses what a return would destroy
 }
 
 }  // namespace
@@ -101,11 +108,14 @@ int main(int argc, char** argv) {
     CLI::Option* check_config =
         app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
     app.add_flag("--json", as_json, "Tell it in JSON")->needs(check_config);
+    std::string description;  // for the service itself
+    app.add_option("--probe-description", description)->group("");
     app.set_version_flag("--version", VERSAVIS_VERSION);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
+    if (!description.empty()) return run_description_probe(description == "zip");
     return check_only ? check(path, as_json) : run(path);
 }

@@ -4,6 +4,7 @@
 #include "board/board_event.hpp"
 #include "configuration/board_configuration.hpp"
 #include "log.hpp"
+#include "state_directory.hpp"
 #include "versavis/ring/path.hpp"
 
 namespace versavis::daemon {
@@ -16,6 +17,10 @@ namespace {
 constexpr std::uint32_t imu_items = 16384;
 constexpr std::uint32_t event_items = 4096;
 constexpr std::uint32_t clock_items = 65536;
+
+/// For cameras that are mute when the service is to end. At half, one that is busy stays under
+/// control for some seconds; at twice, the end takes longer than the two seconds it may.
+constexpr Duration stop_patience = seconds(1);
 
 /// What is asked of a board whose firmware is too old for it, and what to do; empty: nothing.
 std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
@@ -80,8 +85,9 @@ Expected<> Service::make_cameras() {
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
                                          configuration_, configuration_.clock.exchange_rate_hz,
                                          translator_, *clock_recorder_, self);
-    cameras_ = std::make_unique<CameraGroup>(directory_.path(), std::move(*presets), translator_,
-                                             *events_, *board_);
+    cameras_ = std::make_unique<CameraGroup>(directory_.path(), std::move(*presets),
+                                             state_directory(configuration_.state_directory),
+                                             translator_, *events_, *board_);
     for (const CameraConfiguration& camera : configuration_.cameras) cameras_->add(camera);
     return {};
 }
@@ -94,8 +100,13 @@ void Service::start() {
     cameras_->start();
 }
 
+bool Service::stop() {
+    const bool ended = cameras_->stop(host_now() + stop_patience);
+    board_->stop();
+    return ended;
+}
+
 Service::~Service() {
-    if (cameras_) cameras_->stop();
     if (board_) board_->stop();
 }
 

@@ -31,6 +31,10 @@ class Service final : private BoardListener {
 
     void start();
 
+    /// Ends all, in bounded time. False: a device still keeps a thread waiting, and the process
+    /// must end without destroying anything.
+    bool stop();
+
     /// Bounded waits and heartbeats; call it every 50 ms or so.
     void tick();
 

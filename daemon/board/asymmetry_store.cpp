@@ -1,29 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/asymmetry_store.hpp"
 
-#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "state_directory.hpp"
 
 namespace versavis::daemon {
 
 namespace {
 
-constexpr const char* default_directory = "/var/lib/versavis";
 /// What the asymmetry of a port may change from one day to the next, added to its sigma. At half,
 /// sigma is too small after an update of the kernel; at twice, stored values are worth less.
 constexpr Duration another_day = microseconds(3);
 
 /// A stored number beyond a second is none. At half or twice, the same files are refused.
 constexpr std::int64_t largest_ns = 1'000'000'000;
-
-std::filesystem::path file_below(const std::string& directory) {
-    const char* by_systemd = std::getenv("STATE_DIRECTORY");
-    const std::string chosen = !directory.empty()      ? directory
-                               : by_systemd != nullptr ? by_systemd
-                                                       : default_directory;
-    return std::filesystem::path(chosen) / "asymmetry.json";
-}
 
 /// An object, empty when there is no file; null when it is not understood.
 nlohmann::json read(const std::filesystem::path& path) {
@@ -44,7 +36,8 @@ bool plausible(const nlohmann::json& entry) {
 
 }  // namespace
 
-AsymmetryStore::AsymmetryStore(const std::string& directory) : path_(file_below(directory)) {}
+AsymmetryStore::AsymmetryStore(const std::string& directory)
+    : path_(state_directory(directory) / "asymmetry.json") {}
 
 Expected<std::optional<clock::Asymmetry>> AsymmetryStore::load(const std::string& port) const {
     const nlohmann::json document = read(path_);

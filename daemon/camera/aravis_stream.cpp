@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/aravis_stream.hpp"
 
+#include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -31,6 +32,10 @@ unsigned frame_retention_us(const CameraConfiguration& configuration) {
     return std::max(shortest_retention_us, static_cast<unsigned>(std::lround(longest)));
 }
 
+/// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
+/// longer for one that is mute.
+constexpr Duration goodbye = milliseconds(250);
+
 Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configuration) {
     GlibError error;
     arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
@@ -50,13 +55,15 @@ Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configu
 
 Expected<std::unique_ptr<AravisStream>> AravisStream::create(
     ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
-    CameraPipeline& pipeline, FrameMeter* meter) {
-    std::unique_ptr<AravisStream> self(new AravisStream(configuration, setup, pipeline, meter));
+    CameraPipeline& pipeline, FrameMeter* meter, Object<ArvChunkParser> chunks,
+    PatientWork& patient) {
+    std::unique_ptr<AravisStream> self(
+        new AravisStream(configuration, setup, pipeline, meter, patient));
     self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
     if (self->calls_back_)
         if (auto done = set_packet_size(camera, configuration); !done)
             return Unexpected(done.error());
-    if (setup.chunks) self->chunk_parser_.reset(arv_camera_create_chunk_parser(camera));
+    self->chunk_parser_ = std::move(chunks);
     GlibError error;
     self->stream_.reset(arv_camera_create_stream(
         camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
@@ -72,9 +79,15 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(
 
 AravisStream::~AravisStream() {
     closing_ = true;  // buffers that Aravis flushes are not frames
-    // Waits for the stream's thread, which may still read stream_: then nobody writes into the
-    // slots any more.
-    if (stream_) g_object_unref(stream_.get());
+    // Ends the stream's thread, which may still read stream_, and then writes to the camera, which
+    // may be mute. The slots are free as soon as nobody writes into them.
+    ArvStream* stream = stream_.get();
+    if (stream != nullptr && calls_back_) {
+        patient_.run([stream] { g_object_unref(stream); }, goodbye);
+        ended_->get_future().wait();
+    } else if (stream != nullptr) {
+        g_object_unref(stream);
+    }
     static_cast<void>(stream_.release());
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }
@@ -109,8 +122,13 @@ void AravisStream::enlarge_receive_buffer() const {
 }
 
 void AravisStream::on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
-    if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
     auto& stream = *static_cast<AravisStream*>(self);
+    if (type == ARV_STREAM_CALLBACK_TYPE_EXIT) {
+        const auto ended = stream.ended_;  // the stream may be gone before this returns
+        ended->set_value();
+        return;
+    }
+    if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
     if (stream.closing_) return;
     if (ArvBuffer* done = arv_stream_try_pop_buffer(stream.stream_.get())) stream.take(done);
 }
@@ -149,6 +167,42 @@ EventReason AravisStream::refusal(ArvBuffer* buffer) const {
     return whole ? EventReason::none : EventReason::wrong_size;
 }
 
+/// One frame may be cut; two that are alike have another size than was announced.
+void AravisStream::note_size(ArvBuffer* buffer, EventReason refused) {
+    if (refused == EventReason::frame_incomplete) return;
+    std::size_t size = 0;
+    arv_buffer_get_data(buffer, &size);
+    const std::uint64_t now =
+        refused == EventReason::none
+            ? 0
+            : std::uint64_t{static_cast<std::uint16_t>(arv_buffer_get_image_width(buffer))} << 48U |
+                  std::uint64_t{static_cast<std::uint16_t>(arv_buffer_get_image_height(buffer))}
+                      << 32U |
+                  (size & 0xFFFFFFFFU);
+    if (now == 0 || now == misfit_) changed_ = now;
+    misfit_ = now;
+}
+
+std::string AravisStream::changed() const {
+    const std::uint64_t now = changed_;
+    return now == 0
+               ? ""
+               : fmt::format("frames are {} x {} pixels in {} bytes; announced were {} bytes",
+                             now >> 48U, now >> 32U & 0xFFFFU, now & 0xFFFFFFFFU, setup_.payload);
+}
+
+void AravisStream::note_clock(const pairing::Arrival& arrival) {
+    const bool equal = setup_.has_clock && arrival.camera_time.ns == stamp_.ns;
+    equal_stamps_ = equal ? equal_stamps_ + 1 : 0;
+    stamp_ = arrival.camera_time;
+}
+
+std::uint64_t AravisStream::packets() const {
+    return ARV_IS_GV_STREAM(stream_.get())
+               ? arv_stream_get_info_uint64_by_name(stream_.get(), "n_received_packets")
+               : 0;
+}
+
 /// Zero: the camera's number did not arrive. USB3 Vision counts from 0: one is added.
 std::uint64_t AravisStream::block_id(ArvBuffer* buffer) {
     const std::uint64_t id = arv_buffer_get_frame_id(buffer);
@@ -182,9 +236,12 @@ void AravisStream::take(ArvBuffer* buffer) {
     queued_.erase(std::remove(queued_.begin(), queued_.end(), arrival.slot), queued_.end());
     arrival.block_id = block_id(buffer);
     const EventReason refused = refusal(buffer);
+    note_size(buffer, refused);
+    ++taken_;
     if (refused == EventReason::none) {
         if (setup_.has_clock)
             arrival.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
+        note_clock(arrival);
         arrival.exposure = chunk_exposure(buffer);
         arrival.width = width_ = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
         arrival.height = height_ = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));

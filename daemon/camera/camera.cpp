@@ -15,13 +15,37 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Before a camera that was lost is opened again; doubled each time, up to longest_retry. At half,
-/// a camera that boots is asked more often; at twice, it is back 0.2 s later.
-constexpr Duration first_retry = milliseconds(200);
+/// A program that was killed keeps a camera until its heartbeat is missed, 3 s by default. At half,
+/// the service's own earlier life is taken for another program; at twice, another program is named
+/// five seconds later.
+constexpr Duration lease_patience = seconds(5);
 
-/// At half, an absent camera costs twice the broadcasts; at twice, one that was plugged in is found
-/// half a second later.
-constexpr Duration longest_retry = milliseconds(500);
+/// Finding and setting up takes a second, or ten when a large description is looked at for the
+/// first time. At half, such a camera shows as stuck meanwhile; at twice, a stuck one shows later.
+constexpr Duration set_up_patience = seconds(20);
+
+/// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
+/// longer for one that is mute.
+constexpr Duration goodbye = milliseconds(250);
+
+/// From one look at whether a camera is there to the next. At half, twice the packets; at twice,
+/// one that was switched off for a moment is not seen to be.
+constexpr Duration presence_interval = milliseconds(250);
+
+/// Until a camera that leaves triggers unanswered is asked whether it restarted, and then between
+/// questions. At half, a lost frame causes some; at twice, it is back 0.1 s later.
+constexpr Duration first_doubt = milliseconds(150);
+constexpr std::uint64_t triggers_of_doubt = 3;
+constexpr Duration doubt_interval = milliseconds(50);
+
+/// Time of an answer to that. At half, a loaded camera does not answer in time; at twice, the watch
+/// sees less often what else happens.
+constexpr Duration doubt_patience = milliseconds(30);
+
+/// Packets come, but no frame for so long: the camera began to count anew, less than 100 back, and
+/// Aravis takes its frames for late ones. At half, a frame that is sent twice would do; at twice,
+/// frames are missed longer.
+constexpr Duration time_of_deafness = milliseconds(300);
 
 /// Between looks at a streaming camera. At half, an idle service wakes twice as often; at twice,
 /// loss of control shows 20 ms later.
@@ -40,9 +64,22 @@ constexpr Duration time_of_silence = seconds(2);
 /// is opened anew for ever; at twice, a mute one is missed for ten seconds.
 constexpr Duration time_of_free_silence = seconds(5);
 
-void on_control_lost(ArvDevice* /*device*/, std::atomic<bool>* lost) { *lost = true; }
+using Flag = std::shared_ptr<std::atomic<bool>>;
+
+void on_control_lost(ArvDevice* /*device*/, Flag* lost) { **lost = true; }
+void forget(gpointer flag, GClosure* /*closure*/) { delete static_cast<Flag*>(flag); }
 
 }  // namespace
+
+struct Camera::Health {
+    HostTime began = host_now();
+    std::uint64_t received = 0;  ///< complete frames when it began
+    std::uint64_t taken = 0;
+    std::uint64_t packets = 0;  ///< when the newest frame was taken
+    HostTime taken_at = began;
+    HostTime doubted;
+    std::optional<GvcpClient> client;
+};
 
 Camera::Camera(const CameraConfiguration& configuration, CameraEnvironment& environment,
                CameraPipeline& pipeline, Hooks hooks)
@@ -68,9 +105,22 @@ void Camera::stop() {
     if (thread_.joinable()) thread_.join();
 }
 
+bool Camera::ended_by(HostTime deadline) {
+    std::unique_lock lock(mutex_);
+    const Duration left = deadline - host_now();
+    return !thread_.joinable() ||
+           wake_.wait_for(lock, std::chrono::nanoseconds(left.ns), [this] { return ended_; });
+}
+
 CameraReport Camera::report() const {
     const std::lock_guard lock(mutex_);
-    return report_;
+    CameraReport report = report_;
+    if (setting_up_since_.ns != 0 && host_now() - setting_up_since_ > set_up_patience) {
+        report.state = CameraState::failed;
+        report.hint =
+            configuration_.device + ": the camera does not finish its answers; power it off and on";
+    }
+    return report;
 }
 
 void Camera::set_state(CameraState state, const std::string& hint) {
@@ -92,35 +142,92 @@ bool Camera::pause(Duration duration) {
     return !stop_;
 }
 
+void Camera::set_setting_up_since(HostTime since) {
+    const std::lock_guard lock(mutex_);
+    setting_up_since_ = since;
+}
+
 void Camera::run() {
-    Duration retry = first_retry;
     set_state(CameraState::opening, "");
-    do {
-        const std::uint64_t connections = report().connections;
-        const auto ended = session();
+    for (;;) {
+        auto ended = session();
+        set_setting_up_since({});
         environment_.bandwidth.leave(configuration_.name);
-        if (ended) return;
-        retry =
-            report().connections > connections ? first_retry : std::min(retry * 2, longest_retry);
+        if (ended || !pause({})) break;
+        explain(ended.error());
         set_state(ended.error().state, ended.error().error.message());
-    } while (pause(retry));
+        if (!wait_to_retry(ended.error().state)) break;
+    }
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    wake_.notify_all();
+}
+
+/// Control that is held need not be held by a program that runs.
+void Camera::explain(CameraProblem& ended) {
+    if (ended.state != CameraState::busy) {
+        held_since_ = {};
+        return;
+    }
+    if (held_since_.ns == 0) held_since_ = host_now();
+    if (host_now() - held_since_ > lease_patience) return;
+    ended = {CameraState::opening,
+             {configuration_.device, "it is still held, perhaps by a program that was killed",
+              "it frees itself within seconds; it is asked again"}};
+}
+
+/// Waits; not as long when the camera was gone and is back. False: it is to stop.
+bool Camera::wait_to_retry(CameraState why) {
+    const bool held = held_since_.ns != 0;
+    const HostTime until = host_now() + (held ? Retry::soon : retry_.after(why));
+    for (bool gone = false; host_now() < until;) {
+        if (!pause(std::min(until - host_now(), presence_interval))) return false;
+        if (!device_ || until - host_now() < presence_interval) continue;
+        const bool there = answers(doubt_patience);
+        if (there && gone) {
+            retry_.begin_anew();
+            return true;
+        }
+        gone = !there;
+    }
+    return pause({});
+}
+
+bool Camera::answers(Duration patience) const {
+    return GvcpClient(device_->interface, device_->address)
+        .read_register(gvcp_control_privilege, patience)
+        .has_value();
 }
 
 /// From opening the camera to its loss. A value: it was asked to stop.
 CameraResult<> Camera::session() {
-    std::atomic<bool> control_lost{false};  // outlives the camera, whose heartbeat thread sets it
-    auto camera = open_camera(configuration_.device, [this] { return !pause({}); });
-    if (!camera) return Unexpected(camera.error());
-    if (!pause({})) return {};
-    ArvDevice* device = arv_camera_get_device(camera->get());
-    g_signal_connect(device, "control-lost", G_CALLBACK(on_control_lost), &control_lost);
-    const auto setup = set_up_camera(camera->get(), configuration_, environment_.presets);
+    const CameraOpening opening{environment_.descriptions, environment_.claims,
+                                environment_.aravis};
+    set_setting_up_since(host_now());
+    auto opened = open_camera(configuration_.name, configuration_.device, opening,
+                              [this] { return !pause({}); });
+    if (!opened) return Unexpected(opened.error());
+    device_ = opened->network;
+    const auto lost = std::make_shared<std::atomic<bool>>(false);
+    ArvCamera* camera = opened->camera.release();
+    g_signal_connect_data(arv_camera_get_device(camera), "control-lost",
+                          G_CALLBACK(on_control_lost), new Flag(lost), forget, GConnectFlags{});
+    auto ended = pause({}) ? set_up_and_stream(camera, *lost) : CameraResult<>{};
+    environment_.patient.run([camera] { g_object_unref(camera); }, goodbye);
+    return ended;
+}
+
+CameraResult<> Camera::set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost) {
+    auto setup = set_up_camera(camera, configuration_, environment_.presets);
+    set_setting_up_since({});
     if (!setup && control_lost)
         return problem(CameraState::silent,
                        {configuration_.device, "disappeared while it was being set up", ""});
     if (!setup) return problem(CameraState::misconfigured, setup.error());
+    without_clock_ = clock_stands_;
+    setup->has_clock = setup->has_clock && !without_clock_;
     describe(*setup);
-    return stream(camera->get(), *setup, control_lost);
+    return stream(camera, *setup, control_lost);
 }
 
 void Camera::describe(const CameraSetup& setup) {
@@ -152,7 +259,14 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
         exposure_feature_ = setup.exposure_feature;
     }
-    auto stream = AravisStream::create(camera, configuration_, setup, pipeline_, meter_.get());
+    Object<ArvChunkParser> chunks;
+    if (setup.chunks) {
+        const auto turn = lock(environment_.aravis, [this] { return !pause({}); });
+        if (!turn.owns_lock()) return {};
+        chunks.reset(arv_camera_create_chunk_parser(camera));
+    }
+    auto stream = AravisStream::create(camera, configuration_, setup, pipeline_, meter_.get(),
+                                       std::move(chunks), environment_.patient);
     if (!stream) return failed(stream.error());
     plan_bandwidth(camera, setup.payload);
     GlibError error;
@@ -171,7 +285,13 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
         set_state(ended.error().state, ended.error().error.message());
         return ended;
     }
-    arv_camera_stop_acquisition(camera, nullptr);
+    g_object_ref(camera);  // which may be mute
+    environment_.patient.run(
+        [camera] {
+            arv_camera_stop_acquisition(camera, nullptr);
+            g_object_unref(camera);
+        },
+        goodbye);
     return {};
 }
 
@@ -208,26 +328,71 @@ bool Camera::silent(HostTime began) const {
 
 CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
                              const std::atomic<bool>& control_lost) {
-    const HostTime began = host_now();
-    HostTime housekeeping = began;
+    Health health;
+    health.received = pipeline_.report().received;
+    if (device_) health.client.emplace(device_->interface, device_->address);
+    HostTime housekeeping = health.began;
     while (pause(stream.needs_polling() ? Duration{} : step)) {
         if (stream.needs_polling()) stream.poll(step);
         if (control_lost)
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});
-        if (silent(began))
-            return problem(
-                CameraState::silent,
-                {configuration_.name,
-                 pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
-                 "check the trigger cable, TriggerSource and the network; the camera is being "
-                 "reopened"});
+        if (auto good = examine(stream, health); !good) return good;
         if (exposure_) control_exposure(arv_camera_get_device(camera));
         if (host_now() < housekeeping) continue;
         housekeeping = host_now() + housekeeping_interval;
         do_housekeeping(camera);
     }
     return {};
+}
+
+/// Whether what comes, or does not come, means that the camera must be opened anew.
+CameraResult<> Camera::examine(AravisStream& stream, Health& health) {
+    if (const std::string changed = stream.changed(); !changed.empty()) {
+        const bool fitted = pipeline_.report().received > health.received;
+        return problem(fitted ? CameraState::opening : CameraState::misconfigured,
+                       {configuration_.name, changed,
+                        fitted ? "the camera is being reopened"
+                               : "set Width, Height and PixelFormat in [camera.features], or power "
+                                 "it off and on"});
+    }
+    clock_stands_ = configuration_.camera_clock && stream.clock_stands();
+    if (clock_stands_)
+        return problem(CameraState::opening, {configuration_.name, "its clock stands still",
+                                              "the camera is being reopened without it"});
+    if (restarted(health))
+        return problem(CameraState::silent, {configuration_.name, "the camera has restarted", ""});
+    if (silent(health.began))
+        return problem(
+            CameraState::silent,
+            {configuration_.name,
+             pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
+             "check the trigger cable, TriggerSource and the network; the camera is being "
+             "reopened"});
+    if (stream.taken() != health.taken) {
+        health.taken = stream.taken();
+        health.taken_at = host_now();
+        health.packets = stream.packets();
+    }
+    const bool expected =
+        !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
+    if (health.taken > 0 && expected && host_now() - health.taken_at > time_of_deafness &&
+        stream.packets() > health.packets)
+        return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
+                                              "the camera is being reopened"});
+    return {};
+}
+
+/// Whether a camera that leaves triggers unanswered has forgotten that it is controlled.
+bool Camera::restarted(Health& health) const {
+    const HostTime now = host_now();
+    const Duration silence = now - std::max(pipeline_.report().last_frame, health.began);
+    if (!health.client || silence < first_doubt || now - health.doubted < doubt_interval)
+        return false;
+    if (pipeline_.triggered() && pipeline_.unanswered_triggers() < triggers_of_doubt) return false;
+    health.doubted = now;
+    const auto privilege = health.client->read_register(gvcp_control_privilege, doubt_patience);
+    return privilege && (*privilege & gvcp_controlled) == 0;
 }
 
 /// What changes slowly: temperature, and the share of the link as other cameras come and go.
@@ -249,6 +414,8 @@ void Camera::do_housekeeping(ArvCamera* camera) {
     else if (temperature > configuration_.max_temperature_c)
         hint = fmt::format("the camera is at {:.0f} degrees: cool it, or raise 'max_temperature_c'",
                            temperature);
+    else if (without_clock_)
+        hint = "its clock stood still: it is paired without it; power the camera off and on";
     else if (meter_ && !meter_->usable())
         hint =
             "auto exposure cannot meter this pixel format: use Mono or Bayer of 8 to 16 bits, "

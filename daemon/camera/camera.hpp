@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,6 +17,11 @@
 #include "camera/bandwidth_plan.hpp"
 #include "camera/camera_preset.hpp"
 #include "camera/camera_state.hpp"
+#include "camera/description_vetting.hpp"
+#include "camera/device_claims.hpp"
+#include "camera/gvcp.hpp"
+#include "camera/patient_work.hpp"
+#include "camera/retry.hpp"
 #include "configuration/configuration.hpp"
 #include "stream/camera_pipeline.hpp"
 
@@ -45,9 +51,19 @@ struct CameraReport {
 
 /// What all cameras share.
 struct CameraEnvironment {
+    CameraEnvironment(std::filesystem::path rings, std::vector<CameraPreset> known_presets,
+                      const std::filesystem::path& state)
+        : ring_directory(std::move(rings)),
+          presets(std::move(known_presets)),
+          descriptions(own_program, state) {}
+
     std::filesystem::path ring_directory;
     std::vector<CameraPreset> presets;
     BandwidthPlan bandwidth;
+    DescriptionVetting descriptions;
+    DeviceClaims claims;
+    PatientWork patient;
+    std::timed_mutex aravis;  ///< what Aravis cannot do in two threads: parsing, listing USB
 };
 
 /// Its control thread is the only one that calls Aravis's camera and device; frames come on
@@ -70,16 +86,27 @@ class Camera {
     void start();
     void request_stop();  ///< returns at once
     void stop();          ///< waits for the end
+
+    /// After request_stop(). False: its device still keeps it waiting.
+    bool ended_by(HostTime deadline);
     bool streaming() const { return streaming_; }
     CameraReport report() const;
 
  private:
+    struct Health;  // of a camera that streams
+
     void run();
     CameraResult<> session();
+    CameraResult<> set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost);
     CameraResult<> stream(ArvCamera* camera, const CameraSetup& setup,
                           const std::atomic<bool>& control_lost);
     CameraResult<> watch(ArvCamera* camera, AravisStream& stream,
                          const std::atomic<bool>& control_lost);
+    CameraResult<> examine(AravisStream& stream, Health& health);
+    void explain(CameraProblem& ended);
+    bool wait_to_retry(CameraState why);
+    bool answers(Duration patience) const;
+    bool restarted(Health& health) const;
     void plan_bandwidth(ArvCamera* camera, std::uint64_t payload);
     void do_housekeeping(ArvCamera* camera);
     void control_exposure(ArvDevice* device);
@@ -87,6 +114,7 @@ class Camera {
     void describe(const CameraSetup& setup);
     void lose();
     void set_state(CameraState state, const std::string& hint);
+    void set_setting_up_since(HostTime since);
     bool pause(Duration duration);
 
     CameraConfiguration configuration_;
@@ -97,7 +125,9 @@ class Camera {
     mutable std::mutex mutex_;
     std::condition_variable wake_;
     bool stop_ = false;
+    bool ended_ = false;
     CameraReport report_;
+    HostTime setting_up_since_;  ///< 0: it is not being set up
 
     // Of the control thread.
     std::unique_ptr<FrameMeter> meter_;
@@ -105,6 +135,11 @@ class Camera {
     std::string exposure_feature_;
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
+    Retry retry_;
+    std::optional<NetworkDevice> device_;  ///< where it was last seen
+    HostTime held_since_;                  ///< somebody else has control since; 0: nobody
+    bool clock_stands_ = false;            ///< found out while it streamed last
+    bool without_clock_ = false;           ///< for that reason
 
     std::thread thread_;
 };

@@ -1,79 +1,142 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/camera_discovery.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <ifaddrs.h>
 #include <strings.h>
 
-#include <memory>
-#include <mutex>
-#include <optional>
+#include <chrono>
 
 namespace versavis::daemon {
 
 namespace {
 
-struct Listed {
-    std::string id;
-    std::string address;
-};
+/// Until a camera that answers to its address is taken for absent. At half, a busy one may be
+/// missed; at twice, its state is known later.
+constexpr Duration address_patience = milliseconds(300);
+
+/// The same for one that is asked by broadcast, before USB is looked at, and after: cameras may
+/// wait a second with their answer. At half, slow ones are never found; at twice, the state is
+/// known a second later.
+constexpr Duration first_broadcast_patience = milliseconds(100);
+constexpr Duration broadcast_patience = seconds(1);
+
+/// For one register. At half, a busy camera does not answer in time; at twice, a mute one is waited
+/// for longer.
+constexpr Duration answer_patience = milliseconds(500);
+
+constexpr std::chrono::milliseconds look_interval(20);
 
 std::string text(const char* value) { return value == nullptr ? "" : value; }
 
-std::optional<in_addr> parse_address(const std::string& device) {
-    in_addr address{};
-    return inet_pton(AF_INET, device.c_str(), &address) == 1 ? std::optional(address)
-                                                             : std::nullopt;
-}
-
-/// Does this host have an interface in the network of the address?
-bool in_own_network(in_addr address) {
-    ifaddrs* all = nullptr;
-    if (getifaddrs(&all) != 0) return true;
-    const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(all, &freeifaddrs);
-    for (const ifaddrs* entry = all; entry != nullptr; entry = entry->ifa_next) {
-        if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET ||
-            entry->ifa_netmask == nullptr)
-            continue;
-        const auto own = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr)->sin_addr.s_addr;
-        const auto mask = reinterpret_cast<const sockaddr_in*>(entry->ifa_netmask)->sin_addr.s_addr;
-        if ((own & mask) == (address.s_addr & mask)) return true;
-    }
-    return false;
-}
-
-/// The listed device that goes by this id, serial number, MAC or address.
-std::optional<Listed> find_listed(const std::string& device) {
-    for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
-        const Listed listed{text(arv_get_device_id(i)), text(arv_get_device_address(i))};
-        for (const std::string& name : {listed.id, text(arv_get_device_serial_nbr(i)),
-                                        text(arv_get_device_physical_id(i)), listed.address})
-            if (strcasecmp(name.c_str(), device.c_str()) == 0) return listed;
-    }
-    return std::nullopt;
-}
-
-CameraProblem explain(const std::string& device, const std::optional<Listed>& listed,
-                      const std::string& reason) {
-    const auto address = parse_address(listed ? listed->address : device);
+CameraProblem absent(const std::string& device) {
+    const auto address = parse_address(device);
     if (address && !in_own_network(*address))
         return {CameraState::unreachable,
-                {device,
-                 fmt::format("its address {} is not in any network of this host",
-                             listed ? listed->address : device),
+                {device, fmt::format("its address {} is not in any network of this host", device),
                  "give the camera an address of this host's camera network, or the host one of the "
                  "camera's"}};
-    if (reason.find("BUSY") != std::string::npos || reason.find("usy") != std::string::npos)
-        return {CameraState::busy, {device, "another program holds it", "close that program"}};
-    if (listed)
-        return {CameraState::failed,
-                {device, "it is there but cannot be opened: " + reason,
-                 "USB: check the udev rule; GigE: the firewall; else power it off and on"}};
     return {CameraState::absent,
-            {device, "no such camera: " + reason,
+            {device, "no such camera: nobody answers",
              "check cable, power and name ('arv-tool-0.8' lists cameras by address, serial number "
              "and name)"}};
+}
+
+CameraResult<> check_claim(const std::string& camera, const std::string& device,
+                           const std::string& identity, DeviceClaims& claims) {
+    const std::string holder = claims.claim(camera, identity);
+    if (holder.empty()) return {};
+    return problem(CameraState::misconfigured,
+                   {device, fmt::format("is the device of '{}' already", holder),
+                    "give each camera of the configuration a 'device' of its own"});
+}
+
+Object<GInetAddress> glib_address(in_addr address) {
+    return Object<GInetAddress>(g_inet_address_new_from_bytes(
+        reinterpret_cast<const guint8*>(&address), G_SOCKET_FAMILY_IPV4));
+}
+
+/// Its features may be looked at only now that the description is known to be good.
+CameraResult<Object<ArvCamera>> camera_of(const std::string& device, Object<ArvDevice> opened) {
+    GlibError error;
+    Object<ArvCamera> camera(arv_camera_new_with_device(opened.get(), error.out()));
+    if (camera) return camera;
+    return problem(CameraState::failed,
+                   {device, "cannot be opened: " + error.text(), "power it off and on"});
+}
+
+CameraResult<OpenCamera> open_on_network(const std::string& camera, const std::string& device,
+                                         const NetworkDevice& found, const CameraOpening& opening,
+                                         const Cancelled& cancelled) {
+    if (!in_own_network(found.address)) return Unexpected(absent(to_text(found.address)));
+    if (auto free = check_claim(camera, device, to_text(found.address), opening.claims); !free)
+        return Unexpected(free.error());
+    GvcpClient client(found.interface, found.address);
+    const auto held = problem(CameraState::busy,
+                              {device, "is controlled by another program", "close that program"});
+    const auto privilege = client.read_register(gvcp_control_privilege, answer_patience);
+    if (privilege && (*privilege & gvcp_controlled) != 0) return held;
+    const auto description = read_description(client, cancelled);
+    if (!description) return problem(CameraState::failed, description.error());
+    if (auto good = opening.descriptions.vet(device, *description, cancelled); !good)
+        return problem(CameraState::failed, good.error());
+    const auto turn = lock(opening.aravis, cancelled);
+    if (!turn.owns_lock()) return Unexpected(absent(device));
+    GlibError error;
+    Object<ArvDevice> opened(arv_gv_device_new(glib_address(found.interface).get(),
+                                               glib_address(found.address).get(), error.out()));
+    if (!opened)
+        return problem(CameraState::failed,
+                       {device, "it is there but cannot be opened: " + error.text(),
+                        "check the firewall, or power it off and on"});
+    if (arv_gv_device_is_controller(ARV_GV_DEVICE(opened.get())) == FALSE) return held;
+    auto own = camera_of(device, std::move(opened));
+    if (!own) return Unexpected(own.error());
+    return OpenCamera{std::move(*own), found};
+}
+
+/// The listed device that goes by this id, serial number or GUID; empty: none. Asks each device.
+std::string find_on_usb(const std::string& device) {
+    ArvInterface* usb = arv_uv_interface_get_instance();
+    arv_interface_update_device_list(usb);
+    for (unsigned i = 0; i < arv_interface_get_n_devices(usb); ++i) {
+        const std::string id = text(arv_interface_get_device_id(usb, i));
+        for (const std::string& name : {id, text(arv_interface_get_device_serial_nbr(usb, i)),
+                                        text(arv_interface_get_device_physical_id(usb, i))})
+            if (strcasecmp(name.c_str(), device.c_str()) == 0) return id;
+    }
+    return "";
+}
+
+/// None: it is not on USB.
+std::optional<CameraResult<OpenCamera>> open_on_usb(const std::string& camera,
+                                                    const std::string& device,
+                                                    const CameraOpening& opening,
+                                                    const Cancelled& cancelled) {
+    const auto turn = lock(opening.aravis, cancelled);
+    if (!turn.owns_lock()) return std::nullopt;
+    const std::string id = find_on_usb(device);
+    if (id.empty()) return std::nullopt;
+    if (auto free = check_claim(camera, device, id, opening.claims); !free)
+        return Unexpected(free.error());
+    GlibError error;
+    Object<ArvDevice> opened(
+        arv_interface_open_device(arv_uv_interface_get_instance(), id.c_str(), error.out()));
+    if (!opened && error.text().find("usy") != std::string::npos)
+        return problem(CameraState::busy,
+                       {device, "another program holds it", "close that program"});
+    if (!opened)
+        return problem(CameraState::failed,
+                       {device, "it is there but cannot be opened: " + error.text(),
+                        "check the udev rule, or unplug it and plug it in"});
+    Description description;
+    std::size_t size = 0;
+    const char* xml = arv_device_get_genicam_xml(opened.get(), &size);
+    if (xml != nullptr) description.bytes.assign(xml, xml + size);
+    if (auto good = opening.descriptions.vet(device, description, cancelled); !good)
+        return problem(CameraState::failed, good.error());
+    auto own = camera_of(device, std::move(opened));
+    if (!own) return Unexpected(own.error());
+    return OpenCamera{std::move(*own), std::nullopt};
 }
 
 }  // namespace
@@ -92,31 +155,25 @@ const char* to_string(CameraState state) {
     return "unknown";
 }
 
-CameraResult<Object<ArvCamera>> open_camera(const std::string& device,
-                                            const std::function<bool()>& cancelled) {
-    static std::mutex mutex;
-    const std::lock_guard lock(mutex);
-    if (cancelled()) return problem(CameraState::absent, {device, "the search was stopped", ""});
-    std::optional<Listed> listed;
-    if (!parse_address(device)) {
-        // USB is listed at once; the network takes a second, and knows a camera's own name without
-        // being listed.
-        arv_interface_update_device_list(arv_uv_interface_get_instance());
-        listed = find_listed(device);
-        if (!listed) {
-            arv_update_device_list();
-            listed = find_listed(device);
-        }
+std::unique_lock<std::timed_mutex> lock(std::timed_mutex& mutex, const Cancelled& cancelled) {
+    std::unique_lock turn(mutex, std::defer_lock);
+    while (!cancelled() && !turn.try_lock_for(look_interval)) {
     }
-    GlibError error;
-    Object<ArvCamera> camera(
-        arv_camera_new(listed ? listed->id.c_str() : device.c_str(), error.out()));
-    if (!camera) return Unexpected(explain(device, listed, error.text()));
-    ArvDevice* raw = arv_camera_get_device(camera.get());
-    if (ARV_IS_GV_DEVICE(raw) && arv_gv_device_is_controller(ARV_GV_DEVICE(raw)) == FALSE)
-        return problem(CameraState::busy,
-                       {device, "is controlled by another program", "close that program"});
-    return camera;
+    return turn;
+}
+
+CameraResult<OpenCamera> open_camera(const std::string& camera, const std::string& device,
+                                     const CameraOpening& opening, const Cancelled& cancelled) {
+    const bool by_address = parse_address(device).has_value();
+    DeviceSearch search(device);
+    auto found = search.wait(by_address ? address_patience : first_broadcast_patience, cancelled);
+    if (!found && !by_address) {
+        if (auto on_usb = open_on_usb(camera, device, opening, cancelled))
+            return std::move(*on_usb);
+        found = search.wait(broadcast_patience, cancelled);
+    }
+    if (!found) return Unexpected(absent(device));
+    return open_on_network(camera, device, *found, opening, cancelled);
 }
 
 }  // namespace versavis::daemon

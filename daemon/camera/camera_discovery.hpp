@@ -1,19 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Finds a camera by address, MAC, serial number or name, opens it and takes control; says why it
-// cannot.
+// Finds a camera by address, MAC, serial number or name, looks at its description, opens it and
+// takes control; says why it cannot.
 #pragma once
 
 #include <functional>
+#include <mutex>
+#include <optional>
 #include <string>
 
 #include "camera/camera_state.hpp"
+#include "camera/description_vetting.hpp"
+#include "camera/device_claims.hpp"
 #include "camera/genicam.hpp"
+#include "camera/gvcp.hpp"
 
 namespace versavis::daemon {
 
-/// Blocks for seconds when the camera is not there. Opens one camera at a time: what Aravis knows
-/// of devices is shared by all threads. `cancelled` is asked when its turn has come.
-CameraResult<Object<ArvCamera>> open_camera(const std::string& device,
-                                            const std::function<bool()>& cancelled);
+struct OpenCamera {
+    Object<ArvCamera> camera;
+    std::optional<NetworkDevice> network;  ///< none: it is on USB
+};
+
+/// What all that open cameras share.
+struct CameraOpening {
+    DescriptionVetting& descriptions;
+    DeviceClaims& claims;
+    std::timed_mutex& aravis;  ///< Aravis parses into one state, and lists USB into another
+};
+
+/// Of `camera`, whose configuration names the `device`. Cameras on the network are looked for side
+/// by side, and nobody waits for one that is not there. `cancelled` is asked often.
+CameraResult<OpenCamera> open_camera(const std::string& camera, const std::string& device,
+                                     const CameraOpening& opening, const Cancelled& cancelled);
+
+/// Holds the mutex, unless it is cancelled meanwhile: then owns_lock() is false.
+std::unique_lock<std::timed_mutex> lock(std::timed_mutex& mutex, const Cancelled& cancelled);
 
 }  // namespace versavis::daemon

@@ -5,10 +5,27 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace versavis::daemon {
 
 namespace {
+
+/// Letters of a name that are looked at; GigE Vision knows 32. At half, long names are cut; at
+/// twice, nothing changes.
+constexpr std::size_t longest_name = 256;
+
+/// The largest frame. At half, the largest sensors of 2020 would be refused with 16 bits; at twice,
+/// a camera that lies takes twice the memory, for each slot.
+constexpr std::uint64_t largest_frame = 256 << 20;
+
+/// Bytes that a pixel may take: three colours of 16 bits, and padding. At half, colour images would
+/// be refused; at twice, twice the memory for a camera that lies.
+constexpr std::uint64_t most_bytes_per_pixel = 8;
+
+/// What may follow the pixels, such as chunks. At half, still thousands of them; at twice, a MiB
+/// more for a camera that lies.
+constexpr std::uint64_t largest_extra = 1 << 20;
 
 class DeviceBook final : public FeatureBook {
  public:
@@ -22,7 +39,42 @@ class DeviceBook final : public FeatureBook {
     ArvDevice* device_;
 };
 
-std::string text(const char* value) { return value == nullptr ? "" : value; }
+/// What the camera says of itself; empty when it does not.
+std::string name_of(ArvCamera* camera, const char* (*get)(ArvCamera*, GError**)) {
+    GlibError error;
+    const char* value = get(camera, error.out());
+    return error.set() || value == nullptr ? "" : std::string(value, strnlen(value, longest_name));
+}
+
+/// Bytes of a frame with all that may follow the pixels. Errors: it does not say, or what it says
+/// cannot be for images of its size.
+Expected<std::uint64_t> payload_of(ArvCamera* camera, const CameraConfiguration& configuration) {
+    GlibError error;
+    // As 64 bits: arv_camera_get_payload() cuts off half of them.
+    const gint64 announced = arv_device_get_integer_feature_value(arv_camera_get_device(camera),
+                                                                  "PayloadSize", error.out());
+    if (error.set() || announced <= 0)
+        return failure(configuration.name, "the camera does not say how large its frames are",
+                       "power it off and on");
+    const auto payload = static_cast<std::uint64_t>(announced);
+    gint x = 0;
+    gint y = 0;
+    gint width = 0;
+    gint height = 0;
+    arv_camera_get_region(camera, &x, &y, &width, &height, error.out());
+    const bool known = !error.set() && width > 0 && height > 0;
+    const std::uint64_t pixels =
+        known ? static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) : 0;
+    const std::uint64_t most = std::min(
+        largest_frame, known ? pixels * most_bytes_per_pixel + largest_extra : largest_frame);
+    if (payload <= most) return payload;
+    return failure(configuration.name,
+                   fmt::format("the camera announces frames of {} bytes for {} x {} pixels, more "
+                               "than {}",
+                               payload, width, height, most),
+                   "set Width, Height and PixelFormat in [camera.features], or power it off and "
+                   "on");
+}
 
 /// Groups of the preset, in the order that cameras need: the trigger mode last, then the output
 /// lines.
@@ -82,9 +134,9 @@ Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration
                                     const std::vector<CameraPreset>& presets) {
     ArvDevice* device = arv_camera_get_device(camera);
     CameraSetup setup;
-    setup.vendor = text(arv_camera_get_vendor_name(camera, nullptr));
-    setup.model = text(arv_camera_get_model_name(camera, nullptr));
-    setup.serial = text(arv_camera_get_device_serial_number(camera, nullptr));
+    setup.vendor = name_of(camera, arv_camera_get_vendor_name);
+    setup.model = name_of(camera, arv_camera_get_model_name);
+    setup.serial = name_of(camera, arv_camera_get_device_serial_number);
     auto preset = choose_preset(presets, configuration.preset, setup.vendor, setup.model);
     if (!preset) return Unexpected(preset.error());
     setup.preset = preset->name;
@@ -105,13 +157,13 @@ Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration
         if (auto done = set_feature(device, name, value); !done) return Unexpected(done.error());
 
     setup.chunks = configuration.chunks;
-    setup.payload = arv_camera_get_payload(camera, nullptr);
-    if (setup.payload == 0)
-        return failure(configuration.name, "the camera does not say how large its frames are",
-                       "power it off and on");
+    const auto payload = payload_of(camera, configuration);
+    if (!payload) return Unexpected(payload.error());
+    setup.payload = *payload;
     // Without a tick frequency Aravis silently puts the host's time in the place of the camera's.
+    GlibError error;
     setup.has_clock = !ARV_IS_GV_DEVICE(device) || arv_gv_device_get_timestamp_tick_frequency(
-                                                       ARV_GV_DEVICE(device), nullptr) != 0;
+                                                       ARV_GV_DEVICE(device), error.out()) != 0;
     return setup;
 }
 

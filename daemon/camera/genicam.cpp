@@ -11,14 +11,27 @@ namespace versavis::daemon {
 
 namespace {
 
-std::string range_text(ArvGcNode* node) {
-    if (ARV_IS_GC_FLOAT(node))
-        return fmt::format("{} to {}", arv_gc_float_get_min(ARV_GC_FLOAT(node), nullptr),
-                           arv_gc_float_get_max(ARV_GC_FLOAT(node), nullptr));
-    if (ARV_IS_GC_INTEGER(node))
-        return fmt::format("{} to {}", arv_gc_integer_get_min(ARV_GC_INTEGER(node), nullptr),
-                           arv_gc_integer_get_max(ARV_GC_INTEGER(node), nullptr));
-    return "";
+struct Range {
+    double least = 0;
+    double most = 0;
+};
+
+/// None: it is no number, or the camera does not say.
+std::optional<Range> range_of(ArvDevice* device, ArvGcNode* node, const char* name) {
+    GlibError error;
+    Range range;
+    if (ARV_IS_GC_ENUMERATION(node)) return std::nullopt;  // which counts, too
+    if (ARV_IS_GC_FLOAT(node)) {
+        arv_device_get_float_feature_bounds(device, name, &range.least, &range.most, error.out());
+    } else if (ARV_IS_GC_INTEGER(node)) {
+        gint64 least = 0;
+        gint64 most = 0;
+        arv_device_get_integer_feature_bounds(device, name, &least, &most, error.out());
+        range = {static_cast<double>(least), static_cast<double>(most)};
+    } else {
+        return std::nullopt;
+    }
+    return error.set() || !(range.least <= range.most) ? std::nullopt : std::optional(range);
 }
 
 /// The whole text as a number. Throws std::invalid_argument or std::out_of_range.
@@ -45,7 +58,8 @@ std::string allowed(ArvDevice* device, ArvGcNode* node, const std::string& name)
     if (ARV_IS_GC_ENUMERATION(node))
         return fmt::format("{}", fmt::join(enumeration_entries(device, name), ", "));
     if (ARV_IS_GC_BOOLEAN(node)) return "true, false";
-    return range_text(node);
+    const auto range = range_of(device, node, name.c_str());
+    return range ? fmt::format("{} to {}", range->least, range->most) : "";
 }
 
 /// Throws what the conversions of the text throw.
@@ -89,6 +103,12 @@ Expected<> set_feature(ArvDevice* device, const std::string& name, const std::st
                        "'arv-tool-0.8 features' lists them");
     GlibError error;
     try {
+        // Some cameras take what is out of range without a word, and do something else.
+        const auto range = range_of(device, node, name.c_str());
+        if (const double number = range ? to_real(value) : 0;
+            range && (number < range->least || number > range->most))
+            return failure(where, fmt::format("'{}' is out of range", value),
+                           "allowed: " + allowed(device, node, name));
         write(device, node, name.c_str(), value, error.out());
     } catch (const std::exception&) {
         return failure(where, fmt::format("'{}' is of the wrong type", value),

@@ -34,6 +34,7 @@ enum Command : std::uint16_t {
     write_register_command = 0x0082,
     read_memory = 0x0084,
     write_memory = 0x0086,
+    pending_acknowledge = 0x0089,
 };
 
 enum Status : std::uint16_t {
@@ -120,7 +121,8 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       truth_(truth),
       clock_(zero, settings.clock),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
-                  settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c}),
+                  settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c,
+                  settings.hostility}),
       wall_(settings.width, settings.height, scenario.seed),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
@@ -164,17 +166,27 @@ void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in&
     const std::uint16_t command = half(packet, 2);
     if (same(from, controller_)) last_contact_ = host_now();
     std::uint16_t status = success;
+    const bool later = pending(command, packet.subspan(8, half(packet, 4)));
     const std::vector<std::uint8_t> body =
-        answer(command, packet.subspan(8, half(packet, 4)), from, status);
+        later ? std::vector<std::uint8_t>{0, 0, 0xFF, 0xFF}
+              : answer(command, packet.subspan(8, half(packet, 4)), from, status);
     if ((packet[1] & acknowledge_wanted) == 0) return;
     std::vector<std::uint8_t> reply;
     put_half(reply, status);
-    put_half(reply, static_cast<std::uint16_t>(command + 1));
+    put_half(reply, static_cast<std::uint16_t>(later ? +pending_acknowledge : command + 1));
     put_half(reply, static_cast<std::uint16_t>(body.size()));
     put_half(reply, half(packet, 6));
     reply.insert(reply.end(), body.begin(), body.end());
     ::sendto(socket_, reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from),
              sizeof from);
+}
+
+/// In milliseconds, the longest that a device may ask for: a host that believes it waits a minute.
+bool GigeCamera::pending(std::uint16_t command, std::span<const std::uint8_t> body) const {
+    if (settings_.hostility == Hostility::pending_at_all) return command != discovery;
+    const bool reads = command == read_register || command == read_memory;
+    return settings_.hostility == Hostility::pending && reads && body.size() >= 4 &&
+           word(body, 0) == reg_payload_size;
 }
 
 std::vector<std::uint8_t> GigeCamera::answer(std::uint16_t command,
@@ -431,6 +443,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         if (active_fault(FaultKind::repeat_id) == nullptr) next_block_id();
         if (const Fault* jump = active_fault(FaultKind::jump_clock))
             clock_step_ns_ += std::llround(jump->seconds * 1e9);
+        if (active_fault(FaultKind::change_size) != nullptr)
+            registers_.resize(settings_.width, settings_.height / 2);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
         truth.end = truth.start + exposure_at(trigger);
         busy_until_ = truth.end;
@@ -450,11 +464,14 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         return Interval{truth.start, truth.end};
     }
     frame.extended_id = settings_.extended_ids;
-    frame.camera_time_ns = static_cast<std::uint64_t>(
-        clock_.device_ns(stamped(settings_, truth.start, truth.end)) + clock_step_ns_);
-    frame.width = settings_.width;
-    frame.height = settings_.height;
+    if (active_fault(FaultKind::stop_clock) == nullptr)
+        camera_time_ns_ = static_cast<std::uint64_t>(
+            clock_.device_ns(stamped(settings_, truth.start, truth.end)) + clock_step_ns_);
+    frame.camera_time_ns = camera_time_ns_;
+    frame.width = registers_.value(reg_width);
+    frame.height = registers_.value(reg_height);
     frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));
+    frame.pixels = frame.pixels.first(std::size_t{frame.width} * frame.height);
     if (settings_.light > 0) light_up(frame, truth.end - truth.start);
     if (registers_.value(reg_chunk_mode) != 0) frame.chunks = chunks(truth.end - truth.start);
     frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};

@@ -57,6 +57,7 @@ class GigeCamera final : public TriggeredCamera {
     void configure_stream();
     void power_cycle();
     void free_run(HostTime now);
+    bool pending(std::uint16_t command, std::span<const std::uint8_t> body) const;
     bool muted() const { return host_now().ns < muted_until_ns_.load(); }
 
     std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
@@ -82,6 +83,7 @@ class GigeCamera final : public TriggeredCamera {
     bool acquiring_ = false;
     std::uint64_t block_id_ = 0;
     std::int64_t clock_step_ns_ = 0;
+    std::uint64_t camera_time_ns_ = 0;  ///< of the newest frame
     std::uint64_t exposures_ = 0;
     HostTime busy_until_;
     HostTime free_run_next_;

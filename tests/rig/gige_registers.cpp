@@ -12,14 +12,18 @@ namespace versavis::rig {
 
 namespace {
 
-constexpr std::size_t memory_size = 0x40000;
+constexpr std::size_t least_description = 0x20000;
 constexpr std::uint32_t tick_frequency = 1'000'000'000;
 constexpr std::uint32_t capability_write_memory = 1U << 1U;
 constexpr std::uint32_t capability_resend = 1U << 2U;
 
 }  // namespace
 
-GigeRegisters::GigeRegisters(const Identity& identity) : identity_(identity), memory_(memory_size) {
+GigeRegisters::GigeRegisters(const Identity& identity)
+    : identity_(identity),
+      description_(
+          describe_camera(identity.hostility, gige_xml(identity.width, identity.height), reg_xml)),
+      memory_(reg_xml + std::max(description_.bytes.size(), least_description)) {
     reset();
 }
 
@@ -38,10 +42,8 @@ void GigeRegisters::reset() {
     set_text(reg_device_version, "1.0", 32);
     set_text(reg_serial, identity_.serial, 16);
     set_text(reg_user_name, identity_.name, 16);
-    const std::string xml = gige_xml(identity_.width, identity_.height);
-    set_text(reg_xml_url,
-             fmt::format("Local:rig.xml;{:x};{:x}", std::uint32_t{reg_xml}, xml.size()), 512);
-    std::memcpy(memory_.data() + reg_xml, xml.data(), xml.size());
+    set_text(reg_xml_url, description_.url, 512);
+    std::memcpy(memory_.data() + reg_xml, description_.bytes.data(), description_.bytes.size());
     set(reg_interface_count, 1);
     set(reg_stream_count, 1);
     set(reg_capabilities, capability_write_memory | capability_resend);
@@ -84,6 +86,13 @@ bool GigeRegisters::write(std::uint32_t address, std::uint32_t value) {
     if (address == reg_chunk_mode)
         set(reg_payload_size, identity_.width * identity_.height + (value != 0 ? chunk_bytes : 0));
     return true;
+}
+
+void GigeRegisters::resize(std::uint32_t width, std::uint32_t height) {
+    const std::lock_guard lock(mutex_);
+    set(reg_width, width);
+    set(reg_height, height);
+    set(reg_payload_size, width * height);
 }
 
 bool GigeRegisters::read(std::uint32_t address, std::span<std::uint8_t> out) const {

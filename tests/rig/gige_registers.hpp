@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "gige_hostile.hpp"
+
 namespace versavis::rig {
 
 /// Addresses of GigE Vision bootstrap registers (GigE Vision specification 1.2, chapter 28) and of
@@ -92,6 +94,7 @@ class GigeRegisters {
         double exposure_us;
         bool exposure_auto;
         double temperature_c = 45;
+        Hostility hostility = Hostility::none;
     };
     explicit GigeRegisters(const Identity& identity);
 
@@ -103,6 +106,9 @@ class GigeRegisters {
     bool write(std::uint32_t address, std::uint32_t value);
     bool read(std::uint32_t address, std::span<std::uint8_t> out) const;
 
+    /// Frames have this size from now on.
+    void resize(std::uint32_t width, std::uint32_t height);
+
     std::uint32_t value(Register address) const;
     float real(Register address) const;
 
@@ -111,6 +117,7 @@ class GigeRegisters {
     void set_text(Register address, const std::string& text, std::size_t capacity);
 
     Identity identity_;
+    GigeDescription description_;
     mutable std::mutex mutex_;
     std::vector<std::uint8_t> memory_;
 };

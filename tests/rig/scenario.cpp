@@ -41,6 +41,22 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("early_leader", camera.early_leader);
     reader.read("light", camera.light, 0, 1000);
     reader.read("temperature_c", camera.temperature_c, -40, 150);
+    reader.choose<Hostility>("hostile", camera.hostility,
+                             {{"none", Hostility::none},
+                              {"value_loop", Hostility::value_loop},
+                              {"formula_loop", Hostility::formula_loop},
+                              {"offset_loop", Hostility::offset_loop},
+                              {"many_paths", Hostility::many_paths},
+                              {"size_64_bit", Hostility::size_64_bit},
+                              {"size_2_gib", Hostility::size_2_gib},
+                              {"zip_bomb", Hostility::zip_bomb},
+                              {"truncated", Hostility::truncated},
+                              {"long_register", Hostility::long_register},
+                              {"local_file", Hostility::local_file},
+                              {"huge_frames", Hostility::huge_frames},
+                              {"no_numbers", Hostility::no_numbers},
+                              {"pending", Hostility::pending},
+                              {"pending_at_all", Hostility::pending_at_all}});
     read_clock(reader, camera.clock);
     if (camera.name.empty()) reader.fail("name", "a camera needs a 'name'");
     if (camera.address.empty())
@@ -59,6 +75,8 @@ Fault read_fault(TableReader& reader) {
                               {"repeat_id", FaultKind::repeat_id},
                               {"restart_ids", FaultKind::restart_ids},
                               {"jump_clock", FaultKind::jump_clock},
+                              {"change_size", FaultKind::change_size},
+                              {"stop_clock", FaultKind::stop_clock},
                               {"ignore_trigger", FaultKind::ignore_trigger},
                               {"camera_mute", FaultKind::camera_mute},
                               {"camera_reboot", FaultKind::camera_reboot},

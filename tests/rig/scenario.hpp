@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "gige_hostile.hpp"
 #include "skewed_clock.hpp"
 #include "versavis/error.hpp"
 
@@ -43,6 +44,7 @@ struct CameraScenario {
     double light =
         0;  ///< brightness of the image per millisecond of exposure; 0: independent of it
     double temperature_c = 45;
+    Hostility hostility = Hostility::none;
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 
@@ -56,6 +58,8 @@ enum class FaultKind {
     repeat_id,       ///< the frame has the number of the one before
     restart_ids,     ///< numbers start again
     jump_clock,      ///< the camera's clock steps by `seconds`, from this frame on
+    change_size,     ///< from this frame on they have half the height
+    stop_clock,      ///< the camera's clock stands still, since the frame before
     ignore_trigger,  ///< the camera does not expose
     camera_mute,     ///< no answer and no packet for `seconds`
     camera_reboot,   ///< mute for `seconds`, then all registers as after power-up

@@ -12,7 +12,8 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
     std::string scenario = "imu = \"imu0\"\n";
     const std::string link = settings.link.empty() ? "unix:" + socket_path() : settings.link;
     std::string configuration =
-        fmt::format("instance = \"{}\"\n[board]\nlink = \"{}\"\n", settings.name, link);
+        fmt::format("instance = \"{}\"\nstate_directory = \"{}\"\n[board]\nlink = \"{}\"\n",
+                    settings.name, directory_.path().string(), link);
     const auto at = [](const std::vector<std::string>& texts, unsigned i) {
         return i < texts.size() ? texts[i] : std::string();
     };
@@ -20,11 +21,13 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
         return fmt::format("127.0.{}.{}", settings.subnet, i + 2);
     };
     for (unsigned i = 0; i < settings.cameras; ++i) {
-        scenario += fmt::format(
-            "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = {2}\nheight = "
-            "{3}\n{4}\n{5}\n",
-            i, address(i), settings.width, settings.height, settings.camera_scenario,
-            at(settings.scenarios, i));
+        if (i + settings.absent < settings.cameras)
+            scenario += fmt::format(
+                "[[camera]]\nname = \"cam{0}\"\naddress = \"{1}\"\noutput = {0}\nwidth = "
+                "{2}\nheight = "
+                "{3}\n{4}\n{5}\n",
+                i, address(i), settings.width, settings.height, settings.camera_scenario,
+                at(settings.scenarios, i));
         const bool slave = i > 0 && !settings.slave_extra.empty();
         const unsigned real = settings.swapped ? settings.cameras - 1 - i : i;
         configuration += fmt::format(

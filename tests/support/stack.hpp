@@ -34,6 +34,7 @@ struct StackSettings {
     std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
     std::string imu_extra{};               ///< more keys of the IMU
+    unsigned absent = 0;                   ///< cameras, the last ones, that the rig lacks
 };
 
 /// Everything that is configured delivers proved data.

@@ -48,7 +48,7 @@ struct Bench : test::Pipelines {
                    translator,
                    recorder,
                    listener};
-    CameraGroup group{directory.path(), {}, translator, events, link};
+    CameraGroup group{directory.path(), {}, directory.path(), translator, events, link};
 };
 
 }  // namespace

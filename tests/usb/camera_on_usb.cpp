@@ -32,6 +32,15 @@ class UsbRig {
                                                    motion_, *truth_, {&camera}))),
           bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
 
+    /// Another camera on the bus, which takes commands and never answers.
+    void add_mute(const Stack& stack) {
+        rig::CameraScenario settings = stack.scenario().cameras[0];
+        settings.serial = "MUTE";
+        mute_ = std::make_unique<RigU3vCamera>(testbed_.get(), "1-3", settings, zero_, motion_,
+                                               *truth_, stack.scenario().seed);
+        mute_->camera().mute(true);
+    }
+
  private:
     GObjectPtr<UMockdevTestbed> testbed_;
     HostTime zero_;
@@ -44,6 +53,7 @@ class UsbRig {
  private:
     std::unique_ptr<rig::BoardHost> board_;
     UsbBridge bridge_;
+    std::unique_ptr<RigU3vCamera> mute_;
 };
 
 void judge(const Stack& stack) {
@@ -86,4 +96,25 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
         judge(stack);
         CHECK(stack.service().terminate() == 0);
     }
+}
+
+TEST_CASE("usb: two entries for one camera beside a device that never answers end in time") {
+    StackSettings settings{"u3vtwo", 33, 3, 20, "", "", "", 320, 240, "usb"};
+    settings.device = "RIGCAM-cam0";
+    Stack stack(settings);
+    UsbRig rig(stack);
+    rig.add_mute(stack);
+    stack.start_service();
+    stack.wait_for_status([](const auto& s) {
+        unsigned streaming = 0;
+        unsigned told = 0;
+        for (const auto& camera : s["cameras"]) {
+            streaming += camera["state"] == "streaming" ? 1U : 0U;
+            told += camera["state"] == "misconfigured" ? 1U : 0U;
+        }
+        return streaming == 1 && told == 2;
+    });
+    const HostTime asked = host_now();
+    CHECK(stack.service().terminate() == 0);
+    CHECK(host_now() - asked < seconds(2));
 }

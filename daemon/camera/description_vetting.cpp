@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera/description_vetting.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+
+extern char** environ;
+
+namespace versavis::daemon {
+
+namespace {
+
+/// First line of the file: what was found good by other rules is looked at again.
+constexpr const char* file_header = "versavis camera descriptions 1";
+
+/// The most that are kept. At half, more cameras than anybody has; at twice, a device that sends
+/// another one each time fills twice the disk.
+constexpr std::size_t most_kept = 1000;
+
+/// Until a probe is killed. At half, slow machines refuse large descriptions; at twice, a hostile
+/// one is refused later.
+constexpr Duration probe_time = seconds(10);
+
+/// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits longer.
+constexpr Duration look_interval = milliseconds(20);
+
+/// The most that a probe says.
+constexpr std::size_t longest_reason = 500;
+
+/// A child with its standard input and output; killed when nobody waits for it any more.
+class Probe {
+ public:
+    Probe(const std::string& program, bool zipped) {
+        std::array<int, 2> ends{};
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) return;
+        socket_ = ends[0];
+        ::fcntl(socket_, F_SETFL, O_NONBLOCK);
+        std::string option = "--probe-description";
+        std::string kind = zipped ? "zip" : "xml";
+        std::string name = program;
+        char* const arguments[] = {name.data(), option.data(), kind.data(), nullptr};
+        posix_spawn_file_actions_t files;
+        posix_spawn_file_actions_init(&files);
+        posix_spawn_file_actions_adddup2(&files, ends[1], STDIN_FILENO);
+        posix_spawn_file_actions_adddup2(&files, ends[1], STDOUT_FILENO);
+        posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+        posix_spawnattr_t attributes;
+        posix_spawnattr_init(&attributes);
+        sigset_t none;
+        sigemptyset(&none);
+        posix_spawnattr_setsigmask(&attributes, &none);
+        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+        if (posix_spawn(&pid_, name.c_str(), &files, &attributes, arguments, environ) != 0)
+            pid_ = -1;
+        posix_spawnattr_destroy(&attributes);
+        posix_spawn_file_actions_destroy(&files);
+        ::close(ends[1]);
+    }
+    ~Probe() {
+        if (socket_ >= 0) ::close(socket_);
+        if (pid_ > 0) {
+            ::kill(pid_, SIGKILL);
+            ::waitpid(pid_, nullptr, 0);
+        }
+    }
+    Probe(const Probe&) = delete;
+    Probe& operator=(const Probe&) = delete;
+
+    bool runs() const { return pid_ > 0; }
+
+    /// Sends all, and receives what it says until it is done. False: it takes too long.
+    bool talk(const std::vector<std::uint8_t>& bytes, const Cancelled& cancelled) {
+        const HostTime deadline = host_now() + probe_time;
+        for (std::size_t sent = 0; host_now() < deadline && !cancelled();) {
+            const bool sending = sent < bytes.size();
+            pollfd polled{socket_, static_cast<short>(sending ? POLLIN | POLLOUT : POLLIN), 0};
+            const timespec pause{0, look_interval.ns};
+            if (::ppoll(&polled, 1, &pause, nullptr) <= 0) continue;
+            if (sending && (polled.revents & POLLOUT) != 0) {
+                const ssize_t size =
+                    ::send(socket_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+                sent = size > 0 ? sent + static_cast<std::size_t>(size) : bytes.size();
+                if (sent == bytes.size()) ::shutdown(socket_, SHUT_WR);
+            }
+            if ((polled.revents & (POLLIN | POLLHUP)) == 0) continue;
+            std::array<char, longest_reason> part{};
+            const ssize_t size = ::recv(socket_, part.data(), part.size(), 0);
+            if (size <= 0) return true;
+            said_.append(part.data(), static_cast<std::size_t>(size));
+            if (said_.size() > longest_reason) return true;
+        }
+        return false;
+    }
+
+    /// Empty: it found nothing wrong.
+    std::string verdict() {
+        int status = 0;
+        ::waitpid(pid_, &status, 0);
+        pid_ = -1;
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
+        if (WIFEXITED(status) && !said_.empty()) return said_.substr(0, said_.find_first_of('\n'));
+        return WIFSIGNALED(status)
+                   ? fmt::format("it ends its reader with signal {}", WTERMSIG(status))
+                   : "it ends its reader";
+    }
+
+ private:
+    int socket_ = -1;
+    pid_t pid_ = -1;
+    std::string said_;
+};
+
+}  // namespace
+
+DescriptionVetting::DescriptionVetting(std::filesystem::path program,
+                                       const std::filesystem::path& directory)
+    : program_(std::move(program)), file_(directory / "descriptions") {
+    std::ifstream file(file_);
+    std::string line;
+    if (!std::getline(file, line) || line != file_header) return;
+    while (good_.size() < most_kept && std::getline(file, line)) good_.insert(line);
+}
+
+std::optional<std::string> DescriptionVetting::known(const std::string& hash) const {
+    const std::lock_guard lock(mutex_);
+    if (good_.count(hash) != 0) return "";
+    const auto refused = refused_.find(hash);
+    return refused != refused_.end() ? std::optional(refused->second) : std::nullopt;
+}
+
+void DescriptionVetting::keep(const std::string& hash) {
+    const std::lock_guard lock(mutex_);
+    if (good_.size() >= most_kept) good_.clear();
+    good_.insert(hash);
+    const std::filesystem::path part = file_.string() + ".part";
+    std::ofstream file(part);
+    file << file_header << '\n';
+    for (const std::string& line : good_) file << line << '\n';
+    file.close();
+    std::error_code error;  // then it is looked at again in the next life
+    if (file) std::filesystem::rename(part, file_, error);
+}
+
+Expected<> DescriptionVetting::vet(const std::string& camera, const Description& description,
+                                   const Cancelled& cancelled) {
+    const std::string hash = hash_of(description) + (description.zipped ? " zip" : " xml");
+    auto verdict = known(hash);
+    if (!verdict) {
+        Probe probe(program_, description.zipped);
+        if (!probe.runs())
+            return failure(camera, "its description cannot be checked: no probe process",
+                           "allow the service to start processes");
+        const bool done = probe.talk(description.bytes, cancelled);
+        if (!done && cancelled()) return failure(camera, "the check was stopped");
+        verdict = done ? probe.verdict() : "it keeps its reader busy";
+        if (verdict->empty()) {
+            keep(hash);
+        } else {
+            const std::lock_guard lock(mutex_);
+            if (refused_.size() >= most_kept) refused_.clear();
+            refused_[hash] = *verdict;
+        }
+    }
+    if (verdict->empty()) return {};
+    return failure(camera, "its description is refused: " + *verdict,
+                   "ask its maker for another firmware, or take it off the network");
+}
+
+}  // namespace versavis::daemon

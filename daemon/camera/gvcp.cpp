@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera/gvcp.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <poll.h>
+#include <strings.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+
+namespace versavis::daemon {
+
+namespace {
+
+constexpr std::uint16_t port = 3956;
+constexpr std::uint8_t key = 0x42;
+constexpr std::uint8_t acknowledge = 0x01;
+constexpr std::uint8_t acknowledge_by_broadcast = 0x11;
+constexpr std::uint16_t discovery = 0x0002;
+constexpr std::uint16_t read_register_command = 0x0080;
+constexpr std::uint16_t read_memory = 0x0084;
+constexpr std::size_t header_size = 8;
+constexpr std::size_t discovery_size = 0xF8;
+constexpr std::size_t block = 512;  ///< the most that a device must deliver at once
+
+/// Between two questions to all. At half, twice the packets; at twice, a camera that has booted is
+/// seen 50 ms later.
+constexpr Duration ask_interval = milliseconds(50);
+
+/// Until a question is asked again. At half, a slow camera gets each one twice; at twice, a lost
+/// packet costs twice the time.
+constexpr Duration answer_time = milliseconds(200);
+
+/// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits 20 ms longer.
+constexpr Duration look_interval = milliseconds(20);
+
+struct Interface {
+    in_addr address{};
+    in_addr mask{};
+};
+
+std::vector<Interface> own_interfaces() {
+    std::vector<Interface> found;
+    ifaddrs* all = nullptr;
+    if (getifaddrs(&all) != 0) return found;
+    const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(all, &freeifaddrs);
+    for (const ifaddrs* entry = all; entry != nullptr; entry = entry->ifa_next)
+        if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET &&
+            entry->ifa_netmask != nullptr && (entry->ifa_flags & IFF_UP) != 0)
+            found.push_back({reinterpret_cast<const sockaddr_in*>(entry->ifa_addr)->sin_addr,
+                             reinterpret_cast<const sockaddr_in*>(entry->ifa_netmask)->sin_addr});
+    return found;
+}
+
+bool contains(const Interface& interface, in_addr address) {
+    return (interface.address.s_addr & interface.mask.s_addr) ==
+           (address.s_addr & interface.mask.s_addr);
+}
+
+sockaddr_in endpoint(in_addr address, std::uint16_t at) {
+    sockaddr_in end{};
+    end.sin_family = AF_INET;
+    end.sin_addr = address;
+    end.sin_port = htons(at);
+    return end;
+}
+
+int open_socket(in_addr interface) {
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const sockaddr_in own = endpoint(interface, 0);
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+    if (::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0) return socket;
+    ::close(socket);
+    return -1;
+}
+
+std::uint16_t half_at(const std::uint8_t* bytes) {
+    return static_cast<std::uint16_t>(bytes[0] << 8U | bytes[1]);
+}
+
+std::uint32_t word_at(const std::uint8_t* bytes) {
+    return std::uint32_t{half_at(bytes)} << 16U | half_at(bytes + 2);
+}
+
+void put(std::vector<std::uint8_t>& out, std::uint32_t value, unsigned bytes) {
+    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
+}
+
+/// A field of a device's own texts: up to its first zero, and printable.
+std::string field(const std::uint8_t* bytes, std::size_t size) {
+    std::string text(bytes, std::find(bytes, bytes + size, 0));
+    for (char& letter : text)
+        if (letter < ' ' || letter > '~') letter = '?';
+    return text;
+}
+
+NetworkDevice describe(const std::uint8_t* registers, in_addr interface) {
+    NetworkDevice device;
+    device.interface = interface;
+    device.address.s_addr = htonl(word_at(registers + 0x24));
+    device.mac = fmt::format("{:02x}", fmt::join(registers + 0x0A, registers + 0x10, ":"));
+    device.vendor = field(registers + 0x48, 32);
+    device.model = field(registers + 0x68, 32);
+    device.version = field(registers + 0x88, 32);
+    device.serial = field(registers + 0xD8, 16);
+    device.user_name = field(registers + 0xE8, 16);
+    return device;
+}
+
+bool goes_by(const NetworkDevice& device, const std::string& name) {
+    for (const std::string& own :
+         {device.mac, device.serial, device.user_name, device.vendor + "-" + device.serial})
+        if (!own.empty() && strcasecmp(own.c_str(), name.c_str()) == 0) return true;
+    return false;
+}
+
+/// Waits for one of the sockets, and looks at `cancelled` meanwhile. False: it is time to go on.
+bool readable(std::vector<pollfd>& sockets, HostTime until, const Cancelled& cancelled) {
+    for (Duration left = until - host_now(); left.ns > 0; left = until - host_now()) {
+        if (cancelled()) return false;
+        const timespec pause{0, std::min(left, look_interval).ns};
+        if (::ppoll(sockets.data(), sockets.size(), &pause, nullptr) > 0) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
+std::optional<in_addr> parse_address(const std::string& text) {
+    in_addr address{};
+    return inet_pton(AF_INET, text.c_str(), &address) == 1 ? std::optional(address) : std::nullopt;
+}
+
+std::string to_text(in_addr address) {
+    char text[INET_ADDRSTRLEN]{};
+    return inet_ntop(AF_INET, &address, text, sizeof text);
+}
+
+bool in_own_network(in_addr address) {
+    const auto interfaces = own_interfaces();
+    return std::any_of(interfaces.begin(), interfaces.end(),
+                       [&](const Interface& own) { return contains(own, address); });
+}
+
+DeviceSearch::DeviceSearch(std::string name)
+    : name_(std::move(name)), address_(parse_address(name_)) {
+    // A camera beyond a router answers to one of them; what is in an own network, to that one.
+    const bool near = address_ && in_own_network(*address_);
+    for (const Interface& own : own_interfaces()) {
+        if (near && !contains(own, *address_)) continue;
+        if (const int socket = open_socket(own.address); socket >= 0)
+            sockets_.push_back({socket, own.address});
+    }
+}
+
+DeviceSearch::~DeviceSearch() {
+    for (const Socket& socket : sockets_) ::close(socket.descriptor);
+}
+
+void DeviceSearch::ask() const {
+    std::vector<std::uint8_t> packet{key, address_ ? acknowledge : acknowledge_by_broadcast};
+    put(packet, discovery, 2);
+    put(packet, 0, 2);
+    put(packet, 0xFFFF, 2);
+    const sockaddr_in to = endpoint(address_.value_or(in_addr{INADDR_BROADCAST}), port);
+    for (const Socket& socket : sockets_)
+        ::sendto(socket.descriptor, packet.data(), packet.size(), 0,
+                 reinterpret_cast<const sockaddr*>(&to), sizeof to);
+}
+
+std::optional<NetworkDevice> DeviceSearch::receive(const Socket& socket) const {
+    std::uint8_t packet[header_size + 1024];
+    sockaddr_in from{};
+    socklen_t from_size = sizeof from;
+    const ssize_t size = ::recvfrom(socket.descriptor, packet, sizeof packet, 0,
+                                    reinterpret_cast<sockaddr*>(&from), &from_size);
+    if (size < static_cast<ssize_t>(header_size + discovery_size) ||
+        half_at(packet + 2) != discovery + 1)
+        return std::nullopt;
+    NetworkDevice device = describe(packet + header_size, socket.interface);
+    if (!address_) return goes_by(device, name_) ? std::optional(device) : std::nullopt;
+    if (from.sin_addr.s_addr != address_->s_addr) return std::nullopt;
+    device.address = *address_;
+    return device;
+}
+
+std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancelled& cancelled) {
+    std::vector<pollfd> polled;
+    for (const Socket& socket : sockets_) polled.push_back({socket.descriptor, POLLIN, 0});
+    const HostTime deadline = host_now() + patience;
+    // All that a broadcast reaches answers at once: it is not repeated as often.
+    const Duration interval = address_ ? ask_interval : ask_interval * 10;
+    for (HostTime asked; host_now() < deadline && !cancelled();) {
+        if (host_now() - asked >= interval) {
+            ask();
+            asked = host_now();
+        }
+        if (!readable(polled, std::min(deadline, asked + interval), cancelled)) continue;
+        for (const Socket& socket : sockets_)
+            if (auto device = receive(socket)) return device;
+    }
+    return std::nullopt;
+}
+
+GvcpClient::GvcpClient(in_addr interface, in_addr address)
+    : name_(to_text(address)), socket_(open_socket(interface)) {
+    const sockaddr_in to = endpoint(address, port);
+    ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+}
+
+GvcpClient::~GvcpClient() {
+    if (socket_ >= 0) ::close(socket_);
+}
+
+std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t command,
+                                                             const std::vector<std::uint8_t>& body,
+                                                             std::size_t answer_size,
+                                                             Duration patience,
+                                                             const Cancelled& cancelled) {
+    id_ = static_cast<std::uint16_t>(id_ % 0xFFFFU + 1U);  // zero is none
+    std::vector<std::uint8_t> packet{key, acknowledge};
+    put(packet, command, 2);
+    put(packet, static_cast<std::uint32_t>(body.size()), 2);
+    put(packet, id_, 2);
+    packet.insert(packet.end(), body.begin(), body.end());
+    std::vector<pollfd> polled{{socket_, POLLIN, 0}};
+    const HostTime deadline = host_now() + patience;
+    while (host_now() < deadline && !cancelled()) {
+        ::send(socket_, packet.data(), packet.size(), 0);
+        const HostTime again = std::min(deadline, host_now() + answer_time);
+        while (readable(polled, again, cancelled)) {
+            std::uint8_t answer[header_size + block + 4];
+            const ssize_t size = ::recv(socket_, answer, sizeof answer, 0);
+            if (size < 0) break;  // nobody listens there: it may boot
+            const bool ours = size >= static_cast<ssize_t>(header_size) &&
+                              half_at(answer + 2) == command + 1 && half_at(answer + 6) == id_;
+            if (!ours) continue;  // late, or "pending"
+            if (half_at(answer) != 0 || size < static_cast<ssize_t>(header_size + answer_size))
+                return std::nullopt;
+            return std::vector<std::uint8_t>(answer + header_size,
+                                             answer + header_size + answer_size);
+        }
+        if (host_now() < again) {  // refused at once
+            const timespec pause{0, look_interval.ns};
+            nanosleep(&pause, nullptr);
+        }
+    }
+    return std::nullopt;
+}
+
+Expected<std::vector<std::uint8_t>> GvcpClient::read(std::uint32_t address, std::size_t size,
+                                                     Duration patience,
+                                                     const Cancelled& cancelled) {
+    std::vector<std::uint8_t> all;
+    all.reserve(size);
+    while (all.size() < size) {
+        const std::size_t left = std::min(block, (size - all.size() + 3) / 4 * 4);
+        std::vector<std::uint8_t> body;
+        put(body, address + static_cast<std::uint32_t>(all.size()), 4);
+        put(body, static_cast<std::uint32_t>(left), 4);
+        const auto answer = request(read_memory, body, 4 + left, patience, cancelled);
+        if (!answer)
+            return failure(
+                name_, fmt::format("does not deliver its memory at {:#x}", address + all.size()),
+                "power it off and on");
+        all.insert(all.end(), answer->begin() + 4, answer->end());
+    }
+    all.resize(size);
+    return all;
+}
+
+std::optional<std::uint32_t> GvcpClient::read_register(std::uint32_t address, Duration patience) {
+    std::vector<std::uint8_t> body;
+    put(body, address, 4);
+    const auto answer = request(read_register_command, body, 4, patience, [] { return false; });
+    return answer ? std::optional(word_at(answer->data())) : std::nullopt;
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Asks GigE Vision devices over their control protocol, without taking control: who is there, and
+// what its registers hold. Each call ends in bounded time, whatever the device sends.
+#pragma once
+
+#include <netinet/in.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "versavis/error.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::daemon {
+
+/// Asked often by what waits: true ends it.
+using Cancelled = std::function<bool()>;
+
+/// What a device says of itself when it is looked for.
+struct NetworkDevice {
+    in_addr address{};
+    in_addr interface {};  ///< own address that it answers to
+    std::string mac;       ///< as aa:bb:cc:dd:ee:ff
+    std::string vendor;
+    std::string model;
+    std::string version;
+    std::string serial;
+    std::string user_name;
+};
+
+std::optional<in_addr> parse_address(const std::string& text);
+std::string to_text(in_addr address);
+
+/// Does this host have an interface in the network of the address?
+bool in_own_network(in_addr address);
+
+/// Looks for one device by address, MAC, serial number, name, or "vendor-serial".
+class DeviceSearch {
+ public:
+    explicit DeviceSearch(std::string name);
+    ~DeviceSearch();
+    DeviceSearch(const DeviceSearch&) = delete;
+    DeviceSearch& operator=(const DeviceSearch&) = delete;
+
+    /// Asks, again and again, for at most `patience`.
+    std::optional<NetworkDevice> wait(Duration patience, const Cancelled& cancelled);
+
+ private:
+    struct Socket {
+        int descriptor = -1;
+        in_addr interface {};
+    };
+    void ask() const;
+    std::optional<NetworkDevice> receive(const Socket& socket) const;
+
+    std::string name_;
+    std::optional<in_addr> address_;
+    std::vector<Socket> sockets_;
+};
+
+/// Memory of one device. Not thread-safe.
+class GvcpClient {
+ public:
+    GvcpClient(in_addr interface, in_addr address);
+    ~GvcpClient();
+    GvcpClient(const GvcpClient&) = delete;
+    GvcpClient& operator=(const GvcpClient&) = delete;
+
+    /// `size` bytes from a multiple of four on. Each block is asked for until `patience` is over.
+    Expected<std::vector<std::uint8_t>> read(std::uint32_t address, std::size_t size,
+                                             Duration patience, const Cancelled& cancelled);
+    std::optional<std::uint32_t> read_register(std::uint32_t address, Duration patience);
+
+ private:
+    std::optional<std::vector<std::uint8_t>> request(std::uint16_t command,
+                                                     const std::vector<std::uint8_t>& body,
+                                                     std::size_t answer_size, Duration patience,
+                                                     const Cancelled& cancelled);
+
+    std::string name_;
+    int socket_;
+    std::uint16_t id_ = 0;
+};
+
+/// GigE Vision bootstrap registers.
+inline constexpr std::uint32_t gvcp_description_url = 0x200;
+inline constexpr std::uint32_t gvcp_control_privilege = 0xA00;
+inline constexpr std::uint32_t gvcp_controlled = 3;  ///< bits of it: some program has control
+
+}  // namespace versavis::daemon

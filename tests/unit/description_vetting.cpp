@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera/description_vetting.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+
+#include "../support/process.hpp"
+#include "../support/temporary_directory.hpp"
+#include "gige_registers.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+Description honest() {
+    const std::string text = rig::gige_xml(640, 480);
+    return {{text.begin(), text.end()}, false};
+}
+
+bool never() { return false; }
+
+}  // namespace
+
+TEST_CASE("description_vetting: a good one is looked at once, also in the next life") {
+    const test::TemporaryDirectory directory;
+    const std::string daemon = test::program("versavisd");
+    CHECK(DescriptionVetting(daemon, directory.path()).vet("cam0", honest(), never));
+    CHECK(DescriptionVetting("/bin/false", directory.path()).vet("cam0", honest(), never));
+    auto other = honest();
+    other.bytes.push_back('\n');
+    CHECK_FALSE(DescriptionVetting("/bin/false", directory.path()).vet("cam0", other, never));
+}
+
+TEST_CASE("description_vetting: why one is refused is told, and kept for this life only") {
+    const test::TemporaryDirectory directory;
+    auto broken = honest();
+    broken.bytes.resize(1000);
+    DescriptionVetting vetting(test::program("versavisd"), directory.path());
+    for (int i = 0; i < 2; ++i) {
+        const auto refused = vetting.vet("cam0", broken, never);
+        REQUIRE_FALSE(refused);
+        CHECK_THAT(refused.error().message(),
+                   Catch::Contains("cam0") && Catch::Contains("cut off"));
+    }
+    CHECK_FALSE(std::ifstream(directory.path() / "descriptions").good());
+}
+
+TEST_CASE("description_vetting: what ends its reader, or keeps it busy, is refused") {
+    const test::TemporaryDirectory directory;
+    const std::string crash = directory.write("crash", "#!/bin/sh\nkill -SEGV $$\n");
+    const std::string hang = directory.write("hang", "#!/bin/sh\nexec sleep 100\n");
+    std::filesystem::permissions(crash, std::filesystem::perms::owner_all);
+    std::filesystem::permissions(hang, std::filesystem::perms::owner_all);
+    const auto crashed = DescriptionVetting(crash, directory.path()).vet("cam0", honest(), never);
+    REQUIRE_FALSE(crashed);
+    CHECK_THAT(crashed.error().message(), Catch::Contains("ends its reader with signal 11"));
+    int asked = 0;
+    const auto stopped = DescriptionVetting(hang, directory.path()).vet("cam0", honest(), [&] {
+        return ++asked > 3;
+    });
+    REQUIRE_FALSE(stopped);
+    CHECK_THAT(stopped.error().message(), Catch::Contains("stopped"));
+}
