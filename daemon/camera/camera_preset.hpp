@@ -5,9 +5,11 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "camera/line_delays.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::daemon {
@@ -20,6 +22,18 @@ struct PresetStep {
     bool optional = false;  ///< a camera may lack or refuse it
 };
 
+enum class LineKind { opto, direct };
+
+/// One line of the camera's connector, and how late each of its edges is; none: nobody knows.
+struct PresetLine {
+    std::string name;
+    LineKind kind = LineKind::opto;
+    std::optional<EdgeDelay> input_rising;
+    std::optional<EdgeDelay> input_falling;
+    std::optional<EdgeDelay> output_rising;
+    std::optional<EdgeDelay> output_falling;
+};
+
 struct CameraPreset {
     std::string name;
     std::vector<std::string>
@@ -29,6 +43,7 @@ struct CameraPreset {
     std::string strobe_line;
     std::vector<std::string>
         exposure_time;  ///< feature in microseconds: the first that the camera has
+    std::vector<PresetLine> lines;
     std::map<std::string, std::vector<PresetStep>> groups;  ///< by preset_groups
 };
 

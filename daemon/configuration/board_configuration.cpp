@@ -37,7 +37,7 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     out.phase_ns = std::min(short_ns(camera.phase_us),
                             static_cast<std::uint32_t>(std::min(1e9 / camera.rate_hz, 4e9)) - 1);
     out.pulse_ns = short_ns(camera.pulse_us);
-    out.latency_ns = short_ns(camera.latency_us);
+    out.latency_ns = short_ns(camera.latency_us + camera.board_output_ns * 1e-3);
     out.gap_ns = short_ns(camera.gap_us);
     out.exposure_ns = std::llround(camera.exposure_us * 1e3);
     out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);

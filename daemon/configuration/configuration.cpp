@@ -31,6 +31,18 @@ constexpr unsigned spare_slots = 8;
 /// buffers then; at twice, they take twice the memory for it.
 constexpr double longest_wait_s = 0.12;
 
+/// Slowest edge of an exposure line. At half, the slowest known lines still fit; at twice, a figure
+/// in nanoseconds by mistake is taken for microseconds more often.
+constexpr double slowest_edge_us = 1000;
+
+/// Delay of a board's own driver or buffer: nanoseconds, with room for a filter at the input. At
+/// half, a slow filter is refused; at twice, a figure of the camera's line is taken here.
+constexpr double slowest_board_ns = 100'000;
+
+/// Filter delay of an IMU. At half, strong filters at low rates are refused; at twice, milliseconds
+/// by mistake are taken for microseconds more often.
+constexpr double longest_filter_us = 1e6;
+
 bool valid_name(const std::string& name) {
     const auto allowed = [](char c) {
         return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-';
@@ -57,12 +69,18 @@ class Names {
     std::set<std::string> taken_{"clock", "events", "status"};
 };
 
-void read_board(TableReader& reader, BoardConfiguration& board) {
+void read_board(TomlFile& file, TableReader& reader, BoardConfiguration& board) {
     reader.read("link", board.link);
     reader.read("serial", board.serial);
     reader.read("usb_vendor", board.usb_vendor, 0, 0xFFFF);
     reader.read("usb_product", board.usb_product, 0, 0xFFFF);
     reader.read("keep_configuration", board.keep_configuration);
+    if (const toml::table* table = reader.table("board_delay_ns")) {
+        TableReader delays(file, *table);
+        delays.read("inputs", board.input_delay_ns, wire::camera_count, 0, slowest_board_ns);
+        delays.read("outputs", board.output_delay_ns, wire::camera_count, 0, slowest_board_ns);
+        delays.finish();
+    }
     if (board.link != "usb" && board.link.rfind("unix:", 0) != 0)
         reader.fail("link", fmt::format("'{}' is not a valid link", board.link),
                     "use \"usb\" or \"unix:/path/of/socket\"");
@@ -130,6 +148,12 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     reader.read("preset", camera.preset);
     reader.read("trigger_line", camera.trigger_line);
     reader.read("strobe_line", camera.strobe_line);
+    reader.read("strobe_rising_us", camera.strobe_rising_us, 2, 0, slowest_edge_us);
+    reader.read("strobe_falling_us", camera.strobe_falling_us, 2, 0, slowest_edge_us);
+    if (camera.strobe_rising_us.empty() != camera.strobe_falling_us.empty())
+        reader.fail(reader.has("strobe_rising_us") ? "strobe_rising_us" : "strobe_falling_us",
+                    "the delays of both edges of the exposure line are needed",
+                    "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
     reader.choose<bool>("exposure", camera.exposure_by_pulse, {{"timed", false}, {"pulse", true}});
 }
 
@@ -210,6 +234,8 @@ ImuConfiguration read_imu(TableReader& reader) {
     // On the board's grid a reading is set up half a millisecond ahead.
     reader.read("rate_hz", imu.rate_hz, 1, imu.data_ready ? 8000 : 1000);
     reader.read("filter", imu.filter, 0, 7);
+    if (reader.has("filter_delay_us"))
+        reader.read("filter_delay_us", imu.filter_delay_us.emplace(), 0, longest_filter_us);
     return imu;
 }
 
@@ -330,7 +356,7 @@ Expected<Configuration> load_configuration(const std::string& path) {
                           {"debug", LogLevel::debug}});
     if (const toml::table* table = top.table("board")) {
         TableReader reader(file, *table);
-        read_board(reader, configuration.board);
+        read_board(file, reader, configuration.board);
         reader.finish();
     }
     if (const toml::table* table = top.table("clock")) {
@@ -360,6 +386,10 @@ Expected<Configuration> load_configuration(const std::string& path) {
         read_ports(reader, configuration.ports);
         reader.finish();
     }
+    for (CameraConfiguration& camera : configuration.cameras) {
+        camera.board_input_ns = configuration.board.input_delay_ns[camera.output];
+        camera.board_output_ns = configuration.board.output_delay_ns[camera.output];
+    }
     check_imus(top, configuration.imus, configuration.ports.nmea);
     check_pps(top, configuration);
     check_outputs(top, configuration.cameras);
@@ -386,6 +416,11 @@ std::optional<std::uint8_t> test_source(const Configuration& configuration) {
         if (imu.name == configuration.ports.test)
             return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
     return std::nullopt;
+}
+
+imu::FilterDelay ImuConfiguration::filter_delay() const {
+    if (filter_delay_us) return {from_us(*filter_delay_us), {}, imu::DelaySource::configuration};
+    return imu::filter_delay(*model, filter, rate_hz, data_ready);
 }
 
 Duration from_us(double us) { return {std::llround(us * 1e3)}; }

@@ -35,6 +35,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       evidence_(translator),
       completion_(configuration),
       check_(configuration),
+      edges_(configuration),
       triggers_(configuration),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
@@ -99,6 +100,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record) {
     triggers_.recorded(record.trigger, host_now());
     report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
+    edges_.recorded(record);
     pairing::Exposure exposure = completion_.complete(record);
     const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
     // A number that pairing holds already is a repeat: the record that came first counts.
@@ -112,7 +114,9 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record) {
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
-    if (check_.contradicts(arrival, exposure)) {
+    const bool contradicted = check_.contradicts(arrival, exposure);
+    edges_.paired(exposure, check_.told());
+    if (contradicted) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
     } else {
         report_.last_proof = arrival.arrived;
@@ -213,6 +217,12 @@ void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     check_.set_camera_exposure(exposure, since);
 }
 
+void CameraPipeline::set_line_delays(const LineDelays& lines) {
+    const std::lock_guard lock(mutex_);
+    completion_.set_line_delays(lines);
+    edges_.set_line_delays(lines);
+}
+
 std::uint64_t CameraPipeline::newest_trigger() {
     const std::lock_guard lock(mutex_);
     return triggers_.newest();
@@ -229,6 +239,8 @@ PipelineReport CameraPipeline::report() {
     report_.exposure = check_.measured();
     report_.camera_exposure = check_.told();
     report_.exposure_contradicted = check_.contradicted();
+    report_.lines = completion_.line_delays();
+    report_.edges = edges_.report();
     return report_;
 }
 

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/imu_pipeline.hpp"
 
+#include "stream/total_sigma.hpp"
+
 namespace versavis::daemon {
 
 ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
                          clock::Translator& translator)
     : model_(*configuration.model),
       port_(configuration.port()),
+      filter_(configuration.filter_delay()),
       ring_(std::move(ring)),
       translator_(translator) {
     report_.name = configuration.name;
     report_.model = model_.name;
+    report_.filter = filter_;
 }
 
 void ImuPipeline::board_restarted() {
@@ -26,7 +30,7 @@ void ImuPipeline::add(const wire::ImuSample& sample) {
                      : sample.number;
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
     last_number_ = number;
-    const auto stamp = translator_.translate(BoardTime{sample.time_ns});
+    const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay);
     if (!stamp) {
         ++report_.no_clock;
         return;
@@ -35,7 +39,8 @@ void ImuPipeline::add(const wire::ImuSample& sample) {
     metadata.board_time = {sample.time_ns};
     metadata.host_time = stamp->host;
     metadata.number = number;
-    metadata.sigma_ns = stamp->sigma_ns;
+    metadata.sigma_ns = total_sigma_ns(stamp->sigma_ns, filter_.sigma);
+    metadata.filter_delay = filter_.delay;
     metadata.epoch = stamp->epoch;
     if ((metadata.flags & flag_sensor_error) != 0)
         ++report_.faulty;

@@ -20,6 +20,7 @@ struct ImuReport {
     std::uint64_t no_clock = 0;  ///< withheld: board time could not be translated yet
     std::uint64_t faulty = 0;    ///< published with a sensor error
     HostTime last_sample;        ///< without an error
+    imu::FilterDelay filter;
 };
 
 /// Thread-safe.
@@ -39,6 +40,7 @@ class ImuPipeline {
     std::mutex mutex_;
     const imu::ImuModel& model_;
     std::uint8_t port_;
+    imu::FilterDelay filter_;
     ring::Writer ring_;
     clock::Translator& translator_;
     StampGuard guard_;

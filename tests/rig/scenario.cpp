@@ -28,6 +28,8 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("exposure_swing", camera.exposure_swing, 0, 0.99);
     reader.read("exposure_swing_s", camera.exposure_swing_s, 0.1, 1e4);
     reader.read("trigger_latency_us", camera.trigger_latency_us, 0, 1e5);
+    reader.read("line_rising_us", camera.line_rising_us, 0, 1e3);
+    reader.read("line_falling_us", camera.line_falling_us, 0, 1e3);
     reader.read("readout_us", camera.readout_us, 0, 1e6);
     reader.read("link_mbps", camera.link_mbps, 0, 1e5);
     reader.read("packet_loss", camera.packet_loss, 0, 1);

@@ -15,7 +15,8 @@ namespace {
 static_assert(offsetof(Limits, earliest_arrival) == 8 && offsetof(Limits, pattern_duration) == 32 &&
               offsetof(Limits, frames_held) == 40 && offsetof(Limits, camera_clock) == 44);
 static_assert(offsetof(Exposure, start) == 16 && offsetof(Exposure, end_on_host) == 32 &&
-              offsetof(Exposure, kind) == 48 && offsetof(Exposure, exposed) == 52);
+              offsetof(Exposure, kind) == 48 && offsetof(Exposure, exposed) == 52 &&
+              offsetof(Exposure, delay) == 56);
 static_assert(offsetof(Arrival, block_id) == 8 && offsetof(Arrival, arrived) == 24 &&
               offsetof(Arrival, exposure) == 32 && offsetof(Arrival, width) == 40 &&
               offsetof(Arrival, size) == 56);
