@@ -2,6 +2,7 @@
 #include "service.hpp"
 
 #include "board/board_event.hpp"
+#include "camera/line_delays.hpp"
 #include "configuration/board_configuration.hpp"
 #include "log.hpp"
 #include "state_directory.hpp"
@@ -82,9 +83,11 @@ Expected<> Service::make_cameras() {
     auto presets = load_presets(own_presets.empty() ? default_preset_directory() : own_presets);
     if (!presets) return Unexpected(presets.error());
     BoardListener& self = *this;
+    Configuration told = configuration_;
+    for (CameraConfiguration& camera : told.cameras) use_named_preset(*presets, camera);
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         configuration_, configuration_.clock.exchange_rate_hz,
-                                         translator_, *clock_recorder_, self);
+                                         told, configuration_.clock.exchange_rate_hz, translator_,
+                                         *clock_recorder_, self);
     cameras_ = std::make_unique<CameraGroup>(directory_.path(), std::move(*presets),
                                              state_directory(configuration_.state_directory),
                                              translator_, *events_, *board_);

@@ -30,6 +30,31 @@ bool fits(const std::vector<std::string>& parts, const std::string& text) {
            });
 }
 
+/// Slowest edge of a line that a preset may state. At half, the slowest known lines still fit; at
+/// twice, a figure in nanoseconds by mistake is taken for microseconds more often.
+constexpr double slowest_edge_us = 1000;
+
+std::optional<EdgeDelay> read_edge(TableReader& reader, std::string_view key) {
+    std::vector<double> us;
+    reader.read(key, us, 2, 0, slowest_edge_us);
+    if (us.empty()) return std::nullopt;
+    return EdgeDelay{from_us(us[0]), from_us(us[1])};
+}
+
+PresetLine read_line(TableReader& reader) {
+    PresetLine line;
+    reader.read("name", line.name);
+    if (line.name.empty()) reader.fail("name", "a line needs a 'name'");
+    reader.choose<LineKind>("kind", line.kind,
+                            {{"opto", LineKind::opto}, {"direct", LineKind::direct}});
+    if (!reader.has("kind")) reader.fail("kind", "a line needs a 'kind'", "\"opto\" or \"direct\"");
+    line.input_rising = read_edge(reader, "input_rising_us");
+    line.input_falling = read_edge(reader, "input_falling_us");
+    line.output_rising = read_edge(reader, "output_rising_us");
+    line.output_falling = read_edge(reader, "output_falling_us");
+    return line;
+}
+
 Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     const auto root = parse_toml(path.string());
     if (!root) return Unexpected(root.error());
@@ -46,6 +71,11 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
                                     {{"start", pairing::Instant::start},
                                      {"middle", pairing::Instant::middle},
                                      {"end", pairing::Instant::end}});
+    for (const toml::table* table : reader.tables("line")) {
+        TableReader line_reader(file, *table);
+        preset.lines.push_back(read_line(line_reader));
+        line_reader.finish();
+    }
     for (const std::string& group : preset_groups)
         for (const toml::table* table : reader.tables(group)) {
             TableReader step_reader(file, *table);

@@ -5,9 +5,11 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "camera/line_delays.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "versavis/error.hpp"
 
@@ -21,6 +23,18 @@ struct PresetStep {
     bool optional = false;  ///< a camera may lack or refuse it
 };
 
+enum class LineKind { opto, direct };
+
+/// One line of the camera's connector, and how late each of its edges is; none: nobody knows.
+struct PresetLine {
+    std::string name;
+    LineKind kind = LineKind::opto;
+    std::optional<EdgeDelay> input_rising;
+    std::optional<EdgeDelay> input_falling;
+    std::optional<EdgeDelay> output_rising;
+    std::optional<EdgeDelay> output_falling;
+};
+
 struct CameraPreset {
     std::string name;
     std::vector<std::string>
@@ -31,7 +45,8 @@ struct CameraPreset {
     std::vector<std::string>
         exposure_time;  ///< feature in microseconds: the first that the camera has
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< what its stamps are of
-    std::map<std::string, std::vector<PresetStep>> groups;       ///< by preset_groups
+    std::vector<PresetLine> lines;
+    std::map<std::string, std::vector<PresetStep>> groups;  ///< by preset_groups
 };
 
 /// trigger: by a line; strobe: the exposure on a line; free_run: without triggers; pulse_width: the

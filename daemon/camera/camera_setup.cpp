@@ -94,15 +94,25 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
     return groups;
 }
 
+std::string own_or(const std::string& own, const std::string& usual) {
+    return own.empty() ? usual : own;
+}
+
+/// The exposure output that the camera has, which is selected last.
+std::string strobe_line(const CameraPreset& preset, const CameraConfiguration& configuration,
+                        const std::vector<PresetAction>& actions) {
+    std::string line = own_or(configuration.strobe_line, preset.strobe_line);
+    for (const PresetAction& action : actions)
+        if (action.feature == "LineSelector") line = action.value;
+    return line;
+}
+
 Expected<std::vector<PresetAction>> plan_all(const CameraPreset& preset,
                                              const CameraConfiguration& configuration,
                                              ArvDevice* device) {
-    const auto line = [](const std::string& own, const std::string& usual) {
-        return own.empty() ? usual : own;
-    };
     const std::map<std::string, std::string> variables{
-        {"trigger_line", line(configuration.trigger_line, preset.trigger_line)},
-        {"strobe_line", line(configuration.strobe_line, preset.strobe_line)},
+        {"trigger_line", own_or(configuration.trigger_line, preset.trigger_line)},
+        {"strobe_line", own_or(configuration.strobe_line, preset.strobe_line)},
         {"max_exposure_us", fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))},
         {"edge", configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}};
     std::vector<PresetAction> actions;
@@ -149,6 +159,9 @@ Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration
     if (exposure != preset->exposure_time.end()) setup.exposure_feature = *exposure;
     const auto actions = plan_all(*preset, configuration, device);
     if (!actions) return Unexpected(actions.error());
+    setup.lines = line_delays(*preset, configuration,
+                              own_or(configuration.trigger_line, preset->trigger_line),
+                              strobe_line(*preset, configuration, *actions));
 
     arv_camera_stop_acquisition(camera, nullptr);  // somebody may have left it running
     set_if_available(device, "AcquisitionMode", "Continuous");

@@ -4,6 +4,7 @@
 
 #include "camera/camera_preset.hpp"
 #include "camera/genicam.hpp"
+#include "camera/line_delays.hpp"
 #include "configuration/configuration.hpp"
 #include "versavis/time.hpp"
 
@@ -15,6 +16,7 @@ struct CameraSetup {
     std::string model;
     std::string serial;
     std::string preset;
+    LineDelays lines;
     std::string exposure_feature;  ///< in microseconds; empty: it has none
     std::uint64_t payload = 0;     ///< bytes of a frame, chunks included
     bool chunks = false;           ///< frames carry their exposure time

@@ -53,7 +53,8 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     const std::int64_t period_ns = uhz_ns / out.rate_uhz;
     out.phase_ns = short_ns(camera.phase_us, period_ns - 1);
     out.pulse_ns = short_ns(camera.pulse_us, period_ns / 2);
-    out.latency_ns = short_ns(camera.latency_us, std::min(period_ns - 1, longest_latency_ns));
+    out.latency_ns = short_ns(camera.latency_us + camera.board_output_ns * 1e-3,
+                              std::min(period_ns - 1, longest_latency_ns));
     out.gap_ns = short_ns(camera.gap_us, period_ns - 1);
     out.exposure_ns = std::llround(camera.exposure_us * 1e3);
     out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);

@@ -33,12 +33,30 @@ constexpr double longest_wait_s = 0.12;
 /// Trigger pulses, where the period leaves room for them: half of what it may be.
 constexpr double usual_part_of_period = 0.25;
 
-void read_board(TableReader& reader, BoardConfiguration& board) {
+/// Slowest edge of an exposure line. At half, the slowest known lines still fit; at twice, a figure
+/// in nanoseconds by mistake is taken for microseconds more often.
+constexpr double slowest_edge_us = 1000;
+
+/// Delay of a board's own driver or buffer: nanoseconds, with room for a filter at the input. At
+/// half, a slow filter is refused; at twice, a figure of the camera's line is taken here.
+constexpr double slowest_board_ns = 100'000;
+
+/// Filter delay of an IMU. At half, strong filters at low rates are refused; at twice, milliseconds
+/// by mistake are taken for microseconds more often.
+constexpr double longest_filter_us = 1e6;
+
+void read_board(TomlFile& file, TableReader& reader, BoardConfiguration& board) {
     reader.read("link", board.link);
     reader.read("serial", board.serial);
     reader.read("usb_vendor", board.usb_vendor, 0, 0xFFFF);
     reader.read("usb_product", board.usb_product, 0, 0xFFFF);
     reader.read("keep_configuration", board.keep_configuration);
+    if (const toml::table* table = reader.table("board_delay_ns")) {
+        TableReader delays(file, *table);
+        delays.read("inputs", board.input_delay_ns, wire::camera_count, 0, slowest_board_ns);
+        delays.read("outputs", board.output_delay_ns, wire::camera_count, 0, slowest_board_ns);
+        delays.finish();
+    }
 }
 
 void read_clock(TableReader& reader, ClockConfiguration& clock) {
@@ -93,6 +111,12 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
     reader.read("preset", camera.preset);
     reader.read("trigger_line", camera.trigger_line);
     reader.read("strobe_line", camera.strobe_line);
+    reader.read("strobe_rising_us", camera.strobe_rising_us, 2, 0, slowest_edge_us);
+    reader.read("strobe_falling_us", camera.strobe_falling_us, 2, 0, slowest_edge_us);
+    if (camera.strobe_rising_us.empty() != camera.strobe_falling_us.empty())
+        reader.fail(reader.has("strobe_rising_us") ? "strobe_rising_us" : "strobe_falling_us",
+                    "the delays of both edges of the exposure line are needed",
+                    "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
     reader.choose<bool>("exposure", camera.exposure_by_pulse, {{"timed", false}, {"pulse", true}});
 }
 
@@ -155,6 +179,8 @@ ImuConfiguration read_imu(TableReader& reader) {
     reader.read("data_ready", imu.data_ready);
     reader.read("rate_hz", imu.rate_hz, 1, 8000);
     reader.read("filter", imu.filter, 0, 7);
+    if (reader.has("filter_delay_us"))
+        reader.read("filter_delay_us", imu.filter_delay_us.emplace(), 0, longest_filter_us);
     return imu;
 }
 
@@ -200,8 +226,11 @@ void complete(CameraConfiguration& camera) {
 
 /// A slave has rate, phase and longest exposure of its master.
 void complete(Configuration& configuration) {
-    for (CameraConfiguration& camera : configuration.cameras)
+    for (CameraConfiguration& camera : configuration.cameras) {
+        camera.board_input_ns = configuration.board.input_delay_ns[camera.output];
+        camera.board_output_ns = configuration.board.output_delay_ns[camera.output];
         if (camera.master.empty()) complete(camera);
+    }
     for (CameraConfiguration& camera : configuration.cameras) {
         if (camera.master.empty()) continue;
         if (const CameraConfiguration* master =
@@ -261,7 +290,10 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
     Configuration configuration;
     TableReader top(file, *root);
     read_top(top, configuration);
-    read_part(file, top, "board", configuration.board, read_board);
+    read_part(file, top, "board", configuration.board,
+              [&](TableReader& reader, BoardConfiguration& board) {
+                  read_board(file, reader, board);
+              });
     read_part(file, top, "clock", configuration.clock, read_clock);
     read_parts(file, top, "camera", configuration.cameras,
                [&](TableReader& reader) { return read_camera(file, reader); });
@@ -292,6 +324,11 @@ std::optional<std::uint8_t> test_source(const Configuration& configuration) {
         if (imu.name == configuration.ports.test)
             return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
     return std::nullopt;
+}
+
+imu::FilterDelay ImuConfiguration::filter_delay() const {
+    if (filter_delay_us) return {from_us(*filter_delay_us), {}, imu::DelaySource::configuration};
+    return imu::filter_delay(*model, filter, rate_hz, data_ready);
 }
 
 Duration from_us(double us) { return {std::llround(us * 1e3)}; }

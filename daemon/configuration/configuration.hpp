@@ -32,6 +32,8 @@ struct BoardConfiguration {
     std::uint16_t usb_vendor = 0x1209;
     std::uint16_t usb_product = 0x5653;
     bool keep_configuration = false;  ///< it also holds after the board's next power-up
+    std::vector<double> input_delay_ns{0, 0, 0, 0};   ///< of its exposure inputs, wire to stamp
+    std::vector<double> output_delay_ns{0, 0, 0, 0};  ///< of its trigger outputs, time to wire
 };
 
 struct ClockConfiguration {
@@ -71,7 +73,7 @@ struct CameraConfiguration {
     double phase_us = 0;
     double exposure_us = 3000;
     double max_exposure_us = 0;  ///< from the period, if not given
-    double latency_us = 0;
+    double latency_us = 0;       ///< 0: that of the trigger line, as in the preset
     double gap_us = 0;
     double pulse_us = 100;
     bool trigger_inverted = false;
@@ -79,6 +81,11 @@ struct CameraConfiguration {
     std::string preset = "auto";
     std::string trigger_line;  ///< empty: as in the preset
     std::string strobe_line;   ///< empty: as in the preset
+    /// Delay of its exposure line's edges and their sigma; empty: as in the preset.
+    std::vector<double> strobe_rising_us;
+    std::vector<double> strobe_falling_us;
+    double board_input_ns = 0;  ///< of the board's exposure input for this camera
+    double board_output_ns = 0;
     bool exposure_by_pulse =
         false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
     bool chunks = false;
@@ -111,6 +118,10 @@ struct ImuConfiguration {
     double rate_hz = 200;
     unsigned filter = 0;
     bool data_ready = false;
+    std::optional<double> filter_delay_us;  ///< none: as the model has it
+
+    /// From the motion to the sample that shows it.
+    imu::FilterDelay filter_delay() const;
 
     /// IMU port of the board: 0 SPI, 1 UART.
     std::uint8_t port() const { return model->kind == wire::ImuKind::vn100 ? 1 : 0; }

@@ -40,6 +40,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       witness_(ExposureHistory(configuration)),
       completion_(configuration),
       check_(configuration),
+      edges_(configuration),
       triggers_(configuration),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
@@ -124,6 +125,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     triggers_.recorded(record.trigger, received);
     report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
+    edges_.recorded(record);
     pairing::Exposure exposure = completion_.complete(record);
     const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
     // A number that pairing holds already is a repeat: the record that came first counts.
@@ -186,10 +188,12 @@ void CameraPipeline::trigger_skipped() {
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
     const auto middle = middles_.find(exposure.trigger);
+    const bool contradicted = check_.contradicts(arrival, exposure);
+    edges_.paired(exposure, check_.told());
     if (middle == middles_.end()) {
         frame_unpaired(arrival, EventReason::mismatch, nullptr);
         announce_unpaired(exposure, EventReason::mismatch);
-    } else if (check_.contradicts(arrival, exposure)) {
+    } else if (contradicted) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
         announce_unpaired(exposure, EventReason::wrong_exposure);
     } else if (!frames_.publish_proved(arrival, exposure, middle->second)) {
@@ -308,6 +312,12 @@ void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     check_.set_camera_exposure(exposure, since);
 }
 
+void CameraPipeline::set_line_delays(const LineDelays& lines) {
+    const std::lock_guard lock(mutex_);
+    completion_.set_line_delays(lines);
+    edges_.set_line_delays(lines);
+}
+
 std::uint64_t CameraPipeline::newest_trigger() {
     const std::lock_guard lock(mutex_);
     return triggers_.newest();
@@ -325,6 +335,8 @@ PipelineReport CameraPipeline::report() {
     report_.exposure = check_.measured();
     report_.camera_exposure = check_.told();
     report_.exposure_contradicted = check_.contradicted();
+    report_.lines = completion_.line_delays();
+    report_.edges = edges_.report();
     return report_;
 }
 

@@ -12,6 +12,7 @@
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
 #include "log.hpp"
+#include "stream/edge_difference.hpp"
 #include "stream/event_journal.hpp"
 #include "stream/evidence_recorder.hpp"
 #include "stream/exposure_check.hpp"
@@ -44,6 +45,8 @@ struct PipelineReport {
     Duration exposure;                   ///< measured, of the newest frame; 0: unknown
     Duration camera_exposure;            ///< by the camera's account; 0: unknown
     bool exposure_contradicted = false;  ///< the two differ
+    LineDelays lines;
+    EdgeReport edges;
 };
 
 /// Thread-safe. Whoever completes a pair publishes it.
@@ -67,6 +70,9 @@ class CameraPipeline final : private pairing::Outcome {
 
     /// What the camera says that it exposes from now on, about; 0: it changes by itself.
     void set_camera_exposure(Duration exposure, HostTime since);
+
+    /// Before frames of these lines come.
+    void set_line_delays(const LineDelays& lines);
 
     /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
     void add(const pairing::Arrival& arrival);
@@ -138,6 +144,7 @@ class CameraPipeline final : private pairing::Outcome {
     std::uint32_t clock_life_ = 0;
     ExposureCompletion completion_;
     ExposureCheck check_;
+    EdgeDifference edges_;
     TriggerWatch triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;

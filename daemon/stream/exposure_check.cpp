@@ -28,10 +28,10 @@ void ExposureCheck::set_camera_exposure(Duration exposure, HostTime since) {
 
 bool ExposureCheck::contradicts(const pairing::Arrival& arrival,
                                 const pairing::Exposure& exposure) {
-    if (!enabled_ || exposure.kind != StampKind::measured_middle) return false;
-    measured_ = exposure.end - exposure.start;
     told_ = arrival.exposure.ns != 0 ? arrival.exposure : told_at(exposure.earliest_on_host);
-    contradicted_ = told_.ns != 0 && pairing::lengths_differ(told_, measured_);
+    if (exposure.kind != StampKind::measured_middle) return false;
+    measured_ = exposure.end - exposure.start;
+    contradicted_ = enabled_ && told_.ns != 0 && pairing::lengths_differ(told_, measured_);
     return contradicted_;
 }
 

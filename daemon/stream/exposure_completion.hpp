@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the board saw of an exposure, completed: the rest follows from configuration and history.
+// What the board saw of an exposure, less the delays of the lines, and completed: the rest follows
+// from configuration and history.
 #pragma once
 
+#include "camera/line_delays.hpp"
 #include "configuration/configuration.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "wire/messages.hpp"
@@ -16,6 +18,10 @@ class ExposureCompletion {
  public:
     explicit ExposureCompletion(const CameraConfiguration& configuration);
 
+    /// Those of exposures to come.
+    void set_line_delays(const LineDelays& lines) { lines_ = lines; }
+    const LineDelays& line_delays() const { return lines_; }
+
     /// Start and end on the board's clock; the kind says which of them were seen.
     pairing::Exposure complete(const wire::Exposure& record);
 
@@ -24,7 +30,10 @@ class ExposureCompletion {
                               HostTime middle_on_host);
 
  private:
-    Duration latency_;
+    void take_off_delays(pairing::Exposure& exposure) const;
+    Duration not_of_own_line(const wire::Exposure& record) const;
+
+    LineDelays lines_;
     Duration max_exposure_;
     Duration last_exposure_;  ///< as measured last, or as configured
 };

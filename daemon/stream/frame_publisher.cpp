@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/frame_publisher.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "stream/exposure_completion.hpp"
+#include "stream/total_sigma.hpp"
 
 namespace versavis::daemon {
 
@@ -27,13 +25,9 @@ FrameMetadata describe(const pairing::Exposure& exposure) {
     metadata.board_time = middle(exposure.start, exposure.end);
     if (exposure.kind == StampKind::measured_middle)
         metadata.exposure = exposure.end - exposure.start;
+    metadata.delay_ns = static_cast<std::int32_t>(exposure.delay.ns);
     metadata.flags = static_cast<std::uint32_t>(exposure.kind);
     return metadata;
-}
-
-std::uint32_t total_sigma_ns(std::uint32_t clock_ns, Duration kind) {
-    const double sigma = std::hypot(static_cast<double>(clock_ns), static_cast<double>(kind.ns));
-    return static_cast<std::uint32_t>(std::min<double>(sigma, sigma_unknown - 1));
 }
 
 }  // namespace

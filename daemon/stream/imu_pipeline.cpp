@@ -2,6 +2,7 @@
 #include "stream/imu_pipeline.hpp"
 
 #include "stream/arrival_check.hpp"
+#include "stream/total_sigma.hpp"
 
 namespace versavis::daemon {
 
@@ -26,12 +27,14 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
                          clock::Translator& translator, EventJournal& events)
     : model_(*configuration.model),
       port_(configuration.port()),
+      filter_(configuration.filter_delay()),
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
       witness_(history(configuration)) {
     report_.name = configuration.name;
     report_.model = model_.name;
+    report_.filter = filter_;
 }
 
 void ImuPipeline::board_restarted() {
@@ -57,7 +60,7 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
                      : sample.number;
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
     last_number_ = number;
-    if (const auto stamp = translator_.translate(BoardTime{sample.time_ns}))
+    if (const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay))
         publish(sample, number, *stamp);
     else
         ++report_.no_clock;
@@ -90,7 +93,8 @@ void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample, const D
 
 void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
                           const clock::Stamp& stamp) {
-    const auto guarded = guard_.guard(stamp, stamp.sigma_ns);
+    const auto guarded =
+        guard_.guard(stamp, total_sigma_ns(stamp.sigma_ns, filter_.sigma));
     if (!guarded) {
         ++report_.doubted;
         if (guard_.stuck()) translator_.begin_epoch();
@@ -102,6 +106,7 @@ void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
     metadata.host_time = stamp.host;
     metadata.number = number;
     metadata.sigma_ns = guarded->sigma_ns;
+    metadata.filter_delay = filter_.delay;
     metadata.epoch = stamp.epoch;
     metadata.flags |= guarded->flags;
     if ((metadata.flags & flag_sensor_error) != 0)

@@ -24,6 +24,7 @@ struct ImuReport {
     std::uint64_t faulty = 0;    ///< published with a sensor error
     std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
+    imu::FilterDelay filter;
 };
 
 /// Thread-safe.
@@ -49,6 +50,7 @@ class ImuPipeline {
     std::mutex mutex_;
     const imu::ImuModel& model_;
     std::uint8_t port_;
+    imu::FilterDelay filter_;
     ring::Writer ring_;
     clock::Translator& translator_;
     EventJournal& events_;

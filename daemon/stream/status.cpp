@@ -34,6 +34,8 @@ std::string hint(const CameraStatus& status) {
     if (!status.camera.hint.empty() || status.camera.state != CameraState::streaming ||
         !status.triggered)
         return status.camera.hint;
+    const std::string line = line_hint(status.pipeline.edges);
+    if (!line.empty()) return line;
     if (status.pipeline.triggers == 0) return "no trigger yet: is the board running?";
     if (!status.pipeline.measured)
         return "exposures are not being measured: check the exposure line, 'strobe', 'latency_us' "
@@ -75,6 +77,9 @@ const char* to_string(wire::PpsState state) {
     return "unknown";
 }
 
+/// What is not known is null: a zero would be a claim.
+json known(bool is_known, Duration value) { return is_known ? json(value.ns) : json(nullptr); }
+
 json board_json(const BoardReport& board, bool needed) {
     const wire::Health& health = board.health;
     return {{"state", needed ? to_string(board.state) : "unused"},
@@ -113,10 +118,12 @@ json board_json(const BoardReport& board, bool needed) {
 }
 
 json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
+    const bool clock_known =
+        clock.state != clock::ClockState::init && clock.state != clock::ClockState::reset;
     return {{"state", clock::to_string(clock.state)},
             {"output", clock::to_string(clock.output)},
-            {"sigma_ns", clock.sigma.ns},
-            {"bound_ns", clock.bound.ns},
+            {"sigma_ns", known(clock_known, clock.sigma)},
+            {"bound_ns", known(clock_known, clock.bound)},
             {"residual_ns", clock.residual.ns},
             {"innovation_ns", clock.innovation.ns},
             {"since_contact_ns", clock.since_contact.ns},
@@ -179,6 +186,14 @@ json camera_json(const CameraStatus& status) {
             {"frames_without_buffer", pipeline.no_buffer},
             {"exposure_ns", pipeline.exposure.ns},
             {"camera_exposure_ns", pipeline.camera_exposure.ns},
+            {"line", pipeline.lines.line},
+            {"line_delay_start_ns", pipeline.lines.start.delay.ns},
+            {"line_delay_end_ns", pipeline.lines.end.delay.ns},
+            {"line_delay_sigma_ns", middle_sigma(pipeline.lines).ns},
+            {"line_delay_source", to_string(pipeline.lines.source)},
+            {"trigger_delay_ns", pipeline.lines.trigger.delay.ns},
+            {"edge_difference_ns", known(pipeline.edges.frames != 0, pipeline.edges.difference)},
+            {"edge_difference_sigma_ns", known(pipeline.edges.frames != 0, pipeline.edges.sigma)},
             {"locks", pipeline.locks},
             {"slips", pipeline.slips},
             {"last_frame_ns", pipeline.last_frame.ns}};
@@ -206,6 +221,9 @@ std::string to_json(const Status& status) {
                         {"lost", imu.lost},
                         {"no_clock", imu.no_clock},
                         {"faulty", imu.faulty},
+                        {"filter_delay_ns", imu.filter.delay.ns},
+                        {"filter_delay_sigma_ns", imu.filter.sigma.ns},
+                        {"filter_delay_source", imu::to_string(imu.filter.source)},
                         {"last_sample_ns", imu.last_sample.ns}});
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)

@@ -76,10 +76,41 @@ bool AdisDevice::has_crc() const {
     return model_ == AdisModel::adis16448b && (registers_.at(map_.control_at) & 0x10U) != 0;
 }
 
+/// Samples of the sensor that make one of the output, as their mean.
+unsigned AdisDevice::averaged() const {
+    const unsigned rate = registers_.at(map_.rate_at);
+    return map_.octaves ? 1U << (rate >> 8U) : rate + 1;
+}
+
+Nanoseconds AdisDevice::filter_delay() const {
+    return std::llround((taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz * 1e9);
+}
+
+/// Sensor by sensor: mean over the taps, over these means again, and over those for one output.
+Inertial AdisDevice::filtered(Nanoseconds at) const {
+    Inertial felt = world_(at);
+    if (taps() * averaged() == 1) return felt;
+    felt.gyro_deg_s = felt.accel_g = {};
+    const double weight = 1.0 / (taps() * taps() * averaged());
+    for (unsigned back = 0; back + 2 < 2 * taps() + averaged(); ++back) {
+        // How many ways there are to reach so far back with three steps.
+        unsigned ways = 0;
+        for (unsigned first = 0; first < taps(); ++first)
+            for (unsigned second = 0; second < taps(); ++second)
+                if (back >= first + second && back - first - second < averaged()) ++ways;
+        const Inertial then = world_(at - std::llround(back / map_.base_hz * 1e9));
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            felt.gyro_deg_s.at(axis) += ways * weight * then.gyro_deg_s.at(axis);
+            felt.accel_g.at(axis) += ways * weight * then.accel_g.at(axis);
+        }
+    }
+    return felt;
+}
+
 std::vector<std::uint16_t> AdisDevice::burst_words(Nanoseconds at) const {
     const UpdateTimes times = updates();
     const std::int64_t index = times.index_at(at);
-    const Inertial felt = world_(times.time(index));
+    const Inertial felt = filtered(times.time(index));
     std::vector<std::uint16_t> words{diagnosis_};
     const auto add = [&words](double value, double lsb) {
         words.push_back(static_cast<std::uint16_t>(counts(value, lsb)));

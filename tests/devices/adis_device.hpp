@@ -22,6 +22,10 @@ class AdisDevice final : public SpiImuDevice {
     bool signals(Nanoseconds at) const override;
     void brown_out(Nanoseconds at) override { reset(at + map_.reset); }
 
+    /// How much later than the motion its data is, as it is set up: averages that follow each
+    /// other.
+    Nanoseconds filter_delay() const;
+
     /// The next `bursts` have a flipped bit.
     void corrupt(unsigned bursts) { corrupted_ = bursts; }
     /// Bits that DIAG_STAT shows from now on.
@@ -44,6 +48,10 @@ class AdisDevice final : public SpiImuDevice {
         std::uint16_t control_default, rate_default, filter_default;
     };
     static const Map& map(AdisModel model);
+
+    unsigned taps() const { return 1U << (registers_.at(map_.filter_at) & 7U); }
+    unsigned averaged() const;
+    Inertial filtered(Nanoseconds at) const;
 
     bool resetting(Nanoseconds at) const { return at < ready_at_; }
     std::uint16_t read(unsigned address, Nanoseconds at) const;

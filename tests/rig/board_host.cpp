@@ -135,7 +135,9 @@ void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransf
     const HostTime instant = clock_->host(at);
     imu_.transfer(instant.ns, transfer, received);
     const bool sample = transfer.word_gap_ns == 0;  // register accesses have gaps
-    if (sample) truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++, instant});
+    if (sample)
+        truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++,
+                                 instant - nanoseconds(imu_.filter_delay())});
 }
 
 void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
@@ -150,8 +152,11 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
         const auto interval = camera->trigger_line(level, {life_, pulses_[output], instant});
         if (!interval) continue;
         const auto input = static_cast<std::uint8_t>(output);
-        board_->schedule_edge({clock_->device_ns(interval->first), input, true});
-        board_->schedule_edge({clock_->device_ns(interval->second), input, false});
+        const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
+        const HostTime rise = interval->first + late(camera->settings().line_rising_us);
+        const HostTime fall = interval->second + late(camera->settings().line_falling_us);
+        board_->schedule_edge({clock_->device_ns(rise), input, true});
+        board_->schedule_edge({clock_->device_ns(fall), input, false});
     }
 }
 

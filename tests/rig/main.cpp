@@ -58,10 +58,12 @@ std::string status_line(const std::string& instance) {
         if (!stream->copy(item, reinterpret_cast<std::byte*>(text.data()))) continue;
         const auto status = nlohmann::json::parse(text, nullptr, false);
         if (!status.is_object()) continue;
-        line = fmt::format("{} | board {} | clock {} {} us", status["health"].get<std::string>(),
-                           status["board"]["state"].get<std::string>(),
-                           status["clock"]["state"].get<std::string>(),
-                           status["clock"]["sigma_ns"].get<std::int64_t>() / 1000);
+        const auto& sigma = status["clock"]["sigma_ns"];
+        line = fmt::format(
+            "{} | board {} | clock {} {} us", status["health"].get<std::string>(),
+            status["board"]["state"].get<std::string>(),
+            status["clock"]["state"].get<std::string>(),
+            sigma.is_number() ? std::to_string(sigma.get<std::int64_t>() / 1000) : "unknown");
         for (const auto& stream_status : status["streams"])
             if (stream_status["kind"] == "frames" || stream_status["kind"] == "imu")
                 line +=

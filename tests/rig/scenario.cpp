@@ -33,6 +33,8 @@ CameraScenario read_camera(TableReader& reader) {
                             {"middle", Stamped::middle},
                             {"end", Stamped::end},
                             {"readout", Stamped::readout}});
+    reader.read("line_rising_us", camera.line_rising_us, 0, 1e3);
+    reader.read("line_falling_us", camera.line_falling_us, 0, 1e3);
     reader.read("readout_us", camera.readout_us, 0, 1e6);
     reader.read("link_mbps", camera.link_mbps, 0, 1e5);
     reader.read("packet_loss", camera.packet_loss, 0, 1);

@@ -35,6 +35,8 @@ struct CameraScenario {
     double exposure_swing_s = 7;  ///< ... with this period
     double trigger_latency_us = 20;
     Stamped stamps = Stamped::start;
+    double line_rising_us = 0;       ///< how late its exposure line rises ...
+    double line_falling_us = 0;      ///< ... and falls
     double readout_us = 2000;        ///< end of exposure to first packet
     double link_mbps = 1000;         ///< packets leave at this pace; 0: as fast as they can
     double packet_loss = 0;          ///< fraction

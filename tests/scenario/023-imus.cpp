@@ -42,6 +42,25 @@ TEST_CASE(
     for (const wire::ImuSample& sample : samples) REQUIRE(sample.flags == wire::imu_stamped);
 }
 
+TEST_CASE("023-imus-filters: a sample shows the motion of the filter's delay before") {
+    const Part part = GENERATE(values<Part>({
+        {"adis16445", wire::ImuKind::adis16445, 102.4, 102.4},
+        {"adis16448a", wire::ImuKind::adis16448a, 200, 204.8},
+        {"adis16448b", wire::ImuKind::adis16448b, 819.2, 819.2},
+        {"adis16460", wire::ImuKind::adis16460, 500, 512},
+        {"adis16470", wire::ImuKind::adis16470, 100, 100},
+    }));
+    const std::uint8_t filter = GENERATE(std::uint8_t{0}, std::uint8_t{2}, std::uint8_t{4});
+    INFO(part.name << ", filter " << int(filter));
+    Scenario world;
+    world.add_imu(make_imu(part.kind), part.kind, part.rate_hz, true);
+    world.configuration.imus[0].filter = filter;
+    REQUIRE(world.begin());
+    world.run(2 * second);
+    CHECK(world.judge() == "");
+    CHECK(world.inbox().samples[0].size() > part.true_rate_hz);
+}
+
 TEST_CASE("023-imus-without-data-ready: every part is read on the board's grid") {
     const wire::ImuKind kind = GENERATE(
         values({wire::ImuKind::adis16445, wire::ImuKind::adis16448a, wire::ImuKind::adis16448b,

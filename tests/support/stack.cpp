@@ -34,10 +34,10 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
             "[[camera]]\nname = \"cam{0}\"\ndevice = \"{1}\"\noutput = {0}\nlatency_us = "
             "20\npacket_size = "
             "9000\n"
-            "{2}\n{3}\n{4}\n",
+            "{2}\n{3}\n{4}\n{5}\n",
             i, settings.device.empty() ? address(real) : settings.device,
             slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
-            settings.camera_extra, at(settings.extras, i));
+            settings.camera_extra, at(settings.extras, i), settings.lines);
     }
     configuration += "[[imu]]\nname = \"imu0\"\n" + settings.imu_extra;
     scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);

@@ -100,6 +100,45 @@ TEST_CASE("end to end: a slave is exposed by its master, and its stamps are its 
     stack.wait_for_status(healthy);
 }
 
+TEST_CASE(
+    "end to end: a slow exposure line and a filter are taken off, unknown ones are admitted") {
+    const bool known = GENERATE(true, false);
+    StackSettings settings{"delays", 73, 1, 20, "line_rising_us = 90\nline_falling_us = 10",
+                           "",       ""};
+    settings.imu_extra = "filter = 4\n";
+    settings.lines = known ? "strobe_rising_us = [90, 1]\nstrobe_falling_us = [10, 1]\n" : "";
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const rig::Verdict verdict = judge(stack, 5);
+    CHECK(verdict.ok);
+    if (known) CHECK(verdict.streams.at("cam0").error_p50_ns < 30'000);
+    const auto status = stack.wait_for_status(
+        [](const auto& s) { return s["cameras"][0]["edge_difference_ns"].is_number(); });
+    const auto& camera = status["cameras"][0];
+    CHECK(camera["line"] == "Line1");
+    CHECK(camera["line_delay_source"] == (known ? "configuration" : "unknown"));
+    CHECK(camera["line_delay_start_ns"] == (known ? 90'000 : 0));
+    CHECK(camera["line_delay_sigma_ns"] == (known ? 1'000 : 40'000));
+    CHECK(camera["edge_difference_ns"].get<double>() == Approx(-80'000).margin(5'000));
+    CHECK(camera["exposure_ns"].get<double>() ==
+          Approx(known ? 3'000'000 : 2'920'000).margin(5'000));
+    CHECK(camera["hint"] == "");
+    CHECK(status["imus"][0]["filter_delay_ns"].get<double>() == Approx(18'310'547).margin(1));
+}
+
+TEST_CASE("end to end: an exposure line of the wrong polarity is named as such") {
+    Stack stack({"polarity", 74, 1, 20, "", "", "strobe = \"active_low\""});
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find("polarity is wrong") !=
+               std::string::npos;
+    });
+    CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
+               Catch::Contains("Line1") && Catch::Contains("strobe = \"active_high\""));
+}
+
 TEST_CASE("end to end: both cameras' frames of one tick carry the same time") {
     Stack stack({"sync", 11, 2, 25, "exposure_us = 2000", "", ""});
     stack.start_rig();

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads frames of a stream, written from docs/contracts/shm-layout.md alone.
 
-read_ring.py FILE COUNT: prints item number, output time, trigger and size of each frame.
+read_ring.py FILE COUNT: prints item number, output time, trigger, size and corrected delay of each
+frame.
 Exits 0 after COUNT intact frames, 1 if FILE is not a ring or they do not arrive in ten seconds.
 """
 import mmap
@@ -33,6 +34,7 @@ def main(path, count):
         at = descriptors_at + number % descriptors * 128
         sequence, generation, length_and_slot, output_time = unpack(memory, "QQQq", at)
         (trigger,) = unpack(memory, "Q", at + 32)
+        (delay,) = unpack(memory, "i", at + 32 + 88)
         _sigma, width, height, stride = unpack(memory, "IIII", at + 32 + 56)
         length, slot = length_and_slot >> 32, length_and_slot & 0xFFFFFFFF
         complete = sequence == 2 * number + 2 == unpack(memory, "Q", at)[0]
@@ -41,7 +43,8 @@ def main(path, count):
             pixels = memory[begin : begin + length]
             (generation_now,) = unpack(memory, "Q", generations_at + 64 * slot)
             if generation_now == generation and len(pixels) == stride * height:
-                print(f"{number} {output_time} trigger {trigger}: {width} x {height}")
+                size = f"{width} x {height}"
+                print(f"{number} {output_time} trigger {trigger}: {size}, {delay} ns taken off")
                 count -= 1
         number += 1
     return 0 if count == 0 else 1

@@ -411,3 +411,36 @@ TEST_CASE("camera_pipeline: nothing waits while rings are made [threads]", "[thr
     REQUIRE(prepared);
     CHECK(longest < making / 2);
 }
+
+TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is the true one") {
+    Bench bench(camera(20));
+    LineDelays lines;
+    lines.line = "Line1";
+    lines.start = {microseconds(36), microseconds(9)};
+    lines.end = {microseconds(18), microseconds(5)};
+    lines.source = DelaySource::preset;
+    bench.pipeline.set_line_delays(lines);
+    bench.pipeline.set_camera_exposure(microseconds(4018), bench.begin - seconds(10));
+    auto reader = bench.reader("cam0");
+    for (const std::uint64_t tick : pattern) {
+        bench.trigger(tick);
+        bench.frame(tick);
+    }
+    for (std::size_t i = 0; i < std::size(pattern); ++i) {
+        const ring::Item item = reader.next();
+        REQUIRE(item.found == ring::Found::item);
+        const auto frame = unpack<FrameMetadata>(item.metadata);
+        const HostTime seen =
+            bench.begin + bench.period * static_cast<std::int64_t>(frame.tick) + microseconds(2020);
+        CHECK(absolute(frame.host_time - (seen - microseconds(27))) <= microseconds(1));
+        CHECK(item.time.ns == frame.host_time.ns);
+        CHECK(frame.exposure == microseconds(4018));
+        CHECK(frame.delay_ns == 27'000);
+        CHECK(frame.sigma_ns >= 7'000);
+    }
+    const PipelineReport report = bench.pipeline.report();
+    CHECK(report.lines.start.delay == microseconds(36));
+    CHECK(report.edges.difference == microseconds(-18));
+    CHECK(report.edges.frames == std::size(pattern));
+    CHECK(report.exposure == microseconds(4018));
+}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/camera_preset.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <map>
 
@@ -139,4 +140,40 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
     CHECK_THAT(message, Catch::Contains("bad.toml") && Catch::Contains("optional"));
     directory.write("bad.toml", "[[trigger]]\nset = [\"A\"]\n");
     CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("'set' and 'to'"));
+}
+
+TEST_CASE("camera_preset: lines are direct where the camera has such, and have their delays") {
+    for (const char* name : {"flir", "basler-usb", "basler"}) {
+        INFO(name);
+        const auto preset = choose_preset(all(), name, "", "");
+        REQUIRE(preset);
+        const auto strobe =
+            std::find_if(preset->lines.begin(), preset->lines.end(),
+                         [&](const PresetLine& line) { return line.name == preset->strobe_line; });
+        REQUIRE(strobe != preset->lines.end());
+        CHECK((strobe->kind == LineKind::direct) == (std::string(name) != "basler"));
+        REQUIRE((strobe->output_rising && strobe->output_falling));
+        CHECK(strobe->output_rising->sigma.ns > 0);
+    }
+    CHECK(chosen("Basler", "acA1920-155um") == "basler-usb");
+    CHECK(chosen("Basler", "a2A1920-160umPRO") == "basler-ace2");
+}
+
+TEST_CASE("camera_preset: a line that does not add up is refused, with its place") {
+    test::TemporaryDirectory directory;
+    const auto error = [&](const std::string& keys) {
+        directory.write("bad.toml", "[[line]]\nname = \"Line1\"\nkind = \"opto\"\n" + keys);
+        const auto loaded = load_presets(directory.path());
+        return loaded ? std::string("no error") : loaded.error().message();
+    };
+    CHECK(error("output_rising_us = [36.0, 9]\n") == "no error");
+    for (const char* keys :
+         {"output_rising_us = [36]\n", "output_rising_us = 36\n", "output_rising_us = [36, -1]\n",
+          "output_rising_us = [\"a\", 1]\n", "output_rising_us = [36000, 1]\n"})
+        CHECK_THAT(error(keys), Catch::Contains("bad.toml:4:") && Catch::Contains("2 numbers"));
+    CHECK_THAT(error("output_raising_us = [1, 1]\n"), Catch::Contains("output_rising_us"));
+    directory.write("bad.toml", "[[line]]\nkind = \"direct\"\n");
+    CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("'name'"));
+    directory.write("bad.toml", "[[line]]\nname = \"Line1\"\nkind = \"opt\"\n");
+    CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("opto, direct"));
 }

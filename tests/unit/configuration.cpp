@@ -269,3 +269,22 @@ TEST_CASE("configuration: whatever is damaged in a file, it loads or each error 
     }
     CHECK(refused > 1000);
 }
+
+TEST_CASE("configuration: delays of lines, of the board and of an IMU's filter") {
+    const auto configuration = load(
+        camera + "output = 2\nstrobe_rising_us = [36, 9]\nstrobe_falling_us = [18.5, 4]\n" +
+        "latency_us = 10\n[board]\nboard_delay_ns = { inputs = [0, 0, 60, 0], outputs = [1, 2, 30, "
+        "4] }\n[[imu]]\nfilter = 2\n[[imu]]\nname = \"imu1\"\nmodel = "
+        "\"vn100\"\nfilter_delay_us = 2500\n");
+    REQUIRE(configuration);
+    CHECK(configuration->cameras[0].strobe_falling_us == std::vector<double>{18.5, 4});
+    CHECK(configuration->cameras[0].board_input_ns == 60);
+    CHECK(board_configuration(*configuration).cameras[2].latency_ns == 10'030);
+    CHECK(configuration->imus[0].filter_delay().delay == nanoseconds(3'662'109));
+    CHECK(configuration->imus[1].filter_delay().delay == microseconds(2500));
+    CHECK_THAT(error_of(camera + "strobe_rising_us = [36, 9]\n"),
+               Catch::Contains("both edges") && Catch::Contains("strobe_falling_us"));
+    CHECK_THAT(error_of(camera + "strobe_rising_us = 36\n"), Catch::Contains("2 numbers"));
+    CHECK_THAT(error_of("[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n"),
+               Catch::Contains("4 numbers"));
+}

@@ -90,3 +90,51 @@ TEST_CASE("exposure_completion: no frame arrives before the end, if the end is k
     CHECK(exposure.end_on_host == middle + milliseconds(10));
     CHECK(exposure.earliest_on_host == middle - milliseconds(10));
 }
+
+TEST_CASE("exposure_completion: the delays of the lines are taken off start, end and middle") {
+    ExposureCompletion completion(camera());
+    LineDelays lines;
+    lines.trigger = {microseconds(18), microseconds(4)};
+    lines.start = {microseconds(36), microseconds(9)};
+    lines.end = {microseconds(12), microseconds(5)};
+    completion.set_line_delays(lines);
+    const auto whole = completion.complete(record(start_ns, end_ns));
+    CHECK(whole.start.ns == start_ns - 36'000);
+    CHECK(whole.end.ns == end_ns - 12'000);
+    CHECK(whole.delay == microseconds(24));
+    CHECK(kind_sigma(whole, milliseconds(9)) == microseconds(7));
+    const auto endless = completion.complete(record(start_ns, wire::no_time));
+    CHECK(endless.start.ns == start_ns - 36'000);
+    CHECK(endless.end - endless.start == milliseconds(20));
+    CHECK(endless.delay == microseconds(36));
+    const auto unseen = completion.complete(record(wire::no_time, wire::no_time));
+    CHECK(unseen.start.ns == trigger_ns + 18'000);
+    CHECK(unseen.end - unseen.start == microseconds(4024));
+    CHECK(unseen.delay.ns == 0);
+}
+
+TEST_CASE("exposure_completion: without a line of its own, an exposure begins a latency later") {
+    ExposureCompletion completion(camera());
+    LineDelays lines;
+    lines.trigger.delay = microseconds(18);
+    lines.start.delay = lines.end.delay = microseconds(36);
+    completion.set_line_delays(lines);
+    // The board may have been told another latency than the camera turned out to have.
+    const auto predicted = completion.complete(record(start_ns, end_ns, wire::exposure_predicted));
+    CHECK(predicted.start.ns == trigger_ns + 18'000);
+    CHECK(predicted.end - predicted.start == milliseconds(4));
+    // Its master's line triggers it.
+    const auto slave = completion.complete(record(start_ns, end_ns, wire::exposure_from_master));
+    CHECK(slave.start.ns == start_ns + 18'000);
+    CHECK(slave.end - slave.start == milliseconds(4));
+}
+
+TEST_CASE("exposure_completion: delays longer than the exposure leave its middle") {
+    ExposureCompletion completion(camera());
+    LineDelays lines;
+    lines.end.delay = microseconds(60);
+    completion.set_line_delays(lines);
+    const auto exposure = completion.complete(record(start_ns, start_ns + 40'000));
+    CHECK(exposure.start == exposure.end);
+    CHECK(exposure.start.ns == start_ns - 10'000);
+}

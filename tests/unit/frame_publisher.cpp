@@ -46,6 +46,8 @@ pairing::Exposure exposure(StampKind kind) {
     made.start = {99'000'000'000};
     made.end = made.start + milliseconds(4);
     made.kind = kind;
+    made.delay = microseconds(27);
+    made.delay_sigma = {kind == StampKind::measured_middle ? 4'000 : 0};
     return made;
 }
 
@@ -66,7 +68,8 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
     CHECK(measured.board_time.ns == 99'002'000'000);
     CHECK(measured.host_time == middle_stamp.host);
     CHECK(measured.exposure == milliseconds(4));
-    CHECK(measured.sigma_ns == 3'000);
+    CHECK(measured.sigma_ns == 5'000);
+    CHECK(measured.delay_ns == 27'000);
     CHECK(measured.epoch == 8);
     CHECK(measured.trigger == 5);
     CHECK(measured.tick == 6);

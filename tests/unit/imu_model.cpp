@@ -32,3 +32,41 @@ TEST_CASE("imu_model: a failed check is passed on, an unknown part is not invent
     CHECK(imu::find_model("mpu9250") == nullptr);
     CHECK(imu::find_model(wire::ImuKind::none) == nullptr);
 }
+
+namespace {
+
+double delay_ms(const char* name, unsigned filter, double rate_hz, bool data_ready) {
+    const auto delay = imu::filter_delay(*imu::find_model(name), filter, rate_hz, data_ready);
+    CHECK(delay.source == imu::DelaySource::model);
+    CHECK(delay.sigma.ns > 0);
+    return static_cast<double>(delay.delay.ns) * 1e-6;
+}
+
+}  // namespace
+
+TEST_CASE("imu_model: the filter's delay by part, strength and rate") {
+    // Read on the board's grid, the part runs as fast as it can.
+    CHECK(delay_ms("adis16448b", 0, 200, false) == 0);
+    CHECK(delay_ms("adis16448b", 2, 200, false) == Approx(3.662).margin(0.001));
+    CHECK(delay_ms("adis16448a", 4, 200, false) == Approx(18.311).margin(0.001));
+    // Paced by itself it also averages the four samples that make one of its output.
+    CHECK(delay_ms("adis16448b", 0, 200, true) == Approx(1.5 / 0.8192).margin(0.001));
+    CHECK(delay_ms("adis16445", 2, 819.2, true) == Approx(3.662).margin(0.001));
+    CHECK(delay_ms("adis16460", 3, 2048, true) == Approx(7 / 2.048).margin(0.001));
+    CHECK(delay_ms("adis16460", 0, 512, true) == Approx(1.5 / 2.048).margin(0.001));
+    CHECK(delay_ms("adis16470", 6, 2000, true) == Approx(63 / 2.0).margin(0.001));
+    CHECK(delay_ms("adis16470", 1, 100, true) == Approx((1 + 9.5) / 2.0).margin(0.001));
+}
+
+TEST_CASE("imu_model: a filter whose delay nobody states is not guessed, and sigma says so") {
+    for (const char* name : {"icm42688p", "bmi088", "vn100"}) {
+        const auto delay = imu::filter_delay(*imu::find_model(name), 0, 200, true);
+        CHECK(delay.delay.ns == 0);
+        CHECK(delay.source == imu::DelaySource::unknown);
+        CHECK(delay.sigma > milliseconds(1));
+        CHECK(delay.sigma < milliseconds(10));
+    }
+    const imu::ImuModel& icm = *imu::find_model("icm42688p");
+    CHECK(imu::filter_delay(icm, 7, 1000, true).sigma >
+          imu::filter_delay(icm, 0, 1000, true).sigma);
+}

@@ -153,3 +153,30 @@ TEST_CASE("imu_pipeline: when the clock begins anew, so do numbers and times") {
     CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(23)) <=
           microseconds(20));
 }
+
+TEST_CASE(
+    "imu_pipeline: samples are stamped with the time of the motion, not of the filter's end") {
+    test::Pipelines bench;
+    ImuConfiguration configuration;
+    configuration.model = imu::find_model("adis16448b");
+    configuration.filter = 4;
+    const auto override_us = GENERATE(as<std::optional<double>>(), std::nullopt, 5000.0, 0.0);
+    configuration.filter_delay_us = override_us;
+    const Duration delay = override_us ? from_us(*override_us) : microseconds(18311);
+    ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}),
+                         bench.translator);
+    auto reader = bench.reader("imu0");
+    const HostTime begin{50'000'000'000};
+    bench.exchange(begin);
+    pipeline.add(sample(1, test::Pipelines::to_board(begin + milliseconds(40))));
+    const ring::Item item = reader.next();
+    const auto metadata = unpack<ImuMetadata>(item.metadata);
+    CHECK(absolute(metadata.host_time - (begin + milliseconds(40) - delay)) < microseconds(1));
+    CHECK(item.time.ns == metadata.host_time.ns);
+    // The board's own stamp stays as it is, beside what was taken off.
+    CHECK(metadata.board_time == test::Pipelines::to_board(begin + milliseconds(40)));
+    CHECK(absolute(metadata.filter_delay - delay) < microseconds(1));
+    CHECK((metadata.sigma_ns >= 100'000) == !override_us);
+    CHECK(pipeline.report().filter.source ==
+          (override_us ? imu::DelaySource::configuration : imu::DelaySource::model));
+}

@@ -30,24 +30,42 @@ std::string board_line(const json& board) {
                        count(board, "imu_errors"), hint(board));
 }
 
+/// Of a time in ns, without the unit; what is not known is null, and no zero.
+std::string in_us(const json& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_number()
+               ? fmt::format("{:.1f}", found->get<double>() / 1e3)
+               : "unknown";
+}
+
 std::string clock_line(const json& clock) {
     return fmt::format(
-        "clock    {:<10} {}  sigma {:.1f} us, bound {:.1f} us, skew {:+.3f} ppm, round trip {:.0f} "
+        "clock    {:<10} {}  sigma {} us, bound {} us, skew {:+.3f} ppm, round trip {:.0f} "
         "us\n",
-        text(clock, "state"), text(clock, "output"), clock.value("sigma_ns", 0.0) / 1e3,
-        clock.value("bound_ns", 0.0) / 1e3, clock.value("skew_ppm", 0.0),
+        text(clock, "state"), text(clock, "output"), in_us(clock, "sigma_ns"),
+        in_us(clock, "bound_ns"), clock.value("skew_ppm", 0.0),
         clock.value("round_trip_ns", 0.0) / 1e3);
+}
+
+/// What is taken off the middle of its exposures, before it is known: nothing.
+std::string delay_line(const json& camera) {
+    if (text(camera, "line").empty()) return "";
+    return fmt::format(
+        "         {}: start {} us late, end {} us, sigma {} us ({}); end less start, measured: {} "
+        "us\n",
+        text(camera, "line"), in_us(camera, "line_delay_start_ns"),
+        in_us(camera, "line_delay_end_ns"), in_us(camera, "line_delay_sigma_ns"),
+        text(camera, "line_delay_source"), in_us(camera, "edge_difference_ns"));
 }
 
 std::string camera_line(const json& camera) {
     return fmt::format(
         "{:<8} {:<10} {}  pairing {}, published {}, incomplete {}, without trigger {}, triggers "
-        "without "
-        "frame {}, slips {}{}\n",
+        "without frame {}, slips {}{}\n{}",
         text(camera, "name"), text(camera, "state"), text(camera, "model"), text(camera, "pairing"),
         count(camera, "frames_published"), count(camera, "frames_incomplete"),
         count(camera, "frames_without_trigger"), count(camera, "triggers_without_frame"),
-        count(camera, "slips"), hint(camera));
+        count(camera, "slips"), hint(camera), delay_line(camera));
 }
 
 struct ClockFact {
@@ -103,6 +121,7 @@ bool ends_with(std::string_view key, std::string_view end) {
 /// The unit is the end of the key's name.
 std::string with_unit(std::string_view key, const json& value) {
     if (value.is_string()) return value.get<std::string>();
+    if (value.is_null()) return "unknown";
     if (!value.is_number()) return value.dump();
     const auto number = value.get<double>();
     if (ends_with(key, "_ns") && std::abs(number) < 1e9)
@@ -160,9 +179,10 @@ std::string status_text(const json& status) {
     if (status.contains("clock")) out += clock_line(status["clock"]);
     for (const json& camera : status.value("cameras", json::array())) out += camera_line(camera);
     for (const json& imu : status.value("imus", json::array()))
-        out += fmt::format("{:<8} {:<10} published {}, lost {}, faulty {}\n", text(imu, "name"),
-                           text(imu, "model"), count(imu, "published"), count(imu, "lost"),
-                           count(imu, "faulty"));
+        out += fmt::format(
+            "{:<8} {:<10} published {}, lost {}, faulty {}, filter delay {} us ({})\n",
+            text(imu, "name"), text(imu, "model"), count(imu, "published"), count(imu, "lost"),
+            count(imu, "faulty"), in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source"));
     for (const json& stream : status.value("streams", json::array()))
         out +=
             fmt::format("stream   {:<10} {:<7} {:>10} items {:>8.1f} Hz\n", text(stream, "name"),

@@ -37,6 +37,7 @@ json describe(const Received<FrameMetadata>& item) {
                  {"host_time_ns", d.host_time.ns},
                  {"arrival_ns", d.arrival.ns},
                  {"camera_time_ns", d.camera_time.ns},
+                 {"delay_ns", d.delay_ns},
                  {"tick", d.tick},
                  {"width", d.width},
                  {"height", d.height},
@@ -52,6 +53,7 @@ json describe(const Received<ImuMetadata>& item) {
     const ImuMetadata& d = item.data;
     line.update({{"sample", d.number},
                  {"sigma_ns", d.sigma_ns},
+                 {"filter_delay_ns", d.filter_delay.ns},
                  {"gyro_rad_s", vector(d.gyro)},
                  {"accel_m_s2", vector(d.accel)},
                  {"magnetic_t", vector(d.magnetic)},

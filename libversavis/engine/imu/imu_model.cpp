@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/imu/imu_model.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "wire/imu_scale.hpp"
@@ -28,7 +30,82 @@ const ImuModel* find(Matches matches) {
     return nullptr;
 }
 
+/// What a part's digital filters leave out: the sensor element's own bandwidth. The published
+/// offsets of the ADIS16448 with 4 and 16 taps, less that with one, are off by 0.05 to 0.14 ms. At
+/// half, those are not covered; at twice, the filters look worse known than they are.
+constexpr Duration adis_rest = microseconds(100);
+
+/// Delay of a low-pass filter of unknown shape, in periods of its bandwidth: 0.16 with one pole,
+/// 0.22 with two or with a plain average, more with more poles. At half, the true delay is often
+/// beyond one sigma; at twice, a part looks worse than any filter could make it.
+constexpr double periods_of_bandwidth = 0.3;
+
+/// The VN-100 averages its samples, 800 a second, over windows that are its owner's to set; a
+/// window of four, as it is delivered with, delays by 1.9 ms. At half, that is not covered; at
+/// twice, a part without averages looks worse than it is.
+constexpr Duration vn100_window = milliseconds(2);
+
+/// Rate at which the part runs: the board lets one that it does not follow run at four times the
+/// rate at which it is read.
+double part_rate(double rate_hz, bool data_ready) { return data_ready ? rate_hz : 4 * rate_hz; }
+
+/// ADIS16445, ADIS16448, ADIS16460, ADIS16470, by their data sheets: two averages in a row over
+/// 2^filter samples (a Bartlett window), then one over the samples that make one of the output.
+Duration adis_delay(double base_hz, bool octaves, unsigned filter, double rate_hz) {
+    const auto parts = std::llround(base_hz * 1e3) / std::llround(rate_hz * 1e3);
+    const double whole = static_cast<double>(std::clamp(parts, 1LL, octaves ? 1024LL : 2000LL));
+    const double averaged = octaves ? std::exp2(std::floor(std::log2(whole))) : whole;
+    const double taps = std::exp2(filter);
+    return {std::llround((taps - 1 + (averaged - 1) / 2) / base_hz * 1e9)};
+}
+
+/// ICM-42688-P, GYRO_ACCEL_CONFIG0: a half of the rate, or a part of the larger of it and 400 Hz.
+double icm42688p_bandwidth_hz(unsigned filter, double rate_hz) {
+    constexpr std::array<double, 8> parts{2, 4, 5, 8, 10, 16, 20, 40};
+    return (filter == 0 ? rate_hz : std::max(400.0, rate_hz)) / parts.at(std::min(filter, 7U));
+}
+
+/// BMI088, GYRO_BANDWIDTH, the widest at each rate; its accelerometer has 131 Hz at least.
+double bmi088_bandwidth_hz(double rate_hz) {
+    constexpr std::array<std::array<double, 2>, 4> widest{
+        {{100, 32}, {200, 64}, {400, 47}, {1000, 116}}};
+    for (const auto& [rate, bandwidth] : widest)
+        if (rate_hz <= rate) return bandwidth;
+    return 131;
+}
+
+FilterDelay known(Duration delay) { return {delay, adis_rest, DelaySource::model}; }
+
+FilterDelay unknown(double bandwidth_hz) {
+    return {{}, {std::llround(periods_of_bandwidth / bandwidth_hz * 1e9)}, DelaySource::unknown};
+}
+
 }  // namespace
+
+const char* to_string(DelaySource source) {
+    switch (source) {
+        case DelaySource::unknown: return "unknown";
+        case DelaySource::model: return "model";
+        case DelaySource::configuration: return "configuration";
+    }
+    return "unknown";
+}
+
+FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready) {
+    const double rate = part_rate(rate_hz, data_ready);
+    switch (model.kind) {
+        case wire::ImuKind::adis16445:
+        case wire::ImuKind::adis16448a:
+        case wire::ImuKind::adis16448b: return known(adis_delay(819.2, true, filter, rate));
+        case wire::ImuKind::adis16460: return known(adis_delay(2048, false, filter, rate));
+        case wire::ImuKind::adis16470: return known(adis_delay(2000, false, filter, rate));
+        case wire::ImuKind::icm42688p: return unknown(icm42688p_bandwidth_hz(filter, rate));
+        case wire::ImuKind::bmi088: return unknown(bmi088_bandwidth_hz(rate));
+        case wire::ImuKind::vn100:
+        case wire::ImuKind::none: break;
+    }
+    return {{}, vn100_window, DelaySource::unknown};
+}
 
 std::vector<std::string> model_names() {
     std::vector<std::string> names;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Raw IMU words to SI units, as the part's data sheet has it.
+// Raw IMU words to SI units, and the delay of the part's filter, as its data sheet has it.
 #pragma once
 
 #include <optional>
@@ -26,6 +26,20 @@ std::vector<std::string> model_names();
 /// is none.
 const ImuModel* find_model(wire::ImuKind kind);
 const ImuModel* find_model(const std::string& name);
+
+enum class DelaySource { unknown, model, configuration };
+const char* to_string(DelaySource source);
+
+/// How much later than the motion its sample is, by the filters that the part is set up with.
+struct FilterDelay {
+    Duration delay;
+    Duration sigma;  ///< one standard deviation
+    DelaySource source = DelaySource::unknown;
+};
+
+/// Of a part set up for this strength and rate. Not in it: the age of a sample that the board reads
+/// without the part's data-ready line.
+FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready);
 
 /// Fills the physical quantities of `sample`; times, number and epoch are the caller's.
 ImuMetadata to_si(const ImuModel& model, const wire::ImuSample& sample);

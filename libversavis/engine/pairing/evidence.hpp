@@ -30,8 +30,10 @@ struct Exposure {
     HostTime earliest_on_host;  ///< its end, or its start when the end was not seen: no frame of it
                                 ///< can arrive earlier
     StampKind kind = StampKind::measured_middle;
-    bool exposed = true;  ///< false: the exposure line is wired and stayed silent
-    HostTime recorded;    ///< when its record reached the host; 0: unknown
+    bool exposed = true;   ///< false: the exposure line is wired and stayed silent
+    HostTime recorded;     ///< when its record reached the host; 0: unknown
+    Duration delay;        ///< of the lines, already taken off the middle; of the stamp alone
+    Duration delay_sigma;  ///< one standard deviation of it
 };
 
 /// One complete frame.

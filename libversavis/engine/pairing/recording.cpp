@@ -17,7 +17,7 @@ static_assert(offsetof(Limits, earliest_arrival) == 8 && offsetof(Limits, patter
               offsetof(Limits, stamped) == 48);
 static_assert(offsetof(Exposure, start) == 16 && offsetof(Exposure, end_on_host) == 32 &&
               offsetof(Exposure, kind) == 48 && offsetof(Exposure, exposed) == 52 &&
-              offsetof(Exposure, recorded) == 56);
+              offsetof(Exposure, recorded) == 56 && offsetof(Exposure, delay) == 64);
 static_assert(offsetof(Arrival, block_id) == 8 && offsetof(Arrival, arrived) == 24 &&
               offsetof(Arrival, exposure) == 32 && offsetof(Arrival, width) == 40 &&
               offsetof(Arrival, size) == 56);

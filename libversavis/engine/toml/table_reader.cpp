@@ -171,6 +171,23 @@ void TableReader::read(std::string_view key, double& value, double minimum, doub
                TomlRange{minimum, maximum});
 }
 
+void TableReader::read(std::string_view key, std::vector<double>& values, std::size_t count,
+                       double minimum, double maximum) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    std::vector<double> read;
+    if (const toml::array* array = node->as_array())
+        for (const toml::node& entry : *array)
+            if (const auto number = entry.is_number() ? entry.value<double>() : std::nullopt;
+                number && *number >= minimum && *number <= maximum)
+                read.push_back(*number);
+    const bool whole = node->is_array() && node->as_array()->size() == count;
+    if (!whole || read.size() != count)
+        return fail(key, fmt::format("'{}' must be a list of {} numbers from {} to {}", key, count,
+                                     minimum, maximum));
+    values = std::move(read);
+}
+
 void TableReader::read(std::string_view key, std::vector<std::string>& values) {
     const toml::node* node = find(key);
     if (node == nullptr) return;

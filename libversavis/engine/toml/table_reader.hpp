@@ -38,6 +38,10 @@ class TableReader {
     void read(std::string_view key, bool& value);
     void read(std::string_view key, std::vector<std::string>& values);
 
+    /// So many numbers, each in the range.
+    void read(std::string_view key, std::vector<double>& values, std::size_t count, double minimum,
+              double maximum);
+
     /// Accepts whole numbers as well.
     void read(std::string_view key, double& value, double minimum, double maximum);
 

@@ -50,14 +50,15 @@ struct FrameMetadata {
     std::uint32_t flags;         ///< ItemFlag
     std::uint32_t
         tick;  ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
-    std::uint64_t reserved;
+    std::int32_t delay_ns;  ///< of camera's and board's lines, already taken off all times
+    std::uint32_t reserved;
 
     StampKind stamp_kind() const { return static_cast<StampKind>(flags & stamp_kind_mask); }
 };
 
 struct ImuMetadata {
-    BoardTime board_time;
-    HostTime host_time;
+    BoardTime board_time;  ///< of the sample as the board has it: `filter_delay` after the motion
+    HostTime host_time;    ///< of the motion
     std::uint64_t number;  ///< samples since the board's boot
     float gyro[3];         ///< rad/s
     float accel[3];        ///< m/s^2
@@ -66,8 +67,9 @@ struct ImuMetadata {
     float pressure;        ///< pascal; NaN where the part has none
     std::uint32_t sigma_ns;
     std::uint32_t epoch;
-    std::uint32_t flags;  ///< ItemFlag
-    std::uint64_t reserved[2];
+    std::uint32_t flags;    ///< ItemFlag
+    Duration filter_delay;  ///< of the part's filter, already taken off host and output time
+    std::uint64_t reserved;
 };
 
 enum class EventKind : std::uint32_t {

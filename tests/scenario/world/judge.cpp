@@ -135,6 +135,9 @@ void World::judge_imu(unsigned port, std::string& out) {
         const auto found = std::lower_bound(ready.begin(), ready.end(), at);
         return found != ready.end() && *found == at ? found - ready.begin() : std::ptrdiff_t{-1};
     };
+    const wire::ImuConfiguration& asked = configuration.imus[port];
+    const Duration filtered_for =
+        imu::filter_delay(model, asked.filter, asked.rate_millihertz * 1e-3, paced).delay;
     std::ptrdiff_t last_index = -1;
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const wire::ImuSample& sample = samples[i];
@@ -167,7 +170,7 @@ void World::judge_imu(unsigned port, std::string& out) {
         if ((sample.flags & wire::imu_check_failed) != 0) continue;
         const ImuMetadata si = imu::to_si(model, sample);
         const wire::ImuScale scale = wire::imu_scale(sample.kind);
-        const devices::Inertial felt = motion(taken);
+        const devices::Inertial felt = motion(taken - filtered_for.ns);
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const double rate = felt.gyro_deg_s[axis] * 3.14159265358979 / 180;
             const double acceleration = felt.accel_g[axis] * 9.80665;
