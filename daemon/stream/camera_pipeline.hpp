@@ -2,6 +2,7 @@
 // From arrivals and exposures of one camera to stamped frames: pairing, told by both sides.
 #pragma once
 
+#include <array>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -19,6 +20,9 @@
 
 namespace versavis::daemon {
 
+/// Reasons are counted by their number; those from here on are not.
+constexpr std::size_t counted_reasons = 32;
+
 struct PipelineReport {
     pairing::State pairing = pairing::State::searching;
     std::uint64_t received = 0;    ///< complete frames
@@ -34,6 +38,12 @@ struct PipelineReport {
     std::uint64_t suspect = 0;  ///< published although not proved
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
+    std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
+    std::uint64_t clock_frozen = 0;  ///< frames with the camera time of the one before
+    Duration record_delay;           ///< end of the newest exposure to the arrival of its record
+    Duration start_delay;            ///< trigger to the start that its record has; 0: it has none
+    Duration told_exposure;          ///< as the camera was told, or tells; 0: it varies
+    HostTime last_sign;              ///< a frame arrived, whole or not
     HostTime last_frame;
     HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
     Duration exposure;                   ///< measured, of the newest frame; 0: unknown
@@ -100,6 +110,7 @@ class CameraPipeline final : private pairing::Outcome {
 
     void tell(const pairing::Evidence& evidence);
     void begin_anew();
+    void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
@@ -121,6 +132,7 @@ class CameraPipeline final : private pairing::Outcome {
     /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,
     /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
+    CameraTime last_camera_time_;
     PipelineReport report_;
 };
 

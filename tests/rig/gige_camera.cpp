@@ -322,10 +322,11 @@ void GigeCamera::free_run(HostTime now) {
     expose(next, nullptr);
 }
 
-void GigeCamera::reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset) {
+void GigeCamera::afflict_board(std::vector<Fault> faults,
+                               std::function<void(const Fault&)> afflict) {
     const std::lock_guard lock(mutex_);
-    board_resets_ = std::move(exposures);
-    reset_board_ = std::move(reset);
+    board_faults_ = std::move(faults);
+    afflict_board_ = std::move(afflict);
 }
 
 std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
@@ -338,7 +339,8 @@ std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
     if (listens && !muted()) interval = expose(pulse.at, &pulse);
     truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
                            interval.has_value()});
-    return interval;
+    const std::lock_guard lock(mutex_);
+    return active_fault(FaultKind::cut_strobe) != nullptr ? std::nullopt : interval;
 }
 
 Duration GigeCamera::exposure_at(HostTime at) const {
@@ -419,9 +421,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         const std::lock_guard lock(mutex_);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
-        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) !=
-            board_resets_.end())
-            reset_board_();
+        for (const Fault& fault : board_faults_)
+            if (fault.at_exposure == exposures_) afflict_board_(fault);
         if (active_fault(FaultKind::ignore_trigger) != nullptr) {
             if (settings_.ids_count_ignored) next_block_id();
             return std::nullopt;
@@ -433,12 +434,22 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
             clock_step_ns_ += std::llround(jump->seconds * 1e9);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
         truth.end = truth.start + exposure_at(trigger);
-        busy_until_ = truth.end;
+        busy_until_ = std::max(
+            truth.end, trigger + Duration{std::llround(settings_.shortest_period_us * 1e3)});
         frame.block_id = block_id_;
         frame.serial = exposures_;
         if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;
         frame.missing = missing_part();
         frame.after_next = active_fault(FaultKind::swap_frames) != nullptr;
+        if (const Fault* loss = active_fault(FaultKind::lose_packets)) frame.loss = loss->share;
+        if (active_fault(FaultKind::block_large) != nullptr) frame.largest_packet = 1500;
+        frame.camera_time_ns =
+            static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
+        if (active_fault(FaultKind::freeze_clock) == nullptr)
+            frozen_time_ns_ = 0;
+        else if (frozen_time_ns_ == 0)
+            frozen_time_ns_ = frame.camera_time_ns;
+        if (frozen_time_ns_ != 0) frame.camera_time_ns = frozen_time_ns_;
     }
     truth.camera = settings_.name;
     truth.board_life = pulse != nullptr ? pulse->board_life : 0;
@@ -450,8 +461,6 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         return Interval{truth.start, truth.end};
     }
     frame.extended_id = settings_.extended_ids;
-    frame.camera_time_ns =
-        static_cast<std::uint64_t>(clock_.device_ns(truth.start) + clock_step_ns_);
     frame.width = settings_.width;
     frame.height = settings_.height;
     frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));

@@ -34,8 +34,8 @@ class GigeCamera final : public TriggeredCamera {
 
     std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) override;
 
-    /// Calls `reset` at each of these exposures, counted since the rig's start.
-    void reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset);
+    /// Calls `afflict` at the exposure of each of these faults, counted since the rig's start.
+    void afflict_board(std::vector<Fault> faults, std::function<void(const Fault&)> afflict);
 
     const CameraScenario& settings() const override { return settings_; }
 
@@ -78,15 +78,16 @@ class GigeCamera final : public TriggeredCamera {
     Wall wall_;
     GvspTransmitter transmitter_;
 
-    std::mutex mutex_;  ///< guards what follows, down to reset_board_
+    std::mutex mutex_;  ///< guards what follows, down to frozen_time_ns_
     bool acquiring_ = false;
     std::uint64_t block_id_ = 0;
     std::int64_t clock_step_ns_ = 0;
     std::uint64_t exposures_ = 0;
     HostTime busy_until_;
     HostTime free_run_next_;
-    std::vector<std::uint64_t> board_resets_;
-    std::function<void()> reset_board_;
+    std::vector<Fault> board_faults_;
+    std::function<void(const Fault&)> afflict_board_;
+    std::uint64_t frozen_time_ns_ = 0;  ///< 0: the clock runs
 
     sockaddr_in controller_{};  ///< used by the server thread only
     HostTime last_contact_;
