@@ -230,7 +230,10 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("no triggers: the board refuses, see its own hint");
      }},
-    {Fault::camera_silent, in<CameraState::silent>, own_hint},
+    {Fault::camera_silent, in<CameraState::silent>,
+     [](const CameraView& /*c*/) {
+         return std::string("the camera does not answer: check its cable and power");
+     }},
     {Fault::clock_unknown,
      [](const CameraView& c) {
          return c.triggered() && c.all.clock_diagnosis.fault == Fault::clock_unknown;
@@ -451,13 +454,13 @@ std::string describe_failure(const ImuReport& imu) {
     switch (fault_of(imu.failure)) {
         case Fault::imu_missing:
             return fmt::format(
-                "no part answers (0x{:X}): check that an {} is plugged in, its "
-                "power and its wiring",
+                "no part answers (0x{:X}): check that the {} is plugged in, its power, its wiring "
+                "and 'model'",
                 imu.failure.answer, imu.model);
         case Fault::imu_wrong:
             return fmt::format(
-                "another part than an {} answers (0x{:X} in step {} of its set-up): "
-                "correct 'model', or plug in the right one",
+                "another part than the {} answers (0x{:X} in step {} of its set-up): correct "
+                "'model', or plug in the right one",
                 imu.model, imu.failure.answer, imu.failure.step);
         case Fault::imu_silent:
             return fmt::format(

@@ -40,9 +40,15 @@ ImuReport difference(ImuReport now, const ImuReport& before) {
     return now;
 }
 
-/// A camera without frames is opened anew: why it has none is still what is wrong.
-bool outlasts_reopening(Fault fault) {
-    return fault == Fault::no_exposure || fault == Fault::no_frames;
+/// A camera without frames is opened anew, and answers within this time. At half, a slow one is
+/// called silent meanwhile; at twice, the trigger cable of a dead one is blamed a second longer.
+constexpr Duration reopening = milliseconds(1500);
+
+/// Why it has none is still what is wrong meanwhile.
+bool outlasts_reopening(const Diagnosis& before, const CameraStatus& camera, HostTime now) {
+    return camera.diagnosis.fault == Fault::camera_silent &&
+           now - camera.camera.since < reopening &&
+           (before.fault == Fault::no_exposure || before.fault == Fault::no_frames);
 }
 
 }  // namespace
@@ -57,8 +63,7 @@ void HealthWatch::examine(Status& status) {
         const std::string key = "camera " + camera.name;
         camera.diagnosis = diagnose(camera, status);
         const Diagnosis& before = lasting_[key].second;
-        if (camera.diagnosis.fault == Fault::camera_silent && outlasts_reopening(before.fault))
-            camera.diagnosis = before;
+        if (outlasts_reopening(before, camera, status.now)) camera.diagnosis = before;
         date(key, to_string(camera.camera.state), camera.diagnosis, status.now);
     }
     for (ImuStatus& imu : status.imus) {

@@ -105,7 +105,6 @@ TEST_CASE("diagnosis: a camera that cannot be had says why, in its own words") {
         {CameraState::unreachable, Fault::camera_unreachable},
         {CameraState::busy, Fault::camera_busy},
         {CameraState::misconfigured, Fault::camera_misconfigured},
-        {CameraState::silent, Fault::camera_silent},
         {CameraState::failed, Fault::camera_failed}};
     for (const auto& [state, fault] : states) {
         Bench bench;
@@ -113,6 +112,9 @@ TEST_CASE("diagnosis: a camera that cannot be had says why, in its own words") {
         bench.cam().camera.hint = "its own words";
         check(bench.camera(), fault, "its own words");
     }
+    Bench silent;
+    silent.cam().camera.state = CameraState::silent;
+    check(silent.camera(), Fault::camera_silent, "cable and power");
 }
 
 TEST_CASE("diagnosis: a camera is busy because of a twin, of an own lease, or of a stranger") {

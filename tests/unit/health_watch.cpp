@@ -89,7 +89,10 @@ TEST_CASE("health_watch: why a camera has no frames outlasts its being opened an
     }
     CHECK(bench.status.cameras[0].diagnosis.fault == Fault::no_exposure);
     bench.status.cameras[0].camera.state = CameraState::silent;
+    bench.status.cameras[0].camera.since = bench.now;
     CHECK(bench.step(0).fault == Fault::no_exposure);
+    bench.step(0);
+    CHECK(bench.step(0).fault == Fault::camera_silent);
     bench.status.cameras[0].camera.state = CameraState::absent;
     CHECK(bench.step(0).fault == Fault::camera_absent);
 }
