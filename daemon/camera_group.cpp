@@ -5,28 +5,6 @@
 
 namespace versavis::daemon {
 
-namespace {
-
-/// A camera is stalled when no frame came for so long, and three periods on top. At half, a reboot
-/// of the network switch shows as a stall; at twice, a pulled cable shows a second later.
-constexpr Duration stall_patience = seconds(1);
-constexpr int stall_periods = 3;
-
-/// On top of that, time for a start and its proof. At half, a slow start shows as unproved; at
-/// twice, a swapped cable is named five seconds later.
-constexpr Duration proof_patience = seconds(5);
-
-CameraStatus describe(const CameraConfiguration& configuration, bool triggered,
-                      const CameraReport& camera, const PipelineReport& pipeline, HostTime now) {
-    const Duration patience = stall_patience + period_of(configuration) * stall_periods;
-    const bool stalled = triggered && now - pipeline.last_frame > patience;
-    const bool unproved =
-        triggered && !stalled && now - pipeline.last_proof > patience + proof_patience;
-    return {configuration.name, triggered, stalled, unproved, camera, pipeline};
-}
-
-}  // namespace
-
 CameraGroup::CameraGroup(const std::filesystem::path& ring_directory,
                          std::vector<CameraPreset> presets,
                          const std::filesystem::path& state_directory,
@@ -153,11 +131,11 @@ std::vector<std::string> CameraGroup::ring_names() const {
     return names;
 }
 
-std::vector<CameraStatus> CameraGroup::status(HostTime now) const {
+std::vector<CameraStatus> CameraGroup::status() const {
     std::vector<CameraStatus> cameras;
     for (const Unit& unit : units_)
-        cameras.push_back(describe(unit.configuration, unit.pipeline->triggered(),
-                                   unit.camera->report(), unit.pipeline->report(), now));
+        cameras.push_back({unit.configuration.name, unit.configuration, unit.camera->report(),
+                           unit.pipeline->report()});
     return cameras;
 }
 

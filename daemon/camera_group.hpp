@@ -49,7 +49,7 @@ class CameraGroup {
 
     bool any_triggered() const;
     std::vector<std::string> ring_names() const;
-    std::vector<CameraStatus> status(HostTime now) const;
+    std::vector<CameraStatus> status() const;
     std::vector<StreamStatus> streams() const;
 
  private:

@@ -35,7 +35,7 @@ sigset_t block_signals() {
 /// Ticks until a signal asks to stop; returns it.
 int serve(Service& service, const sigset_t& signals) {
     const timespec interval{0, Service::tick_interval.ns};
-    std::string health;
+    Health health = Health::starting;
     for (;;) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
@@ -47,8 +47,8 @@ int serve(Service& service, const sigset_t& signals) {
         sd_notify(0, "WATCHDOG=1");
         if (health == service.health()) continue;
         health = service.health();
-        sd_notifyf(0, "STATUS=%s", health.c_str());
-        log(LogLevel::info, "service", "health: {}", health);
+        sd_notifyf(0, "STATUS=%s", to_string(health));
+        log(LogLevel::info, "service", "health: {}", to_string(health));
     }
 }
 

@@ -6,6 +6,7 @@
 #include "configuration/board_configuration.hpp"
 #include "log.hpp"
 #include "state_directory.hpp"
+#include "stream/diagnosis.hpp"
 #include "versavis/ring/path.hpp"
 
 namespace versavis::daemon {
@@ -172,10 +173,14 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     if (source == EventSource::camera) cameras_->name_source(*entry);
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
-            if (imu->port() == event.source) entry->source_name = imu->report().name;
-        const bool ready = event.kind == wire::EventKind::imu_ready;
-        log(ready ? LogLevel::info : LogLevel::warning, entry->source_name, "{}: step {}, value {}",
-            to_string(entry->kind), event.detail, event.value);
+            if (imu->port() == event.source) {
+                const bool told = imu->tell(event, host_now());
+                const ImuReport report = imu->report();
+                entry->source_name = report.name;
+                if (told)
+                    log(report.working ? LogLevel::info : LogLevel::warning, report.name, "{}",
+                        report.working ? "it answers, and samples" : describe_failure(report));
+            }
     }
     events_->add(*entry);
 }
@@ -209,11 +214,12 @@ Status Service::collect_status(HostTime now) {
     status.clock = translator_.report();
     asymmetry_.keep(status.clock);
     status.grid = alignment_.report(now);
-    status.cameras = cameras_->status(now);
+    status.cameras = cameras_->status();
     status.streams = cameras_->streams();
     for (auto& imu : imus_) {
-        status.imus.push_back(imu->report());
-        status.streams.push_back({status.imus.back().name, "imu", status.imus.back().published});
+        status.imus.push_back({imu->report()});
+        const ImuReport& report = status.imus.back().report;
+        status.streams.push_back({report.name, "imu", report.published});
     }
     status.streams.push_back({"events", "events", events_->items()});
     status.streams.push_back({"clock", "clock", clock_recorder_->items()});

@@ -38,8 +38,8 @@ class Service final : private BoardListener {
     /// Bounded waits and heartbeats; call it every 50 ms or so.
     void tick();
 
-    /// "ok", "starting" or "degraded", as of the last status document.
-    const std::string& health() const { return status_.health(); }
+    /// As of the last status document.
+    Health health() const { return status_.health(); }
 
     static constexpr Duration tick_interval = milliseconds(50);
 

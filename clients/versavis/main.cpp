@@ -30,13 +30,20 @@ int fail(const Error& error) {
     return EX_UNAVAILABLE;
 }
 
-/// 0: all is well; 1: it is running, but something is not delivering; 69: it is not running.
+/// At a start, scripts ask again instead of giving up.
+constexpr int exit_starting = 2;
+
+int exit_code(const std::string& health) {
+    if (health == "ok") return EX_OK;
+    return health == "starting" ? exit_starting : EXIT_FAILURE;
+}
+
 int show_status(const std::string& instance, bool json) {
     const auto status = client::read_status(instance);
     if (!status) return fail(status.error());
     fmt::print("{}", json ? status->dump() + "\n" : client::status_text(*status));
     std::fflush(stdout);
-    return status->value("health", "") == "ok" ? EX_OK : EXIT_FAILURE;
+    return exit_code(status->value("health", ""));
 }
 
 int watch_status(const std::string& instance, bool json) {
@@ -79,7 +86,8 @@ int main(int argc, char** argv) {
     auto* status = app.add_subcommand(
         "status",
         "Show the state of board, clock, cameras and streams. Exits 0 if all is well, "
-        "1 if something is not delivering, 69 if the service is not running");
+        "1 if something is not delivering, 2 while it starts, 69 if the service is not running "
+        "(docs/user/troubleshooting.md)");
     status->add_flag("--watch", watch, "Refresh every second");
     status->add_flag("--json", json,
                      "Print the status document as JSON (docs/contracts/status.md)");

@@ -322,7 +322,7 @@ void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
 }
 
 bool Camera::silent(HostTime began) const {
-    const Duration since = host_now() - std::max(pipeline_.report().last_frame, began);
+    const Duration since = host_now() - std::max(pipeline_.report().last_sign, began);
     if (!pipeline_.triggered()) return since > time_of_free_silence;
     return pipeline_.unanswered_triggers() > triggers_of_silence && since > time_of_silence;
 }

@@ -166,6 +166,9 @@ Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration
     arv_camera_stop_acquisition(camera, nullptr);  // somebody may have left it running
     set_if_available(device, "AcquisitionMode", "Continuous");
     if (auto done = carry_out(device, *actions); !done) return Unexpected(done.error());
+    // One that cannot be told its rate keeps its own, and is held against the configured one.
+    if (configuration.trigger == TriggerSource::free_run)
+        arv_camera_set_frame_rate(camera, configuration.rate_hz, nullptr);
     for (const auto& [name, value] : configuration.features)
         if (auto done = set_feature(device, name, value); !done) return Unexpected(done.error());
 

@@ -56,6 +56,11 @@ void CameraPipeline::begin_anew() {
     middles_.clear();  // of numbers that may come again
 }
 
+void CameraPipeline::count_refusal(EventReason reason) {
+    const auto number = static_cast<std::size_t>(reason);
+    if (number < report_.refused.size()) ++report_.refused[number];
+}
+
 Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
                                    std::uint64_t payload_size, bool has_clock,
                                    pairing::Instant stamp_instant) {
@@ -100,6 +105,8 @@ void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64
     frames_.abandon(slot);
     if (reason == EventReason::none) return;
     ++report_.incomplete;
+    count_refusal(reason);
+    report_.last_sign = host_now();
     triggers_.answered();
     if (triggered()) tell(pairing::Shortfall{block_id, reason});
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
@@ -108,7 +115,10 @@ void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64
 void CameraPipeline::add(const pairing::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     ++report_.received;
-    report_.last_frame = arrival.arrived;
+    report_.last_frame = report_.last_sign = arrival.arrived;
+    if (arrival.camera_time.ns != 0 && arrival.camera_time == last_camera_time_)
+        ++report_.clock_frozen;
+    last_camera_time_ = arrival.camera_time;
     triggers_.answered();
     if (triggered()) return tell(arrival);
     ++report_.published;
@@ -126,6 +136,8 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
     edges_.recorded(record);
+    const bool started = record.start_ns != wire::no_time;
+    report_.start_delay = {started ? record.start_ns - record.trigger_ns : 0};
     pairing::Exposure exposure = completion_.complete(record);
     const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
     // A number that pairing holds already is a repeat: the record that came first counts.
@@ -134,6 +146,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
         return std::nullopt;
     }
     ExposureCompletion::place_on_host(exposure, record, stamp->host);
+    report_.record_delay = host_now() - exposure.end_on_host;
     tell(exposure);
     return stamp;
 }
@@ -211,6 +224,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
                                     const pairing::Exposure* guess) {
     ++report_.frames_without_trigger;
+    count_refusal(reason);
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(arrival.block_id));
     if (configuration_.on_unproved == OnUnproved::withhold || reason == EventReason::out_of_order)
         return frames_.abandon(arrival.slot);
@@ -310,6 +324,7 @@ void CameraPipeline::starved(std::uint64_t frames) {
 void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     const std::lock_guard lock(mutex_);
     check_.set_camera_exposure(exposure, since);
+    report_.told_exposure = exposure;
 }
 
 void CameraPipeline::set_line_delays(const LineDelays& lines) {

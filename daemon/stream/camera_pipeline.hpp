@@ -2,6 +2,7 @@
 // From arrivals and exposures of one camera to stamped frames: pairing, told by both sides.
 #pragma once
 
+#include <array>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -23,6 +24,9 @@
 
 namespace versavis::daemon {
 
+/// Reasons are counted by their number; those from here on are not.
+constexpr std::size_t counted_reasons = 32;
+
 struct PipelineReport {
     pairing::State pairing = pairing::State::searching;
     std::uint64_t received = 0;    ///< complete frames
@@ -40,6 +44,12 @@ struct PipelineReport {
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
+    std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
+    std::uint64_t clock_frozen = 0;  ///< frames with the camera time of the one before
+    Duration record_delay;           ///< end of the newest exposure to the arrival of its record
+    Duration start_delay;            ///< trigger to the start that its record has; 0: it has none
+    Duration told_exposure;          ///< as the camera was told, or tells; 0: it varies
+    HostTime last_sign;              ///< a frame arrived, whole or not
     HostTime last_frame;
     HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
     Duration exposure;                   ///< measured, of the newest frame; 0: unknown
@@ -127,6 +137,7 @@ class CameraPipeline final : private pairing::Outcome {
     void adopt_step(const wire::Exposure& record, const Doubt& doubt);
     void follow_clock(std::uint32_t life);
     std::optional<pairing::Start> advance_locked(HostTime now);
+    void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
     void journal(EventKind kind, EventReason reason, std::int64_t value,
@@ -152,6 +163,7 @@ class CameraPipeline final : private pairing::Outcome {
     /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
     std::uint64_t last_used_ = 0;  ///< trigger
+    CameraTime last_camera_time_;
     PipelineReport report_;
     std::vector<Line> unsaid_;  ///< advance() logs it: nothing is written under the lock
 };

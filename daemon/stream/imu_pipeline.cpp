@@ -20,6 +20,13 @@ PulseHistory history(const ImuConfiguration& configuration) {
     const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
     return {period, period / rate_parts, wander_parts};
 }
+/// The board tries a failed part once a second: so many equal failures make one more line. At half,
+/// a log has 12 lines an hour of it; at twice, 3.
+constexpr std::uint64_t failures_per_line = 600;
+
+/// A failure that did not come for so long is a new one. At half, a part that fails twice a minute
+/// fills the log; at twice, one that fails every two minutes does not show there.
+constexpr Duration forgotten_after = seconds(60);
 
 }  // namespace
 
@@ -35,6 +42,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
     report_.name = configuration.name;
     report_.model = model_.name;
     report_.filter = filter_;
+    report_.rate_hz = configuration.rate_hz;
 }
 
 void ImuPipeline::board_restarted() {
@@ -45,6 +53,17 @@ void ImuPipeline::board_restarted() {
 void ImuPipeline::begin_anew() {
     last_number_.reset();
     witness_.forget();
+}
+
+bool ImuPipeline::tell(const wire::Event& event, HostTime now) {
+    const std::lock_guard lock(mutex_);
+    ImuFailure& last = report_.failure;
+    report_.working = event.kind == wire::EventKind::imu_ready;
+    if (report_.working) return last.times <= 1;
+    const bool again = last.kind == event.kind && last.step == event.detail &&
+                       last.answer == event.value && now - last.last < forgotten_after;
+    last = {event.kind, event.detail, event.value, again ? last.times + 1 : 1, now};
+    return last.times % failures_per_line == 1;
 }
 
 bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {

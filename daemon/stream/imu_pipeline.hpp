@@ -15,6 +15,18 @@
 
 namespace versavis::daemon {
 
+/// The last failure of a part that the board told of.
+struct ImuFailure {
+    wire::EventKind kind = wire::EventKind::imu_failed;
+    std::uint16_t step = 0;  ///< of its set-up, or imu_step_running
+    std::int64_t answer = 0;
+    std::uint64_t times = 0;  ///< in a row; 0: none
+    HostTime last;
+};
+
+/// The step of a failure after the set-up.
+constexpr std::uint16_t imu_step_running = 0xFFFF;
+
 struct ImuReport {
     std::string name;
     std::string model;
@@ -25,6 +37,9 @@ struct ImuReport {
     std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
     imu::FilterDelay filter;
+    double rate_hz = 0;          ///< configured
+    ImuFailure failure;
+    bool working = false;  ///< it was set up, and has not failed since
 };
 
 /// Thread-safe.
@@ -36,6 +51,9 @@ class ImuPipeline {
     /// False: the sample is doubted, and nothing may be made of its time.
     bool add(const wire::ImuSample& sample, HostTime received);
     void board_restarted();
+
+    /// The part was set up, or failed. True: that is new, or is due to be told once more.
+    bool tell(const wire::Event& event, HostTime now);
     void heartbeat(HostTime now);
     ImuReport report();
     /// IMU port of the board.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace versavis::daemon {
@@ -14,47 +15,13 @@ using nlohmann::json;
 
 constexpr int schema = 1;
 
-/// After the start, what does not deliver yet is called starting. At half, slow cameras show as
-/// degraded at first; at twice, a broken rig is called so five seconds later.
-constexpr Duration grace = seconds(5);
-
-/// Without a good sample for so long an IMU does not deliver. At half, a part that sets itself up
-/// again shows as lost; at twice, a pulled cable shows three seconds later.
-constexpr Duration imu_patience = seconds(3);
-
-bool delivers(const CameraStatus& camera) {
-    if (camera.camera.state != CameraState::streaming) return false;
-    if (camera.stalled) return false;
-    return !camera.triggered ||
-           (camera.pipeline.pairing == pairing::State::locked && camera.pipeline.measured &&
-            !camera.pipeline.exposure_contradicted);
-}
-
-std::string hint(const CameraStatus& status) {
-    if (!status.camera.hint.empty() || status.camera.state != CameraState::streaming ||
-        !status.triggered)
-        return status.camera.hint;
-    const std::string line = line_hint(status.pipeline.edges);
-    if (!line.empty()) return line;
-    if (status.pipeline.triggers == 0) return "no trigger yet: is the board running?";
-    if (!status.pipeline.measured)
-        return "exposures are not being measured: check the exposure line, 'strobe', 'latency_us' "
-               "and "
-               "'max_exposure_us'";
-    if (status.pipeline.exposure_contradicted)
-        return fmt::format(
-            "the exposure line shows {} us, but the camera exposes {} us: check 'strobe_line' and "
-            "its "
-            "LineSource, or "
-            "set check_exposure = false",
-            status.pipeline.exposure.ns / 1000, status.pipeline.camera_exposure.ns / 1000);
-    if (status.unproved)
-        return "the frames do not follow this output's triggers: check that the trigger cable is "
-               "on "
-               "it, and "
-               "TriggerSource";
-    return status.stalled ? "triggers are sent but no frames come: check trigger cable and network"
-                          : "";
+/// The keys that every device has; they replace those of the same name.
+json with_diagnosis(json device, const Diagnosis& diagnosis) {
+    device.update({{"health", to_string(diagnosis.health)},
+                   {"fault", to_string(diagnosis.fault)},
+                   {"since_ns", diagnosis.since.ns},
+                   {"hint", diagnosis.hint}});
+    return device;
 }
 
 const char* to_string(wire::ResetCause cause) {
@@ -79,12 +46,16 @@ const char* to_string(wire::PpsState state) {
 
 /// What is not known is null: a zero would be a claim.
 json known(bool is_known, Duration value) { return is_known ? json(value.ns) : json(nullptr); }
+/// Of an IMU, which the board drives.
+const char* state(const ImuStatus& imu, const Status& status) {
+    if (status.board.state != BoardState::running) return "absent";
+    if (imu.delivery.full || imu.report.working) return "running";
+    return imu.report.failure.times > 0 ? "failed" : "opening";
+}
 
 json board_json(const BoardReport& board, bool needed) {
     const wire::Health& health = board.health;
     return {{"state", needed ? to_string(board.state) : "unused"},
-            {"since_ns", board.since.ns},
-            {"hint", board.hint},
             {"port", board.port},
             {"serial", board.serial},
             {"firmware", board.firmware},
@@ -156,11 +127,13 @@ json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
 }
 
 json camera_json(const CameraStatus& status) {
-    const auto& [name, triggered, stalled, unproved, camera, pipeline] = status;
-    return {{"name", name},
+    const CameraReport& camera = status.camera;
+    const PipelineReport& pipeline = status.pipeline;
+    const bool triggered = status.triggered();
+    return {{"name", status.name},
             {"state", to_string(camera.state)},
-            {"since_ns", camera.since.ns},
-            {"hint", hint(status)},
+            {"configured_hz", status.configuration.rate_hz},
+            {"delivered_hz", status.delivery.rate_hz},
             {"trigger", triggered ? "board" : "free"},
             {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
             {"stamp_instant", pairing::to_string(pipeline.stamp_instant)},
@@ -201,47 +174,50 @@ json camera_json(const CameraStatus& status) {
 
 }  // namespace
 
-std::string health(const Status& status) {
-    bool ok = !status.board_needed || (status.board.state == BoardState::running &&
-                                       status.clock.state == clock::ClockState::locked);
-    for (const CameraStatus& camera : status.cameras) ok = ok && delivers(camera);
-    for (const ImuReport& imu : status.imus) ok = ok && status.now - imu.last_sample < imu_patience;
-    if (ok) return "ok";
-    return status.now - status.started < grace ? "starting" : "degraded";
+Health health(const Status& status) {
+    Health worst = std::max(status.board_diagnosis.health, status.clock_diagnosis.health);
+    for (const CameraStatus& camera : status.cameras)
+        worst = std::max(worst, camera.diagnosis.health);
+    for (const ImuStatus& imu : status.imus) worst = std::max(worst, imu.diagnosis.health);
+    return worst;
 }
 
 std::string to_json(const Status& status) {
     json cameras = json::array();
-    for (const CameraStatus& camera : status.cameras) cameras.push_back(camera_json(camera));
+    for (const CameraStatus& camera : status.cameras)
+        cameras.push_back(with_diagnosis(camera_json(camera), camera.diagnosis));
     json imus = json::array();
-    for (const ImuReport& imu : status.imus)
-        imus.push_back({{"name", imu.name},
-                        {"model", imu.model},
-                        {"published", imu.published},
-                        {"lost", imu.lost},
-                        {"no_clock", imu.no_clock},
-                        {"faulty", imu.faulty},
-                        {"filter_delay_ns", imu.filter.delay.ns},
-                        {"filter_delay_sigma_ns", imu.filter.sigma.ns},
-                        {"filter_delay_source", imu::to_string(imu.filter.source)},
-                        {"last_sample_ns", imu.last_sample.ns}});
+    for (const ImuStatus& imu : status.imus)
+        imus.push_back(with_diagnosis({{"name", imu.report.name},
+                                       {"model", imu.report.model},
+                                       {"state", state(imu, status)},
+                                       {"configured_hz", imu.report.rate_hz},
+                                       {"delivered_hz", imu.delivery.rate_hz},
+                                       {"published", imu.report.published},
+                                       {"lost", imu.report.lost},
+                                       {"no_clock", imu.report.no_clock},
+                                       {"faulty", imu.report.faulty},
+                                       {"last_sample_ns", imu.report.last_sample.ns}},
+                                      imu.diagnosis));
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
         streams.push_back({{"name", stream.name},
                            {"kind", stream.kind},
                            {"items", stream.items},
                            {"rate_hz", stream.rate_hz}});
-    const json document{{"schema", schema},
-                        {"instance", status.instance},
-                        {"pid", ::getpid()},
-                        {"started_ns", status.started.ns},
-                        {"host_time_ns", status.now.ns},
-                        {"health", health(status)},
-                        {"board", board_json(status.board, status.board_needed)},
-                        {"clock", clock_json(status.clock, status.grid)},
-                        {"cameras", cameras},
-                        {"imus", imus},
-                        {"streams", streams}};
+    const json document{
+        {"schema", schema},
+        {"instance", status.instance},
+        {"pid", ::getpid()},
+        {"started_ns", status.started.ns},
+        {"host_time_ns", status.now.ns},
+        {"health", to_string(health(status))},
+        {"board",
+         with_diagnosis(board_json(status.board, status.board_needed), status.board_diagnosis)},
+        {"clock", with_diagnosis(clock_json(status.clock, status.grid), status.clock_diagnosis)},
+        {"cameras", cameras},
+        {"imus", imus},
+        {"streams", streams}};
     // Names from devices may hold anything; what is no UTF-8 is replaced.
     return document.dump(-1, ' ', false, json::error_handler_t::replace);
 }

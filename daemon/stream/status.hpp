@@ -10,17 +10,29 @@
 #include "camera/camera.hpp"
 #include "engine/clock/translator.hpp"
 #include "stream/camera_pipeline.hpp"
+#include "stream/delivery.hpp"
+#include "stream/diagnosis.hpp"
 #include "stream/imu_pipeline.hpp"
 
 namespace versavis::daemon {
 
 struct CameraStatus {
     std::string name;
-    bool triggered = true;
-    bool stalled = false;   ///< no frame for longer than its rate explains
-    bool unproved = false;  ///< frames come, but for long none could be proved
+    CameraConfiguration configuration;
     CameraReport camera;
     PipelineReport pipeline;
+    PipelineReport recent{};  ///< its counters, of the last moments only
+    DeliveryReport delivery{};
+    Diagnosis diagnosis{};
+
+    bool triggered() const { return configuration.trigger == TriggerSource::board; }
+};
+
+struct ImuStatus {
+    ImuReport report;
+    ImuReport recent{};  ///< its counters, of the last moments only
+    DeliveryReport delivery{};
+    Diagnosis diagnosis{};
 };
 
 struct StreamStatus {
@@ -36,15 +48,17 @@ struct Status {
     HostTime now;
     bool board_needed = true;
     BoardReport board;
+    Diagnosis board_diagnosis;
     clock::ClockReport clock;
+    Diagnosis clock_diagnosis;
     GridReport grid;
     std::vector<CameraStatus> cameras;
-    std::vector<ImuReport> imus;
+    std::vector<ImuStatus> imus;
     std::vector<StreamStatus> streams;
 };
 
-/// "ok", "starting" or "degraded": whether all that is configured delivers proved data.
-std::string health(const Status& status);
+/// That of the device that is worst off.
+Health health(const Status& status);
 
 std::string to_json(const Status& status);
 

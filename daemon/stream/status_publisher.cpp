@@ -34,6 +34,7 @@ void StatusPublisher::publish(Status status, clock::Translator& translator) {
     next_ = status.now + interval;
     status.streams.push_back({"status", "status", ring_.head()});
     for (StreamStatus& stream : status.streams) stream.rate_hz = rate_hz(stream, status.now);
+    watch_.examine(status);
     health_ = daemon::health(status);
     const std::string document = to_json(status);
     const auto slot = ring_.acquire();

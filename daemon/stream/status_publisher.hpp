@@ -9,6 +9,7 @@
 
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
+#include "stream/health_watch.hpp"
 #include "stream/status.hpp"
 
 namespace versavis::daemon {
@@ -21,12 +22,13 @@ class StatusPublisher {
 
     bool due(HostTime now) const { return now >= next_; }
 
-    /// Adds the status stream itself and the rates of all streams, and publishes.
+    /// Adds the status stream itself, the rates of all streams and the health of all devices, and
+    /// publishes.
     void publish(Status status, clock::Translator& translator);
     void heartbeat(HostTime now) { ring_.heartbeat(now); }
 
-    /// "ok", "starting" or "degraded", as of the last document.
-    const std::string& health() const { return health_; }
+    /// As of the last document.
+    Health health() const { return health_; }
 
  private:
     explicit StatusPublisher(ring::Writer ring) : ring_(std::move(ring)) {}
@@ -36,7 +38,8 @@ class StatusPublisher {
     ring::Writer ring_;
     HostTime next_;
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
-    std::string health_ = "starting";
+    HealthWatch watch_;
+    Health health_ = Health::starting;
 };
 
 }  // namespace versavis::daemon

@@ -101,6 +101,11 @@ std::uint64_t Reader::head() const {
 }
 std::uint32_t Reader::writer_pid() const { return segment_->mapping.header().writer_pid; }
 
+bool Reader::writer_found() const {
+    const Header& header = segment_->mapping.header();
+    return start_ticks_of(header.writer_pid) == header.writer_start_ticks;
+}
+
 std::uint64_t Reader::retained() const {
     const Header& header = segment_->mapping.header();
     return header.slot_count == 0 ? header.descriptor_count

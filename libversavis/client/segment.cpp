@@ -72,14 +72,19 @@ Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access
     return mapping;
 }
 
-std::uint64_t start_ticks_of_this_process() {
-    std::ifstream stat("/proc/self/stat");
+std::uint64_t start_ticks_of(std::uint32_t pid) {
+    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
     std::string line;
     std::getline(stat, line);
     std::size_t at = line.rfind(')');  // the command may contain spaces
+    if (at != std::string::npos && (line[at + 2] == 'Z' || line[at + 2] == 'X')) return 0;
     for (int field = 3; field <= 22 && at != std::string::npos; ++field)
         at = line.find(' ', at + 1);
     return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
+}
+
+std::uint64_t start_ticks_of_this_process() {
+    return start_ticks_of(static_cast<std::uint32_t>(::getpid()));
 }
 
 bool is_own(const Header& header) {

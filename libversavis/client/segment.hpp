@@ -42,7 +42,9 @@ class Mapping {
     boost::interprocess::mapped_region region_;
 };
 
-/// Field 22 of /proc/self/stat. With the process id it identifies this process until reboot.
+/// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process
+/// id it identifies a process until reboot.
+std::uint64_t start_ticks_of(std::uint32_t pid);
 std::uint64_t start_ticks_of_this_process();
 
 /// True when this process made the segment.

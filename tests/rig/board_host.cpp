@@ -35,6 +35,7 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
     return felt;
 }
 
+constexpr Duration lateness = milliseconds(600);
 constexpr Duration marked_ahead = milliseconds(500);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
@@ -133,6 +134,11 @@ void BoardHost::restart() {
 void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
                              std::span<std::uint8_t> received) {
     const HostTime instant = clock_->host(at);
+    if (suffers(FaultKind::imu_missing)) {
+        std::fill(received.begin(), received.end(), std::uint8_t{0xFF});
+        return;
+    }
+    if (suffers(FaultKind::imu_noisy)) imu_.corrupt(1);
     imu_.transfer(instant.ns, transfer, received);
     const bool sample = transfer.word_gap_ns == 0;  // register accesses have gaps
     if (sample)
@@ -164,8 +170,10 @@ void BoardHost::run() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
         if (utc_) hear_gnss();
+        board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
         board_->run_until(board_now());
-        exchange_bytes();
+        plug(!suffers(FaultKind::board_gone));
+        if (!suffers(FaultKind::board_mute)) exchange_bytes();
         const HostTime wake =
             clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
         wait(std::min(wake, host_now() + longest_wait));
@@ -204,6 +212,38 @@ void BoardHost::accept_host() {
 void BoardHost::drop_host() {
     if (host_ >= 0) ::close(host_);
     host_ = -1;
+    late_.clear();
+}
+
+void BoardHost::suffer(const Fault& fault) {
+    if (fault.kind == FaultKind::board_reset) return reset();
+    const HostTime until = host_now() + Duration{std::llround(fault.seconds * 1e9)};
+    suffers_until_ns_[static_cast<std::size_t>(fault.kind)] = until.ns;
+}
+
+bool BoardHost::suffers(FaultKind kind) const {
+    return host_now().ns < suffers_until_ns_[static_cast<std::size_t>(kind)];
+}
+
+/// Without its name nobody finds the socket.
+void BoardHost::plug(bool in) {
+    if (in == plugged_) return;
+    plugged_ = in;
+    const std::string unplugged = socket_path_ + ".unplugged";
+    std::rename((in ? unplugged : socket_path_).c_str(), (in ? socket_path_ : unplugged).c_str());
+    if (!in) drop_host();
+}
+
+/// What the board wrote leaves when it is due, in its order.
+void BoardHost::write_late(HostTime now) {
+    const auto out = board_->transmitted();
+    if (!out.empty()) {
+        const HostTime due = suffers(FaultKind::late_records) ? now + lateness : now;
+        late_.emplace_back(due, std::vector(out.begin(), out.end()));
+        board_->consume(out.size(), board_now());
+    }
+    for (; !late_.empty() && late_.front().first <= now; late_.pop_front())
+        ::send(host_, late_.front().second.data(), late_.front().second.size(), MSG_NOSIGNAL);
 }
 
 void BoardHost::exchange_bytes() {
@@ -221,6 +261,7 @@ void BoardHost::exchange_bytes() {
         board_->run_until(at);
     }
     if (size == 0 || errno != EAGAIN) return drop_host();
+    if (suffers(FaultKind::late_records) || !late_.empty()) return write_late(host_now());
     const auto out = board_->transmitted();
     // Stamped before writing: the host may receive the bytes before this process continues.
     const firmware::Nanoseconds leaving = board_now();

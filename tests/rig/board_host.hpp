@@ -2,11 +2,14 @@
 // Runs the firmware in real time behind a unix socket, wired to the emulated cameras and the IMU.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "adis_device.hpp"
@@ -31,8 +34,8 @@ class BoardHost {
     BoardHost(const BoardHost&) = delete;
     BoardHost& operator=(const BoardHost&) = delete;
 
-    /// The board restarts as soon as it can. Callable from any thread.
-    void reset() { reset_pending_ = true; }
+    /// From now on, for as long as the fault says. Callable from any thread.
+    void suffer(const Fault& fault);
 
  private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
@@ -47,6 +50,10 @@ class BoardHost {
     void hear_gnss();
     void accept_host();
     void drop_host();
+    void reset() { reset_pending_ = true; }
+    bool suffers(FaultKind kind) const;
+    void plug(bool in);
+    void write_late(HostTime now);
     void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
     void imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
                       std::span<std::uint8_t> received);
@@ -71,6 +78,9 @@ class BoardHost {
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
     std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
+    std::deque<std::pair<HostTime, std::vector<std::uint8_t>>> late_;  ///< on its way to the host
+    bool plugged_ = true;
+    std::array<std::atomic<std::int64_t>, fault_kinds> suffers_until_ns_{};
     std::atomic<bool> reset_pending_{false};
     std::atomic<bool> stop_{false};
     std::thread thread_;

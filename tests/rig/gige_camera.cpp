@@ -334,10 +334,11 @@ void GigeCamera::free_run(HostTime now) {
     expose(next, nullptr);
 }
 
-void GigeCamera::reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset) {
+void GigeCamera::afflict_board(std::vector<Fault> faults,
+                               std::function<void(const Fault&)> afflict) {
     const std::lock_guard lock(mutex_);
-    board_resets_ = std::move(exposures);
-    reset_board_ = std::move(reset);
+    board_faults_ = std::move(faults);
+    afflict_board_ = std::move(afflict);
 }
 
 std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
@@ -350,7 +351,8 @@ std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
     if (listens && !muted()) interval = expose(pulse.at, &pulse);
     truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
                            interval.has_value()});
-    return interval;
+    const std::lock_guard lock(mutex_);
+    return active_fault(FaultKind::cut_strobe) != nullptr ? std::nullopt : interval;
 }
 
 Duration GigeCamera::exposure_at(HostTime at) const {
@@ -431,9 +433,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         const std::lock_guard lock(mutex_);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
-        if (std::find(board_resets_.begin(), board_resets_.end(), exposures_) !=
-            board_resets_.end())
-            reset_board_();
+        for (const Fault& fault : board_faults_)
+            if (fault.at_exposure == exposures_) afflict_board_(fault);
         if (active_fault(FaultKind::ignore_trigger) != nullptr) {
             if (settings_.ids_count_ignored) next_block_id();
             return std::nullopt;
@@ -447,12 +448,15 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
             registers_.resize(settings_.width, settings_.height / 2);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
         truth.end = truth.start + exposure_at(trigger);
-        busy_until_ = truth.end;
+        busy_until_ = std::max(
+            truth.end, trigger + Duration{std::llround(settings_.shortest_period_us * 1e3)});
         frame.block_id = block_id_;
         frame.serial = exposures_;
         if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;
         frame.missing = missing_part();
         frame.after_next = active_fault(FaultKind::swap_frames) != nullptr;
+        if (const Fault* loss = active_fault(FaultKind::lose_packets)) frame.loss = loss->share;
+        if (active_fault(FaultKind::block_large) != nullptr) frame.largest_packet = 1500;
     }
     truth.camera = settings_.name;
     truth.board_life = pulse != nullptr ? pulse->board_life : 0;

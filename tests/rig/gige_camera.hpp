@@ -34,8 +34,8 @@ class GigeCamera final : public TriggeredCamera {
 
     std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) override;
 
-    /// Calls `reset` at each of these exposures, counted since the rig's start.
-    void reset_board_at(std::vector<std::uint64_t> exposures, std::function<void()> reset);
+    /// Calls `afflict` at the exposure of each of these faults, counted since the rig's start.
+    void afflict_board(std::vector<Fault> faults, std::function<void(const Fault&)> afflict);
 
     const CameraScenario& settings() const override { return settings_; }
 
@@ -79,7 +79,7 @@ class GigeCamera final : public TriggeredCamera {
     Wall wall_;
     GvspTransmitter transmitter_;
 
-    std::mutex mutex_;  ///< guards what follows, down to reset_board_
+    std::mutex mutex_;  ///< guards what follows, down to busy_until_
     bool acquiring_ = false;
     std::uint64_t block_id_ = 0;
     std::int64_t clock_step_ns_ = 0;
@@ -87,8 +87,8 @@ class GigeCamera final : public TriggeredCamera {
     std::uint64_t exposures_ = 0;
     HostTime busy_until_;
     HostTime free_run_next_;
-    std::vector<std::uint64_t> board_resets_;
-    std::function<void()> reset_board_;
+    std::vector<Fault> board_faults_;
+    std::function<void(const Fault&)> afflict_board_;
 
     sockaddr_in controller_{};  ///< used by the server thread only
     HostTime last_contact_;

@@ -91,6 +91,14 @@ std::uint32_t data_packets(const StreamFrame& frame, const StreamSettings& setti
     return static_cast<std::uint32_t>((data_bytes(frame) + size - 1) / size);
 }
 
+/// A packet that is lost is also lost when it is asked for again: only frame and number decide.
+bool lost(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t id) {
+    const bool full = id != 0 && id < data_packets(frame, settings);
+    if (frame.largest_packet != 0 && full) return settings.packet_size > frame.largest_packet;
+    const std::uint64_t mixed = (frame.block_id * 0x9E3779B97F4A7C15ULL + id) * 0xBF58476D1CE4E5B9;
+    return static_cast<double>(mixed >> 40U) < frame.loss * static_cast<double>(1U << 24U);
+}
+
 std::chrono::nanoseconds until(HostTime time) {
     return std::chrono::nanoseconds((time - host_now()).ns);
 }
@@ -249,6 +257,7 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
         if (lossy && packet_loss_ > 0 &&
             std::uniform_real_distribution<>(0, 1)(random_) < packet_loss_)
             continue;
+        if (lost(frame, settings, id)) continue;
         const PacketFormat format = id == 0 ? leader : id == trailer_id ? trailer : payload;
         headers[count] = packet_header(frame, format, id);
         special[count] = special_body(frame, settings, id);

@@ -35,6 +35,8 @@ struct StreamFrame {
     std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter, or be owned
     std::shared_ptr<const std::vector<std::uint8_t>> owned_pixels;
     std::vector<std::uint8_t> chunks;  ///< what follows the pixels; empty: no chunk data
+    double loss = 0;                   ///< share of its packets that never leaves
+    std::uint32_t largest_packet = 0;  ///< larger ones get lost; 0: none
     HostTime leader_due;               ///< when the leader leaves
     HostTime due;                      ///< when the first packet after it leaves
     std::function<void(bool sent)> done;

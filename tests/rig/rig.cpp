@@ -5,12 +5,11 @@ namespace versavis::rig {
 
 namespace {
 
-std::vector<std::uint64_t> board_resets(const Scenario& scenario, const std::string& camera) {
-    std::vector<std::uint64_t> exposures;
+std::vector<Fault> board_faults(const Scenario& scenario, const std::string& camera) {
+    std::vector<Fault> faults;
     for (const Fault& fault : scenario.faults)
-        if (fault.kind == FaultKind::board_reset && fault.camera == camera)
-            exposures.push_back(fault.at_exposure);
-    return exposures;
+        if (of_board(fault.kind) && fault.camera == camera) faults.push_back(fault);
+    return faults;
 }
 
 }  // namespace
@@ -34,8 +33,9 @@ Expected<std::unique_ptr<Rig>> Rig::start(const Scenario& scenario, const std::s
     if (!board) return Unexpected(board.error());
     rig->board_ = std::move(*board);
     for (GigeCamera* camera : wired)
-        camera->reset_board_at(board_resets(scenario, camera->settings().name),
-                               [host = rig->board_.get()] { host->reset(); });
+        camera->afflict_board(
+            board_faults(scenario, camera->settings().name),
+            [host = rig->board_.get()](const Fault& fault) { host->suffer(fault); });
     return rig;
 }
 

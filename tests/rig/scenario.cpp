@@ -41,6 +41,7 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("extended_ids", camera.extended_ids);
     reader.read("ids_count_ignored", camera.ids_count_ignored);
     reader.read("early_leader", camera.early_leader);
+    reader.read("shortest_period_us", camera.shortest_period_us, 0, 1e7);
     reader.read("light", camera.light, 0, 1000);
     reader.read("temperature_c", camera.temperature_c, -40, 150);
     reader.choose<Hostility>("hostile", camera.hostility,
@@ -68,25 +69,25 @@ CameraScenario read_camera(TableReader& reader) {
 
 Fault read_fault(TableReader& reader) {
     Fault fault;
-    reader.choose<FaultKind>("kind", fault.kind,
-                             {{"drop_frame", FaultKind::drop_frame},
-                              {"drop_leader", FaultKind::drop_leader},
-                              {"drop_last", FaultKind::drop_last},
-                              {"half_frame", FaultKind::half_frame},
-                              {"swap_frames", FaultKind::swap_frames},
-                              {"repeat_id", FaultKind::repeat_id},
-                              {"restart_ids", FaultKind::restart_ids},
-                              {"jump_clock", FaultKind::jump_clock},
-                              {"change_size", FaultKind::change_size},
-                              {"stop_clock", FaultKind::stop_clock},
-                              {"ignore_trigger", FaultKind::ignore_trigger},
-                              {"camera_mute", FaultKind::camera_mute},
-                              {"camera_reboot", FaultKind::camera_reboot},
-                              {"board_reset", FaultKind::board_reset}});
+    reader.choose<FaultKind>(
+        "kind", fault.kind,
+        {{"drop_frame", FaultKind::drop_frame},         {"drop_leader", FaultKind::drop_leader},
+         {"drop_last", FaultKind::drop_last},           {"half_frame", FaultKind::half_frame},
+         {"swap_frames", FaultKind::swap_frames},       {"repeat_id", FaultKind::repeat_id},
+         {"restart_ids", FaultKind::restart_ids},       {"jump_clock", FaultKind::jump_clock},
+         {"change_size", FaultKind::change_size},       {"stop_clock", FaultKind::stop_clock},
+         {"ignore_trigger", FaultKind::ignore_trigger}, {"camera_mute", FaultKind::camera_mute},
+         {"camera_reboot", FaultKind::camera_reboot},   {"lose_packets", FaultKind::lose_packets},
+         {"block_large", FaultKind::block_large},       {"cut_strobe", FaultKind::cut_strobe},
+         {"board_reset", FaultKind::board_reset},       {"board_gone", FaultKind::board_gone},
+         {"board_mute", FaultKind::board_mute},         {"late_records", FaultKind::late_records},
+         {"imu_missing", FaultKind::imu_missing},       {"imu_noisy", FaultKind::imu_noisy},
+         {"imu_stuck", FaultKind::imu_stuck}});
     reader.read("camera", fault.camera);
     reader.read("at_exposure", fault.at_exposure, 1, INT64_MAX);
     reader.read("count", fault.count, 1, INT64_MAX);
     reader.read("seconds", fault.seconds, -1e6, 1e6);
+    reader.read("share", fault.share, 0, 1);
     return fault;
 }
 

@@ -43,6 +43,7 @@ struct CameraScenario {
     bool extended_ids = false;       ///< block ids of 64 bits
     bool ids_count_ignored = false;  ///< an ignored trigger also takes a block id
     bool early_leader = false;       ///< a frame's leader is sent when its exposure begins
+    double shortest_period_us = 0;   ///< triggers that come sooner are ignored
     double light =
         0;  ///< brightness of the image per millisecond of exposure; 0: independent of it
     double temperature_c = 45;
@@ -65,9 +66,20 @@ enum class FaultKind {
     ignore_trigger,  ///< the camera does not expose
     camera_mute,     ///< no answer and no packet for `seconds`
     camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
-    board_reset,     ///< the board restarts with another nonce; `camera` names whose exposures
-                     ///< count
+    lose_packets,    ///< a `share` of the packets never leaves, not even when asked for again
+    block_large,     ///< no packet above 1500 bytes gets through
+    cut_strobe,      ///< the exposure line shows nothing
+    // Of the board, for `seconds`; `camera` names whose exposures count.
+    board_reset,   ///< the board restarts with another nonce
+    board_gone,    ///< it is unplugged
+    board_mute,    ///< it neither reads nor writes
+    late_records,  ///< what it writes arrives 600 ms late
+    imu_missing,   ///< nobody drives the line of the IMU's answers, which reads as ones
+    imu_noisy,     ///< bits of the IMU's bursts are wrong
+    imu_stuck,     ///< no transfer of the IMU ends
 };
+constexpr std::size_t fault_kinds = static_cast<std::size_t>(FaultKind::imu_stuck) + 1;
+constexpr bool of_board(FaultKind kind) { return kind >= FaultKind::board_reset; }
 
 struct Fault {
     FaultKind kind = FaultKind::drop_frame;
@@ -76,6 +88,7 @@ struct Fault {
         0;  ///< happens with this exposure of the camera, counted since the rig's start
     std::uint64_t count = 1;  ///< this many exposures in a row
     double seconds = 1;       ///< negative for a clock that steps back
+    double share = 0.5;
 };
 
 struct Scenario {

@@ -22,11 +22,9 @@ Status healthy() {
     CameraStatus camera;
     camera.name = "cam0";
     camera.camera.state = CameraState::streaming;
-    camera.pipeline.pairing = pairing::State::locked;
     status.cameras.push_back(camera);
-    ImuReport imu;
-    imu.name = "imu0";
-    imu.last_sample = status.now;
+    ImuStatus imu;
+    imu.report.name = "imu0";
     status.imus.push_back(imu);
     status.streams.push_back({"cam0", "frames", 7, 20.0});
     return status;
@@ -45,30 +43,34 @@ void collect(const nlohmann::json& value, std::string prefix, std::vector<std::s
 
 }  // namespace
 
-TEST_CASE("status: healthy only if all that is configured delivers") {
-    CHECK(health(healthy()) == "ok");
+TEST_CASE("status: as healthy as the device that is worst off") {
+    CHECK(health(healthy()) == Health::ok);
     Status status = healthy();
-    status.cameras[0].pipeline.pairing = pairing::State::searching;
-    CHECK(health(status) == "degraded");
-    status.now = HostTime{1'000'000'000};
-    CHECK(health(status) == "starting");
-    status = healthy();
-    status.cameras[0].triggered = false;
-    status.cameras[0].pipeline.pairing = pairing::State::searching;
-    CHECK(health(status) == "ok");
-    status.board.state = BoardState::absent;
-    CHECK(health(status) == "degraded");
-    status.board_needed = false;
-    CHECK(health(status) == "ok");
-    status = healthy();
-    status.imus[0].last_sample = HostTime{50'000'000'000};
-    CHECK(health(status) == "degraded");
-    status = healthy();
-    status.cameras[0].stalled = true;
-    CHECK(health(status) == "degraded");
-    status = healthy();
-    status.cameras[0].camera.state = CameraState::failed;
-    CHECK(health(status) == "degraded");
+    Diagnosis* const all[] = {&status.board_diagnosis, &status.clock_diagnosis,
+                              &status.cameras[0].diagnosis, &status.imus[0].diagnosis};
+    for (Diagnosis* diagnosis : all) {
+        diagnosis->health = Health::starting;
+        CHECK(health(status) == Health::starting);
+        diagnosis->health = Health::degraded;
+        CHECK(health(status) == Health::degraded);
+        CHECK(nlohmann::json::parse(to_json(status))["health"] == "degraded");
+        diagnosis->health = Health::ok;
+    }
+}
+
+TEST_CASE("status: each device has health, state, fault, since when, and what to do") {
+    Status status = healthy();
+    status.imus[0].diagnosis = {Health::degraded, Fault::imu_missing, "plug it in", HostTime{7}};
+    const auto document = nlohmann::json::parse(to_json(status));
+    for (const auto& device :
+         {document["board"], document["clock"], document["cameras"][0], document["imus"][0]})
+        for (const char* key : {"health", "state", "fault", "since_ns", "hint"})
+            CHECK(device.contains(key));
+    CHECK(document["imus"][0]["health"] == "degraded");
+    CHECK(document["imus"][0]["fault"] == "imu_missing");
+    CHECK(document["imus"][0]["since_ns"] == 7);
+    CHECK(document["imus"][0]["hint"] == "plug it in");
+    CHECK(document["cameras"][0]["fault"] == "");
 }
 
 TEST_CASE("status: what the kernel says of its clock, and whether its TAI is worth the name") {
@@ -108,8 +110,8 @@ TEST_CASE("status: what a device says of itself cannot break the document") {
 
 TEST_CASE("status: the text for a person names what is wrong and what to do") {
     Status status = healthy();
-    status.cameras[0].camera.state = CameraState::failed;
-    status.cameras[0].camera.hint = "no such camera; check its cable";
+    status.cameras[0].diagnosis = {Health::degraded, Fault::camera_absent,
+                                   "no such camera; check its cable", status.now};
     const std::string text = client::status_text(nlohmann::json::parse(to_json(status)));
     CHECK_THAT(text, Catch::Contains("degraded"));
     CHECK_THAT(text, Catch::Contains("check its cable"));

@@ -64,12 +64,12 @@ TEST_CASE("status_publisher: health is that of the newest document") {
     test::Pipelines bench;
     auto publisher = StatusPublisher::create(bench.directory.path());
     REQUIRE(publisher);
-    CHECK(publisher->health() == "starting");
+    CHECK(publisher->health() == Health::starting);
     Status status;
     status.now = HostTime{100'000'000'000};
     publisher->publish(status, bench.translator);  // the board is needed, and not there
-    CHECK(publisher->health() == "degraded");
+    CHECK(publisher->health() == Health::degraded);
     status.board_needed = false;
     publisher->publish(status, bench.translator);
-    CHECK(publisher->health() == "ok");
+    CHECK(publisher->health() == Health::ok);
 }

@@ -5,6 +5,19 @@
 
 namespace versavis::client {
 
+namespace {
+
+/// The service's heart beats every 50 ms. A process that cannot be found, but whose heart beats, is
+/// of another container. At half, one that was just held up is called dead; at twice, a dead one
+/// is named a quarter of a second later.
+constexpr Duration heart_stopped = milliseconds(250);
+
+bool has_died(const ring::Reader& reader) {
+    return !reader.writer_found() && host_now() - reader.last_heartbeat() > heart_stopped;
+}
+
+}  // namespace
+
 Expected<nlohmann::json> read_status(const std::string& instance) {
     auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
     if (!stream) return Unexpected(stream.error());
@@ -17,7 +30,7 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
             stream->copy(item, reinterpret_cast<std::byte*>(text.data())))
             newest = std::move(text);
     }
-    if (!stream->reader().writer_alive())
+    if (!stream->reader().writer_alive() || has_died(stream->reader()))
         return failure(fmt::format("instance {}", instance), "the service has died or is hanging",
                        "see its log ('journalctl -u versavisd'), then restart it");
     if (!newest)
@@ -29,6 +42,19 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
                        "the status document has another version",
                        "install service and clients of the same release");
     return document;
+}
+
+Error explain(const Error& error, const std::string& instance, const std::string& stream) {
+    const auto status = read_status(instance);
+    if (!status) return error;
+    for (const char* kind : {"cameras", "imus"})
+        for (const auto& device : status->value(kind, nlohmann::json::array()))
+            if (device.value("name", "") == stream && device.value("fault", "") != "")
+                return {stream,
+                        fmt::format("the device is {}, so there is nothing to read",
+                                    device.value("state", "not well")),
+                        device.value("hint", "see 'versavis status'")};
+    return error;
 }
 
 }  // namespace versavis::client

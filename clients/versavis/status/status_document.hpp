@@ -10,8 +10,12 @@
 
 namespace versavis::client {
 
-/// The newest document of `instance`. Errors: the service is not running, or its document is older
-/// than three seconds.
+/// The newest document of `instance`. Errors: the service is not running, its process has ended, or
+/// its heart has not beaten for three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
+
+/// Why `stream` cannot be read: what the service says is wrong with the device of this name, if it
+/// says so, else `error`.
+Error explain(const Error& error, const std::string& instance, const std::string& stream);
 
 }  // namespace versavis::client

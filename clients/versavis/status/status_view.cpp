@@ -19,8 +19,11 @@ std::uint64_t count(const json& object, const char* key) {
     return object.value(key, std::uint64_t{0});
 }
 
+/// In a line of its own, after its word.
 std::string hint(const json& part) {
-    return text(part, "hint").empty() ? "" : fmt::format("\n         {}", text(part, "hint"));
+    const std::string fault = text(part, "fault");
+    if (text(part, "hint").empty()) return "";
+    return fmt::format("\n         {}{}{}", fault, fault.empty() ? "" : ": ", text(part, "hint"));
 }
 
 std::string board_line(const json& board) {
@@ -38,13 +41,27 @@ std::string in_us(const json& object, const char* key) {
                : "unknown";
 }
 
+/// Of a clock that is not known there are no figures.
+std::string clock_figures(const json& clock) {
+    if (text(clock, "state") == "init" || text(clock, "state") == "reset") return "unknown";
+    return fmt::format("sigma {} us, bound {} us, skew {:+.3f} ppm, round trip {:.0f} us",
+                       in_us(clock, "sigma_ns"), in_us(clock, "bound_ns"),
+                       clock.value("skew_ppm", 0.0), clock.value("round_trip_ns", 0.0) / 1e3);
+}
+
 std::string clock_line(const json& clock) {
+    return fmt::format("clock    {:<10} {}  {}{}\n", text(clock, "state"), text(clock, "output"),
+                       clock_figures(clock), hint(clock));
+}
+
+std::string imu_line(const json& imu) {
     return fmt::format(
-        "clock    {:<10} {}  sigma {} us, bound {} us, skew {:+.3f} ppm, round trip {:.0f} "
-        "us\n",
-        text(clock, "state"), text(clock, "output"), in_us(clock, "sigma_ns"),
-        in_us(clock, "bound_ns"), clock.value("skew_ppm", 0.0),
-        clock.value("round_trip_ns", 0.0) / 1e3);
+        "{:<8} {:<10} {}  {:.1f} of {:g} Hz, published {}, lost {}, faulty {}, filter delay {} us "
+        "({}){}\n",
+        text(imu, "name"), text(imu, "state"), text(imu, "model"), imu.value("delivered_hz", 0.0),
+        imu.value("configured_hz", 0.0), count(imu, "published"), count(imu, "lost"),
+        count(imu, "faulty"), in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source"),
+        hint(imu));
 }
 
 /// What is taken off the middle of its exposures, before it is known: nothing.
@@ -60,12 +77,13 @@ std::string delay_line(const json& camera) {
 
 std::string camera_line(const json& camera) {
     return fmt::format(
-        "{:<8} {:<10} {}  pairing {}, published {}, incomplete {}, without trigger {}, triggers "
-        "without frame {}, slips {}{}\n{}",
-        text(camera, "name"), text(camera, "state"), text(camera, "model"), text(camera, "pairing"),
-        count(camera, "frames_published"), count(camera, "frames_incomplete"),
-        count(camera, "frames_without_trigger"), count(camera, "triggers_without_frame"),
-        count(camera, "slips"), hint(camera), delay_line(camera));
+        "{:<8} {:<10} {}  {:.1f} of {:g} Hz, pairing {}, published {}, incomplete {}, without "
+        "trigger {}, triggers without frame {}, slips {}{}\n{}",
+        text(camera, "name"), text(camera, "state"), text(camera, "model"),
+        camera.value("delivered_hz", 0.0), camera.value("configured_hz", 0.0),
+        text(camera, "pairing"), count(camera, "frames_published"),
+        count(camera, "frames_incomplete"), count(camera, "frames_without_trigger"),
+        count(camera, "triggers_without_frame"), count(camera, "slips"), hint(camera), delay_line(camera));
 }
 
 struct ClockFact {
@@ -76,6 +94,10 @@ struct ClockFact {
 
 constexpr std::array clock_facts{
     ClockFact{"state", "state", ""},
+    ClockFact{"health", "health", ""},
+    ClockFact{"fault", "fault", "what is wrong, in a word"},
+    ClockFact{"hint", "hint", ""},
+    ClockFact{"since_ns", "since", "when state or fault changed, CLOCK_MONOTONIC_RAW"},
     ClockFact{"output", "output clock", "clock of the published stamps"},
     ClockFact{"sigma_ns", "sigma", "one standard deviation of a stamp made now"},
     ClockFact{"bound_ns", "bound", "its largest possible error, however asymmetric the link is"},
@@ -178,11 +200,7 @@ std::string status_text(const json& status) {
     if (status.contains("board")) out += board_line(status["board"]);
     if (status.contains("clock")) out += clock_line(status["clock"]);
     for (const json& camera : status.value("cameras", json::array())) out += camera_line(camera);
-    for (const json& imu : status.value("imus", json::array()))
-        out += fmt::format(
-            "{:<8} {:<10} published {}, lost {}, faulty {}, filter delay {} us ({})\n",
-            text(imu, "name"), text(imu, "model"), count(imu, "published"), count(imu, "lost"),
-            count(imu, "faulty"), in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source"));
+    for (const json& imu : status.value("imus", json::array())) out += imu_line(imu);
     for (const json& stream : status.value("streams", json::array()))
         out +=
             fmt::format("stream   {:<10} {:<7} {:>10} items {:>8.1f} Hz\n", text(stream, "name"),

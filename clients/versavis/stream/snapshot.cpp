@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "status/status_document.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::client {
@@ -60,7 +61,7 @@ Expected<> write_png(const std::string& path, const FrameMetadata& frame,
 Expected<std::string> snapshot(const std::string& instance, const std::string& stream_name,
                                const std::string& path, Duration timeout) {
     auto stream = FrameStream::open(stream_name, instance);
-    if (!stream) return Unexpected(stream.error());
+    if (!stream) return Unexpected(explain(stream.error(), instance, stream_name));
     const HostTime deadline = host_now() + timeout;
     while (host_now() < deadline) {
         const auto item = stream->wait(deadline - host_now());
@@ -72,7 +73,8 @@ Expected<std::string> snapshot(const std::string& instance, const std::string& s
         return fmt::format("{}: {} x {}, {} stamp {} ns", path, item.data.width, item.data.height,
                            to_string(item.data.stamp_kind()), item.time.ns);
     }
-    return failure(stream_name, "no frame arrived in time", "see 'versavis status'");
+    const Error late{stream_name, "no frame arrived in time", "see 'versavis status'"};
+    return Unexpected(explain(late, instance, stream_name));
 }
 
 }  // namespace versavis::client

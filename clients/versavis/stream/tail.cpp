@@ -10,6 +10,7 @@
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "pairing/evidence_json.hpp"
+#include "status/status_document.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::client {
@@ -152,7 +153,7 @@ Expected<> print_stream(const TailSettings& settings) {
 
 Expected<> tail(const TailSettings& settings) {
     auto reader = ring::Reader::open(stream_path(settings.instance, settings.stream));
-    if (!reader) return Unexpected(reader.error());
+    if (!reader) return Unexpected(explain(reader.error(), settings.instance, settings.stream));
     switch (reader->kind()) {
         case ring::StreamKind::frames: return print_stream<FrameStream>(settings);
         case ring::StreamKind::imu: return print_stream<ImuStream>(settings);

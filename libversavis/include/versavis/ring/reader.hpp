@@ -69,6 +69,7 @@ class VERSAVIS_API Reader {
     std::uint64_t retained() const;  ///< how many items can be read at any one time
     HostTime last_heartbeat() const;
     std::uint32_t writer_pid() const;
+    bool writer_found() const;  ///< its process runs, as far as this one can see
     bool writer_alive()
         const;  ///< its state is live and its heartbeat is younger than three seconds
 

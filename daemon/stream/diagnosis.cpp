@@ -1,0 +1,574 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/diagnosis.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "stream/status.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// A start may take so long, and so many periods on top, before what is missing is a fault. At
+/// half, slow starts of cameras without a clock show as faults; at twice, a fault from the start on
+/// is named five seconds later.
+constexpr Duration start_patience = seconds(4);
+constexpr int start_periods = 20;
+
+/// The board answers ten times a second. At half, a loaded host is taken for a silent board; at
+/// twice, a dead board is named half a second later.
+constexpr Duration board_silence = milliseconds(1000);
+
+/// A camera is released by its last controller within the heartbeat of GigE Vision, 3 s by default,
+/// and some have 10 s. At half, an own lease is called another program's; at twice, another
+/// program's is called a lease for longer after a start.
+constexpr Duration lease = seconds(10);
+
+/// Of the frames or triggers lately, what is more than chance. At half, a single one can be a
+/// cause; at twice, a cause of one in seven is missed.
+constexpr double telling_share = 0.08;
+
+/// Of them all, but for what was on its way when it began.
+constexpr double nearly_all = 0.9;
+
+/// Records that take so long after the exposure come too late for pairing. At half, a slow link is
+/// blamed; at twice, a late one is not named.
+constexpr Duration late_record = milliseconds(200);
+
+/// An exposure that leaves the camera less of its period than this share cannot keep the rate: it
+/// reads out, too. At half, such cameras are called slow; at twice, long exposures are blamed.
+constexpr double shortest_rest = 0.05;
+
+/// What two measures of one exposure may differ by: edges of slow lines. At half, opto-couplers are
+/// missed; at twice, a late start of the camera is called inverted.
+constexpr Duration edge_delay = microseconds(300);
+
+/// The largest packets that pass every network. Half: none sends such; twice: many do not pass.
+constexpr std::uint32_t common_packet = 1500;
+
+/// Frames whose camera time stood still, of the last: at half or twice, the same.
+constexpr std::uint64_t frozen_frames = 2;
+
+bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
+
+struct CameraView {
+    const CameraStatus& it;
+    const Status& all;
+
+    bool triggered() const { return it.triggered(); }
+    bool streaming() const { return it.camera.state == CameraState::streaming; }
+    bool in(CameraState state) const { return it.camera.state == state; }
+    bool full() const { return it.delivery.full; }
+    bool strobe() const { return it.configuration.strobe != Strobe::none; }
+    std::uint64_t frames() const { return it.recent.received + it.recent.incomplete; }
+    std::uint64_t refused(EventReason reason) const {
+        return it.recent.refused[static_cast<std::size_t>(reason)];
+    }
+    Duration period() const { return period_of(it.configuration); }
+    Duration exposure() const {
+        const Duration told = it.pipeline.told_exposure;
+        return told.ns != 0 ? told : it.pipeline.exposure;
+    }
+    bool starting() const {
+        return !full() && !it.delivery.fell_short &&
+               all.now - it.delivery.began < start_patience + period() * start_periods;
+    }
+};
+
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+bool some(std::uint64_t part, std::uint64_t whole) {
+    return part >= 2 && share(part, whole) > telling_share;
+}
+
+bool all_of(std::uint64_t part, std::uint64_t whole) {
+    return part > 0 && share(part, whole) >= nearly_all;
+}
+
+template <CameraState state>
+bool in(const CameraView& camera) {
+    return camera.in(state);
+}
+
+std::string own_hint(const CameraView& camera) { return camera.it.camera.hint; }
+
+bool same_device(const CameraView& camera) {
+    const auto& cameras = camera.all.cameras;
+    return camera.in(CameraState::busy) &&
+           std::any_of(cameras.begin(), cameras.end(), [&](const CameraStatus& other) {
+               const std::string& device = camera.it.configuration.device;
+               return other.name != camera.it.name &&
+                      (other.configuration.device == device || other.camera.serial == device);
+           });
+}
+
+bool leased(const CameraView& camera) {
+    return camera.in(CameraState::busy) && camera.all.now - camera.all.started < lease;
+}
+
+bool lost_packets(const CameraView& camera) {
+    return !camera.full() && some(camera.refused(EventReason::frame_incomplete), camera.frames());
+}
+
+/// Nothing of the size of a full packet passes.
+bool packets_too_large(const CameraView& camera) {
+    return lost_packets(camera) && camera.it.camera.packet_size > common_packet &&
+           all_of(camera.refused(EventReason::frame_incomplete), camera.frames());
+}
+
+bool late_records(const CameraView& camera) {
+    return camera.triggered() && !camera.full() && camera.it.pipeline.record_delay > late_record;
+}
+
+bool exposes_too_long(const CameraView& camera) {
+    const double rest = 1 - share(static_cast<std::uint64_t>(camera.exposure().ns),
+                                  static_cast<std::uint64_t>(camera.period().ns));
+    return !camera.full() && rest < shortest_rest;
+}
+
+/// The line rises where the exposure ends.
+bool strobe_inverted(const CameraView& camera) {
+    const Duration latency = from_us(camera.it.configuration.latency_us);
+    const Duration exposure = camera.it.pipeline.told_exposure;
+    const Duration late = camera.it.pipeline.start_delay - latency - exposure;
+    return camera.triggered() && camera.strobe() && exposure > edge_delay &&
+           some(camera.it.recent.unmeasured + camera.refused(EventReason::wrong_exposure),
+                camera.it.recent.triggers) &&
+           absolute(late) < edge_delay;
+}
+
+bool exposes_not(const CameraView& camera) {
+    return camera.triggered() && camera.strobe() && camera.frames() == 0 &&
+           all_of(camera.it.recent.unmeasured, camera.it.recent.triggers);
+}
+
+bool frames_missing(const CameraView& camera) {
+    const std::uint64_t unmeasured = camera.strobe() ? camera.it.recent.unmeasured : 0;
+    const std::uint64_t exposed = camera.it.recent.triggers - unmeasured;
+    return camera.triggered() && !camera.full() && exposed > camera.frames() &&
+           some(exposed - camera.frames(), exposed);
+}
+
+/// Some triggers are answered, the others come while it is busy.
+bool answers_some(const CameraView& camera) {
+    const std::uint64_t asked = camera.it.recent.triggers;
+    const bool free = !camera.triggered() && camera.frames() > 0;
+    return !camera.full() && (free || (asked > camera.frames() && camera.frames() > 0 &&
+                                       some(asked - camera.frames(), asked)));
+}
+
+bool strobe_missing(const CameraView& camera) {
+    return camera.triggered() && camera.strobe() && camera.frames() > 0 &&
+           some(camera.it.recent.unmeasured, camera.it.recent.triggers);
+}
+
+/// Frames come, and so do exposures, but they are not each other's.
+bool not_followed(const CameraView& camera) {
+    const PipelineReport& recent = camera.it.recent;
+    const bool searching = camera.it.pipeline.pairing != pairing::State::locked &&
+                           2 * camera.frames() >= recent.triggers;
+    return camera.triggered() && !camera.full() && camera.frames() > 0 &&
+           (!camera.strobe() || !some(recent.unmeasured, recent.triggers)) &&
+           (searching ||
+            some(camera.refused(EventReason::mismatch) + camera.refused(EventReason::unproved),
+                 camera.frames()));
+}
+
+std::string count_of(std::uint64_t part, std::uint64_t whole) {
+    return fmt::format("{} of the last {} frames", part, whole);
+}
+
+std::string rates(const CameraView& camera) {
+    return fmt::format("{:.1f} of {:g} Hz", camera.it.delivery.rate_hz,
+                       camera.it.configuration.rate_hz);
+}
+
+struct Rule {
+    Fault fault;
+    bool (*applies)(const CameraView&);
+    std::string (*hint)(const CameraView&);
+};
+
+/// The first that applies is the cause.
+constexpr Rule camera_rules[] = {
+    {Fault::same_device, same_device,
+     [](const CameraView& c) {
+         return fmt::format(
+             "another camera of the configuration has the same device {}: give each "
+             "its own address or serial number",
+             c.it.configuration.device);
+     }},
+    {Fault::camera_lease, leased,
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "still held by its last controller, perhaps this service's last run: "
+             "it is released within seconds, or another program has it");
+     }},
+    {Fault::camera_busy, in<CameraState::busy>, own_hint},
+    {Fault::camera_unreachable, in<CameraState::unreachable>, own_hint},
+    {Fault::camera_absent, in<CameraState::absent>, own_hint},
+    {Fault::camera_misconfigured, in<CameraState::misconfigured>, own_hint},
+    {Fault::camera_failed, in<CameraState::failed>, own_hint},
+    {Fault::board_gone,
+     [](const CameraView& c) {
+         return c.triggered() && c.all.board_diagnosis.fault == Fault::board_gone;
+     },
+     [](const CameraView& /*c*/) { return std::string("no triggers: the board is gone"); }},
+    {Fault::board_silent,
+     [](const CameraView& c) {
+         return c.triggered() && c.all.board_diagnosis.fault == Fault::board_silent;
+     },
+     [](const CameraView& /*c*/) { return std::string("no triggers: the board does not answer"); }},
+    {Fault::board_refuses,
+     [](const CameraView& c) {
+         return c.triggered() && c.all.board_diagnosis.fault == Fault::board_refuses;
+     },
+     [](const CameraView& /*c*/) {
+         return std::string("no triggers: the board refuses, see its own hint");
+     }},
+    {Fault::camera_silent, in<CameraState::silent>,
+     [](const CameraView& /*c*/) {
+         return std::string("the camera does not answer: check its cable and power");
+     }},
+    {Fault::clock_unknown,
+     [](const CameraView& c) {
+         return c.triggered() && c.all.clock_diagnosis.fault == Fault::clock_unknown;
+     },
+     [](const CameraView& /*c*/) {
+         return std::string("frames are withheld: the board's clock is not known yet");
+     }},
+    {Fault::starting, [](const CameraView& c) { return !c.streaming() || c.starting(); },
+     [](const CameraView& c) {
+         return std::string(c.streaming() ? "a start is in progress: its frames are being proved"
+                                          : "it is being opened and set up");
+     }},
+    {Fault::link_full,
+     [](const CameraView& c) { return lost_packets(c) && !c.it.camera.bandwidth.fits(); },
+     own_hint},
+    {Fault::packet_size, packets_too_large,
+     [](const CameraView& c) {
+         return fmt::format(
+             "{} lost packets: packets of {} bytes do not pass; set the MTU of "
+             "interface and switches to 9000, or packet_size = 1500",
+             count_of(c.refused(EventReason::frame_incomplete), c.frames()),
+             c.it.camera.packet_size);
+     }},
+    {Fault::packet_loss, lost_packets,
+     [](const CameraView& c) {
+         return fmt::format(
+             "{} lost packets on the way: check cable and switch, raise "
+             "net.core.rmem_max, or lower rate or size",
+             count_of(c.refused(EventReason::frame_incomplete), c.frames()));
+     }},
+    {Fault::wrong_size,
+     [](const CameraView& c) {
+         return !c.full() && some(c.refused(EventReason::wrong_size), c.frames());
+     },
+     [](const CameraView& c) {
+         return fmt::format(
+             "{} were not of the size that the camera announced: does another "
+             "program set it? restart the service after a change",
+             count_of(c.refused(EventReason::wrong_size), c.frames()));
+     }},
+    {Fault::no_buffer, [](const CameraView& c) { return !c.full() && c.it.recent.no_buffer > 0; },
+     [](const CameraView& c) {
+         return fmt::format("{} frames found no free slot: raise 'slots' and 'buffers'",
+                            c.it.recent.no_buffer);
+     }},
+    {Fault::no_triggers,
+     [](const CameraView& c) { return c.triggered() && !c.full() && c.it.recent.triggers == 0; },
+     [](const CameraView& c) {
+         return c.it.configuration.master.empty()
+                    ? std::string("the board reports no triggers: see its hint and 'output'")
+                    : fmt::format("no triggers: {}, its master, does not expose",
+                                  c.it.configuration.master);
+     }},
+    {Fault::late_records, late_records,
+     [](const CameraView& c) {
+         return fmt::format(
+             "the board's records come {} ms after their exposure, too late to "
+             "prove frames: lower the load of the host and of the USB",
+             c.it.pipeline.record_delay.ns / 1'000'000);
+     }},
+    {Fault::exposure_too_long, exposes_too_long,
+     [](const CameraView& c) {
+         return fmt::format(
+             "it exposes {} us of a period of {} us, so triggers come while it is "
+             "busy ({}): lower ExposureTime or 'rate_hz'",
+             c.exposure().ns / 1000, c.period().ns / 1000, rates(c));
+     }},
+    {Fault::strobe_inverted, strobe_inverted,
+     [](const CameraView& c) {
+         return fmt::format(
+             "the exposure line rises {} us after the trigger, where the exposure "
+             "of {} us ends: it is inverted; change 'strobe' to \"{}\"",
+             c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.told_exposure.ns / 1000,
+             c.it.configuration.strobe == Strobe::active_high ? "active_low" : "active_high");
+     }},
+    {Fault::line_delays,
+     [](const CameraView& c) { return c.triggered() && !line_hint(c.it.pipeline.edges).empty(); },
+     [](const CameraView& c) { return line_hint(c.it.pipeline.edges); }},
+    {Fault::wrong_exposure,
+     [](const CameraView& c) { return c.triggered() && c.it.pipeline.exposure_contradicted; },
+     [](const CameraView& c) {
+         return fmt::format(
+             "the exposure line shows {} us, but the camera exposes {} us: check "
+             "'strobe_line' and its LineSource, or set check_exposure = false",
+             c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
+     }},
+    {Fault::no_exposure, exposes_not,
+     [](const CameraView& c) {
+         return fmt::format(
+             "triggers are sent but it does not expose: check that its trigger "
+             "cable is on output {}, and TriggerSource",
+             c.it.configuration.output);
+     }},
+    {Fault::camera_clock,
+     [](const CameraView& c) {
+         return c.triggered() && !c.full() && c.it.recent.clock_frozen >= frozen_frames;
+     },
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "the camera's clock stands still, so nothing proves its frames: power "
+             "it off and on, or set camera_clock = false");
+     }},
+    {Fault::unproved, not_followed,
+     [](const CameraView& c) {
+         return fmt::format(
+             "{} of the last {} frames were proved, for they do not follow the "
+             "triggers of output {}: are trigger cables swapped? check "
+             "TriggerSource",
+             c.it.recent.published - c.it.recent.suspect, c.frames(), c.it.configuration.output);
+     }},
+    {Fault::rate_too_high,
+     [](const CameraView& c) {
+         return answers_some(c) && (!c.strobe() || !c.triggered() || !frames_missing(c));
+     },
+     [](const CameraView& c) {
+         return fmt::format(
+             "the camera delivers {}: it cannot do more; lower 'rate_hz', its "
+             "exposure or its size",
+             rates(c));
+     }},
+    {Fault::no_frames, frames_missing,
+     [](const CameraView& c) {
+         return fmt::format(
+             "{} of the last {} exposures have no frame here: check network, "
+             "firewall and the camera's bandwidth limit",
+             c.it.recent.triggers - std::min(c.frames(), c.it.recent.triggers),
+             c.it.recent.triggers);
+     }},
+    {Fault::strobe_missing, strobe_missing,
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "frames come, but their exposures are not being measured: check the "
+             "exposure line, 'strobe_line' and 'max_exposure_us', or set strobe = "
+             "\"none\"");
+     }},
+    {Fault::too_slow, [](const CameraView& c) { return !c.full(); },
+     [](const CameraView& c) {
+         return fmt::format("{} are delivered: 'versavis tail events' says what is missing",
+                            rates(c));
+     }},
+};
+
+bool young(HostTime since, HostTime now) { return now - since < start_patience; }
+
+/// Whatever is wrong, who never delivered is given its time first.
+Health health_of(Fault fault, bool delivered, bool in_time) {
+    if (fault == Fault::none) return Health::ok;
+    return !delivered && in_time ? Health::starting : Health::degraded;
+}
+
+Diagnosis conclude(Fault fault, std::string hint, bool delivered, bool in_time) {
+    return {health_of(fault, delivered, in_time), fault, std::move(hint), {}};
+}
+
+bool answered_by_nobody(std::int64_t answer) {
+    return answer == 0 || answer == 0xFF || answer == 0xFFFF;
+}
+
+Fault fault_of(const ImuFailure& failure) {
+    if (failure.kind == wire::EventKind::imu_silent) return Fault::imu_silent;
+    if (failure.step == imu_step_running) return Fault::imu_failed;
+    return answered_by_nobody(failure.answer) ? Fault::imu_missing : Fault::imu_wrong;
+}
+
+}  // namespace
+
+const char* to_string(Health health) {
+    switch (health) {
+        case Health::ok: return "ok";
+        case Health::starting: return "starting";
+        case Health::degraded: return "degraded";
+    }
+    return "degraded";
+}
+
+const char* to_string(Fault fault) {
+    switch (fault) {
+        case Fault::none: return "";
+        case Fault::starting: return "starting";
+        case Fault::board_gone: return "board_gone";
+        case Fault::board_silent: return "board_silent";
+        case Fault::board_refuses: return "board_refuses";
+        case Fault::clock_unknown: return "clock_unknown";
+        case Fault::clock_holdover: return "clock_holdover";
+        case Fault::clock_step: return "clock_step";
+        case Fault::camera_absent: return "camera_absent";
+        case Fault::camera_unreachable: return "camera_unreachable";
+        case Fault::camera_busy: return "camera_busy";
+        case Fault::camera_lease: return "camera_lease";
+        case Fault::same_device: return "same_device";
+        case Fault::camera_misconfigured: return "camera_misconfigured";
+        case Fault::camera_silent: return "camera_silent";
+        case Fault::camera_failed: return "camera_failed";
+        case Fault::link_full: return "link_full";
+        case Fault::packet_size: return "packet_size";
+        case Fault::packet_loss: return "packet_loss";
+        case Fault::wrong_size: return "wrong_size";
+        case Fault::no_buffer: return "no_buffer";
+        case Fault::no_triggers: return "no_triggers";
+        case Fault::late_records: return "late_records";
+        case Fault::exposure_too_long: return "exposure_too_long";
+        case Fault::strobe_inverted: return "strobe_inverted";
+        case Fault::no_exposure: return "no_exposure";
+        case Fault::no_frames: return "no_frames";
+        case Fault::rate_too_high: return "rate_too_high";
+        case Fault::strobe_missing: return "strobe_missing";
+        case Fault::line_delays: return "line_delays";
+        case Fault::wrong_exposure: return "wrong_exposure";
+        case Fault::camera_clock: return "camera_clock";
+        case Fault::unproved: return "unproved";
+        case Fault::too_slow: return "too_slow";
+        case Fault::imu_missing: return "imu_missing";
+        case Fault::imu_wrong: return "imu_wrong";
+        case Fault::imu_silent: return "imu_silent";
+        case Fault::imu_failed: return "imu_failed";
+        case Fault::imu_faulty: return "imu_faulty";
+    }
+    return "";
+}
+
+std::string describe_failure(const ImuReport& imu) {
+    switch (fault_of(imu.failure)) {
+        case Fault::imu_missing:
+            return fmt::format(
+                "no part answers (0x{:X}): check that the {} is plugged in, its power, its wiring "
+                "and 'model'",
+                imu.failure.answer, imu.model);
+        case Fault::imu_wrong:
+            return fmt::format(
+                "another part than the {} answers (0x{:X} in step {} of its set-up): correct "
+                "'model', or plug in the right one",
+                imu.model, imu.failure.answer, imu.failure.step);
+        case Fault::imu_silent:
+            return fmt::format(
+                "the {} says nothing: check its power, and its data-ready or serial "
+                "line",
+                imu.model);
+        default:
+            return fmt::format(
+                "the {} fails while it samples, and is set up again: check its "
+                "power and the length of its cable",
+                imu.model);
+    }
+}
+
+Diagnosis diagnose_board(const Status& status) {
+    const BoardReport& board = status.board;
+    const bool in_time = young(status.started, status.now);
+    const bool known = board.connections > 0;
+    if (!status.board_needed) return {};
+    switch (board.state) {
+        case BoardState::absent: return conclude(Fault::board_gone, board.hint, known, in_time);
+        case BoardState::handshake:
+            return conclude(known ? Fault::board_silent : Fault::starting,
+                            "it is there, and is being asked who it is", known, in_time);
+        case BoardState::incompatible:
+        case BoardState::refused: return conclude(Fault::board_refuses, board.hint, true, in_time);
+        case BoardState::running: break;
+    }
+    if (status.clock.since_contact > board_silence)
+        return conclude(Fault::board_silent,
+                        fmt::format("nothing came from it for {:.1f} s: check its cable and power",
+                                    static_cast<double>(status.clock.since_contact.ns) * 1e-9),
+                        known, in_time);
+    return conclude(Fault::none, board.hint, known, in_time);
+}
+
+Diagnosis diagnose_clock(const Status& status) {
+    const bool in_time = young(status.started, status.now);
+    const Fault cause = status.board_diagnosis.fault;
+    if (!status.board_needed) return {};
+    using clock::ClockState;
+    const ClockState state = status.clock.state;
+    if (is_one(cause) && state != ClockState::locked)
+        return conclude(cause, "no exchanges: see the board's hint", status.clock.slots > 0,
+                        in_time);
+    switch (state) {
+        case ClockState::locked: return {};
+        case ClockState::init:
+        case ClockState::reset:
+            return conclude(Fault::clock_unknown,
+                            "the board's clock is not known yet: it takes a few exchanges", false,
+                            in_time);
+        case ClockState::converging:
+            return conclude(Fault::starting, "the estimate is not yet as good as it will be", false,
+                            in_time);
+        case ClockState::holdover:
+            return conclude(Fault::clock_holdover,
+                            "no exchanges for seconds, sigma grows: check the board's cable and "
+                            "the host's load",
+                            true, in_time);
+        case ClockState::step:
+            return conclude(Fault::clock_step,
+                            "messages contradict the estimate, which begins anew if that lasts: "
+                            "was a clock set, or the host suspended?",
+                            true, in_time);
+    }
+    return {};
+}
+
+Diagnosis diagnose(const CameraStatus& status, const Status& all) {
+    const CameraView camera{status, all};
+    const Rule* rule =
+        std::find_if(std::begin(camera_rules), std::end(camera_rules),
+                     [&](const Rule& candidate) { return candidate.applies(camera); });
+    if (rule == std::end(camera_rules)) return conclude(Fault::none, status.camera.hint, true, {});
+    const Duration patience = start_patience + camera.period() * start_periods;
+    return conclude(rule->fault, rule->hint(camera), status.delivery.ever,
+                    all.now - all.started < patience);
+}
+
+Diagnosis diagnose(const ImuStatus& imu, const Status& all) {
+    const auto because = [&](Fault fault, const std::string& hint) {
+        return conclude(fault, hint, imu.delivery.ever, young(all.started, all.now));
+    };
+    const ImuReport& report = imu.report;
+    if (is_one(all.board_diagnosis.fault))
+        return because(all.board_diagnosis.fault, "no samples: the board is gone or silent");
+    if (some(imu.recent.faulty, imu.recent.published))
+        return because(Fault::imu_faulty,
+                       fmt::format("{} of the last {} samples failed their check: check wiring, "
+                                   "ground and the length of its cable",
+                                   imu.recent.faulty, imu.recent.published));
+    if (report.failure.times > 0 && (!report.working || report.failure.times > 1) &&
+        !imu.delivery.full)
+        return because(fault_of(report.failure), describe_failure(report));
+    if (imu.delivery.full) return {};
+    if (young(imu.delivery.began, all.now) && !imu.delivery.fell_short)
+        return because(Fault::starting, "it is being set up");
+    if (imu.recent.published == 0)
+        return because(Fault::imu_silent, "no samples come: check its power and its wiring");
+    return because(Fault::too_slow,
+                   fmt::format("{:.1f} of {:g} Hz are delivered: lower 'rate_hz', or the load of "
+                               "USB and board",
+                               imu.delivery.rate_hz, report.rate_hz));
+}
+
+}  // namespace versavis::daemon

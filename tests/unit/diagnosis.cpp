@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/diagnosis.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "stream/status.hpp"
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+const HostTime now{100'000'000'000};
+
+/// A minute after the start, a camera at 20 Hz and an IMU deliver; the last second was looked at.
+struct Bench {
+    Bench() {
+        status.now = now;
+        status.started = now - seconds(60);
+        status.board.state = BoardState::running;
+        status.board.connections = 1;
+        status.clock.state = clock::ClockState::locked;
+        status.cameras.resize(2);
+        for (std::size_t i = 0; i < 2; ++i) {
+            CameraStatus& camera = status.cameras[i];
+            camera.name = camera.configuration.name = i == 0 ? "cam0" : "cam1";
+            camera.configuration.device = i == 0 ? "127.0.0.2" : "127.0.0.3";
+            camera.configuration.output = static_cast<unsigned>(i);
+            camera.camera.state = CameraState::streaming;
+            camera.camera.packet_size = 9000;
+            camera.pipeline.pairing = pairing::State::locked;
+            camera.pipeline.told_exposure = camera.pipeline.exposure = milliseconds(3);
+            camera.recent.received = camera.recent.published = camera.recent.triggers = 20;
+            camera.delivery = {true, true, false, now - seconds(59), 20};
+        }
+        ImuStatus imu;
+        imu.report.name = "imu0";
+        imu.report.model = "adis16448";
+        imu.report.rate_hz = 200;
+        imu.report.working = true;
+        imu.recent.published = 200;
+        imu.delivery = {true, true, false, now - seconds(59), 200};
+        status.imus.push_back(imu);
+    }
+
+    Diagnosis camera() {
+        board();
+        return diagnose(status.cameras[0], status);
+    }
+    Diagnosis imu() {
+        board();
+        return diagnose(status.imus[0], status);
+    }
+    Diagnosis board() {
+        status.board_diagnosis = diagnose_board(status);
+        status.clock_diagnosis = diagnose_clock(status);
+        return status.board_diagnosis;
+    }
+
+    CameraStatus& cam() { return status.cameras[0]; }
+
+    /// So many frames of the last second were published, and the rest refused.
+    void refuse(EventReason reason, std::uint64_t frames) {
+        const bool whole =
+            reason != EventReason::frame_incomplete && reason != EventReason::wrong_size;
+        cam().delivery.full = false;
+        cam().recent.published -= frames;
+        if (!whole) {
+            cam().recent.received -= frames;
+            cam().recent.incomplete = frames;
+        }
+        cam().recent.refused[static_cast<std::size_t>(reason)] = frames;
+    }
+
+    Status status;
+};
+
+using Catch::Contains;
+
+void check(const Diagnosis& diagnosis, Fault fault, const std::string& words) {
+    INFO(to_string(diagnosis.fault) << ": " << diagnosis.hint);
+    CHECK(diagnosis.fault == fault);
+    CHECK(diagnosis.health == Health::degraded);
+    CHECK_THAT(diagnosis.hint, Contains(words));
+}
+
+}  // namespace
+
+TEST_CASE("diagnosis: what delivers is well, and keeps the remarks of its camera") {
+    Bench bench;
+    CHECK(bench.board().health == Health::ok);
+    CHECK(bench.status.clock_diagnosis.health == Health::ok);
+    CHECK(bench.imu().fault == Fault::none);
+    bench.cam().camera.hint = "the camera is at 80 degrees";
+    CHECK(bench.camera().health == Health::ok);
+    CHECK(bench.camera().hint == "the camera is at 80 degrees");
+}
+
+TEST_CASE("diagnosis: a camera that cannot be had says why, in its own words") {
+    const std::pair<CameraState, Fault> states[] = {
+        {CameraState::absent, Fault::camera_absent},
+        {CameraState::unreachable, Fault::camera_unreachable},
+        {CameraState::busy, Fault::camera_busy},
+        {CameraState::misconfigured, Fault::camera_misconfigured},
+        {CameraState::failed, Fault::camera_failed}};
+    for (const auto& [state, fault] : states) {
+        Bench bench;
+        bench.cam().camera.state = state;
+        bench.cam().camera.hint = "its own words";
+        check(bench.camera(), fault, "its own words");
+    }
+    Bench silent;
+    silent.cam().camera.state = CameraState::silent;
+    check(silent.camera(), Fault::camera_silent, "cable and power");
+}
+
+TEST_CASE("diagnosis: a camera is busy because of a twin, of an own lease, or of a stranger") {
+    Bench bench;
+    bench.cam().camera.state = CameraState::busy;
+    bench.status.started = now - seconds(8);
+    check(bench.camera(), Fault::camera_lease, "released within seconds");
+    bench.cam().configuration.device = "127.0.0.3";
+    check(bench.camera(), Fault::same_device, "127.0.0.3");
+    bench.cam().configuration.device = "SERIAL7";
+    bench.status.cameras[1].camera.serial = "SERIAL7";
+    check(bench.camera(), Fault::same_device, "SERIAL7");
+}
+
+TEST_CASE("diagnosis: without the board, triggered cameras, IMUs and the clock name the board") {
+    Bench bench;
+    bench.status.board.state = BoardState::absent;
+    bench.status.board.hint = "plug it in";
+    bench.status.clock.state = clock::ClockState::holdover;
+    check(bench.board(), Fault::board_gone, "plug it in");
+    check(bench.camera(), Fault::board_gone, "no triggers: the board is gone");
+    check(bench.imu(), Fault::board_gone, "no samples: the board");
+    check(bench.status.clock_diagnosis, Fault::board_gone, "board");
+    bench.cam().configuration.trigger = TriggerSource::free_run;
+    CHECK(bench.camera().health == Health::ok);
+    bench.status.board_needed = false;
+    CHECK(bench.board().health == Health::ok);
+}
+
+TEST_CASE("diagnosis: a board that does not answer, or refuses, is the cause as well") {
+    Bench bench;
+    bench.status.clock.since_contact = milliseconds(1200);
+    check(bench.board(), Fault::board_silent, "1.2 s");
+    check(bench.camera(), Fault::board_silent, "does not answer");
+    bench.status.board.state = BoardState::handshake;
+    check(bench.board(), Fault::board_silent, "asked");
+    bench.status.board.state = BoardState::refused;
+    bench.status.board.hint = "output 3 is used twice";
+    check(bench.board(), Fault::board_refuses, "used twice");
+    check(bench.camera(), Fault::board_refuses, "refuses");
+}
+
+TEST_CASE("diagnosis: the clock says what its state means") {
+    Bench bench;
+    const std::pair<clock::ClockState, Fault> states[] = {
+        {clock::ClockState::init, Fault::clock_unknown},
+        {clock::ClockState::reset, Fault::clock_unknown},
+        {clock::ClockState::holdover, Fault::clock_holdover},
+        {clock::ClockState::step, Fault::clock_step}};
+    for (const auto& [state, fault] : states) {
+        bench.status.clock.state = state;
+        check(diagnose_clock(bench.status), fault, "");
+    }
+    bench.status.clock.state = clock::ClockState::reset;
+    check(bench.camera(), Fault::clock_unknown, "withheld");
+}
+
+TEST_CASE("diagnosis: a start in progress is told, and is no fault of a young service") {
+    Bench bench;
+    bench.cam().delivery = {false, false, false, now - seconds(2), 0};
+    CHECK(bench.camera().fault == Fault::starting);
+    CHECK(bench.camera().health == Health::degraded);
+    bench.status.started = now - seconds(3);
+    CHECK(bench.camera().health == Health::starting);
+    bench.cam().camera.state = CameraState::absent;
+    CHECK(bench.camera().fault == Fault::camera_absent);
+    CHECK(bench.camera().health == Health::starting);
+    bench.cam().delivery.ever = true;
+    CHECK(bench.camera().health == Health::degraded);
+}
+
+TEST_CASE("diagnosis: lost packets are told from packets that do not pass, in numbers") {
+    Bench bench;
+    bench.refuse(EventReason::frame_incomplete, 10);
+    check(bench.camera(), Fault::packet_loss, "10 of the last 20 frames");
+    bench.refuse(EventReason::frame_incomplete, 10);
+    bench.cam().recent.incomplete = 20;
+    bench.cam().recent.refused[1] = 20;
+    check(bench.camera(), Fault::packet_size, "9000 bytes");
+    bench.cam().camera.packet_size = 1500;
+    check(bench.camera(), Fault::packet_loss, "20 of the last 20");
+    bench.cam().camera.bandwidth.link_mbps = 100;
+    bench.cam().camera.bandwidth.link_needed_mbps = 300;
+    bench.cam().camera.hint = "the link carries 100 Mbit/s";
+    check(bench.camera(), Fault::link_full, "100 Mbit/s");
+}
+
+TEST_CASE("diagnosis: a free camera whose frames are incomplete is not well either") {
+    Bench bench;
+    bench.cam().configuration.trigger = TriggerSource::free_run;
+    bench.refuse(EventReason::frame_incomplete, 20);
+    check(bench.camera(), Fault::packet_size, "MTU");
+    Bench slow;
+    slow.cam().configuration.trigger = TriggerSource::free_run;
+    slow.cam().delivery = {false, true, false, now - seconds(50), 12};
+    check(slow.camera(), Fault::rate_too_high, "12.0 of 20 Hz");
+}
+
+TEST_CASE("diagnosis: frames of a wrong size, and frames without a slot") {
+    Bench bench;
+    bench.refuse(EventReason::wrong_size, 15);
+    check(bench.camera(), Fault::wrong_size, "15 of the last 20");
+    Bench starved;
+    starved.cam().delivery.full = false;
+    starved.cam().recent.no_buffer = 3;
+    check(starved.camera(), Fault::no_buffer, "slots");
+}
+
+TEST_CASE("diagnosis: no triggers, of the board or of the master") {
+    Bench bench;
+    bench.cam().delivery.full = false;
+    bench.cam().recent = {};
+    check(bench.camera(), Fault::no_triggers, "'output'");
+    bench.cam().configuration.master = "cam1";
+    check(bench.camera(), Fault::no_triggers, "cam1");
+}
+
+TEST_CASE("diagnosis: late records are told with how late they are") {
+    Bench bench;
+    bench.refuse(EventReason::exposure_missing, 20);
+    bench.cam().pipeline.record_delay = milliseconds(600);
+    check(bench.camera(), Fault::late_records, "600 ms");
+}
+
+TEST_CASE("diagnosis: an exposure longer than the period, and a rate that the camera cannot do") {
+    Bench bench;
+    bench.cam().delivery = {false, true, false, now - seconds(50), 10};
+    bench.cam().recent.received = bench.cam().recent.published = 10;
+    bench.cam().recent.unmeasured = 10;
+    check(bench.camera(), Fault::rate_too_high, "10.0 of 20 Hz");
+    bench.cam().pipeline.told_exposure = milliseconds(60);
+    check(bench.camera(), Fault::exposure_too_long, "60000 us");
+}
+
+TEST_CASE("diagnosis: an inverted exposure line rises where the exposure ends") {
+    Bench bench;
+    bench.cam().recent.unmeasured = 20;
+    bench.cam().pipeline.start_delay = microseconds(3020);
+    check(bench.camera(), Fault::strobe_inverted, "active_low");
+    bench.cam().configuration.strobe = Strobe::active_low;
+    check(bench.camera(), Fault::strobe_inverted, "active_high");
+    bench.cam().pipeline.start_delay = microseconds(20);
+    check(bench.camera(), Fault::strobe_missing, "exposure line");
+}
+
+TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which one is it?") {
+    Bench trigger;
+    trigger.cam().delivery.full = false;
+    trigger.cam().recent.received = trigger.cam().recent.published = 0;
+    trigger.cam().recent.unmeasured = 20;
+    check(trigger.camera(), Fault::no_exposure, "output 0");
+    Bench strobe;
+    strobe.cam().recent.unmeasured = 20;
+    check(strobe.camera(), Fault::strobe_missing, "measured");
+    Bench network;
+    network.cam().delivery.full = false;
+    network.cam().recent.received = network.cam().recent.published = 0;
+    check(network.camera(), Fault::no_frames, "20 of the last 20");
+    Bench contradicted;
+    contradicted.cam().pipeline.exposure_contradicted = true;
+    contradicted.cam().pipeline.camera_exposure = milliseconds(5);
+    check(contradicted.camera(), Fault::wrong_exposure, "5000 us");
+}
+
+TEST_CASE("diagnosis: a clock that stands still, and triggers of another output") {
+    Bench frozen;
+    frozen.refuse(EventReason::mismatch, 20);
+    frozen.cam().recent.clock_frozen = 20;
+    check(frozen.camera(), Fault::camera_clock, "stands still");
+    Bench swapped;
+    swapped.refuse(EventReason::unproved, 20);
+    swapped.cam().pipeline.pairing = pairing::State::searching;
+    check(swapped.camera(), Fault::unproved, "swapped");
+    Bench unknown;
+    unknown.cam().delivery = {false, true, false, now - seconds(50), 17};
+    check(unknown.camera(), Fault::too_slow, "17.0 of 20 Hz");
+}
+
+TEST_CASE("diagnosis: of an IMU: nobody answers, another part does, it is silent, or flawed") {
+    Bench bench;
+    ImuStatus& imu = bench.status.imus[0];
+    imu.delivery.full = false;
+    imu.report.working = false;
+    imu.report.failure = {wire::EventKind::imu_failed, 1, 0, 5, now};
+    check(bench.imu(), Fault::imu_missing, "adis16448");
+    imu.report.failure.answer = 120;
+    check(bench.imu(), Fault::imu_wrong, "0x78");
+    imu.report.failure.step = imu_step_running;
+    check(bench.imu(), Fault::imu_failed, "set up again");
+    imu.report.failure.kind = wire::EventKind::imu_silent;
+    check(bench.imu(), Fault::imu_silent, "nothing");
+    imu.report.failure = {};
+    imu.recent.faulty = 100;
+    check(bench.imu(), Fault::imu_faulty, "100 of the last 200");
+    imu.recent = {};
+    check(bench.imu(), Fault::imu_silent, "no samples");
+    imu.recent.published = 100;
+    imu.delivery.rate_hz = 100;
+    check(bench.imu(), Fault::too_slow, "100.0 of 200 Hz");
+}
+
+TEST_CASE("diagnosis: every fault has a word of its own, and a row in the manual") {
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/troubleshooting.md");
+    REQUIRE(file);
+    std::stringstream manual;
+    manual << file.rdbuf();
+    std::set<std::string> words;
+    for (int i = 1; i <= static_cast<int>(last_fault); ++i) {
+        const std::string word = to_string(static_cast<Fault>(i));
+        CHECK(words.insert(word).second);
+        CHECK_THAT(manual.str(), Contains("| `" + word + "` |"));
+    }
+}

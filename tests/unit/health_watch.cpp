@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stream/health_watch.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::daemon;
+
+namespace {
+
+/// A service with one camera at 20 Hz, in simulated time, looked at twice a second.
+struct Bench {
+    Bench() {
+        status.started = now;
+        status.board.state = BoardState::running;
+        status.board.connections = 1;
+        status.clock.state = clock::ClockState::locked;
+        CameraStatus camera;
+        camera.name = "cam0";
+        camera.camera.state = CameraState::streaming;
+        camera.camera.connections = 1;
+        camera.pipeline.pairing = pairing::State::locked;
+        status.cameras.push_back(camera);
+        ImuStatus imu;
+        imu.report.name = "imu0";
+        imu.report.rate_hz = 200;
+        status.imus.push_back(imu);
+    }
+
+    /// Half a second in which the camera delivers so much of its rate, and loses the rest.
+    Diagnosis step(double share = 1) {
+        now = now + milliseconds(500);
+        PipelineReport& pipeline = status.cameras[0].pipeline;
+        const auto whole = static_cast<std::uint64_t>(10 * share);
+        pipeline.triggers += 10;
+        pipeline.received += whole;
+        pipeline.published += whole;
+        pipeline.incomplete += 10 - whole;
+        pipeline.refused[1] += 10 - whole;
+        status.imus[0].report.published += 100;
+        status.now = now;
+        watch.examine(status);
+        return status.cameras[0].diagnosis;
+    }
+
+    HostTime now{100'000'000'000};
+    Status status;
+    HealthWatch watch;
+};
+
+}  // namespace
+
+TEST_CASE("health_watch: from the start to full, to a loss within two seconds, and back") {
+    Bench bench;
+    CHECK(bench.step().health == Health::starting);
+    for (int i = 0; i < 3; ++i) bench.step();
+    CHECK(bench.status.cameras[0].diagnosis.health == Health::ok);
+    CHECK(bench.status.imus[0].diagnosis.health == Health::ok);
+    CHECK(health(bench.status) == Health::ok);
+    const HostTime began = bench.now;
+    while (bench.step(0.5).health == Health::ok) REQUIRE(bench.now - began <= seconds(2));
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
+    const HostTime since = bench.status.cameras[0].diagnosis.since;
+    CHECK(since == bench.now);
+    bench.step(0.5);
+    CHECK(bench.status.cameras[0].diagnosis.since == since);
+    for (int i = 0; i < 8; ++i) bench.step();
+    CHECK(health(bench.status) == Health::ok);
+}
+
+TEST_CASE("health_watch: frames that are published as suspect are not delivered") {
+    Bench bench;
+    for (int i = 0; i < 6; ++i) bench.step();
+    for (int i = 0; i < 4; ++i) {
+        bench.status.cameras[0].pipeline.suspect += 10;
+        bench.step();
+    }
+    CHECK(bench.status.cameras[0].diagnosis.health == Health::degraded);
+}
+
+TEST_CASE("health_watch: why a camera has no frames outlasts its being opened anew") {
+    Bench bench;
+    for (int i = 0; i < 6; ++i) bench.step();
+    PipelineReport& pipeline = bench.status.cameras[0].pipeline;
+    for (int i = 0; i < 6; ++i) {
+        pipeline.unmeasured += 10;
+        pipeline.incomplete -= 10;  // nothing comes at all
+        bench.step(0);
+    }
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::no_exposure);
+    bench.status.cameras[0].camera.state = CameraState::silent;
+    bench.status.cameras[0].camera.since = bench.now;
+    CHECK(bench.step(0).fault == Fault::no_exposure);
+    bench.step(0);
+    CHECK(bench.step(0).fault == Fault::camera_silent);
+    bench.status.cameras[0].camera.state = CameraState::absent;
+    CHECK(bench.step(0).fault == Fault::camera_absent);
+}
+
+TEST_CASE("health_watch: a camera that is opened again and again is not starting for ever") {
+    Bench bench;
+    bench.status.cameras[0].pipeline.pairing = pairing::State::searching;
+    for (int i = 0; i < 20; ++i) {
+        ++bench.status.cameras[0].camera.connections;
+        bench.step(0);
+    }
+    CHECK(bench.status.cameras[0].diagnosis.health == Health::degraded);
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
+}
