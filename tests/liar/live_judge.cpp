@@ -161,7 +161,9 @@ void LiveJudge::take(unsigned camera, const FrameStream& stream,
         wrong.what =
             fmt::format("{} {}: tick {} instead of {}", name, truth.number, item.data.tick, *tick);
         wrongs_.push_back(wrong);
+        return;
     }
+    truth.fate = Fate::good;
 }
 
 void LiveJudge::take(const Received<ImuMetadata>& item) {
@@ -184,7 +186,9 @@ void LiveJudge::take(const Received<ImuMetadata>& item) {
         wrong.what =
             fmt::format("{} {}: number {}", system_.scenario.imu, truth.number, item.data.number);
         wrongs_.push_back(wrong);
+        return;
     }
+    truth.fate = Fate::good;
 }
 
 /// The rig's receiver marks whole seconds of UTC.
