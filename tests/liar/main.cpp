@@ -127,8 +127,22 @@ class Run {
         judge_->poll();
     }
 
+    /// Pairing and hint of each camera, for a stream that does not come back.
+    std::string condition() {
+        std::string text = "not back;";
+        const auto status = stack_.wait_for_status([](const auto&) { return true; });
+        for (const auto& camera : status["cameras"])
+            text += fmt::format(" {}: {}, {} {}", camera["name"].get<std::string>(),
+                                camera["state"].get<std::string>(),
+                                camera["pairing"].get<std::string>(),
+                                camera["hint"].get<std::string>());
+        write_log("status " + status.dump());
+        return text;
+    }
+
     void restart_service(Row& row) {
         liar_.obey({});
+        if (!row.recovery && stack_.service().wait({}) < 0) row.complaints.push_back(condition());
         const int code = stack_.service().terminate();
         if (code != 0) {
             const std::string output = stack_.service().output();
