@@ -90,7 +90,10 @@ class Run {
                 row, [&] { tell(*kind, row); }, !settings_.brief || last);
         }
         std::erase_if(chosen, [](const Kind* kind) { return kind->way == Way::step; });
-        if (!chosen.empty() && liar_.damaged() < settings_.messages) tell_at_random(chosen);
+        if (!chosen.empty() && liar_.damaged() < settings_.messages) {
+            tell_from_the_start(chosen);
+            tell_at_random(chosen);
+        }
         return finish();
     }
 
@@ -120,11 +123,14 @@ class Run {
         liar_.forget();
         stack_.start_service();
         stack_.wait_for_status(test::healthy);
-        judge_ = std::make_unique<LiveJudge>(
+        judge_ = make_judge();
+    }
+
+    std::unique_ptr<LiveJudge> make_judge() const {
+        return std::make_unique<LiveJudge>(
             JudgedSystem{stack_.scenario(), stack_.instance(), stack_.truth_path(), magnetic_lsb_t,
                          Duration{static_cast<std::int64_t>(settings_.floor_us * 1e3)}},
             liar_);
-        judge_->poll();
     }
 
     /// Pairing and hint of each camera, for a stream that does not come back.
@@ -157,7 +163,12 @@ class Run {
     void watch(Duration time) {
         const HostTime end = host_now() + time;
         while (host_now() < end) {
-            for (const Wrong& wrong : judge_->poll()) blame(wrong);
+            const std::vector<Wrong> wrongs = judge_->poll();
+            for (const Told& told : liar_.told_since(logged_)) {
+                write_log(to_text(told));
+                ++logged_;
+            }
+            for (const Wrong& wrong : wrongs) blame(wrong);
             const timespec pause{0, 5'000'000};
             nanosleep(&pause, nullptr);
         }
@@ -184,7 +195,6 @@ class Run {
         row.damaged = liar_.damaged() - damaged_before;
         row.tally = judge_->tally(begin, host_now() - in_flight);
         row.worst = judge_->take_worst();
-        for (const Told& told : liar_.told_since(told_before_)) write_log(to_text(told));
         if (!row.recovery || stack_.service().wait({}) >= 0) restart_service(row);
         print(row);
         rows_.push_back(row);
@@ -213,6 +223,20 @@ class Run {
             liar_.obey({{&kind}, rate});
             watch(milliseconds(1500));
         }
+    }
+
+    /// The service hears no word of truth before the first lie.
+    void tell_from_the_start(const std::vector<const Kind*>& chosen) {
+        Row row{"from the start"};
+        const auto lies = [&] {
+            stack_.service().terminate();
+            liar_.forget();
+            liar_.obey({chosen, 0.1});
+            stack_.start_service();
+            judge_ = make_judge();
+            watch(seconds(5));
+        };
+        phase(row, lies, true);
     }
 
     void tell_at_random(const std::vector<const Kind*>& chosen) {
@@ -301,6 +325,7 @@ class Run {
     std::vector<Row> rows_;
     Row* row_ = nullptr;
     std::size_t told_before_ = 0;
+    std::size_t logged_ = 0;
 };
 
 }  // namespace
