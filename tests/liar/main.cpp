@@ -254,17 +254,26 @@ class Run {
         }
     }
 
-    /// The lie about the same exposure or sample, else the last one.
-    void blame(const Wrong& wrong) {
+    /// The lie about the same exposure or sample, else the last one; and the last about the clock.
+    std::string suspects(const Wrong& wrong) const {
         const std::vector<Told> told = liar_.told_since(told_before_);
-        const auto about = std::find_if(told.rbegin(), told.rend(), [&](const Told& t) {
+        const auto last = [&](auto condition) {
+            const auto found = std::find_if(told.rbegin(), told.rend(), condition);
+            return found == told.rend() ? "" : "; " + to_text(*found);
+        };
+        const std::string about = last([&](const Told& t) {
             return t.number == wrong.number && t.camera == wrong.camera &&
                    (t.type == Type::exposure || t.type == Type::imu_sample);
         });
-        const std::string lie = about != told.rend() ? to_text(*about)
-                                : told.empty()       ? "no lie"
-                                                     : "the last was " + to_text(told.back());
-        const std::string text = fmt::format("{}; {}", wrong.what, lie);
+        const std::string any = last([](const Told&) { return true; });
+        const std::string clock = last([](const Told& t) {
+            return t.type == Type::clock_answer || t.type == Type::clock_follow_up;
+        });
+        return (about.empty() ? any : about) + (clock == any ? "" : clock);
+    }
+
+    void blame(const Wrong& wrong) {
+        const std::string text = wrong.what + suspects(wrong);
         write_log("WRONG " + text);
         ++(wrong.is_stamp ? row_->wrong : row_->mislabelled);
         constexpr std::size_t shown = 4;
