@@ -239,6 +239,7 @@ void Liar::continue_lies(Packet& packet, HostTime now) {
             follow_ups_.find(static_cast<std::uint32_t>(get(packet, clock_follow_up::id)));
         if (lied != follow_ups_.end()) {
             shift({clock_follow_up::sent}, lied->second, packet);
+            follow_ups_.erase(lied);
             damage_counted(now);
         }
     }

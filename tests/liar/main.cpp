@@ -193,7 +193,7 @@ class Run {
             }
         }
         row.damaged = liar_.damaged() - damaged_before;
-        row.tally = judge_->tally(begin, host_now() - in_flight);
+        row.tally = judge_->tally(begin - in_flight, host_now() - in_flight);
         row.worst = judge_->take_worst();
         if (!row.recovery || stack_.service().wait({}) >= 0) restart_service(row);
         print(row);
