@@ -150,7 +150,9 @@ TEST_CASE("damage: as many as ordered") {
     liar.obey({{kind}, 0.5});
     pass_all(liar, 7000);
     CHECK(liar.damaged() == Approx(500).margin(80));
-    liar.obey({});
+    liar.obey({{find_kind("late-record")}, 1, 1});
+    pass_all(liar, 70);
+    liar.obey({});  // also ends what would last
     const std::uint64_t before = liar.damaged();
     pass_all(liar, 700);
     CHECK(liar.damaged() == before);
