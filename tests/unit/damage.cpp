@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "damage.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <map>
+#include <set>
+
+using namespace versavis;
+using namespace versavis::liar;
+
+namespace {
+
+constexpr Duration period = milliseconds(10);
+
+/// Payload sizes of the document.
+const std::map<Type, std::size_t> sizes{
+    {Type::exposure, 48}, {Type::imu_sample, 56},      {Type::event, 24}, {Type::clock_answer, 24},
+    {Type::health, 88},   {Type::clock_follow_up, 16}, {Type::log, 96}};
+
+/// The packets of a board: of each type in turn, each with instants and numbers of its own.
+class Board {
+ public:
+    Packet next() {
+        const auto& [type, size] = *std::next(sizes.begin(), sequence_ % sizes.size());
+        Packet packet{type, 7, sequence_++, Bytes(size)};
+        const std::int64_t n = sequence_;
+        for (const Field& field : instants(type)) set(packet, field, n * 1'000'000);
+        if (type == Type::exposure) {
+            set(packet, exposure::camera, n % 2);
+            set(packet, exposure::trigger, n);
+            set(packet, exposure::tick, n + 100);
+            set(packet, exposure::flags, 1);
+        } else if (type == Type::imu_sample) {
+            set(packet, imu_sample::number, n);
+            set(packet, imu_sample::age, n + 1);
+        } else if (type == Type::event) {
+            set(packet, event::sequence, n);
+            set(packet, event::value, n + 1);
+        } else if (type == Type::clock_answer) {
+            set(packet, clock_answer::id, n);
+        } else if (type == Type::clock_follow_up) {
+            set(packet, clock_follow_up::id, n);
+        }
+        return packet;
+    }
+
+ private:
+    std::uint32_t sequence_ = 0;
+};
+
+/// What `packet` is without the number that the liar writes into samples.
+Bytes plain(Packet packet) {
+    if (packet.type == Type::imu_sample) {
+        set(packet, imu_sample::magnetic_x, 0);
+        set(packet, imu_sample::magnetic_y, 0);
+    }
+    return packet.payload;
+}
+
+std::vector<Bytes> pass_all(Liar& liar, int count) {
+    Board board;
+    std::vector<Bytes> out;
+    for (int i = 0; i < count; ++i)
+        for (const Packet& told : liar.pass(board.next(), HostTime{i})) out.push_back(encode(told));
+    return out;
+}
+
+bool keeps_its_messages(Way way) {
+    return way != Way::drop && way != Way::repeat && way != Way::swap_messages &&
+           way != Way::swap_fields;
+}
+
+}  // namespace
+
+TEST_CASE("damage: without orders everything passes as it is") {
+    Liar liar(1, period);
+    Board board;
+    for (int i = 0; i < 100; ++i) {
+        const Packet packet = board.next();
+        const auto out = liar.pass(packet, HostTime{i});
+        REQUIRE(out.size() == 1);
+        CHECK(plain(out[0]) == packet.payload);
+        CHECK(out[0].sequence == packet.sequence);
+    }
+    CHECK(liar.damaged() == 0);
+}
+
+TEST_CASE("damage: each kind reaches each of its fields and nothing else, unseen by the CRC") {
+    for (const Kind& kind : kinds()) {
+        INFO(kind.name);
+        Liar liar(3, period);
+        liar.obey({{&kind}, 1});
+        Board board;
+        std::map<Type, std::set<unsigned>> changed;
+        std::uint32_t expected = 0;
+        for (int i = 0; i < 3000; ++i) {
+            const Packet packet = board.next();
+            const auto told = liar.pass(packet, HostTime{i});
+            for (const Packet& out : told) {
+                CHECK(out.sequence == expected++);
+                Bytes encoded = encode(out);
+                encoded.pop_back();
+                REQUIRE(decode(encoded));
+            }
+            if (!keeps_its_messages(kind.way)) continue;
+            REQUIRE(told.size() == 1);
+            const Bytes after = plain(told[0]);
+            for (unsigned at = 0; at < after.size(); ++at)
+                if (after[at] != packet.payload[at]) changed[packet.type].insert(at);
+        }
+        CHECK(liar.damaged() > 0);
+        CHECK(liar.told_since(0).front().kind == &kind);
+        if (!keeps_its_messages(kind.way) || kind.way == Way::flip_bits || kind.way == Way::step)
+            continue;
+        for (const Victim& victim : kind.victims) {
+            std::set<unsigned>& bytes = changed[victim.type];
+            for (const Field& field : victim.fields) {
+                INFO(field.name);
+                const auto begin = bytes.lower_bound(field.offset);
+                const auto end = bytes.lower_bound(field.offset + field.size);
+                CHECK(begin != end);
+                bytes.erase(begin, end);
+            }
+        }
+        // A late answer's follow-up agrees with it.
+        if (kind.way == Way::late) changed.erase(Type::clock_follow_up);
+        for (const auto& [type, bytes] : changed) CHECK(bytes.empty());
+    }
+}
+
+TEST_CASE("damage: the seed chooses") {
+    std::vector<const Kind*> every;
+    for (const Kind& kind : kinds()) every.push_back(&kind);
+    const auto run = [&](std::uint64_t seed) {
+        Liar liar(seed, period);
+        liar.obey({every, 0.5});
+        return pass_all(liar, 2000);
+    };
+    CHECK(run(1) == run(1));
+    CHECK(run(1) != run(2));
+}
+
+TEST_CASE("damage: as many as ordered") {
+    Liar liar(1, period);
+    const Kind* kind = find_kind("start");
+    liar.obey({{kind}, 1, 1});
+    pass_all(liar, 700);
+    CHECK(liar.damaged() == 1);
+    liar.obey({{kind}, 0.5});
+    pass_all(liar, 7000);
+    CHECK(liar.damaged() == Approx(500).margin(80));
+    liar.obey({{find_kind("late-record")}, 1, 1});
+    pass_all(liar, 70);
+    liar.obey({});  // also ends what would last
+    const std::uint64_t before = liar.damaged();
+    pass_all(liar, 700);
+    CHECK(liar.damaged() == before);
+}
+
+TEST_CASE("damage: messages that change places are all told") {
+    for (const char* name : {"swap-messages", "swap-fields"}) {
+        Liar liar(1, period);
+        liar.obey({{find_kind(name)}, 1});
+        Board board;
+        std::multiset<std::int64_t> numbers;
+        for (int i = 0; i < 3500; ++i) {
+            if (i == 3493) liar.obey({});
+            for (const Packet& told : liar.pass(board.next(), HostTime{i}))
+                if (told.type == Type::exposure) numbers.insert(get(told, exposure::trigger));
+        }
+        CHECK(numbers.size() == 500);
+        CHECK(std::set<std::int64_t>(numbers.begin(), numbers.end()).size() == 500);
+    }
+}
+
+TEST_CASE("damage: a clock that steps does so in every message, and by whole periods") {
+    Liar liar(1, period);
+    liar.obey({{find_kind("clock-step")}, 1, 1});
+    Board board;
+    const Packet first = board.next();
+    const std::int64_t step =
+        get(liar.pass(first, {}).at(0), exposure::start) - get(first, exposure::start);
+    CHECK(step != 0);
+    CHECK(step % period.ns == 0);
+    for (int i = 0; i < 700; ++i) {
+        const Packet packet = board.next();
+        const Packet told = liar.pass(packet, {}).at(0);
+        for (const Field& field : instants(packet.type))
+            CHECK(get(told, field) - get(packet, field) == step);
+    }
+    liar.forget();
+    const Packet packet = board.next();
+    CHECK(plain(liar.pass(packet, {}).at(0)) == packet.payload);
+}
+
+TEST_CASE("damage: what was not observed stays so") {
+    Liar liar(1, period);
+    liar.obey({{find_kind("record")}, 1});
+    Packet packet = Board().next();
+    REQUIRE(packet.type == Type::exposure);
+    set(packet, exposure::end, unobserved);
+    const Packet told = liar.pass(packet, {}).at(0);
+    CHECK(get(told, exposure::start) != get(packet, exposure::start));
+    CHECK(get(told, exposure::end) == unobserved);
+}
+
+TEST_CASE("damage: a sample's true number outlives every lie, and so does a frame's tick") {
+    std::vector<const Kind*> every;
+    for (const Kind& kind : kinds()) every.push_back(&kind);
+    Liar liar(5, period);
+    liar.obey({every, 1});
+    Board board;
+    std::set<std::uint32_t> given;
+    for (int i = 0; i < 7000; ++i) {
+        const Packet packet = board.next();
+        if (packet.type == Type::imu_sample)
+            given.insert(static_cast<std::uint32_t>(get(packet, imu_sample::number)));
+        for (const Packet& told : liar.pass(packet, HostTime{i})) {
+            if (told.type != Type::imu_sample) continue;
+            constexpr double lsb = 1e-4 / 7000;
+            const auto word = [&](const Field& field) {
+                return static_cast<float>(static_cast<std::int16_t>(get(told, field)) * lsb);
+            };
+            CHECK(given.count(true_number(word(imu_sample::magnetic_x),
+                                          word(imu_sample::magnetic_y), lsb)) == 1);
+        }
+        if (packet.type == Type::exposure)
+            CHECK(liar.true_tick(static_cast<unsigned>(get(packet, exposure::camera)),
+                                 static_cast<std::uint64_t>(get(packet, exposure::trigger))) ==
+                  static_cast<std::uint64_t>(get(packet, exposure::tick)));
+    }
+}
