@@ -65,6 +65,7 @@ json board_json(const BoardReport& board, bool needed) {
             {"lost_packets", board.lost_packets},
             {"malformed_packets", board.malformed},
             {"impossible_packets", board.impossible},
+            {"exchanges_doubted", board.exchanges_doubted},
             {"dropped_bytes", board.dropped_bytes},
             {"dropped_by_board", health.dropped_exposures + health.dropped_clock_answers +
                                      health.dropped_events + health.dropped_imu_samples +
@@ -155,6 +156,7 @@ json camera_json(const CameraStatus& status) {
             {"triggers", pipeline.triggers},
             {"triggers_without_frame", pipeline.triggers_without_frame},
             {"exposures_unmeasured", pipeline.unmeasured},
+            {"records_doubted", pipeline.records_doubted},
             {"frames_suspect", pipeline.suspect},
             {"frames_without_buffer", pipeline.no_buffer},
             {"exposure_ns", pipeline.exposure.ns},
@@ -197,6 +199,11 @@ std::string to_json(const Status& status) {
                                        {"lost", imu.report.lost},
                                        {"no_clock", imu.report.no_clock},
                                        {"faulty", imu.report.faulty},
+                                       {"doubted", imu.report.doubted},
+                                       {"filter_delay_ns", imu.report.filter.delay.ns},
+                                       {"filter_delay_sigma_ns", imu.report.filter.sigma.ns},
+                                       {"filter_delay_source",
+                                        imu::to_string(imu.report.filter.source)},
                                        {"last_sample_ns", imu.report.last_sample.ns}},
                                       imu.diagnosis));
     json streams = json::array();
