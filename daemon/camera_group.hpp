@@ -41,7 +41,6 @@ class CameraGroup {
     void name_source(JournalEntry& entry) const;
 
     bool any_triggered() const;
-    std::vector<std::string> ring_names() const;
     std::vector<CameraStatus> status(HostTime now) const;
     std::vector<StreamStatus> streams() const;
 

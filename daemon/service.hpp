@@ -15,6 +15,7 @@
 #include "stream/clock_recorder.hpp"
 #include "stream/event_journal.hpp"
 #include "stream/imu_pipeline.hpp"
+#include "stream/output_step_watch.hpp"
 #include "stream/status_publisher.hpp"
 
 namespace versavis::daemon {
@@ -47,6 +48,7 @@ class Service final : private BoardListener {
     bool board_needed() const { return !imus_.empty() || cameras_->any_triggered(); }
     void align_grid(HostTime now);
     Status collect_status(HostTime now);
+    void tell_output_step(const OutputStep& step);
 
     // On the link's thread.
     void board_restarted() override;
@@ -61,6 +63,7 @@ class Service final : private BoardListener {
     ring::OwnedDirectory directory_;
     clock::Translator translator_;
     StatusPublisher status_;
+    OutputStepWatch output_steps_;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     std::unique_ptr<EventJournal> events_;

@@ -36,6 +36,7 @@ const char* to_string(EventKind kind) {
         case EventKind::imu_failed: return "imu_failed";
         case EventKind::imu_silent: return "imu_silent";
         case EventKind::utc_label: return "utc_label";
+        case EventKind::output_clock_stepped: return "output_clock_stepped";
     }
     return "unknown";
 }

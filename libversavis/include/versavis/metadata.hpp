@@ -92,6 +92,7 @@ enum class EventKind : std::uint32_t {
     imu_failed = 19,            ///< the part is not the one configured; value: what it answered
     imu_silent = 20,            ///< no data-ready edge, end of transfer or bytes arrived
     utc_label = 21,  ///< the PPS pulse at this time was labelled; value: UTC seconds since 1970
+    output_clock_stepped = 24,  ///< value: ns by which its offset to the host's clock changed
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
