@@ -122,15 +122,6 @@ bool CameraGroup::any_triggered() const {
                        [](const Unit& unit) { return unit.pipeline->triggered(); });
 }
 
-std::vector<std::string> CameraGroup::ring_names() const {
-    std::vector<std::string> names;
-    for (const Unit& unit : units_) {
-        names.push_back(unit.configuration.name);
-        names.push_back(unit.configuration.name + evidence_suffix);
-    }
-    return names;
-}
-
 std::vector<CameraStatus> CameraGroup::status() const {
     std::vector<CameraStatus> cameras;
     for (const Unit& unit : units_)

@@ -48,7 +48,6 @@ class CameraGroup {
     void name_source(JournalEntry& entry) const;
 
     bool any_triggered() const;
-    std::vector<std::string> ring_names() const;
     std::vector<CameraStatus> status() const;
     std::vector<StreamStatus> streams() const;
 

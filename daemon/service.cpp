@@ -33,6 +33,17 @@ std::string missing_capability(const Configuration& configuration, std::uint32_t
     return "";
 }
 
+/// Of all rings: readers of these are handed over.
+std::vector<std::string> ring_names(const Configuration& configuration) {
+    std::vector<std::string> names{"status", "events", "clock"};
+    for (const ImuConfiguration& imu : configuration.imus) names.push_back(imu.name);
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        names.push_back(camera.name);
+        names.push_back(camera.name + evidence_suffix);
+    }
+    return names;
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -41,6 +52,9 @@ Expected<std::unique_ptr<Service>> Service::create(const Configuration& configur
     if (!output) return Unexpected(output.error());
     auto directory = ring::OwnedDirectory::claim(instance_directory(configuration.instance));
     if (!directory) return Unexpected(directory.error());
+    // First what is dead: its memory may be needed, and readers of streams that are no longer
+    // configured learn that they are gone.
+    directory->remove_stale(ring_names(configuration));
     auto status = StatusPublisher::create(directory->path());
     if (!status) return Unexpected(status.error());
     std::unique_ptr<Service> service(
@@ -97,9 +111,6 @@ Expected<> Service::make_cameras() {
 }
 
 void Service::start() {
-    // Before the cameras make their rings: readers of streams that are no longer configured learn
-    // that they are gone.
-    directory_.remove_stale(cameras_->ring_names());
     if (board_needed()) board_->start();
     cameras_->start();
 }
@@ -202,6 +213,14 @@ void Service::tick() {
     if (status_.due(now)) status_.publish(collect_status(now), translator_);
 }
 
+void Service::tell_output_step(const OutputStep& step) {
+    const Duration by = step.after - step.before;
+    log(LogLevel::warning, "clock",
+        "the output clock stepped by {} ns, from {} to {} ns after the host's: a new epoch begins",
+        by.ns, step.before.ns, step.after.ns);
+    events_->add({EventKind::output_clock_stepped, EventReason::none, 0, "clock", by.ns});
+}
+
 Status Service::collect_status(HostTime now) {
     Status status;
     status.instance = configuration_.instance;
@@ -213,6 +232,7 @@ Status Service::collect_status(HostTime now) {
         status.board.hint = missing_capability(configuration_, status.board.capabilities);
     status.clock = translator_.report();
     asymmetry_.keep(status.clock);
+    if (const auto step = output_steps_.see(status.clock)) tell_output_step(*step);
     status.grid = alignment_.report(now);
     status.cameras = cameras_->status();
     status.streams = cameras_->streams();

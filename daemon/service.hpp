@@ -16,6 +16,7 @@
 #include "stream/event_journal.hpp"
 #include "stream/event_witness.hpp"
 #include "stream/imu_pipeline.hpp"
+#include "stream/output_step_watch.hpp"
 #include "stream/status_publisher.hpp"
 
 namespace versavis::daemon {
@@ -53,6 +54,7 @@ class Service final : private BoardListener {
     void align_grid(HostTime now);
     void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
+    void tell_output_step(const OutputStep& step);
 
     // On the link's thread.
     void board_restarted() override;
@@ -68,6 +70,7 @@ class Service final : private BoardListener {
     ring::OwnedDirectory directory_;
     clock::Translator translator_;
     StatusPublisher status_;
+    OutputStepWatch output_steps_;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     std::unique_ptr<EventJournal> events_;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "log.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -11,9 +13,9 @@ namespace {
 /// Between documents. At half, a status costs twice the CPU; at twice, trouble shows a second late.
 constexpr Duration interval = milliseconds(500);
 
-/// Room for one document: some 30 cameras and IMUs. At half, large rigs do not fit; at twice, it
-/// takes 512 KiB more.
-constexpr std::uint64_t document_size = 64 * 1024;
+/// Room for one document at first: some 30 cameras and IMUs. At half, large rigs need a second ring
+/// as soon as they start; at twice, it takes 512 KiB more.
+constexpr std::uint64_t first_document_size = 64 * 1024;
 
 /// Documents kept: a reader may take four seconds over one. At half, it has two; at twice, eight.
 constexpr std::uint32_t slots = 8;
@@ -21,13 +23,28 @@ constexpr std::uint32_t slots = 8;
 /// Uncertainty of "now" as a stamp. It tells readers no more than that this is no measurement.
 constexpr Duration stamp_sigma = microseconds(1);
 
+Expected<ring::Writer> make_ring(const std::filesystem::path& directory, std::uint64_t size) {
+    return ring::Writer::create(directory,
+                                {"status", ring::StreamKind::status, slots, slots, size});
+}
+
 }  // namespace
 
 Expected<StatusPublisher> StatusPublisher::create(const std::filesystem::path& directory) {
-    auto ring = ring::Writer::create(
-        directory, {"status", ring::StreamKind::status, slots, slots, document_size});
+    auto ring = make_ring(directory, first_document_size);
     if (!ring) return Unexpected(ring.error());
-    return StatusPublisher(std::move(*ring));
+    return StatusPublisher(directory, std::move(*ring));
+}
+
+/// False: there is no room for a document of this size, and none can be made.
+bool StatusPublisher::make_room(std::size_t size) {
+    if (size <= ring_.slot_size()) return true;
+    auto larger = make_ring(directory_, 2 * size);
+    if (larger)
+        ring_ = std::move(*larger);
+    else
+        log(LogLevel::error, "status", "{}", larger.error().message());
+    return larger.has_value();
 }
 
 void StatusPublisher::publish(Status status, clock::Translator& translator) {
@@ -37,12 +54,12 @@ void StatusPublisher::publish(Status status, clock::Translator& translator) {
     watch_.examine(status);
     health_ = daemon::health(status);
     const std::string document = to_json(status);
+    if (!make_room(document.size())) return;
     const auto slot = ring_.acquire();
     if (!slot) return;
-    const std::size_t size = std::min<std::size_t>(document.size(), ring_.slot_size());
-    std::memcpy(ring_.slot_data(*slot), document.data(), size);
+    std::memcpy(ring_.slot_data(*slot), document.data(), document.size());
     const clock::Stamp stamp = translator.translate(status.now, stamp_sigma);
-    ring_.publish(*slot, static_cast<std::uint32_t>(size), stamp.output, {});
+    ring_.publish(*slot, static_cast<std::uint32_t>(document.size()), stamp.output, {});
 }
 
 double StatusPublisher::rate_hz(const StreamStatus& stream, HostTime now) {

@@ -23,7 +23,7 @@ class StatusPublisher {
     bool due(HostTime now) const { return now >= next_; }
 
     /// Adds the status stream itself, the rates of all streams and the health of all devices, and
-    /// publishes.
+    /// publishes the document whole: in a larger ring, if need be.
     void publish(Status status, clock::Translator& translator);
     void heartbeat(HostTime now) { ring_.heartbeat(now); }
 
@@ -31,10 +31,13 @@ class StatusPublisher {
     Health health() const { return health_; }
 
  private:
-    explicit StatusPublisher(ring::Writer ring) : ring_(std::move(ring)) {}
+    StatusPublisher(std::filesystem::path directory, ring::Writer ring)
+        : directory_(std::move(directory)), ring_(std::move(ring)) {}
 
+    bool make_room(std::size_t size);
     double rate_hz(const StreamStatus& stream, HostTime now);
 
+    std::filesystem::path directory_;
     ring::Writer ring_;
     HostTime next_;
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;

@@ -110,9 +110,12 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     wire::AlignGrid alignment;
     wire::Reboot reboot;
     if (packet.read(hello)) return greet(hello);
-    // A host that speaks to another life of this board learns of this one at once.
-    if (!greeted_) return transmitter_.send(introduction());
-    if (packet.read(request)) return send(wire::ClockAnswer{request.id, 0, received, 0});
+    // A host that asks another life of this board for the time learns of this one at once. Nothing
+    // else is answered: it could be an echo.
+    const bool asked = packet.read(request);
+    if (!greeted_ && asked) transmitter_.send(introduction());
+    if (!greeted_) return;
+    if (asked) return send(wire::ClockAnswer{request.id, 0, received, 0});
     if (packet.read(configuration)) return configure(configuration);
     if (packet.read(begin)) return start(begin);
     if (packet.read(end)) return stop(end.cameras);

@@ -38,6 +38,7 @@ const char* to_string(EventKind kind) {
         case EventKind::utc_label: return "utc_label";
         case EventKind::message_doubted: return "message_doubted";
         case EventKind::stream_stepped: return "stream_stepped";
+        case EventKind::output_clock_stepped: return "output_clock_stepped";
     }
     return "unknown";
 }

@@ -33,6 +33,9 @@ std::vector<Metric> bench_clock();
 /// callback.
 std::vector<Metric> bench_cameras(double seconds);
 
+/// How late a board's bytes are stamped under load, against one thread that reads and works.
+std::vector<Metric> bench_link();
+
 /// Instructions and memory of the firmware's core.
 std::vector<Metric> bench_firmware();
 

@@ -27,13 +27,27 @@ TEST_CASE("030-host-restarts: a new hello stops the cameras, numbers go on, samp
 TEST_CASE("030-silent-until-hello: nothing is sent to what may be an echoing terminal") {
     Scenario world;
     world.add_camera(0);
-    world.send(wire::ClockRequest{1, 0});
     world.run(10 * second);
     CHECK(world.inbox().packets == 0);
     const std::uint8_t echo[] = {'h', 'e', 'l', 'l', 'o', 0, 0x01, 0x02, 0};
     world.send_bytes(echo);
     world.run(second);
     CHECK(world.inbox().packets == 0);
+    REQUIRE(world.begin());
+}
+
+TEST_CASE(
+    "030-another-life: a host that asks for the time learns of the new life, an echo nothing") {
+    Scenario world;
+    world.send(wire::ClockRequest{1, 0});
+    world.run(second);
+    REQUIRE(world.inbox().hellos.size() == 1);
+    wire::Frame echo{};
+    wire::encode(world.inbox().hellos.front(), 1, 0, echo);
+    world.send_bytes({echo.bytes, echo.size});
+    world.send(wire::Start{1, 0, {}});
+    world.run(second);
+    CHECK(world.inbox().packets == 1);
     REQUIRE(world.begin());
 }
 

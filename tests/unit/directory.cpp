@@ -2,6 +2,7 @@
 #include "engine/ring/directory.hpp"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 
@@ -50,4 +51,32 @@ TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     CHECK(std::filesystem::exists(directory->path() / "own"));
     CHECK_FALSE(std::filesystem::exists(stranger));
     CHECK(reader->next().found == Found::gone);
+}
+
+TEST_CASE("directory: one that others may write to is refused, with the cure") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(::mkdir(path.c_str(), 0700) == 0);
+    for (const mode_t mode : {0777U, 0770U, 01777U}) {
+        REQUIRE(::chmod(path.c_str(), mode) == 0);
+        CHECK_THAT(OwnedDirectory::claim(path).error().message(),
+                   Catch::Contains("can be written by others") && Catch::Contains("chmod 0750"));
+    }
+    REQUIRE(::chmod(path.c_str(), 0750) == 0);
+    CHECK(OwnedDirectory::claim(path));
+    REQUIRE(::chmod(parent.path().c_str(), 0777) == 0);
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("chmod 0755"));
+}
+
+TEST_CASE("directory: a link or another's directory is refused") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    std::filesystem::create_directory_symlink(parent.path(), path);
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("not a directory"));
+    const std::filesystem::path foreign = ::geteuid() == 0 ? parent.path() / "foreign" : "/proc";
+    if (::geteuid() == 0) {
+        REQUIRE(::mkdir(foreign.c_str(), 0750) == 0);
+        REQUIRE(::chown(foreign.c_str(), 12345, 12345) == 0);
+    }
+    CHECK_THAT(OwnedDirectory::claim(foreign).error().message(), Catch::Contains("another user"));
 }

@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <fstream>
+#include <functional>
 #include <thread>
 
 #include "../support/temporary_directory.hpp"
@@ -254,4 +262,88 @@ TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
     REQUIRE_FALSE(huge);
     CHECK_THAT(huge.error().message(), Catch::Contains("/dev/shm"));
     CHECK(std::filesystem::is_empty(directory.path()));
+}
+
+namespace {
+
+/// Runs `body` in a process of its own, which ends as if it were killed; true: it returned true.
+bool in_process(const std::function<bool()>& body) {
+    const pid_t child = ::fork();
+    if (child == 0) ::_exit(body() ? 0 : 1);
+    int status = 0;
+    return ::waitpid(child, &status, 0) == child && status == 0;
+}
+
+bool write_line(const char* path, const std::string& line) {
+    return static_cast<bool>(std::ofstream(path) << line << std::flush);
+}
+
+/// /dev/shm of this process alone, of 3 MiB.
+bool make_memory_tight() {
+    const uid_t user = ::geteuid();
+    const gid_t group = ::getegid();
+    if (::unshare(user == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER) != 0) return false;
+    if (user != 0 && !(write_line("/proc/self/setgroups", "deny") &&
+                       write_line("/proc/self/uid_map", fmt::format("{0} {0} 1", user)) &&
+                       write_line("/proc/self/gid_map", fmt::format("{0} {0} 1", group))))
+        return false;
+    return ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+           ::mount("tmpfs", "/dev/shm", "tmpfs", 0, "size=3m,mode=0700") == 0;
+}
+
+/// In a small memory of its own: a dead writer's ring takes more than half of it.
+bool made_anew_in_tight_memory() {
+    const char* memory = "/dev/shm";
+    if (!make_memory_tight()) return false;
+    const Shape shape{"frames", StreamKind::frames, 8, 4, 512 << 10};
+    const bool left = in_process([&] {
+        auto writer = Writer::create(memory, shape);
+        if (!writer) return false;
+        for (int i = 0; i < 3; ++i) writer->publish(*writer->acquire(), 1, {}, {});
+        ::_exit(0);  // without its destructor
+    });
+    auto reader = Reader::open(std::filesystem::path(memory) / "frames", Reader::From::oldest);
+    if (!left || !reader) return false;
+    const Item held = reader->next();
+    auto writer = Writer::create(memory, shape);
+    if (held.found != Found::item || !writer || reader->intact(held)) return false;
+    writer->publish(*writer->acquire(), 1, {}, {});
+    Item item = reader->next();
+    while (item.found == Found::lost) item = reader->next();
+    return item.found == Found::restarted && reader->next().found == Found::item;
+}
+
+}  // namespace
+
+TEST_CASE("ring: a dead writer's memory is used again where there is no other") {
+    CHECK(in_process(made_anew_in_tight_memory));
+}
+
+TEST_CASE_METHOD(Fixture, "ring: no item is lost when one writer follows another [threads]",
+                 "[threads]") {
+    constexpr std::uint64_t lives = 300;
+    constexpr std::uint64_t items = 20;
+    std::atomic<std::uint64_t> followed{0};
+    auto first = std::make_unique<Writer>(inline_writer());
+    Reader reader = this->reader("numbers");
+    std::thread writing([&] {
+        auto writer = std::move(first);
+        for (std::uint64_t life = 0; life < lives; ++life) {
+            for (std::uint64_t i = 0; i < items; ++i) publish(*writer, life * items + i);
+            // The next follows when the reader has followed so far: it may skip no life.
+            while (followed < life) std::this_thread::yield();
+            if (life + 1 < lives) writer = std::make_unique<Writer>(inline_writer());
+        }
+        while (followed + 1 < lives) std::this_thread::yield();
+    });
+    std::uint64_t expected = 0;
+    while (expected < lives * items) {
+        const Item item = reader.next();
+        if (item.found == Found::restarted) ++followed;
+        if (item.found == Found::lost) expected += item.lost;
+        if (item.found != Found::item) continue;
+        REQUIRE(item.metadata[0] == expected);
+        ++expected;
+    }
+    writing.join();
 }

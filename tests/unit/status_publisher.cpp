@@ -73,3 +73,18 @@ TEST_CASE("status_publisher: health is that of the newest document") {
     publisher->publish(status, bench.translator);
     CHECK(publisher->health() == Health::ok);
 }
+
+TEST_CASE("status_publisher: a large document is whole, in a larger ring") {
+    test::Pipelines bench;
+    auto publisher = StatusPublisher::create(bench.directory.path());
+    REQUIRE(publisher);
+    auto reader = bench.reader("status");
+    Status status;
+    status.now = HostTime{100'000'000'000};
+    status.cameras.resize(200);
+    publisher->publish(status, bench.translator);
+    CHECK(reader.next().found == ring::Found::restarted);
+    CHECK(newest(reader)["cameras"].size() == 200);
+    publisher->publish(status, bench.translator);
+    CHECK(newest(reader)["cameras"].size() == 200);  // in the same ring
+}

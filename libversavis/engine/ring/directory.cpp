@@ -22,6 +22,28 @@ namespace {
 // file.
 constexpr auto lock_name = ".lock";
 
+/// Nobody else can put a ring there or take one away, from there or with the whole directory.
+Expected<> check_trust(const std::filesystem::path& path) {
+    struct stat directory {};
+    struct stat parent {};
+    if (::lstat(path.c_str(), &directory) != 0 || !S_ISDIR(directory.st_mode))
+        return failure(path.string(), "is not a directory", "remove it");
+    if (directory.st_uid != ::geteuid())
+        return failure(path.string(),
+                       fmt::format("belongs to another user (uid {})", directory.st_uid),
+                       "remove it, or run the service as that user");
+    if ((directory.st_mode & (S_IWGRP | S_IWOTH)) != 0)
+        return failure(path.string(), "can be written by others",
+                       fmt::format("remove it, or 'chmod 0750 {}'", path.string()));
+    const auto above = path.parent_path();
+    const bool open_to_all = ::stat(above.c_str(), &parent) == 0 &&
+                             (parent.st_mode & S_IWOTH) != 0 && (parent.st_mode & S_ISVTX) == 0;
+    if (open_to_all)
+        return failure(above.string(), "can be written by everybody",
+                       fmt::format("'chmod 0755 {}'", above.string()));
+    return {};
+}
+
 }  // namespace
 
 Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path) {
@@ -33,6 +55,7 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     if (error)
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
+    if (auto trusted = check_trust(path); !trusted) return Unexpected(trusted.error());
     const int lock = ::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
     if (lock < 0)
         return failure(path.string(),

@@ -14,7 +14,7 @@ class OwnedDirectory {
  public:
     /// Creates `path` (0750) if needed and locks it for this process. Segments that a dead owner
     /// left are kept until remove_stale(), so that their readers can be handed over. Errors: no
-    /// permission, another service owns it.
+    /// permission, another service owns it, others may write there.
     static Expected<OwnedDirectory> claim(const std::filesystem::path& path);
 
     OwnedDirectory(OwnedDirectory&& other) noexcept;

@@ -67,6 +67,22 @@ Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
                    "configure fewer slots or enlarge /dev/shm");
 }
 
+/// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
+/// its slot taken back, then the successor.
+void release(const std::filesystem::path& path, const Mapping& dead) {
+    const Header& header = dead.header();
+    for (std::uint32_t slot = 0; slot < header.slot_count; ++slot)
+        dead.generation(slot).fetch_add(2, std::memory_order_relaxed);
+    // SYNC 4: release fence here, acquire fence in Reader::intact(), as in Writer::acquire().
+    std::atomic_thread_fence(std::memory_order_release);
+    const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+    if (file < 0) return;
+    const auto begin = static_cast<off_t>(header.slots_at);
+    ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
+                static_cast<off_t>(header.total_size) - begin);
+    ::close(file);
+}
+
 void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.abi_major = abi_major;
     header.abi_minor = abi_minor;
@@ -111,13 +127,17 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     const auto path = directory / shape.name;
     const auto temporary = directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
-    if (auto allocated = allocate(temporary, size); !allocated)
-        return Unexpected(allocated.error());
+    auto old = Mapping::open(path, Mapping::Access::read_write);
+    auto allocated = allocate(temporary, size);
+    if (!allocated && old && !is_own(old->header())) {
+        release(path, *old);
+        allocated = allocate(temporary, size);
+    }
+    if (!allocated) return Unexpected(allocated.error());
     auto mapping = Mapping::open_unchecked(temporary, Mapping::Access::read_write);
     if (!mapping) return Unexpected(mapping.error());
     fill_header(mapping->header(), shape, size);
     // The name points to the new segment before readers of the old one wake up and look for it.
-    auto old = Mapping::open(path, Mapping::Access::read_write);
     if (::rename(temporary.c_str(), path.c_str()) != 0)
         return failure(path.string(),
                        fmt::format("cannot be renamed into place: {}", reason(errno)));

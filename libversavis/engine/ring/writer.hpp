@@ -29,8 +29,9 @@ struct Shape {
 class Writer {
  public:
     /// Makes the segment `directory / shape.name`, its memory allocated and populated. A segment
-    /// that an earlier writer left there is marked superseded and its readers are woken. Errors:
-    /// the file cannot be created, or its memory not reserved.
+    /// that an earlier writer left there is marked superseded and its readers are woken; where
+    /// memory is short, what a dead writer left is freed first. Errors: the file cannot be created,
+    /// or its memory not reserved.
     static Expected<Writer> create(const std::filesystem::path& directory, const Shape& shape);
 
     Writer(Writer&&) noexcept;

@@ -96,6 +96,7 @@ enum class EventKind : std::uint32_t {
     utc_label = 21,  ///< the PPS pulse at this time was labelled; value: UTC seconds since 1970
     message_doubted = 22,  ///< its witnesses contradict a message of the board: it was not used
     stream_stepped = 23,   ///< several messages agree against all before: a new epoch begins
+    output_clock_stepped = 24,  ///< value: ns by which its offset to the host's clock changed
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
