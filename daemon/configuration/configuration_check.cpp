@@ -34,7 +34,7 @@ class Findings {
     explicit Findings(TomlProblems& problems) : problems_(problems) {}
 
     void add(const TomlEntry& entry, const std::string& key, const std::string& what,
-             const std::string& cure, std::optional<TomlRange> range = {}) {
+             const std::string& cure, const TomlRange& range = {}) {
         TomlProblem found = entry.problem(key, what, cure);
         found.range = range;
         const auto same_place = [&](const TomlProblem& known) {
@@ -52,7 +52,7 @@ class Findings {
             add(entry, key,
                 fmt::format("'{}' is {}, and must be at most {} ({})", key, quantity(key, value),
                             quantity(key, maximum), reason),
-                cure, TomlRange{0, maximum});
+                cure, TomlRange{std::nullopt, maximum});
     }
 
  private:

@@ -18,10 +18,8 @@ std::string to_json(const std::string& path, const TomlProblems& problems) {
         if (!problem.table.empty()) entry["table"] = problem.table;
         if (!problem.key.empty()) entry["key"] = problem.key;
         if (const auto unit = unit_of(problem.key); !unit.empty()) entry["unit"] = unit;
-        if (problem.range) {
-            entry["minimum"] = problem.range->minimum;
-            entry["maximum"] = problem.range->maximum;
-        }
+        if (problem.range.minimum) entry["minimum"] = *problem.range.minimum;
+        if (problem.range.maximum) entry["maximum"] = *problem.range.maximum;
         list.push_back(std::move(entry));
     }
     // A name in the file system may hold any bytes.

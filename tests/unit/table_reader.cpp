@@ -82,7 +82,7 @@ TEST_CASE("table_reader: problems are collected with place, table and key") {
     CHECK(file.problems[0].message() ==
           "t.toml:2:12: 'width_us' must be a number from 0 to 2 us, and is 3; see manual");
     CHECK(file.problems[0].key == "width_us");
-    CHECK(file.problems[0].range->maximum == 2);
+    CHECK(file.problems[0].range.maximum == 2);
     CHECK(file.problems[1].cure == "did you mean \"round\"?");
     CHECK(file.problems[2].message() == "t.toml:3:1: unknown key 'hight'; did you mean 'height'?");
     CHECK(file.problems[2].table == "[t]");

@@ -22,10 +22,10 @@ struct TomlPlace {
     std::string text() const;
 };
 
-/// What a key may be, in the unit of its name.
+/// What a key may be, in the unit of its name, as far as it is limited.
 struct TomlRange {
-    double minimum = 0;
-    double maximum = 0;
+    std::optional<double> minimum;
+    std::optional<double> maximum;
 };
 
 struct TomlProblem {
@@ -34,7 +34,7 @@ struct TomlProblem {
     std::string key;    ///< empty: the table as a whole
     std::string what;
     std::string cure;
-    std::optional<TomlRange> range{};
+    TomlRange range{};
 
     /// "file:line:column: what; cure" on one line, without control characters.
     std::string message() const;

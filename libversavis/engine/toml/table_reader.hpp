@@ -76,8 +76,7 @@ class TableReader {
 
  private:
     const toml::node* find(std::string_view key);
-    void refuse(std::string_view key, const std::string& expected,
-                std::optional<TomlRange> range = {});
+    void refuse(std::string_view key, const std::string& expected, const TomlRange& range = {});
     void read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
                       std::int64_t maximum);
     std::optional<std::size_t> find_choice(std::string_view key,
