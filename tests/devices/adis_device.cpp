@@ -86,22 +86,28 @@ Nanoseconds AdisDevice::filter_delay() const {
     return std::llround((taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz * 1e9);
 }
 
-/// Sensor by sensor: mean over the taps, over these means again, and over those for one output.
+/// Of the newest sample and those before it: the mean over the taps, over these means again, and
+/// over those that make one of the output.
+std::vector<double> AdisDevice::weights() const {
+    std::vector<double> weights{1};
+    for (const unsigned length : {taps(), taps(), averaged()}) {
+        std::vector<double> mean(weights.size() + length - 1);
+        for (std::size_t i = 0; i < weights.size(); ++i)
+            for (std::size_t back = 0; back < length; ++back) mean[i + back] += weights[i] / length;
+        weights = std::move(mean);
+    }
+    return weights;
+}
+
 Inertial AdisDevice::filtered(Nanoseconds at) const {
     Inertial felt = world_(at);
-    if (taps() * averaged() == 1) return felt;
     felt.gyro_deg_s = felt.accel_g = {};
-    const double weight = 1.0 / (taps() * taps() * averaged());
-    for (unsigned back = 0; back + 2 < 2 * taps() + averaged(); ++back) {
-        // How many ways there are to reach so far back with three steps.
-        unsigned ways = 0;
-        for (unsigned first = 0; first < taps(); ++first)
-            for (unsigned second = 0; second < taps(); ++second)
-                if (back >= first + second && back - first - second < averaged()) ++ways;
-        const Inertial then = world_(at - std::llround(back / map_.base_hz * 1e9));
+    double back = 0;
+    for (const double weight : weights()) {
+        const Inertial then = world_(at - std::llround(back++ / map_.base_hz * 1e9));
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            felt.gyro_deg_s.at(axis) += ways * weight * then.gyro_deg_s.at(axis);
-            felt.accel_g.at(axis) += ways * weight * then.accel_g.at(axis);
+            felt.gyro_deg_s.at(axis) += weight * then.gyro_deg_s.at(axis);
+            felt.accel_g.at(axis) += weight * then.accel_g.at(axis);
         }
     }
     return felt;

@@ -51,6 +51,7 @@ class AdisDevice final : public SpiImuDevice {
 
     unsigned taps() const { return 1U << (registers_.at(map_.filter_at) & 7U); }
     unsigned averaged() const;
+    std::vector<double> weights() const;
     Inertial filtered(Nanoseconds at) const;
 
     bool resetting(Nanoseconds at) const { return at < ready_at_; }
