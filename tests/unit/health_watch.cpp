@@ -107,3 +107,13 @@ TEST_CASE("health_watch: a camera that is opened again and again is not starting
     CHECK(bench.status.cameras[0].diagnosis.health == Health::degraded);
     CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
 }
+
+TEST_CASE("health_watch: what recovers keeps its fault until it is trusted again") {
+    Bench bench;
+    for (int i = 0; i < 6; ++i) bench.step();
+    for (int i = 0; i < 4; ++i) bench.step(0.5);
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
+    for (int i = 0; i < 5; ++i) CHECK(bench.step().fault == Fault::packet_loss);
+    for (int i = 0; i < 3; ++i) bench.step();
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::none);
+}
