@@ -51,6 +51,11 @@ constexpr std::uint32_t common_packet = 1500;
 /// Frames whose camera time stood still, of the last: at half or twice, the same.
 constexpr std::uint64_t frozen_frames = 2;
 
+/// Without a frame, whole or not, for so long and so many periods, a camera sends none. At half, a
+/// host that pauses makes one; at twice, another cause is named first.
+constexpr Duration quiet_time = milliseconds(300);
+constexpr int quiet_periods = 5;
+
 bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
 
 struct CameraView {
@@ -70,6 +75,9 @@ struct CameraView {
     Duration exposure() const {
         const Duration told = it.pipeline.told_exposure;
         return told.ns != 0 ? told : it.pipeline.exposure;
+    }
+    bool quiet() const {
+        return all.now - it.pipeline.last_sign > std::max(quiet_time, period() * quiet_periods);
     }
     bool starting() const {
         return !full() && !it.delivery.fell_short &&
@@ -142,8 +150,9 @@ bool strobe_inverted(const CameraView& camera) {
 }
 
 bool exposes_not(const CameraView& camera) {
-    return camera.triggered() && camera.strobe() && camera.frames() == 0 &&
-           all_of(camera.it.recent.unmeasured, camera.it.recent.triggers);
+    return camera.triggered() && camera.strobe() && camera.quiet() &&
+           !camera.it.pipeline.measured &&
+           some(camera.it.recent.unmeasured, camera.it.recent.triggers);
 }
 
 bool frames_missing(const CameraView& camera) {
@@ -154,7 +163,7 @@ bool frames_missing(const CameraView& camera) {
 }
 
 bool all_frames_missing(const CameraView& camera) {
-    return camera.frames() == 0 && frames_missing(camera);
+    return camera.quiet() && frames_missing(camera);
 }
 
 std::string missing_hint(const CameraView& camera) {

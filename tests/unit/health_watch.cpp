@@ -37,12 +37,14 @@ struct Bench {
         pipeline.published += whole;
         pipeline.incomplete += 10 - whole;
         pipeline.refused[1] += 10 - whole;
+        if (!mute) pipeline.last_sign = now;
         status.imus[0].report.published += 100;
         status.now = now;
         watch.examine(status);
         return status.cameras[0].diagnosis;
     }
 
+    bool mute = false;
     HostTime now{100'000'000'000};
     Status status;
     HealthWatch watch;
@@ -82,6 +84,8 @@ TEST_CASE("health_watch: why a camera has no frames outlasts its being opened an
     Bench bench;
     for (int i = 0; i < 6; ++i) bench.step();
     PipelineReport& pipeline = bench.status.cameras[0].pipeline;
+    bench.mute = true;
+    pipeline.measured = false;
     for (int i = 0; i < 6; ++i) {
         pipeline.unmeasured += 10;
         pipeline.incomplete -= 10;  // nothing comes at all
