@@ -51,6 +51,11 @@ constexpr std::uint32_t common_packet = 1500;
 /// Frames whose camera time stood still, of the last: at half or twice, the same.
 constexpr std::uint64_t frozen_frames = 2;
 
+/// Without a frame, whole or not, for so long and so many periods, a camera sends none. At half, a
+/// host that pauses makes one; at twice, another cause is named first.
+constexpr Duration quiet_time = milliseconds(300);
+constexpr int quiet_periods = 5;
+
 bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
 
 struct CameraView {
@@ -70,6 +75,9 @@ struct CameraView {
     Duration exposure() const {
         const Duration told = it.pipeline.told_exposure;
         return told.ns != 0 ? told : it.pipeline.exposure;
+    }
+    bool quiet() const {
+        return all.now - it.pipeline.last_sign > std::max(quiet_time, period() * quiet_periods);
     }
     bool starting() const {
         return !full() && !it.delivery.fell_short &&
@@ -142,8 +150,9 @@ bool strobe_inverted(const CameraView& camera) {
 }
 
 bool exposes_not(const CameraView& camera) {
-    return camera.triggered() && camera.strobe() && camera.frames() == 0 &&
-           all_of(camera.it.recent.unmeasured, camera.it.recent.triggers);
+    return camera.triggered() && camera.strobe() && camera.quiet() &&
+           !camera.it.pipeline.measured &&
+           some(camera.it.recent.unmeasured, camera.it.recent.triggers);
 }
 
 bool frames_missing(const CameraView& camera) {
@@ -151,6 +160,18 @@ bool frames_missing(const CameraView& camera) {
     const std::uint64_t exposed = camera.it.recent.triggers - unmeasured;
     return camera.triggered() && !camera.full() && exposed > camera.frames() &&
            some(exposed - camera.frames(), exposed);
+}
+
+bool all_frames_missing(const CameraView& camera) {
+    return camera.quiet() && frames_missing(camera);
+}
+
+std::string missing_hint(const CameraView& camera) {
+    const std::uint64_t triggers = camera.it.recent.triggers;
+    return fmt::format(
+        "{} of the last {} exposures have no frame here: check network, firewall and the camera's "
+        "bandwidth limit",
+        triggers - std::min(camera.frames(), triggers), triggers);
 }
 
 /// Some triggers are answered, the others come while it is busy.
@@ -241,19 +262,16 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("frames are withheld: the board's clock is not known yet");
      }},
-    {Fault::starting, [](const CameraView& c) { return !c.streaming() || c.starting(); },
-     [](const CameraView& c) {
-         return std::string(c.streaming() ? "a start is in progress: its frames are being proved"
-                                          : "it is being opened and set up");
-     }},
+    {Fault::starting, [](const CameraView& c) { return !c.streaming(); },
+     [](const CameraView& /*c*/) { return std::string("it is being opened and set up"); }},
     {Fault::link_full,
      [](const CameraView& c) { return lost_packets(c) && !c.it.camera.bandwidth.fits(); },
      own_hint},
     {Fault::packet_size, packets_too_large,
      [](const CameraView& c) {
          return fmt::format(
-             "{} lost packets: packets of {} bytes do not pass; set the MTU of "
-             "interface and switches to 9000, or packet_size = 1500",
+             "{} lost packets: do packets of {} bytes pass? set the MTU of interface and switches "
+             "to 9000, or packet_size = 1500; else check the cable",
              count_of(c.refused(EventReason::frame_incomplete), c.frames()),
              c.it.camera.packet_size);
      }},
@@ -278,6 +296,19 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& c) {
          return fmt::format("{} frames found no free slot: raise 'slots' and 'buffers'",
                             c.it.recent.no_buffer);
+     }},
+    {Fault::no_exposure, exposes_not,
+     [](const CameraView& c) {
+         return fmt::format(
+             "triggers are sent but it does not expose: check that its trigger "
+             "cable is on output {}, and TriggerSource",
+             c.it.configuration.output);
+     }},
+    {Fault::no_frames, all_frames_missing, missing_hint},
+    // A start in progress looks like what follows.
+    {Fault::starting, [](const CameraView& c) { return c.starting(); },
+     [](const CameraView& /*c*/) {
+         return std::string("a start is in progress: its frames are being proved");
      }},
     {Fault::no_triggers,
      [](const CameraView& c) { return c.triggered() && !c.full() && c.it.recent.triggers == 0; },
@@ -320,13 +351,6 @@ constexpr Rule camera_rules[] = {
              "'strobe_line' and its LineSource, or set check_exposure = false",
              c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
      }},
-    {Fault::no_exposure, exposes_not,
-     [](const CameraView& c) {
-         return fmt::format(
-             "triggers are sent but it does not expose: check that its trigger "
-             "cable is on output {}, and TriggerSource",
-             c.it.configuration.output);
-     }},
     {Fault::camera_clock,
      [](const CameraView& c) {
          return c.triggered() && !c.full() && c.it.recent.clock_frozen >= frozen_frames;
@@ -354,14 +378,7 @@ constexpr Rule camera_rules[] = {
              "exposure or its size",
              rates(c));
      }},
-    {Fault::no_frames, frames_missing,
-     [](const CameraView& c) {
-         return fmt::format(
-             "{} of the last {} exposures have no frame here: check network, "
-             "firewall and the camera's bandwidth limit",
-             c.it.recent.triggers - std::min(c.frames(), c.it.recent.triggers),
-             c.it.recent.triggers);
-     }},
+    {Fault::no_frames, frames_missing, missing_hint},
     {Fault::strobe_missing, strobe_missing,
      [](const CameraView& /*c*/) {
          return std::string(

@@ -51,6 +51,13 @@ bool outlasts_reopening(const Diagnosis& before, const CameraStatus& camera, Hos
            (before.fault == Fault::no_exposure || before.fault == Fault::no_frames);
 }
 
+/// What it lacked a moment ago has ended, and it is not yet trusted.
+bool recovers(const Diagnosis& before, const CameraStatus& camera) {
+    return camera.diagnosis.fault == Fault::too_slow && before.fault != Fault::none &&
+           camera.recent.published - camera.recent.suspect + 1 >= camera.recent.triggers &&
+           camera.recent.received > 0;
+}
+
 }  // namespace
 
 void HealthWatch::examine(Status& status) {
@@ -63,7 +70,8 @@ void HealthWatch::examine(Status& status) {
         const std::string key = "camera " + camera.name;
         camera.diagnosis = diagnose(camera, status);
         const Diagnosis& before = lasting_[key].second;
-        if (outlasts_reopening(before, camera, status.now)) camera.diagnosis = before;
+        if (outlasts_reopening(before, camera, status.now) || recovers(before, camera))
+            camera.diagnosis = before;
         date(key, to_string(camera.camera.state), camera.diagnosis, status.now);
     }
     for (ImuStatus& imu : status.imus) {

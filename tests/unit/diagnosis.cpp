@@ -32,6 +32,7 @@ struct Bench {
             camera.camera.state = CameraState::streaming;
             camera.camera.packet_size = 9000;
             camera.pipeline.pairing = pairing::State::locked;
+            camera.pipeline.last_sign = now;
             camera.pipeline.told_exposure = camera.pipeline.exposure = milliseconds(3);
             camera.recent.received = camera.recent.published = camera.recent.triggers = 20;
             camera.delivery = {true, true, false, now - seconds(59), 20};
@@ -265,12 +266,19 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     trigger.cam().delivery.full = false;
     trigger.cam().recent.received = trigger.cam().recent.published = 0;
     trigger.cam().recent.unmeasured = 20;
+    trigger.cam().pipeline.measured = false;
+    trigger.cam().pipeline.last_sign = now - seconds(1);
+    check(trigger.camera(), Fault::no_exposure, "output 0");
+    trigger.cam().recent.received = 14;  // before it was cut
+    trigger.cam().recent.unmeasured = 6;
+    trigger.cam().pipeline.last_sign = now - milliseconds(350);
     check(trigger.camera(), Fault::no_exposure, "output 0");
     Bench strobe;
     strobe.cam().recent.unmeasured = 20;
     check(strobe.camera(), Fault::strobe_missing, "measured");
     Bench network;
     network.cam().delivery.full = false;
+    network.cam().pipeline.last_sign = now - seconds(1);
     network.cam().recent.received = network.cam().recent.published = 0;
     check(network.camera(), Fault::no_frames, "20 of the last 20");
     Bench contradicted;

@@ -37,12 +37,14 @@ struct Bench {
         pipeline.published += whole;
         pipeline.incomplete += 10 - whole;
         pipeline.refused[1] += 10 - whole;
+        if (!mute) pipeline.last_sign = now;
         status.imus[0].report.published += 100;
         status.now = now;
         watch.examine(status);
         return status.cameras[0].diagnosis;
     }
 
+    bool mute = false;
     HostTime now{100'000'000'000};
     Status status;
     HealthWatch watch;
@@ -82,6 +84,8 @@ TEST_CASE("health_watch: why a camera has no frames outlasts its being opened an
     Bench bench;
     for (int i = 0; i < 6; ++i) bench.step();
     PipelineReport& pipeline = bench.status.cameras[0].pipeline;
+    bench.mute = true;
+    pipeline.measured = false;
     for (int i = 0; i < 6; ++i) {
         pipeline.unmeasured += 10;
         pipeline.incomplete -= 10;  // nothing comes at all
@@ -106,4 +110,14 @@ TEST_CASE("health_watch: a camera that is opened again and again is not starting
     }
     CHECK(bench.status.cameras[0].diagnosis.health == Health::degraded);
     CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
+}
+
+TEST_CASE("health_watch: what recovers keeps its fault until it is trusted again") {
+    Bench bench;
+    for (int i = 0; i < 6; ++i) bench.step();
+    for (int i = 0; i < 4; ++i) bench.step(0.5);
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);
+    for (int i = 0; i < 5; ++i) CHECK(bench.step().fault == Fault::packet_loss);
+    for (int i = 0; i < 3; ++i) bench.step();
+    CHECK(bench.status.cameras[0].diagnosis.fault == Fault::none);
 }
