@@ -142,13 +142,13 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
 }
 
 TEST_CASE("camera_preset: a family may be known by what its cameras stamp") {
-    const test::TemporaryDirectory directory;
-    std::ofstream(directory.path() / "known.toml") << "stamp_instant = \"end\"\n";
-    std::ofstream(directory.path() / "other.toml") << "vendors = [\"else\"]\n";
+    test::TemporaryDirectory directory;
+    directory.write("known.toml", "stamp_instant = \"end\"\n");
+    directory.write("other.toml", "vendors = [\"else\"]\n");
     const auto presets = load_presets(directory.path());
     REQUIRE(presets);
     CHECK(choose_preset(*presets, "known", "", "")->stamp_instant == pairing::Instant::end);
     CHECK(choose_preset(*presets, "other", "", "")->stamp_instant == pairing::Instant::unknown);
-    std::ofstream(directory.path() / "known.toml") << "stamp_instant = \"dawn\"\n";
+    directory.write("known.toml", "stamp_instant = \"dawn\"\n");
     CHECK_FALSE(load_presets(directory.path()));
 }
