@@ -148,6 +148,26 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
     CHECK(judge(stack, 2).ok);
 }
 
+TEST_CASE("cameras: which instant of a changing exposure a camera stamps is found out, and shown") {
+    const std::string changing =
+        "width = 320\nheight = 240\nexposure_us = 8000\nexposure_swing = 0.7\n"
+        "exposure_swing_s = 0.43\nstamps = ";
+    StackSettings settings{"stamps", 56, 4, 20, "", "", ""};
+    settings.scenarios = {changing + "\"start\"", changing + "\"middle\"", changing + "\"end\"",
+                          changing + "\"readout\""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const std::string found[] = {"start", "middle", "end", "end"};
+    const auto status = stack.wait_for_status([&](const auto& s) {
+        for (std::size_t i = 0; i < std::size(found); ++i)
+            if (s["cameras"][i]["stamp_instant"] != found[i]) return false;
+        return true;
+    });
+    for (const auto& camera : status["cameras"]) CHECK(camera["slips"] == 0);
+    judge(stack, 2);
+}
+
 TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs again") {
     StackSettings settings{
         "replay", 55, 1,

@@ -177,3 +177,15 @@ TEST_CASE("camera_preset: a line that does not add up is refused, with its place
     directory.write("bad.toml", "[[line]]\nname = \"Line1\"\nkind = \"opt\"\n");
     CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("opto, direct"));
 }
+
+TEST_CASE("camera_preset: a family may be known by what its cameras stamp") {
+    test::TemporaryDirectory directory;
+    directory.write("known.toml", "stamp_instant = \"end\"\n");
+    directory.write("other.toml", "vendors = [\"else\"]\n");
+    const auto presets = load_presets(directory.path());
+    REQUIRE(presets);
+    CHECK(choose_preset(*presets, "known", "", "")->stamp_instant == pairing::Instant::end);
+    CHECK(choose_preset(*presets, "other", "", "")->stamp_instant == pairing::Instant::unknown);
+    directory.write("known.toml", "stamp_instant = \"dawn\"\n");
+    CHECK_FALSE(load_presets(directory.path()));
+}

@@ -294,14 +294,19 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
     proved_.reset();
     shortest_delay_ns_ = INT64_MAX;
     fruitless_starts_ = 0;
-    start_ends_ =
-        std::min(start_ends_, last_arrival_ + limits_.pattern_duration + limits_.latest_arrival);
+    end_start_soon();
     outcome_.locked(exposures_.front().exposure);
     for (const std::uint64_t trigger : triggers)
         if (trigger != 0)
             pair_front(trigger);
         else
             drop_front(EventReason::unproved);
+}
+
+/// The pauses between starts are over, but not a start that the board may still carry out.
+void Pairing::end_start_soon() {
+    start_ends_ =
+        std::min(start_ends_, last_arrival_ + limits_.pattern_duration + limits_.latest_arrival);
 }
 
 /// False while the record of the exposure there may come: unless the frame would have arrived
@@ -335,7 +340,8 @@ bool Pairing::verified(const Arrival& arrival, const Record& record) const {
     return !record.used && record.exposure.exposed &&
            arrival_possible(limits_, arrival, record.exposure) && ids_agree(arrival, record) &&
            !length_contradicts(arrival, record.exposure) && (record.prompt || by_clock_) &&
-           ((record.prompt && by_clock_) || ids_exact(arrival, record));
+           ((record.prompt && by_clock_) || ids_exact(arrival, record)) &&
+           (record.prompt || perhaps_not_taken(proved_->record, record) == 0);
 }
 
 /// Were a trigger left out of the count, a frame of the exposure before would do as well: it would
@@ -668,10 +674,9 @@ void Pairing::reset() {
     shortfalls_.clear();
     proved_.reset();
     waits_for_witness_ = false;
-    start_.reset();
     fruitless_starts_ = 0;
     frames_since_start_ = 0;
-    start_ends_ = {};
+    end_start_soon();
 }
 
 }  // namespace versavis::pairing

@@ -76,7 +76,8 @@ class Pairing {
     /// For a new stream of the camera; between reset() and the first evidence.
     void set_limits(const Limits& limits);
 
-    /// Gives back everything and searches anew: camera or board began a new life.
+    /// Gives back everything and searches anew: camera or board began a new life, or the board's
+    /// clock is estimated anew. A start that the board carries out goes on.
     void reset();
 
     State state() const { return state_; }
@@ -130,6 +131,7 @@ class Pairing {
     bool records_complete(const Arrival& arrival) const;
     void search();
     std::vector<std::uint64_t> find_alignment(const std::vector<Arrival>& frames) const;
+    void end_start_soon();
     void lock(const std::vector<std::uint64_t>& triggers);
 
     bool decide_locked();
