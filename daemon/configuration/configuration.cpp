@@ -290,10 +290,9 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
     Configuration configuration;
     TableReader top(file, *root);
     read_top(top, configuration);
-    read_part(file, top, "board", configuration.board,
-              [&](TableReader& reader, BoardConfiguration& board) {
-                  read_board(file, reader, board);
-              });
+    read_part(
+        file, top, "board", configuration.board,
+        [&](TableReader& reader, BoardConfiguration& board) { read_board(file, reader, board); });
     read_part(file, top, "clock", configuration.clock, read_clock);
     read_parts(file, top, "camera", configuration.cameras,
                [&](TableReader& reader) { return read_camera(file, reader); });

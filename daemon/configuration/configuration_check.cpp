@@ -12,14 +12,11 @@
 #include <tuple>
 
 #include "camera/camera_preset.hpp"
+#include "engine/pairing/pairing.hpp"
 
 namespace versavis::daemon {
 
 namespace {
-
-/// Exposures that the pairing remembers: a frame that comes later finds none. At half, fast cameras
-/// must deliver twice as fast; at twice, what is configured would not be kept.
-constexpr double exposures_kept = 128;
 
 /// A slow start sends one pulse a second: a frame must come before the next. At half, slow cameras
 /// cannot start; at twice, a frame could be of either pulse.
@@ -452,7 +449,8 @@ constexpr void (*rules[])(const Configuration&, Findings&){check_that_it_serves,
 }  // namespace
 
 double longest_arrival_ms(const CameraConfiguration& camera) {
-    const double kept = exposures_kept * 1e3 / camera.rate_hz;
+    const double kept =
+        static_cast<double>(pairing::longest_latest_arrival(period_of(camera)).ns) * 1e-6;
     return camera.camera_clock ? kept : std::min(kept, longest_arrival_without_clock_ms);
 }
 

@@ -146,6 +146,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
         return std::nullopt;
     }
     ExposureCompletion::place_on_host(exposure, record, stamp->host);
+    exposure.recorded = received;
     report_.record_delay = host_now() - exposure.end_on_host;
     tell(exposure);
     return stamp;

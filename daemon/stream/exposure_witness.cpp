@@ -22,7 +22,7 @@ constexpr Duration equal_exposures = microseconds(40);
 
 /// The grid differs from the board's clock by no more than this: aligned to the host or to pulses
 /// it slews. At half, it is doubted while it slews; at twice, lost records loosen the next by more.
-constexpr std::int64_t largest_slew_parts = 500;  // 1 / 0.002
+constexpr std::int64_t largest_slew_parts = 1000;  // one part in so many
 
 /// A trigger that leaves late says so, and is sent no later than this. At half, triggers of a busy
 /// board are doubted; at twice, a lie may hide behind the flag for 4 ms.
@@ -123,7 +123,9 @@ std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record
     if (expected_ns > furthest_ns) return doubt;
     const Duration off = since - Duration{static_cast<std::int64_t>(expected_ns)};
     Duration tolerance = pace_.tolerance() + compensation(record);
-    tolerance = tolerance + (rounded(expected_ns) - pace_.value()) / largest_slew_parts;
+    const Duration skipped = rounded(expected_ns) - pace_.value();
+    tolerance = tolerance + skipped / largest_slew_parts +
+                pace_.uncertainty() * (skipped.ns / pace_.value().ns);
     if (has(record, wire::exposure_late) || has(*newest_, wire::exposure_late))
         tolerance = tolerance + latest_trigger;
     if (absolute(off) <= tolerance) return std::nullopt;

@@ -13,8 +13,8 @@ namespace {
 constexpr std::int64_t rate_parts = 4;
 
 /// Over lost samples a part's pace may wander by one part in so many. At half, the first sample
-/// after a second's gap may be off by 4 ms; at twice, parts that warm up are doubted after a gap.
-constexpr std::int64_t wander_parts = 500;
+/// after a second's gap may be off by 0.2 ms; at twice, parts that warm up are doubted after a gap.
+constexpr std::int64_t wander_parts = 10'000;
 
 PulseHistory history(const ImuConfiguration& configuration) {
     const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
@@ -112,8 +112,7 @@ void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample, const D
 
 void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
                           const clock::Stamp& stamp) {
-    const auto guarded =
-        guard_.guard(stamp, total_sigma_ns(stamp.sigma_ns, filter_.sigma));
+    const auto guarded = guard_.guard(stamp, total_sigma_ns(stamp.sigma_ns, filter_.sigma));
     if (!guarded) {
         ++report_.doubted;
         if (guard_.stuck()) translator_.begin_epoch();

@@ -37,7 +37,7 @@ struct ImuReport {
     std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
     imu::FilterDelay filter;
-    double rate_hz = 0;          ///< configured
+    double rate_hz = 0;  ///< configured
     ImuFailure failure;
     bool working = false;  ///< it was set up, and has not failed since
 };

@@ -9,7 +9,7 @@ std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
     if (pulses <= 0)
         return Doubt{EventReason::implausible_number, pulse.number, newest_->number + 1};
     const Duration off = pulse.at - newest_->at - pace_.value() * pulses;
-    const Duration wander = pace_.value() * (pulses - 1) / wander_parts_;
+    const Duration wander = (pace_.value() / wander_parts_ + pace_.uncertainty()) * (pulses - 1);
     if (absolute(off) <= pace_.tolerance() + wander) return std::nullopt;
     return Doubt{EventReason::implausible_time, pulse.at.ns, (pulse.at - off).ns};
 }

@@ -190,22 +190,22 @@ std::string to_json(const Status& status) {
         cameras.push_back(with_diagnosis(camera_json(camera), camera.diagnosis));
     json imus = json::array();
     for (const ImuStatus& imu : status.imus)
-        imus.push_back(with_diagnosis({{"name", imu.report.name},
-                                       {"model", imu.report.model},
-                                       {"state", state(imu, status)},
-                                       {"configured_hz", imu.report.rate_hz},
-                                       {"delivered_hz", imu.delivery.rate_hz},
-                                       {"published", imu.report.published},
-                                       {"lost", imu.report.lost},
-                                       {"no_clock", imu.report.no_clock},
-                                       {"faulty", imu.report.faulty},
-                                       {"doubted", imu.report.doubted},
-                                       {"filter_delay_ns", imu.report.filter.delay.ns},
-                                       {"filter_delay_sigma_ns", imu.report.filter.sigma.ns},
-                                       {"filter_delay_source",
-                                        imu::to_string(imu.report.filter.source)},
-                                       {"last_sample_ns", imu.report.last_sample.ns}},
-                                      imu.diagnosis));
+        imus.push_back(
+            with_diagnosis({{"name", imu.report.name},
+                            {"model", imu.report.model},
+                            {"state", state(imu, status)},
+                            {"configured_hz", imu.report.rate_hz},
+                            {"delivered_hz", imu.delivery.rate_hz},
+                            {"published", imu.report.published},
+                            {"lost", imu.report.lost},
+                            {"no_clock", imu.report.no_clock},
+                            {"faulty", imu.report.faulty},
+                            {"doubted", imu.report.doubted},
+                            {"filter_delay_ns", imu.report.filter.delay.ns},
+                            {"filter_delay_sigma_ns", imu.report.filter.sigma.ns},
+                            {"filter_delay_source", imu::to_string(imu.report.filter.source)},
+                            {"last_sample_ns", imu.report.last_sample.ns}},
+                           imu.diagnosis));
     json streams = json::array();
     for (const StreamStatus& stream : status.streams)
         streams.push_back({{"name", stream.name},

@@ -32,13 +32,16 @@ class SteadyValue {
         return !known() || absolute(value - this->value()) <= tolerance() + allowance;
     }
 
+    /// How far off value() can be from what it will be in the mean.
+    Duration uncertainty() const { return tolerance() / static_cast<std::int64_t>(count_ + 1); }
+
     void learn(Duration value) {
         if (!known()) mean_ns_ = static_cast<double>(value.ns);
         const double off = static_cast<double>(value.ns) - mean_ns_;
-        count_ = std::min(count_ + 1, memory);
+        count_ = std::min(count_ + 1, mean_memory);
         mean_ns_ += off / count_;
         // What was supposed at first counts as one more value.
-        deviation_ns_ += (std::abs(off) - deviation_ns_) / (count_ + 1);
+        deviation_ns_ += (std::abs(off) - deviation_ns_) / (std::min(count_, memory) + 1);
     }
 
  private:
@@ -51,9 +54,13 @@ class SteadyValue {
     /// by 20 us pass as good.
     static constexpr Duration floor = microseconds(10);
 
-    /// Values that mean and scatter are taken of. At half, the scatter itself scatters, and honest
-    /// values are doubted; at twice, a drift is followed late.
+    /// Values that the scatter is taken of. At half, it scatters itself, and honest values are
+    /// doubted; at twice, what was supposed at first lasts twice as long.
     static constexpr double memory = 16;
+
+    /// The same for the mean, which is what gaps are bridged by. At half, the first value after a
+    /// gap may be off by twice as much; at twice, a drift is followed late.
+    static constexpr double mean_memory = 256;
 
     double mean_ns_ = 0;
     double deviation_ns_;

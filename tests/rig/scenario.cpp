@@ -69,20 +69,30 @@ CameraScenario read_camera(TableReader& reader) {
 
 Fault read_fault(TableReader& reader) {
     Fault fault;
-    reader.choose<FaultKind>(
-        "kind", fault.kind,
-        {{"drop_frame", FaultKind::drop_frame},         {"drop_leader", FaultKind::drop_leader},
-         {"drop_last", FaultKind::drop_last},           {"half_frame", FaultKind::half_frame},
-         {"swap_frames", FaultKind::swap_frames},       {"repeat_id", FaultKind::repeat_id},
-         {"restart_ids", FaultKind::restart_ids},       {"jump_clock", FaultKind::jump_clock},
-         {"change_size", FaultKind::change_size},       {"stop_clock", FaultKind::stop_clock},
-         {"ignore_trigger", FaultKind::ignore_trigger}, {"camera_mute", FaultKind::camera_mute},
-         {"camera_reboot", FaultKind::camera_reboot},   {"lose_packets", FaultKind::lose_packets},
-         {"block_large", FaultKind::block_large},       {"cut_strobe", FaultKind::cut_strobe},
-         {"board_reset", FaultKind::board_reset},       {"board_gone", FaultKind::board_gone},
-         {"board_mute", FaultKind::board_mute},         {"late_records", FaultKind::late_records},
-         {"imu_missing", FaultKind::imu_missing},       {"imu_noisy", FaultKind::imu_noisy},
-         {"imu_stuck", FaultKind::imu_stuck}});
+    reader.choose<FaultKind>("kind", fault.kind,
+                             {{"drop_frame", FaultKind::drop_frame},
+                              {"drop_leader", FaultKind::drop_leader},
+                              {"drop_last", FaultKind::drop_last},
+                              {"half_frame", FaultKind::half_frame},
+                              {"swap_frames", FaultKind::swap_frames},
+                              {"repeat_id", FaultKind::repeat_id},
+                              {"restart_ids", FaultKind::restart_ids},
+                              {"jump_clock", FaultKind::jump_clock},
+                              {"change_size", FaultKind::change_size},
+                              {"stop_clock", FaultKind::stop_clock},
+                              {"ignore_trigger", FaultKind::ignore_trigger},
+                              {"camera_mute", FaultKind::camera_mute},
+                              {"camera_reboot", FaultKind::camera_reboot},
+                              {"lose_packets", FaultKind::lose_packets},
+                              {"block_large", FaultKind::block_large},
+                              {"cut_strobe", FaultKind::cut_strobe},
+                              {"board_reset", FaultKind::board_reset},
+                              {"board_gone", FaultKind::board_gone},
+                              {"board_mute", FaultKind::board_mute},
+                              {"late_records", FaultKind::late_records},
+                              {"imu_missing", FaultKind::imu_missing},
+                              {"imu_noisy", FaultKind::imu_noisy},
+                              {"imu_stuck", FaultKind::imu_stuck}});
     reader.read("camera", fault.camera);
     reader.read("at_exposure", fault.at_exposure, 1, INT64_MAX);
     reader.read("count", fault.count, 1, INT64_MAX);

@@ -237,8 +237,8 @@ TEST_CASE("faults: the manual has those of this table, and of those without a ri
     // These need what the rig has not, or pass too fast; the rules have tests of their own.
     std::set<std::string> words{"starting",       "board_refuses", "too_slow",    "clock_unknown",
                                 "clock_holdover", "clock_step",    "same_device", "camera_failed",
-                                "link_full",      "no_buffer",     "no_triggers", "wrong_exposure", "line_delays",
-                                "imu_failed"};
+                                "link_full",      "no_buffer",     "no_triggers", "wrong_exposure",
+                                "line_delays",    "imu_failed"};
     for (const Case& c : cases) words.insert(c.fault);
     std::set<std::string> rows;
     std::ifstream manual(VERSAVIS_SOURCE_DIR "/docs/user/troubleshooting.md");

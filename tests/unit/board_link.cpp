@@ -428,6 +428,8 @@ TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
     running.board.load()->hold_writes(false);
     CHECK(at_once);
     CHECK(given.get() == BoardState::running);
+}
+
 TEST_CASE("board_link: what the board refuses is told in the words of the file") {
     Clock clock;
     Listener listener;

@@ -71,7 +71,7 @@ TEST_CASE("configuration: defaults follow the rate, so that a fast camera needs 
     CHECK(fast.max_exposure_us == 1000);
     CHECK(fast.exposure_us == 700);
     CHECK(fast.pulse_us == 100);
-    CHECK(fast.latest_arrival_ms == 128);
+    CHECK(fast.latest_arrival_ms == 500);
     CHECK(fast.slots == 6 + 8 + 120);
 }
 
@@ -282,9 +282,9 @@ TEST_CASE("configuration: delays of lines, of the board and of an IMU's filter")
     CHECK(board_configuration(*configuration).cameras[2].latency_ns == 10'030);
     CHECK(configuration->imus[0].filter_delay().delay == nanoseconds(3'662'109));
     CHECK(configuration->imus[1].filter_delay().delay == microseconds(2500));
-    CHECK_THAT(error_of(camera + "strobe_rising_us = [36, 9]\n"),
+    CHECK_THAT(errors_of(camera + "strobe_rising_us = [36, 9]\n"),
                Catch::Contains("both edges") && Catch::Contains("strobe_falling_us"));
-    CHECK_THAT(error_of(camera + "strobe_rising_us = 36\n"), Catch::Contains("2 numbers"));
-    CHECK_THAT(error_of("[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n"),
+    CHECK_THAT(errors_of(camera + "strobe_rising_us = 36\n"), Catch::Contains("2 numbers"));
+    CHECK_THAT(errors_of("[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n"),
                Catch::Contains("4 numbers"));
 }

@@ -164,11 +164,12 @@ TEST_CASE(
     configuration.filter_delay_us = override_us;
     const Duration delay = override_us ? from_us(*override_us) : microseconds(18311);
     ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}),
-                         bench.translator);
+                         bench.translator, bench.events);
     auto reader = bench.reader("imu0");
     const HostTime begin{50'000'000'000};
     bench.exchange(begin);
-    pipeline.add(sample(1, test::Pipelines::to_board(begin + milliseconds(40))));
+    pipeline.add(sample(1, test::Pipelines::to_board(begin + milliseconds(40))),
+                 begin + milliseconds(41));
     const ring::Item item = reader.next();
     const auto metadata = unpack<ImuMetadata>(item.metadata);
     CHECK(absolute(metadata.host_time - (begin + milliseconds(40) - delay)) < microseconds(1));
@@ -186,7 +187,7 @@ TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it h
     ImuConfiguration configuration;
     configuration.model = imu::find_model("adis16448b");
     ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 16}),
-                         bench.translator);
+                         bench.translator, bench.events);
     wire::Event event{};
     HostTime now{100'000'000'000};
     int told = 0;

@@ -83,7 +83,8 @@ std::string camera_line(const json& camera) {
         camera.value("delivered_hz", 0.0), camera.value("configured_hz", 0.0),
         text(camera, "pairing"), count(camera, "frames_published"),
         count(camera, "frames_incomplete"), count(camera, "frames_without_trigger"),
-        count(camera, "triggers_without_frame"), count(camera, "slips"), hint(camera), delay_line(camera));
+        count(camera, "triggers_without_frame"), count(camera, "slips"), hint(camera),
+        delay_line(camera));
 }
 
 struct ClockFact {
