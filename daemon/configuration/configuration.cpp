@@ -229,6 +229,7 @@ void complete(Configuration& configuration) {
     for (CameraConfiguration& camera : configuration.cameras) {
         camera.board_input_ns = configuration.board.input_delay_ns[camera.output];
         camera.board_output_ns = configuration.board.output_delay_ns[camera.output];
+        if (configuration.clock.align) camera.grid_slew_ppm = configuration.clock.max_slew_ppm;
         if (camera.master.empty()) complete(camera);
     }
     for (CameraConfiguration& camera : configuration.cameras) {

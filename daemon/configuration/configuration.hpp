@@ -86,6 +86,7 @@ struct CameraConfiguration {
     std::vector<double> strobe_falling_us;
     double board_input_ns = 0;  ///< of the board's exposure input for this camera
     double board_output_ns = 0;
+    double grid_slew_ppm = 0;  ///< at most; 0: the grid runs freely
     bool exposure_by_pulse =
         false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
     bool chunks = false;

@@ -20,9 +20,14 @@ constexpr Duration shortest_patience = milliseconds(2);
 /// us.
 constexpr Duration equal_exposures = microseconds(40);
 
-/// The grid differs from the board's clock by no more than this: aligned to the host or to pulses
-/// it slews. At half, it is doubted while it slews; at twice, lost records loosen the next by more.
-constexpr std::int64_t largest_slew_parts = 1000;  // one part in so many
+/// The grid runs at the board's pace within one part in so many: aligned, it follows another clock.
+/// At half, the second record of a life may be off by twice as much; at twice, grids that are
+/// aligned to a poor clock are doubted at first.
+constexpr std::int64_t first_pace_parts = 500;
+
+/// Over lost records the pace may wander by one part in so many. At half, the first record after a
+/// second's gap may be off by 0.2 ms; at twice, it is doubted when the board warms up.
+constexpr std::int64_t wander_parts = 10'000;
 
 /// A trigger that leaves late says so, and is sent no later than this. At half, triggers of a busy
 /// board are doubted; at twice, a lie may hide behind the flag for 4 ms.
@@ -78,7 +83,8 @@ std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
 ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
     : period_(period_of(configuration)),
       slave_(!configuration.master.empty()),
-      pace_(period_, period_ / largest_slew_parts),
+      slew_(rounded(static_cast<double>(period_.ns) * configuration.grid_slew_ppm * 1e-6)),
+      pace_(period_, period_ / first_pace_parts),
       latency_(first_tolerance),
       length_(first_tolerance) {
     lengths_[length_count_++] = from_us(configuration.exposure_us);
@@ -123,9 +129,9 @@ std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record
     if (expected_ns > furthest_ns) return doubt;
     const Duration off = since - Duration{static_cast<std::int64_t>(expected_ns)};
     Duration tolerance = pace_.tolerance() + compensation(record);
-    const Duration skipped = rounded(expected_ns) - pace_.value();
-    tolerance = tolerance + skipped / largest_slew_parts +
-                pace_.uncertainty() * (skipped.ns / pace_.value().ns);
+    const std::int64_t skipped = rounded(expected_ns).ns / pace_.value().ns - 1;
+    tolerance = tolerance + slew_ * (skipped + 1) +
+                (pace_.value() / wander_parts + pace_.uncertainty()) * skipped;
     if (has(record, wire::exposure_late) || has(*newest_, wire::exposure_late))
         tolerance = tolerance + latest_trigger;
     if (absolute(off) <= tolerance) return std::nullopt;

@@ -68,6 +68,7 @@ class ExposureHistory {
     std::optional<wire::Exposure> newest_;
     bool grid_known_ = false;  ///< the next tick can be told from the newest record's
     std::uint64_t skips_ = 0;  ///< told since the newest record
+    Duration slew_;            ///< by which a period may differ from the one before
     SteadyValue pace_;         ///< from one grid point to the next
     SteadyValue latency_;
     SteadyValue length_;
