@@ -12,7 +12,6 @@
 
 #include "../support/stack.hpp"
 #include "board/board_link.hpp"
-#include "configuration/board_configuration.hpp"
 #include "engine/clock/recording.hpp"
 #include "metric.hpp"
 #include "stream/camera_pipeline.hpp"
@@ -36,8 +35,8 @@ class Work final : public BoardListener {
     Work(const Configuration& configuration, const std::filesystem::path& directory,
          clock::Translator& translator, EventJournal& events)
         : imu_(configuration.imus[0],
-               *ring::Writer::create(directory, {"imu0", ring::StreamKind::imu, 16384}),
-               translator) {
+               *ring::Writer::create(directory, {"imu0", ring::StreamKind::imu, 16384}), translator,
+               events) {
         for (const CameraConfiguration& camera : configuration.cameras) {
             cameras_.push_back(
                 std::make_unique<CameraPipeline>(camera, camera.output, translator, events));
@@ -50,11 +49,14 @@ class Work final : public BoardListener {
     void board_synchronised() override {}
     void board_connected() override { connected_ = true; }
     void board_lost() override {}
-    void exposure(const wire::Exposure& record) override {
-        if (record.camera < cameras_.size()) cameras_[record.camera]->add(record);
+    void exposure(const wire::Exposure& record, HostTime received) override {
+        if (record.camera < cameras_.size()) cameras_[record.camera]->add(record, received);
     }
-    void imu_sample(const wire::ImuSample& sample) override { imu_.add(sample); }
-    void board_event(const wire::Event& /*event*/) override {}
+    bool imu_sample(const wire::ImuSample& sample, HostTime received) override {
+        return imu_.add(sample, received);
+    }
+    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 
     bool connected() const { return connected_; }
 
@@ -75,11 +77,11 @@ class WorkingStream final : public ByteStream {
         ::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &ordinary);
         auto chunk = stream_->read(into, timeout);
         if (chunk)
-            decoder_.feed(into.data(), chunk->size, [this](const wire::Packet& packet) {
+            decoder_.feed(into.data(), chunk->size, [&](const wire::Packet& packet) {
                 wire::Exposure record{};
                 wire::ImuSample sample{};
-                if (packet.read(record)) work_.exposure(record);
-                if (packet.read(sample)) work_.imu_sample(sample);
+                if (packet.read(record)) work_.exposure(record, chunk->received);
+                if (packet.read(sample)) work_.imu_sample(sample, chunk->received);
             });
         return chunk;
     }
@@ -125,9 +127,12 @@ struct Idle final : BoardListener {
     void board_synchronised() override {}
     void board_connected() override { work.board_connected(); }
     void board_lost() override {}
-    void exposure(const wire::Exposure& /*record*/) override {}
-    void imu_sample(const wire::ImuSample& /*sample*/) override {}
-    void board_event(const wire::Event& /*event*/) override {}
+    void exposure(const wire::Exposure& /*record*/, HostTime /*received*/) override {}
+    bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
+        return true;
+    }
+    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
     Work& work;
 };
 
@@ -136,7 +141,7 @@ struct Idle final : BoardListener {
 std::vector<double> delays_us(const test::Stack& stack, bool own_thread) {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto configuration = load_configuration(stack.configuration_path());
-    if (!configuration) throw std::runtime_error(configuration.error().message());
+    if (!configuration) throw std::runtime_error("the rig's configuration is refused");
     clock::Translator translator(*clock::OutputClock::create(clock::OutputClockKind::realtime));
     EventJournal events(
         *ring::Writer::create(directory.path(), {"events", ring::StreamKind::events, 4096}),
@@ -153,8 +158,7 @@ std::vector<double> delays_us(const test::Stack& stack, bool own_thread) {
             if (!stream || own_thread) return stream;
             return std::make_unique<WorkingStream>(std::move(*stream), work);
         },
-        board_configuration(*configuration), configuration->clock.exchange_rate_hz, translator,
-        recorder, listener);
+        *configuration, configuration->clock.exchange_rate_hz, translator, recorder, listener);
     link.start();
     while (!work.connected()) pause(milliseconds(10));
     link.start_cameras(0xF, pairing::Start::steady);

@@ -281,6 +281,10 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     network.cam().pipeline.last_sign = now - seconds(1);
     network.cam().recent.received = network.cam().recent.published = 0;
     check(network.camera(), Fault::no_frames, "20 of the last 20");
+    Bench load;
+    load.cam().pipeline.edges.inverted = true;
+    load.cam().pipeline.edges.line = "Line1";
+    check(load.camera(), Fault::line_delays, "Line1");
     Bench contradicted;
     contradicted.cam().pipeline.exposure_contradicted = true;
     contradicted.cam().pipeline.camera_exposure = milliseconds(5);
