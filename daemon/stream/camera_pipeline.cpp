@@ -169,8 +169,8 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
 
 /// What pairing knows of the board's time is void when the estimate of that time is.
 void CameraPipeline::follow_clock(std::uint32_t life) {
-    if (life == clock_life_) return;
-    clock_life_ = life;
+    const auto before = std::exchange(clock_life_, life);
+    if (!before || before == life) return;
     witness_.forget();
     begin_anew();
 }

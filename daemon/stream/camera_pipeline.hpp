@@ -152,7 +152,7 @@ class CameraPipeline final : private pairing::Outcome {
     FramePublisher frames_;
     EvidenceRecorder evidence_;
     ExposureWitness witness_;
-    std::uint32_t clock_life_ = 0;
+    std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
     ExposureCompletion completion_;
     ExposureCheck check_;
     EdgeDifference edges_;

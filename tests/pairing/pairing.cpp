@@ -236,6 +236,32 @@ TEST_CASE("pairing: the exposures that are kept reach as far back as frames may 
     CHECK(verdict.withheld == 0);
 }
 
+TEST_CASE("pairing: a reset does not end the start that the board carries out") {
+    struct Nobody final : pairing::Outcome {
+        void paired(const pairing::Arrival& /*a*/, const pairing::Exposure& /*e*/) override {}
+        void frame_unpaired(const pairing::Arrival& /*a*/, EventReason /*r*/,
+                            const pairing::Exposure* /*guess*/) override {}
+        void exposure_unpaired(const pairing::Exposure& /*e*/, EventReason /*r*/) override {}
+        void locked(const pairing::Exposure& /*e*/) override {}
+        void slipped(const pairing::Arrival& /*a*/) override {}
+    } nobody;
+    pairing::Limits limits;
+    pairing::Pairing paired(limits, nobody);
+    const HostTime begin{1'000'000'000'000};
+    paired.start_requested(pairing::Start::pattern, begin);
+    paired.reset();
+    const Duration carried_out = limits.pattern_duration + limits.latest_arrival;
+    for (int i = 0; i < 12; ++i) {
+        pairing::Arrival arrival;
+        arrival.block_id = static_cast<std::uint64_t>(i) + 1;
+        arrival.arrived = begin + milliseconds(50) * i;
+        arrival.camera_time = {arrival.arrived.ns};
+        paired.add(arrival);
+    }
+    CHECK_FALSE(paired.wanted_start(begin + carried_out));
+    CHECK(paired.wanted_start(begin + carried_out + milliseconds(1)) == pairing::Start::pattern);
+}
+
 TEST_CASE("pairing: the same world has the same verdict") {
     WorldSettings settings = with(FaultKind::clock_jump);
     settings.late_frames = 0.05;

@@ -35,9 +35,9 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
             "20\npacket_size = "
             "9000\n"
             "{2}\n{3}\n{4}\n{5}\n",
-            i, settings.device.empty() ? address(real) : settings.device,
+            i, at(settings.devices, i).empty() ? address(real) : at(settings.devices, i),
             slave ? settings.slave_extra : fmt::format("rate_hz = {}", settings.rate_hz),
-            settings.camera_extra, at(settings.extras, i), settings.lines);
+            settings.lines, settings.camera_extra, at(settings.extras, i));
     }
     configuration += "[[imu]]\nname = \"imu0\"\n" + settings.imu_extra;
     scenario_path_ = directory_.write("scenario.toml", scenario + settings.faults);

@@ -28,9 +28,9 @@ struct StackSettings {
     std::uint32_t height = 240;
     std::string link{};  ///< of the service to the board; empty: the rig's socket
     std::string
-        slave_extra{};     ///< instead of a rate, for the cameras of the service after the first
-    std::string device{};  ///< `device` of every camera of the service; empty: its address
-    bool swapped = false;  ///< the service takes each camera for the other
+        slave_extra{};  ///< instead of a rate, for the cameras of the service after the first
+    std::vector<std::string> devices{};    ///< `device` of each camera; empty: its address
+    bool swapped = false;                  ///< the service takes each camera for the other
     std::vector<std::string> scenarios{};  ///< more keys of the rig, by camera
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
     std::string imu_extra{};               ///< more keys of the IMU

@@ -150,7 +150,7 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
 
 TEST_CASE("cameras: which instant of a changing exposure a camera stamps is found out, and shown") {
     const std::string changing =
-        "width = 320\nheight = 240\nexposure_us = 8000\nexposure_swing = 0.7\n"
+        "exposure_us = 8000\nexposure_swing = 0.7\n"
         "exposure_swing_s = 0.43\nstamps = ";
     StackSettings settings{"stamps", 56, 4, 20, "", "", ""};
     settings.scenarios = {changing + "\"start\"", changing + "\"middle\"", changing + "\"end\"",

@@ -305,8 +305,7 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
 
 /// The pauses between starts are over, but not a start that the board may still carry out.
 void Pairing::end_start_soon() {
-    start_ends_ =
-        std::min(start_ends_, last_arrival_ + limits_.pattern_duration + limits_.latest_arrival);
+    start_ends_ = std::min(start_ends_, start_carried_out_);
 }
 
 /// False while the record of the exposure there may come: unless the frame would have arrived
@@ -566,6 +565,7 @@ void Pairing::start_requested(Start start, HostTime now) {
     // A start costs triggers: what does not help is asked for less and less often.
     const int patience = std::clamp(fruitless_starts_ - starts_in_a_row, 1, longest_patience);
     const Duration duration = start == Start::slow ? slow_duration : limits_.pattern_duration;
+    start_carried_out_ = now + duration + limits_.latest_arrival;
     start_ends_ = now + (duration + limits_.latest_arrival) * patience;
 }
 

@@ -190,6 +190,7 @@ class Pairing {
     int fruitless_starts_ = 0;
     int frames_since_start_ = 0;
     HostTime last_arrival_;
+    HostTime start_carried_out_;  ///< by the board, and no frame of it can come later
     HostTime start_ends_;  ///< no other start before: of two patterns within one arrival window, a
                            ///< frame of one could be taken for one of the other
 };

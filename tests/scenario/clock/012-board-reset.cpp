@@ -8,7 +8,9 @@
 using namespace versavis;
 using namespace versavis::clock_world;
 
-TEST_CASE("clock 012: a board that is reset is known again after one exchange, with its skew") {
+TEST_CASE(
+    "clock 012: a board that is reset is known again after one exchange, untold after three, with "
+    "its skew") {
     const bool told = GENERATE(true, false);
     Settings settings;
     settings.length = seconds(130);
@@ -23,11 +25,9 @@ TEST_CASE("clock 012: a board that is reset is known again after one exchange, w
             CHECK(observer.estimate(*settings.board_reset).state == clock::ClockState::reset);
         }
         TrueTime first = *settings.board_reset;
+        int exchanges = told ? 1 : 3;  // a single one may lie
         for (const Delivery& delivery : world.deliveries())
-            if (delivery.at > first) {
-                first = delivery.at;
-                break;
-            }
+            if (delivery.at > first && exchanges-- > 0) first = delivery.at;
         CHECK(absolute(observer.error(first)) < milliseconds(1));
         CHECK(observer.at(first).skew_ppm() == Approx(skew).margin(0.5));
         CHECK(observer.at(first).restarts() == (told ? 0 : 1));
