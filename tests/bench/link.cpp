@@ -198,22 +198,11 @@ void set_realtime(pid_t process) {
 
 /// Four outputs at 100 Hz and an IMU at 800 Hz, while busy threads take all that they get.
 std::vector<Metric> bench_link() {
-    test::Stack stack({"benchlink",
-                       43,
-                       4,
-                       100,
-                       "",
-                       "[board]\nclock_skew_ppm = 0\nclock_drift_ppm_per_s = 0\n",
-                       "",
-                       320,
-                       240,
-                       "",
-                       "",
-                       "",
-                       false,
-                       {},
-                       {},
-                       "rate_hz = 800\n"});
+    test::StackSettings settings{
+        "benchlink", 43, 4, 100, "", "[board]\nclock_skew_ppm = 0\nclock_drift_ppm_per_s = 0\n",
+        ""};
+    settings.imu_extra = "rate_hz = 800\n";
+    test::Stack stack(settings);
     stack.start_rig();
     set_realtime(stack.rig().pid());
     std::vector<double> before;

@@ -270,7 +270,7 @@ TEST_CASE("cameras: one that another program controls is left alone, and taken w
 
 TEST_CASE("cameras: an address in no network of this host is unreachable") {
     StackSettings settings{"nowhere", 59, 1, 20, "", "", ""};
-    settings.device = "203.0.113.9";
+    settings.devices = {"203.0.113.9"};
     Stack stack(settings);
     stack.start_service();
     const auto status = stack.wait_for_status(

@@ -137,7 +137,7 @@ StackSettings settings_of(const Case& c, unsigned number) {
             "[[fault]]\ncamera = \"cam0\"\nat_exposure = " + std::to_string(begins_at) + "\n" +
             c.broken + "\n";
     settings.imu_extra = text(c.imu);
-    settings.device = text(c.address);
+    settings.devices.assign(settings.cameras, text(c.address));
     settings.swapped = c.scene == Scene::swapped;
     if (settings.swapped) settings.cameras = 2;
     return settings;
@@ -262,7 +262,7 @@ TEST_CASE("faults: a service that was killed is said to be dead at once") {
 
 TEST_CASE("faults: who reads the stream of an absent camera is told that it is absent") {
     StackSettings settings{"noring", first_subnet + 98, 1, 20, "", "", ""};
-    settings.device = "127.0.99.98";
+    settings.devices = {"127.0.99.98"};
     Stack stack(settings);
     stack.start_service();
     stack.wait_for_status([](const json& s) { return s["cameras"][0]["state"] == "absent"; });
