@@ -53,7 +53,8 @@ class Probe {
         posix_spawn_file_actions_init(&files);
         posix_spawn_file_actions_adddup2(&files, ends[1], STDIN_FILENO);
         posix_spawn_file_actions_adddup2(&files, ends[1], STDOUT_FILENO);
-        // What its libraries write there fails and is nobody's; /dev/null may not exist in a chroot.
+        // What its libraries write there fails and is nobody's; /dev/null may not exist in a
+        // chroot.
         posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/", O_RDONLY | O_DIRECTORY, 0);
         posix_spawnattr_t attributes;
         posix_spawnattr_init(&attributes);

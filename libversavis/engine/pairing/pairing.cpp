@@ -304,9 +304,7 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
 }
 
 /// The pauses between starts are over, but not a start that the board may still carry out.
-void Pairing::end_start_soon() {
-    start_ends_ = std::min(start_ends_, start_carried_out_);
-}
+void Pairing::end_start_soon() { start_ends_ = std::min(start_ends_, start_carried_out_); }
 
 /// False while the record of the exposure there may come: unless the frame would have arrived
 /// before it was exposed.
