@@ -40,7 +40,6 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       witness_(ExposureHistory(configuration)),
       completion_(configuration),
       check_(configuration),
-      edges_(configuration),
       triggers_(configuration),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
@@ -135,7 +134,6 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     triggers_.recorded(record.trigger, received);
     report_.measured = measured(record);
     if (!report_.measured) ++report_.unmeasured;
-    edges_.recorded(record);
     const bool started = record.start_ns != wire::no_time;
     report_.start_delay = {started ? record.start_ns - record.trigger_ns : 0};
     pairing::Exposure exposure = completion_.complete(record);

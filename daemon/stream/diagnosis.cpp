@@ -335,8 +335,9 @@ constexpr Rule camera_rules[] = {
     {Fault::strobe_inverted, strobe_inverted,
      [](const CameraView& c) {
          return fmt::format(
-             "the exposure line rises {} us after the trigger, where the exposure "
-             "of {} us ends: it is inverted; change 'strobe' to \"{}\"",
+             "{}: the exposure line rises {} us after the trigger, where the exposure of {} us "
+             "ends: its polarity is wrong; change 'strobe' to \"{}\"",
+             c.it.pipeline.edges.line.empty() ? c.it.name : c.it.pipeline.edges.line,
              c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.told_exposure.ns / 1000,
              c.it.configuration.strobe == Strobe::active_high ? "active_low" : "active_high");
      }},

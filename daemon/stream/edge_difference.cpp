@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/pairing/alignment.hpp"
-
 namespace versavis::daemon {
 
 namespace {
@@ -25,11 +23,6 @@ constexpr unsigned frames_to_tell = 8;
 /// a cause; at twice, slow pull-ups are found only when they take a millisecond.
 constexpr double significant_sigmas = 3;
 
-/// Shortest exposure by which polarity is told: half of it is beyond what an unknown line and an
-/// unknown latency can be. At half, a slow line of a short exposure is named inverted; at twice,
-/// only longer exposures are judged.
-constexpr Duration shortest_told = milliseconds(1);
-
 /// Standard deviation of normal noise by the median of its absolute deviations, and that of the
 /// median of n samples by theirs: factors of statistics, not of taste.
 constexpr double sigma_per_deviation = 1.4826;
@@ -45,48 +38,22 @@ double us(Duration duration) { return static_cast<double>(duration.ns) * 1e-3; }
 
 }  // namespace
 
-EdgeDifference::EdgeDifference(const CameraConfiguration& configuration)
-    : period_(period_of(configuration)) {
-    report_.strobe = configuration.strobe;
-}
-
 void EdgeDifference::set_line_delays(const LineDelays& lines) {
     report_.line = lines.line;
     report_.frames = 0;
     report_.expected = lines.end.delay - lines.start.delay;
     report_.expected_sigma = {std::llround(std::hypot(lines.start.sigma.ns, lines.end.sigma.ns))};
-    inverted_frames_ = 0;
     next_ = 0;
 }
 
-void EdgeDifference::recorded(const wire::Exposure& record) {
-    const bool seen = record.start_ns != wire::no_time;
-    start_after_trigger_ = {seen ? record.start_ns - record.trigger_ns : 0};
-}
-
-/// An inverted line begins where the exposure ends, and lasts until the next one begins.
-bool EdgeDifference::looks_inverted(const pairing::Exposure& exposure, Duration told) const {
-    using pairing::lengths_differ;
-    if (told < shortest_told) return false;
-    if (exposure.kind == StampKind::predicted_middle)
-        return !lengths_differ(told, start_after_trigger_);
-    const Duration length = exposure.end - exposure.start;
-    return exposure.kind == StampKind::measured_middle && lengths_differ(told, length) &&
-           !lengths_differ(period_ - told, length);
-}
-
 void EdgeDifference::paired(const pairing::Exposure& exposure, Duration told) {
-    if (told.ns == 0) return;
-    report_.exposure = told;
-    inverted_frames_ = looks_inverted(exposure, told) ? inverted_frames_ + 1 : 0;
-    if (exposure.kind != StampKind::measured_middle) return;
+    if (told.ns == 0 || exposure.kind != StampKind::measured_middle) return;
     surplus_ns_[next_++ % surplus_ns_.size()] = (exposure.end - exposure.start - told).ns;
     report_.frames = std::min(next_, surplus_ns_.size());
 }
 
 EdgeReport EdgeDifference::report() const {
     EdgeReport report = report_;
-    report.inverted = inverted_frames_ >= frames_to_tell;
     if (report.frames == 0) return report;
     auto samples = surplus_ns_;
     std::int64_t* end = samples.data() + report.frames;
@@ -102,12 +69,6 @@ EdgeReport EdgeDifference::report() const {
 }
 
 std::string line_hint(const EdgeReport& edges) {
-    const char* other = edges.strobe == Strobe::active_low ? "active_high" : "active_low";
-    if (edges.inverted)
-        return fmt::format(
-            "{}: the exposure line goes active when the camera's exposure of {:.1f} ms ends: its "
-            "polarity is wrong, set strobe = \"{}\"",
-            edges.line, us(edges.exposure) * 1e-3, other);
     const double doubt = std::hypot(edges.sigma.ns, edges.expected_sigma.ns);
     const Duration surplus = edges.difference - edges.expected;
     if (edges.frames < frames_to_tell ||

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // By how much the end of an exposure shows later on its line than the start, measured against the
-// camera's own exposure time, and what it says of line, load and polarity.
+// camera's own exposure time, and what it says of line and load.
 #pragma once
 
 #include <array>
@@ -9,31 +9,23 @@
 
 #include "camera/line_delays.hpp"
 #include "engine/pairing/evidence.hpp"
-#include "wire/messages.hpp"
 
 namespace versavis::daemon {
 
 struct EdgeReport {
     std::string line;
-    Strobe strobe = Strobe::active_high;
     std::size_t frames = 0;   ///< that were measured; 0: nothing is known
     Duration difference;      ///< delay of the end less that of the start
     Duration sigma;           ///< of that, one standard deviation
     Duration expected;        ///< by preset or configuration
     Duration expected_sigma;  ///< of that
-    Duration exposure;        ///< newest, by the camera's account
-    bool inverted = false;    ///< the line is active when the camera does not expose
 };
 
 /// Not thread-safe.
 class EdgeDifference {
  public:
-    explicit EdgeDifference(const CameraConfiguration& configuration);
-
     /// Of the exposures to come; what was measured before is void.
     void set_line_delays(const LineDelays& lines);
-
-    void recorded(const wire::Exposure& record);
 
     /// A frame's exposure, and how long it was by the camera's account; 0: unknown.
     void paired(const pairing::Exposure& exposure, Duration told);
@@ -41,12 +33,7 @@ class EdgeDifference {
     EdgeReport report() const;
 
  private:
-    bool looks_inverted(const pairing::Exposure& exposure, Duration told) const;
-
-    Duration period_;
     EdgeReport report_;
-    Duration start_after_trigger_;  ///< of the newest record; 0: no start was seen
-    unsigned inverted_frames_ = 0;  ///< in a row
     /// Measured length, corrected, less the camera's account: the newest, in no order.
     std::array<std::int64_t, 32> surplus_ns_{};
     std::size_t next_ = 0;

@@ -282,8 +282,10 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     network.cam().recent.received = network.cam().recent.published = 0;
     check(network.camera(), Fault::no_frames, "20 of the last 20");
     Bench load;
-    load.cam().pipeline.edges.inverted = true;
     load.cam().pipeline.edges.line = "Line1";
+    load.cam().pipeline.edges.frames = 32;
+    load.cam().pipeline.edges.difference = microseconds(-80);
+    load.cam().pipeline.edges.sigma = microseconds(2);
     check(load.camera(), Fault::line_delays, "Line1");
     Bench contradicted;
     contradicted.cam().pipeline.exposure_contradicted = true;

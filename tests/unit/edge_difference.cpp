@@ -22,21 +22,14 @@ LineDelays opto() {
 struct Bench {
     Bench() { edges.set_line_delays(opto()); }
 
-    static CameraConfiguration camera() {
-        CameraConfiguration configuration;
-        configuration.rate_hz = 20;
-        return configuration;
-    }
-
     /// `surplus`: what its length, the delays taken off, exceeds the camera's account by.
-    void frame(Duration surplus, StampKind kind = StampKind::measured_middle) {
+    void frame(Duration surplus) {
         pairing::Exposure exposure;
         exposure.end = exposure.start + told + surplus;
-        exposure.kind = kind;
         edges.paired(exposure, told);
     }
 
-    EdgeDifference edges{camera()};
+    EdgeDifference edges;
 };
 
 }  // namespace
@@ -69,35 +62,5 @@ TEST_CASE("edge_difference: a line that is slower than known is named, with load
     for (const char* part : {"Line1", "126 us more", "-24", "load", "pull-up", "polarity"})
         CHECK_THAT(hint, Catch::Contains(part));
     bench.edges.set_line_delays(opto());
-    CHECK(line_hint(bench.edges.report()).empty());
-}
-
-TEST_CASE("edge_difference: a line that is active while the camera does not expose is inverted") {
-    Bench bench;
-    const bool seen_whole = GENERATE(true, false);
-    wire::Exposure record{};
-    record.trigger_ns = 1'000'000'000;
-    record.start_ns = record.trigger_ns + 20'000 + told.ns;
-    for (int i = 0; i < 8; ++i) {
-        bench.edges.recorded(record);
-        // Until the next exposure begins, or longer than the board waits.
-        bench.frame(milliseconds(50) - told - told,
-                    seen_whole ? StampKind::measured_middle : StampKind::predicted_middle);
-    }
-    const std::string hint = line_hint(bench.edges.report());
-    for (const char* part : {"Line1", "3.0 ms", "polarity", "active_low"})
-        CHECK_THAT(hint, Catch::Contains(part));
-    bench.frame({});
-    CHECK_FALSE(bench.edges.report().inverted);
-}
-
-TEST_CASE("edge_difference: a missing end does not make a line inverted") {
-    Bench bench;
-    wire::Exposure record{};
-    record.start_ns = record.trigger_ns + 20'000;
-    for (int i = 0; i < 20; ++i) {
-        bench.edges.recorded(record);
-        bench.frame(milliseconds(40), StampKind::predicted_middle);
-    }
     CHECK(line_hint(bench.edges.report()).empty());
 }
