@@ -115,9 +115,6 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     ++report_.received;
     report_.last_frame = report_.last_sign = arrival.arrived;
-    if (arrival.camera_time.ns != 0 && arrival.camera_time == last_camera_time_)
-        ++report_.clock_frozen;
-    last_camera_time_ = arrival.camera_time;
     triggers_.answered();
     if (triggered()) return tell(arrival);
     ++report_.published;

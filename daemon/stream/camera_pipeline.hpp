@@ -45,11 +45,10 @@ struct PipelineReport {
     std::uint64_t slips = 0;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
     std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
-    std::uint64_t clock_frozen = 0;  ///< frames with the camera time of the one before
-    Duration record_delay;           ///< end of the newest exposure to the arrival of its record
-    Duration start_delay;            ///< trigger to the start that its record has; 0: it has none
-    Duration told_exposure;          ///< as the camera was told, or tells; 0: it varies
-    HostTime last_sign;              ///< a frame arrived, whole or not
+    Duration record_delay;   ///< end of the newest exposure to the arrival of its record
+    Duration start_delay;    ///< trigger to the start that its record has; 0: it has none
+    Duration told_exposure;  ///< as the camera was told, or tells; 0: it varies
+    HostTime last_sign;      ///< a frame arrived, whole or not
     HostTime last_frame;
     HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
     Duration exposure;                   ///< measured, of the newest frame; 0: unknown
@@ -163,7 +162,6 @@ class CameraPipeline final : private pairing::Outcome {
     /// translated once as it came.
     std::map<std::uint64_t, clock::Stamp> middles_;
     std::uint64_t last_used_ = 0;  ///< trigger
-    CameraTime last_camera_time_;
     PipelineReport report_;
     std::vector<Line> unsaid_;  ///< advance() logs it: nothing is written under the lock
 };

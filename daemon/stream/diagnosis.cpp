@@ -21,11 +21,6 @@ constexpr int start_periods = 20;
 /// twice, a dead board is named half a second later.
 constexpr Duration board_silence = milliseconds(1000);
 
-/// A camera is released by its last controller within the heartbeat of GigE Vision, 3 s by default,
-/// and some have 10 s. At half, an own lease is called another program's; at twice, another
-/// program's is called a lease for longer after a start.
-constexpr Duration lease = seconds(10);
-
 /// Of the frames or triggers lately, what is more than chance. At half, a single one can be a
 /// cause; at twice, a cause of one in seven is missed.
 constexpr double telling_share = 0.08;
@@ -47,9 +42,6 @@ constexpr Duration edge_delay = microseconds(300);
 
 /// The largest packets that pass every network. Half: none sends such; twice: many do not pass.
 constexpr std::uint32_t common_packet = 1500;
-
-/// Frames whose camera time stood still, of the last: at half or twice, the same.
-constexpr std::uint64_t frozen_frames = 2;
 
 /// Without a frame, whole or not, for so long and so many periods, a camera sends none. At half, a
 /// host that pauses makes one; at twice, another cause is named first.
@@ -104,18 +96,9 @@ bool in(const CameraView& camera) {
 
 std::string own_hint(const CameraView& camera) { return camera.it.camera.hint; }
 
-bool same_device(const CameraView& camera) {
-    const auto& cameras = camera.all.cameras;
-    return camera.in(CameraState::busy) &&
-           std::any_of(cameras.begin(), cameras.end(), [&](const CameraStatus& other) {
-               const std::string& device = camera.it.configuration.device;
-               return other.name != camera.it.name &&
-                      (other.configuration.device == device || other.camera.serial == device);
-           });
-}
-
+/// It would be open, did not something hold it that ends by itself.
 bool leased(const CameraView& camera) {
-    return camera.in(CameraState::busy) && camera.all.now - camera.all.started < lease;
+    return camera.in(CameraState::opening) && !own_hint(camera).empty();
 }
 
 bool lost_packets(const CameraView& camera) {
@@ -216,19 +199,7 @@ struct Rule {
 
 /// The first that applies is the cause.
 constexpr Rule camera_rules[] = {
-    {Fault::same_device, same_device,
-     [](const CameraView& c) {
-         return fmt::format(
-             "another camera of the configuration has the same device {}: give each "
-             "its own address or serial number",
-             c.it.configuration.device);
-     }},
-    {Fault::camera_lease, leased,
-     [](const CameraView& /*c*/) {
-         return std::string(
-             "still held by its last controller, perhaps this service's last run: "
-             "it is released within seconds, or another program has it");
-     }},
+    {Fault::camera_lease, leased, own_hint},
     {Fault::camera_busy, in<CameraState::busy>, own_hint},
     {Fault::camera_unreachable, in<CameraState::unreachable>, own_hint},
     {Fault::camera_absent, in<CameraState::absent>, own_hint},
@@ -352,15 +323,6 @@ constexpr Rule camera_rules[] = {
              "'strobe_line' and its LineSource, or set check_exposure = false",
              c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
      }},
-    {Fault::camera_clock,
-     [](const CameraView& c) {
-         return c.triggered() && !c.full() && c.it.recent.clock_frozen >= frozen_frames;
-     },
-     [](const CameraView& /*c*/) {
-         return std::string(
-             "the camera's clock stands still, so nothing proves its frames: power "
-             "it off and on, or set camera_clock = false");
-     }},
     {Fault::unproved, not_followed,
      [](const CameraView& c) {
          return fmt::format(
@@ -441,7 +403,6 @@ const char* to_string(Fault fault) {
         case Fault::camera_unreachable: return "camera_unreachable";
         case Fault::camera_busy: return "camera_busy";
         case Fault::camera_lease: return "camera_lease";
-        case Fault::same_device: return "same_device";
         case Fault::camera_misconfigured: return "camera_misconfigured";
         case Fault::camera_silent: return "camera_silent";
         case Fault::camera_failed: return "camera_failed";
@@ -460,7 +421,6 @@ const char* to_string(Fault fault) {
         case Fault::strobe_missing: return "strobe_missing";
         case Fault::line_delays: return "line_delays";
         case Fault::wrong_exposure: return "wrong_exposure";
-        case Fault::camera_clock: return "camera_clock";
         case Fault::unproved: return "unproved";
         case Fault::too_slow: return "too_slow";
         case Fault::imu_missing: return "imu_missing";

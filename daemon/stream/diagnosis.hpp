@@ -38,7 +38,6 @@ enum class Fault {
     camera_unreachable,
     camera_busy,
     camera_lease,
-    same_device,
     camera_misconfigured,
     camera_silent,
     camera_failed,
@@ -58,7 +57,6 @@ enum class Fault {
     strobe_missing,
     line_delays,
     wrong_exposure,
-    camera_clock,
     unproved,
     too_slow,
     // Of an IMU.

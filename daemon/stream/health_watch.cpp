@@ -29,7 +29,6 @@ PipelineReport difference(PipelineReport now, const PipelineReport& before) {
     now.triggers -= before.triggers;
     now.unmeasured -= before.unmeasured;
     now.suspect -= before.suspect;
-    now.clock_frozen -= before.clock_frozen;
     for (std::size_t i = 0; i < now.refused.size(); ++i) now.refused[i] -= before.refused[i];
     return now;
 }

@@ -49,7 +49,7 @@ Error explain(const Error& error, const std::string& instance, const std::string
     if (!status) return error;
     for (const char* kind : {"cameras", "imus"})
         for (const auto& device : status->value(kind, nlohmann::json::array()))
-            if (device.value("name", "") == stream && device.value("fault", "") != "")
+            if (device.value("name", "") == stream && !device.value("fault", std::string()).empty())
                 return {stream,
                         fmt::format("the device is {}, so there is nothing to read",
                                     device.value("state", "not well")),
