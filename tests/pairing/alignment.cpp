@@ -58,6 +58,21 @@ TEST_CASE(
     CHECK(regular.align().empty());
 }
 
+TEST_CASE("alignment: a gap where a frame was lost is no place in the pattern") {
+    // The record of the first frame is not there any more: all of them fit one exposure later.
+    Bench bench({0, 1, 2, 3, 4, 5, 6, 8, 9});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6, 8}) bench.frame(trigger);
+    bench.exposures.pop_front();
+    CHECK(bench.align().empty());
+}
+
+TEST_CASE("alignment: a single longer gap is no place in the pattern") {
+    // The grid may have waited there, because the board's time was set back.
+    Bench bench({0, 1, 2, 3, 4, 6, 7});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6, 7}) bench.frame(trigger);
+    CHECK(bench.align().empty());
+}
+
 TEST_CASE("alignment: a late frame is left out of the proof") {
     Bench bench({0, 1, 3, 4, 7, 9, 11});
     for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6})

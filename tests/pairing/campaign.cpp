@@ -15,7 +15,8 @@ constexpr CameraClock clocks[] = {CameraClock::good, CameraClock::drifting, Came
 constexpr std::uint64_t first_fault = 40;
 constexpr std::uint64_t fault_distance = 50;
 constexpr std::uint64_t quiet_end = 120;  // pulses after the last fault ...
-constexpr double quiet_end_s = 2;         // ... and seconds: time to lock again
+constexpr double quiet_end_s = 5;         // ... and seconds: time to estimate the board's clock
+                                          // anew, and to lock again
 
 /// What is no matter of the matrix, but may matter.
 WorldSettings variation(std::uint64_t seed) {
@@ -28,7 +29,6 @@ WorldSettings variation(std::uint64_t seed) {
     if (seed % 4 == 3) settings.late_frames = 0;
     settings.stamped = static_cast<pairing::Instant>(1 + seed % 7 % 3);
     if (seed % 7 == 2) settings.readout_start = milliseconds(1);
-    settings.reset_with_clock = seed / 4 % 2 != 0;
     if (seed % 11 != 0) return settings;
     settings.exposure = microseconds(500);
     settings.other_exposure = milliseconds(3);

@@ -34,7 +34,10 @@ TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") 
         }
         CHECK(totals.not_locked == 0);
         CHECK(quantile(totals.first_published, 1) < milliseconds(600));
-        CHECK(quantile(totals.recoveries, 0.95) < seconds(1));
+        // A pattern that was under way when the board's clock was estimated anew ends first.
+        const bool stepped =
+            row.kind == FaultKind::board_time_step || row.kind == FaultKind::board_time_step_grid;
+        CHECK(quantile(totals.recoveries, 0.95) < milliseconds(stepped ? 1500 : 1000));
         const bool outage =
             row.kind == FaultKind::camera_reboot || row.kind == FaultKind::board_reset;
         if (outage) CHECK_FALSE(totals.recoveries.empty());
@@ -55,8 +58,25 @@ TEST_CASE("matrix: faults at random, close together at times") {
 }
 
 TEST_CASE("matrix: worlds that once ended with wrong pairs, or without any") {
-    for (const std::uint64_t seed : {929, 1092, 1184, 1911, 2147, 2860, 2953, 8552, 9344}) {
-        const Totals totals = run_random(1, seed, CameraClock::good);
+    struct Ended {
+        std::uint64_t seed;
+        CameraClock clock = CameraClock::good;
+    };
+    for (const auto& [seed, clock] : std::initializer_list<Ended>{{554},
+                                                                  {929},
+                                                                  {1092},
+                                                                  {1184},
+                                                                  {1911},
+                                                                  {2147},
+                                                                  {2860},
+                                                                  {2953},
+                                                                  {3513},
+                                                                  {8552},
+                                                                  {9344},
+                                                                  {20099},
+                                                                  {36299},
+                                                                  {3520, CameraClock::absent}}) {
+        const Totals totals = run_random(1, seed, clock);
         INFO("seed " << seed);
         CHECK(totals.wrong == 0);
         CHECK(totals.not_locked == 0);

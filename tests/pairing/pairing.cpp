@@ -210,9 +210,31 @@ TEST_CASE("pairing: a board whose time steps is never followed to other triggers
         with(GENERATE(FaultKind::board_time_step, FaultKind::board_time_step_grid));
     settings.seed = GENERATE(range(1, 30));
     settings.clock = GENERATE(CameraClock::good, CameraClock::absent);
-    settings.reset_with_clock = GENERATE(false, true);
     settings.pulses = 400;
     CHECK(run(settings).lies_published == 0);
+}
+
+TEST_CASE("pairing: a board whose time steps while the link stalls is not believed meanwhile") {
+    const bool fast = GENERATE(false, true);
+    WorldSettings settings = world(GENERATE(range(20U, 45U)));
+    settings.rate_hz = fast ? 155 : 20;
+    settings.faults = {{120, FaultKind::usb_stall},
+                       {fast ? 220 : 130, FaultKind::board_time_step_grid},
+                       {fast ? 260 : 135, FaultKind::duplicate_id}};
+    settings.pulses = fast ? 1400 : 400;
+    run(settings);
+}
+
+TEST_CASE("pairing: ids that stay one behind are not confirmed by a single frame's arrival") {
+    WorldSettings settings = world(GENERATE(range(1U, 30U)));
+    settings.clock = CameraClock::absent;
+    settings.rate_hz = 155;
+    settings.exposure = microseconds(500);
+    settings.other_exposure = milliseconds(3);
+    settings.switched_every = 1;  // the ends of neighbours lie closer than their starts
+    settings.faults[8] = FaultKind::duplicate_id;
+    settings.pulses = 300;
+    CHECK(run_world(settings).wrong == 0);
 }
 
 TEST_CASE("pairing: one record that lies costs few frames, and none is published by it") {

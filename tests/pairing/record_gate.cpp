@@ -74,6 +74,29 @@ TEST_CASE(
     CHECK_FALSE(gate_after(5).accepts(ahead));
 }
 
+TEST_CASE(
+    "record_gate: after a stall, only an exposure since its end shows that the link has caught "
+    "up") {
+    RecordGate gate = gate_after(5);
+    CHECK(gate.live());
+    const HostTime stall_ends = record(10, 10).recorded + milliseconds(45);
+    for (std::uint64_t i = 6; i <= 10; ++i) {
+        Exposure held_up = record(i, i);
+        held_up.recorded = stall_ends;
+        gate.take(held_up);
+        CHECK_FALSE(gate.live());
+    }
+    // Of a board whose time was set forward by a period meanwhile: it seems to come promptly.
+    Exposure seems_prompt = shifted(record(11, 11), milliseconds(-4));
+    seems_prompt.recorded = stall_ends;
+    REQUIRE(gate.accepts(seems_prompt));
+    RecordGate deceived = gate;
+    deceived.take(seems_prompt);
+    CHECK_FALSE(deceived.live());
+    gate.take(record(12, 12));
+    CHECK(gate.live());
+}
+
 TEST_CASE("record_gate: records that come late are good, but not prompt") {
     RecordGate gate = gate_after(5);
     CHECK(gate.prompt());

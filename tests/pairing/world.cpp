@@ -203,6 +203,8 @@ class World final : private pairing::Outcome {
         const Duration noise = between(-microseconds(30), microseconds(30));
         at(link_free_, [this, exposure, noise, life = life_]() mutable {
             if (life != life_) return;
+            // As the service does, before it looks at the record.
+            if (std::exchange(clock_anew_, false)) pairing_.reset();
             exposure.recorded = now_;
             exposure.end_on_host = exposure.earliest_on_host = to_host(exposure.end) + noise;
             pairing_.add(exposure);
@@ -232,8 +234,8 @@ class World final : private pairing::Outcome {
         at(now_ + between(milliseconds(300), seconds(3)), [this, life = life_] {
             if (life != life_) return;
             estimated_offset_ = board_offset_;
+            clock_anew_ = true;
             recovers();
-            if (settings_.reset_with_clock) pairing_.reset();
         });
     }
 
@@ -497,6 +499,7 @@ class World final : private pairing::Outcome {
     std::uint64_t pulses_ = 0;
     std::int64_t board_offset_ = 77'000'000'000;
     std::int64_t estimated_offset_ = board_offset_;
+    bool clock_anew_ = false;  ///< the estimate of the board's
     Duration grid_waits_;
     HostTime link_free_;
 

@@ -58,8 +58,6 @@ struct WorldSettings {
     Duration exposure;        ///< 0: 2 ms or a third of the period, and it follows the light
     Duration other_exposure;  ///< from `switched_every` to the same number of pulses later ...
     std::uint64_t switched_every = 0;  ///< ... and so on; 0: never
-    bool reset_with_clock = false;     ///< the service resets pairing when the board's clock is
-                                       ///< estimated anew
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames =

@@ -22,6 +22,10 @@ constexpr double same_difference = 0.125;
 // anything.
 constexpr double irregularity = 0.5;
 
+// Gaps that must be so much longer. At half (1) a grid that waits once, because the board's time
+// was set back, looks like a place of the pattern; at twice starts take twice as long.
+constexpr std::ptrdiff_t longer_gaps = 2;
+
 // A frame that is later than the quickest one of a start by more, in smallest gaps, is not proved
 // with the others. At half starts with some jitter fail; at twice one period late passes.
 constexpr double lateness_spread = 0.6;
@@ -84,7 +88,6 @@ class Search {
     /// cannot be.
     std::optional<Alignment> explain(std::int64_t difference_ns) const {
         Alignment alignment;
-        const Record* first = nullptr;
         const Record* last = nullptr;
         const Arrival* last_frame = nullptr;
         for (const Arrival& frame : frames_) {
@@ -102,32 +105,36 @@ class Search {
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
-            if (first == nullptr) first = record;
+            // The board's time may have been set back: the same time came twice, and from such
+            // records nothing can be learned of the arrivals.
+            alignment.unknown = alignment.unknown || !record->prompt;
             last = record;
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
         }
-        if (first == nullptr) return std::nullopt;
-        // The board's time may have been set back among them: the same time came twice.
-        alignment.unknown = alignment.unknown || (first->prompt && !last->prompt);
+        if (last == nullptr) return std::nullopt;
         return alignment;
     }
 
     /// Regular triggers prove nothing: the true exposures may be those whose records are missing at
-    /// either end.
+    /// either end. Only a gap with a frame at both ends counts: where one was lost, two gaps of the
+    /// pattern may be as long as two others.
     bool irregular(const std::vector<std::uint64_t>& triggers) const {
-        std::int64_t shortest = INT64_MAX;
-        std::int64_t longest = 0;
+        const auto has_frame = [&](const Exposure& exposure) {
+            return std::binary_search(triggers.begin(), triggers.end(), exposure.trigger);
+        };
+        std::vector<std::int64_t> gaps;
         for (std::size_t i = 1; i < exposures_.size(); ++i) {
             const Exposure& before = exposures_[i - 1].exposure;
             const Exposure& after = exposures_[i].exposure;
-            if (before.trigger < triggers.front() || after.trigger > triggers.back() ||
-                after.trigger != before.trigger + 1)
-                continue;
-            shortest = std::min(shortest, (after.start - before.start).ns);
-            longest = std::max(longest, (after.start - before.start).ns);
+            if (after.trigger == before.trigger + 1 && has_frame(before) && has_frame(after))
+                gaps.push_back((after.start - before.start).ns);
         }
-        return longest > shortest + part_of(gap_ns_, irregularity);
+        if (gaps.empty()) return false;
+        const std::int64_t usual =
+            *std::min_element(gaps.begin(), gaps.end()) + part_of(gap_ns_, irregularity);
+        return std::count_if(gaps.begin(), gaps.end(),
+                             [usual](std::int64_t gap) { return gap > usual; }) >= longer_gaps;
     }
 
     /// A frame of another exposure than these could not have arrived when it did.

@@ -247,6 +247,7 @@ void Pairing::note(const Shortfall& shortfall) {
 }
 
 void Pairing::process() {
+    if (!gate_.live()) return;
     if (state_ == State::searching) search();
     while (state_ != State::searching && !arrivals_.empty() &&
            (state_ == State::locked ? decide_locked() : decide_checking())) {
@@ -473,8 +474,9 @@ bool Pairing::decide_checking() {
     }
     const Record* late = by_latency(arrival);
     const Reading reading = read(arrival);
-    if (reading.verified && reading.record == late && steady(arrival, reading)) {
-        relock(*late);  // all agree: nothing stepped after all
+    const bool all_agree = reading.verified && reading.record == late && steady(arrival, reading);
+    if (all_agree && by_clock_) {
+        relock(*late);  // nothing stepped after all
         return true;
     }
     const Record* clocked = by_clock(arrival);
@@ -484,7 +486,9 @@ bool Pairing::decide_checking() {
     // A clock that steps does not hit another exposure to some microseconds. When it fits so well,
     // it is ids and arrivals that have stepped together.
     const Record* counted = by_clock_ && clocked == nullptr ? by_ids(arrival) : nullptr;
-    if (!suspect(Stepped::ids, arrival, ids_may_have_stepped ? clocked : nullptr) &&
+    // Without the camera's clock a single frame may come when one of another exposure would.
+    if (!suspect(Stepped::nothing, arrival, all_agree ? late : nullptr) &&
+        !suspect(Stepped::ids, arrival, ids_may_have_stepped ? clocked : nullptr) &&
         !suspect(Stepped::clock, arrival, counted == late ? counted : nullptr))
         give_up_front();
     return true;

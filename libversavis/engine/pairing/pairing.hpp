@@ -95,7 +95,7 @@ class Pairing {
 
  private:
     /// What may have stepped at a slip, so that the other kinds of evidence still agree.
-    enum class Stepped : std::size_t { ids, clock };
+    enum class Stepped : std::size_t { ids, clock, nothing };
 
     struct Pair {
         Arrival arrival;
@@ -181,7 +181,7 @@ class Pairing {
     std::int64_t shortest_delay_ns_ = 0;     ///< from end of exposure to arrival, since the lock
     Relation latency_{false};                ///< arrival against its end on the host
     std::optional<Pair> proved_;             ///< the newest that was published
-    std::array<Suspicion, 2> suspicions_{};  ///< by Stepped
+    std::array<Suspicion, 3> suspicions_{};  ///< by Stepped
     bool waits_for_witness_ = false;
     int undecided_ = 0;  ///< frames since the slip
     HostTime slipped_;

@@ -52,15 +52,24 @@ bool RecordGate::in_order(const Exposure& before, const Exposure& after) const {
            off_grid * period + grid_rate * by_grid;
 }
 
+std::int64_t RecordGate::tolerance_ns() const {
+    return std::max(part_of(period_.ns, off_delay), least_off_delay_ns);
+}
+
+/// Least time from the end of an exposure until its record comes.
+double RecordGate::earliest_ns() const {
+    const auto least_ns = static_cast<double>(earliest_.ns);
+    if (confirmed_ < records_to_confirm) return least_ns;
+    return std::max(least_ns, static_cast<double>(*least_delay_ns_ - tolerance_ns()));
+}
+
 bool RecordGate::too_early(const Exposure& exposure) const {
-    if (exposure.recorded.ns == 0) return false;
-    double earliest_ns = static_cast<double>(earliest_.ns);
-    if (confirmed_ >= records_to_confirm)
-        earliest_ns =
-            std::max(earliest_ns,
-                     static_cast<double>(*least_delay_ns_ - std::max(part_of(period_.ns, off_delay),
-                                                                     least_off_delay_ns)));
-    return apart_ns(exposure.earliest_on_host, exposure.recorded) < earliest_ns;
+    return exposure.recorded.ns != 0 &&
+           apart_ns(exposure.earliest_on_host, exposure.recorded) < earliest_ns();
+}
+
+bool RecordGate::live() const {
+    return !newest_ || apart_ns(newest_->earliest_on_host, late_until_) <= earliest_ns();
 }
 
 bool RecordGate::accepts(const Exposure& exposure) const {
@@ -71,12 +80,15 @@ void RecordGate::take(const Exposure& exposure) {
     if (exposure.recorded.ns != 0) {
         const std::int64_t delay_ns = (exposure.recorded - exposure.earliest_on_host).ns;
         const double since_ns = newest_ ? apart_ns(newest_->start, exposure.start) : 0;
+        const bool first = !least_delay_ns_;
         const std::int64_t least_ns = least_delay_ns_.value_or(delay_ns) +
                                       std::llround(delay_forgotten * std::max(since_ns, 0.0));
         confirmed_ = delay_ns < least_ns - part_of(period_.ns, off_delay) ? 0 : confirmed_ + 1;
         least_delay_ns_ = std::min(least_ns, delay_ns);
-        prompt_ =
-            delay_ns <= latest_.ns && delay_ns - *least_delay_ns_ <= part_of(period_.ns, off_delay);
+        const std::int64_t late_ns = delay_ns - *least_delay_ns_;
+        prompt_ = delay_ns <= latest_.ns && late_ns <= part_of(period_.ns, off_delay);
+        if (first || delay_ns > latest_.ns || late_ns > tolerance_ns())
+            late_until_ = exposure.recorded;
     }
     newest_ = exposure;
 }

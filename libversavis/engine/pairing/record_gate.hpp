@@ -32,6 +32,11 @@ class RecordGate {
     /// or the board's time was set back: nobody can tell.
     bool prompt() const { return prompt_; }
 
+    /// The link has caught up: the newest record is of an exposure so long after the last late one
+    /// came that it was not held up with that. Until then, nobody can tell a delay of the link from
+    /// a step of the board's time.
+    bool live() const;
+
     /// How soon records reach the host is learned anew.
     void forget_delay() {
         least_delay_ns_.reset();
@@ -39,6 +44,8 @@ class RecordGate {
     }
 
  private:
+    std::int64_t tolerance_ns() const;
+    double earliest_ns() const;
     bool too_early(const Exposure& exposure) const;
 
     Duration period_;
@@ -48,6 +55,7 @@ class RecordGate {
     std::optional<std::int64_t> least_delay_ns_;  ///< on the way to the host
     int confirmed_ = 0;                           ///< records that took no less, in a row
     bool prompt_ = true;
+    HostTime late_until_;  ///< when the newest late record came, or the first of all
 };
 
 }  // namespace versavis::pairing
