@@ -280,11 +280,10 @@ Expected<> BoardLink::read_until(const std::function<bool()>& done, Duration tim
 
 Expected<> BoardLink::read(Duration timeout) {
     wake_.wait(timeout);
-    const auto drained =
-        reader_->drain([&](std::span<const std::uint8_t> bytes, HostTime received) {
-            decoder_.feed(bytes.data(), bytes.size(),
-                          [&](const wire::Packet& packet) { take(packet, received); });
-        });
+    auto drained = reader_->drain([&](std::span<const std::uint8_t> bytes, HostTime received) {
+        decoder_.feed(bytes.data(), bytes.size(),
+                      [&](const wire::Packet& packet) { take(packet, received); });
+    });
     if (!drained) return drained;
     if (anew_) return failure("board", "was reset");
     const std::uint64_t dropped = reader_->dropped();
