@@ -99,7 +99,7 @@ std::string find_on_usb(const std::string& device) {
     ArvInterface* usb = arv_uv_interface_get_instance();
     arv_interface_update_device_list(usb);
     for (unsigned i = 0; i < arv_interface_get_n_devices(usb); ++i) {
-        const std::string id = text(arv_interface_get_device_id(usb, i));
+        std::string id = text(arv_interface_get_device_id(usb, i));
         for (const std::string& name : {id, text(arv_interface_get_device_serial_nbr(usb, i)),
                                         text(arv_interface_get_device_physical_id(usb, i))})
             if (strcasecmp(name.c_str(), device.c_str()) == 0) return id;

@@ -161,7 +161,7 @@ class Graph {
         costs_[name].steps = 0;  // being looked at
         Cost sum;
         for (const std::string& other : feature->second.parts) {
-            const auto part = cost(other);
+            auto part = cost(other);
             if (!part) return part;
             sum.steps = std::min(sum.steps + part->steps, most_steps + 1);
             sum.depth = std::max(sum.depth, part->depth + 1);

@@ -14,8 +14,6 @@
 #include <array>
 #include <fstream>
 
-extern char** environ;
-
 namespace versavis::daemon {
 
 namespace {
