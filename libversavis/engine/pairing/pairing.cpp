@@ -170,11 +170,10 @@ Pairing::Reading Pairing::read(const Arrival& arrival) const {
         Reading reading{instant, expected_ns(instant, arrival)};
         reading.record = exposures_.near(instant, reading.instant_ns, loose_ns());
         reading.verified = reading.record != nullptr && verified(arrival, *reading.record);
-        if (best.instant == Instant::unknown || (reading.verified && !best.verified))
-            best = reading;
-        else if (reading.verified && reading.record != best.record)
+        const bool first = best.instant == Instant::unknown || (reading.verified && !best.verified);
+        if (!first && reading.verified && reading.record != best.record)
             best.ambiguous = true;
-        else if (reading.verified && !steady(arrival, best))
+        else if (first || (reading.verified && !steady(arrival, best)))
             best = reading;
     }
     return best;
