@@ -316,6 +316,10 @@ bool made_anew_in_tight_memory() {
 }  // namespace
 
 TEST_CASE("ring: a dead writer's memory is used again where there is no other") {
+    if (!in_process(make_memory_tight)) {
+        WARN("not tested: in a chroot no process can have a /dev/shm of its own");
+        return;
+    }
     CHECK(in_process(made_anew_in_tight_memory));
 }
 
