@@ -308,9 +308,11 @@ class Run {
             sum.wrong += row.wrong;
             sum.mislabelled += row.mislabelled;
             sum.worst = std::max(sum.worst, row.worst);
-            if (!row.recovery || *row.recovery > longest_recovery) slow = true;
             if (!row.recovery) sum.recovery.reset();
-            if (row.recovery && sum.recovery) sum.recovery = std::max(*sum.recovery, *row.recovery);
+            slow = slow || !row.recovery;
+            if (row.damaged == 0 || !row.recovery) continue;  // the first start is no recovery
+            slow = slow || *row.recovery > longest_recovery;
+            if (sum.recovery) sum.recovery = std::max(*sum.recovery, *row.recovery);
         }
         print(sum);
         const int code = stack_.service().terminate();
