@@ -11,6 +11,8 @@
 #include <memory>
 #include <system_error>
 
+#include "realtime.hpp"
+
 namespace versavis::liar {
 
 namespace {
@@ -65,6 +67,7 @@ Proxy::~Proxy() {
 }
 
 void Proxy::run() {
+    rig::run_like_hardware();
     while (!stop_) {
         pollfd readable[] = {{service_ < 0 ? listener_ : service_, POLLIN, 0}, {board_, POLLIN, 0}};
         if (::poll(readable, 2, stop_noticed_ms) <= 0) continue;

@@ -103,6 +103,16 @@ TEST_CASE("pairing: a late exposure record is waited for") {
     CHECK(run(with(FaultKind::record_late)).withheld == 0);
 }
 
+TEST_CASE("pairing: a link that often holds records up does not keep a camera from being paired") {
+    WorldSettings settings = world(GENERATE(range(1U, 40U)));
+    settings.held_records = 0.5;
+    settings.rate_hz = GENERATE(20.0, 155.0);
+    const Verdict verdict = run(settings);
+    CAPTURE(settings.seed, settings.rate_hz);
+    CHECK(verdict.starts <= 1);
+    CHECK(static_cast<double>(verdict.first_published.ns) * 1e-9 * settings.rate_hz < 150);
+}
+
 TEST_CASE("pairing: waiting for exposure records is bounded, and goes on when they come again") {
     Verdict verdict = run(with(FaultKind::usb_stall));
     CHECK(verdict.frame_reasons[EventReason::exposure_missing] > 20);

@@ -197,8 +197,9 @@ class World final : private pairing::Outcome {
 
     void send_record(Exposure exposure, HostTime sent) {
         if (fault_ == FaultKind::usb_stall) link_free_ = now_ + seconds(2);
-        const Duration delay =
-            fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
+        Duration delay = fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
+        if (settings_.held_records > 0 && chance(settings_.held_records))
+            delay = delay + between({}, period_ * 2);
         link_free_ = std::max(link_free_, sent + delay);
         const Duration noise = between(-microseconds(30), microseconds(30));
         at(link_free_, [this, exposure, noise, life = life_]() mutable {

@@ -61,9 +61,10 @@ struct WorldSettings {
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames =
-        0.005;             ///< share of frames that the host is slow to take, by 40 ms at most
-    double link_load = 0;  ///< time that a frame takes on the link, in periods; above 1 frames
-                           ///< queue in the camera, and triggers are lost when three wait
+        0.005;                ///< share of frames that the host is slow to take, by 40 ms at most
+    double held_records = 0;  ///< share of records that the link holds up, by two periods at most
+    double link_load = 0;     ///< time that a frame takes on the link, in periods; above 1 frames
+                              ///< queue in the camera, and triggers are lost when three wait
     bool drops_after_exposure = false;          ///< ... not ignored, but exposed and then dropped
     std::map<std::uint64_t, FaultKind> faults;  ///< by the number of the pulse at which they happen
     std::uint64_t pulses = 300;

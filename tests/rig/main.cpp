@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "judge.hpp"
+#include "realtime.hpp"
 #include "rig.hpp"
 #include "versavis/ring/path.hpp"
 #include "versavis/stream.hpp"
@@ -34,6 +35,7 @@ int run(const std::string& scenario_path, const std::string& socket_path,
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     auto scenario = load_scenario(scenario_path);
     if (!scenario) return fail(scenario.error(), EX_CONFIG);
+    run_like_hardware();
     auto rig = Rig::start(*scenario, socket_path, truth_path);
     if (!rig) return fail(rig.error(), EX_UNAVAILABLE);
     fmt::print("rig ready: board at {}", socket_path);

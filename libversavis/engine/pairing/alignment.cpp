@@ -105,9 +105,6 @@ class Search {
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
-            // The board's time may have been set back: the same time came twice, and from such
-            // records nothing can be learned of the arrivals.
-            alignment.unknown = alignment.unknown || !record->prompt;
             last = record;
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
@@ -182,10 +179,8 @@ class Search {
  private:
     std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
 
-    /// Arrivals alone prove nothing while the board's time may have been set back.
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
-               (instant_ != Instant::arrival || record.prompt) &&
                arrival_possible(limits_, frame, record.exposure) &&
                !length_contradicts(frame, record.exposure);
     }
