@@ -120,10 +120,10 @@ bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t point
 }
 
 std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
-    const Duration since{record.trigger_ns - newest_->trigger_ns};
-    const std::uint64_t ticks = record.tick - newest_->tick;
+    const Duration since{record.trigger_ns - punctual_->trigger_ns};
+    const std::uint64_t ticks = record.tick - punctual_->tick;
     const Doubt doubt{EventReason::implausible_time, record.trigger_ns,
-                      newest_->trigger_ns + pace_.value().ns};
+                      punctual_->trigger_ns + pace_.value().ns};
     // As real numbers: ticks may be a lie.
     const double expected_ns = static_cast<double>(ticks) * static_cast<double>(pace_.value().ns);
     if (expected_ns > furthest_ns) return doubt;
@@ -132,7 +132,7 @@ std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record
     const std::int64_t skipped = rounded(expected_ns).ns / pace_.value().ns - 1;
     tolerance = tolerance + slew_ * (skipped + 1) +
                 (pace_.value() / wander_parts + pace_.uncertainty()) * skipped;
-    if (has(record, wire::exposure_late) || has(*newest_, wire::exposure_late))
+    if (has(record, wire::exposure_late) || has(*punctual_, wire::exposure_late))
         tolerance = tolerance + latest_trigger;
     if (absolute(off) <= tolerance) return std::nullopt;
     return Doubt{doubt.reason, doubt.said, (Duration{record.trigger_ns} - off).ns};
@@ -171,11 +171,12 @@ std::optional<Doubt> ExposureHistory::end_doubt(const WitnessedExposure& exposur
 
 void ExposureHistory::learn(const WitnessedExposure& exposure) {
     const wire::Exposure& record = exposure.record;
-    if (grid_known_ && !has(record, wire::exposure_late) && !has(*newest_, wire::exposure_late) &&
+    if (grid_known_ && !has(record, wire::exposure_late) && !has(*punctual_, wire::exposure_late) &&
         compensation(record) * 2 < equal_exposures) {
-        const auto ticks = static_cast<std::int64_t>(record.tick - newest_->tick);
-        pace_.learn({(record.trigger_ns - newest_->trigger_ns) / ticks});
+        const auto ticks = static_cast<std::int64_t>(record.tick - punctual_->tick);
+        pace_.learn({(record.trigger_ns - punctual_->trigger_ns) / ticks});
     }
+    if (!grid_known_ || !has(record, wire::exposure_late)) punctual_ = record;
     newest_ = record;
     grid_known_ = true;
     skips_ = 0;

@@ -66,6 +66,7 @@ class ExposureHistory {
     Duration lengths_[remembered_lengths];
     std::size_t length_count_ = 0;
     std::optional<wire::Exposure> newest_;
+    std::optional<wire::Exposure> punctual_;  ///< the newest whose trigger did not leave late
     bool grid_known_ = false;  ///< the next tick can be told from the newest record's
     std::uint64_t skips_ = 0;  ///< told since the newest record
     Duration slew_;            ///< by which a period may differ from the one before

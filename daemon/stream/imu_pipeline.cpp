@@ -16,10 +16,16 @@ constexpr std::int64_t rate_parts = 4;
 /// after a second's gap may be off by 0.2 ms; at twice, parts that warm up are doubted after a gap.
 constexpr std::int64_t wander_parts = 10'000;
 
+/// Samples in a row that agree, after the clock or the board began anew, until one is published:
+/// the first has no neighbour. At half (1), a lie at that moment passes; at twice, each beginning
+/// costs three samples more.
+constexpr int samples_to_confirm = 3;
+
 PulseHistory history(const ImuConfiguration& configuration) {
     const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
     return {period, period / rate_parts, wander_parts};
 }
+
 /// The board tries a failed part once a second: so many equal failures make one more line. At half,
 /// a log has 12 lines an hour of it; at twice, 3.
 constexpr std::uint64_t failures_per_line = 600;
@@ -38,7 +44,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
-      witness_(history(configuration)) {
+      witness_(history(configuration), samples_to_confirm) {
     report_.name = configuration.name;
     report_.model = model_.name;
     report_.filter = filter_;
@@ -73,17 +79,23 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
         journal(EventKind::message_doubted, sample, *doubted);
         return false;
     }
-    // 32 bits on the wire are extended by the number before.
-    const std::uint64_t number =
-        last_number_ ? *last_number_ + (sample.number - static_cast<std::uint32_t>(*last_number_))
-                     : sample.number;
-    if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
+    const std::uint64_t number = extended(sample.number);
+    if (witness_.confirmed() && last_number_ && number > *last_number_)
+        report_.lost += number - *last_number_ - 1;
     last_number_ = number;
-    if (const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay))
+    const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay);
+    if (stamp && witness_.confirmed())
         publish(sample, number, *stamp);
     else
         ++report_.no_clock;
     return true;
+}
+
+/// 32 bits on the wire are extended by the number before, which may be a lie while it is alone.
+std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
+    if (!last_number_) return number;
+    const auto step = static_cast<std::int32_t>(number - static_cast<std::uint32_t>(*last_number_));
+    return *last_number_ + static_cast<std::uint64_t>(std::int64_t{step});
 }
 
 std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {

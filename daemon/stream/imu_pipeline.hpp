@@ -32,7 +32,7 @@ struct ImuReport {
     std::string model;
     std::uint64_t published = 0;
     std::uint64_t lost = 0;      ///< numbers that never arrived
-    std::uint64_t no_clock = 0;  ///< withheld: board time could not be translated yet
+    std::uint64_t no_clock = 0;  ///< withheld: before the clock and two neighbours are known
     std::uint64_t faulty = 0;    ///< published with a sensor error
     std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
@@ -63,6 +63,7 @@ class ImuPipeline {
     void begin_anew();
     std::optional<Doubt> doubt(const wire::ImuSample& sample, HostTime received);
     void journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt);
+    std::uint64_t extended(std::uint32_t number) const;
     void publish(const wire::ImuSample& sample, std::uint64_t number, const clock::Stamp& stamp);
 
     std::mutex mutex_;

@@ -16,15 +16,19 @@ namespace versavis::daemon {
 template <class History>
 class Witness {
  public:
-    explicit Witness(History blank) : blank_(std::move(blank)), believed_(blank_), rival_(blank_) {}
+    /// `to_confirm`: messages that must agree, after nothing was known, until they are confirmed.
+    explicit Witness(History blank, int to_confirm = 1)
+        : blank_(std::move(blank)), believed_(blank_), rival_(blank_), to_confirm_(to_confirm) {}
 
     /// None: the message is believed, and remembered. `exchanges`: of the clock until now.
     template <class Message>
     std::optional<Doubt> judge(const Message& message, std::uint64_t exchanges) {
         const auto doubt = believed_.doubt(message);
-        if (!doubt) {
+        if (doubt && !confirmed()) forget();  // which of them lies, nobody can tell
+        if (!doubt || !confirmed()) {
             believed_.learn(message);
             rivals_ = 0;
+            ++agreed_;
             return std::nullopt;
         }
         if (rivals_ > 0 && rival_.doubt(message)) rivals_ = 0;
@@ -35,6 +39,9 @@ class Witness {
         rival_.learn(message);
         return doubt;
     }
+
+    /// The newest one that was believed has others beside it.
+    bool confirmed() const { return agreed_ >= to_confirm_; }
 
     /// So many doubted messages in a row agree among themselves that it is no accident, and the
     /// clock has been compared often enough since to know that it was not its own step.
@@ -50,12 +57,14 @@ class Witness {
             believed_ = rival_;
         else
             believed_.learn(message);
+        agreed_ = to_confirm_;
     }
 
     /// The next message may belong anywhere.
     void forget() {
         believed_.rebase();
         rivals_ = 0;
+        agreed_ = 0;
     }
 
     History& believed() { return believed_; }
@@ -74,6 +83,8 @@ class Witness {
     History rival_;
     int rivals_ = 0;
     std::uint64_t rival_since_ = 0;
+    int to_confirm_;
+    int agreed_ = 0;
 };
 
 }  // namespace versavis::daemon

@@ -267,9 +267,10 @@ inline constexpr std::uint32_t align_largest_slew_ppb = 1'000'000;
 /// The start patterns, by camera: grid points 0..19 after start that get a pulse, bit 0 first;
 /// afterwards all do. Four neighbouring gaps that are not all equal occur only once in all of the
 /// patterns, so that five frames identify their triggers, and show when the cables of two cameras
-/// are swapped. A slave has its master's.
-inline constexpr std::uint32_t start_pattern_bits[camera_count] = {0xE4A9B, 0xA3A73, 0xE2765,
-                                                                   0xE1AE3};
+/// are swapped. Two of the first four gaps are longer than the shortest, so that the first five
+/// frames do. A slave has its master's.
+inline constexpr std::uint32_t start_pattern_bits[camera_count] = {0xE4A9B, 0xA3A75, 0xC5A5D,
+                                                                   0x856D7};
 inline constexpr unsigned start_pattern_length = 20;
 
 /// Slow start: only every n-th grid point gets a pulse. Each camera has an interval of its own, at

@@ -192,8 +192,8 @@ std::vector<Packet> Liar::pass(Packet packet, HostTime now) {
         out.push_back(std::move(first));
         out.push_back(std::move(packet));
     } else {
-        continue_lies(packet, now);
-        const Kind* kind = choose(packet);
+        // One lie to a message: two may forge another that agrees with itself.
+        const Kind* kind = continue_lies(packet, now) ? nullptr : choose(packet);
         if (kind == nullptr) {
             out.push_back(std::move(packet));
         } else {
@@ -233,7 +233,9 @@ const Kind* Liar::choose(const Packet& packet) {
     return fitting[below(fitting.size())];
 }
 
-void Liar::continue_lies(Packet& packet, HostTime now) {
+/// True when the packet is damaged now.
+bool Liar::continue_lies(Packet& packet, HostTime now) {
+    bool lied_on = false;
     if (packet.type == Type::clock_follow_up) {
         const auto lied =
             follow_ups_.find(static_cast<std::uint32_t>(get(packet, clock_follow_up::id)));
@@ -241,6 +243,7 @@ void Liar::continue_lies(Packet& packet, HostTime now) {
             shift({clock_follow_up::sent}, lied->second, packet);
             follow_ups_.erase(lied);
             damage_counted(now);
+            lied_on = true;
         }
     }
     for (Lasting& lasting : lasting_) {
@@ -254,8 +257,10 @@ void Liar::continue_lies(Packet& packet, HostTime now) {
                 lasting.amount_ns;
         damage_counted(now);
         --lasting.left;
+        lied_on = true;
     }
     std::erase_if(lasting_, [](const Lasting& lasting) { return lasting.left == 0; });
+    return lied_on;
 }
 
 std::vector<Packet> Liar::lie(const Kind& kind, const Victim& victim, Packet packet, HostTime now) {

@@ -95,7 +95,7 @@ class Liar {
     };
 
     void observe(Packet& packet);
-    void continue_lies(Packet& packet, HostTime now);
+    bool continue_lies(Packet& packet, HostTime now);
     std::vector<Packet> lie(const Kind& kind, const Victim& victim, Packet packet, HostTime now);
     bool alter(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
     bool shift(const std::vector<Field>& fields, std::int64_t by_ns, Packet& packet);

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/pairing/alignment.hpp"
 
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "wire/messages.hpp"
 
 using namespace versavis;
 using namespace versavis::pairing;
@@ -43,6 +49,19 @@ class Bench {
 };
 
 using Triggers = std::vector<std::uint64_t>;
+using Gaps = std::vector<int>;
+
+/// Between the pulses of a start pattern and of the regular ticks after it.
+Gaps gaps_of_start(std::uint32_t bits) {
+    Gaps gaps;
+    int last = 0;
+    for (int tick = 1; tick < static_cast<int>(wire::start_pattern_length) + 4; ++tick) {
+        const bool after = tick >= static_cast<int>(wire::start_pattern_length);
+        if (after || (bits >> static_cast<unsigned>(tick) & 1U) != 0)
+            gaps.push_back(tick - std::exchange(last, tick));
+    }
+    return gaps;
+}
 
 }  // namespace
 
@@ -56,6 +75,22 @@ TEST_CASE(
     Bench regular({0, 1, 2, 3, 4, 5, 6, 7});
     for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6}) regular.frame(trigger);
     CHECK(regular.align().empty());
+}
+
+TEST_CASE(
+    "alignment: four gaps have one place in all start patterns, and the first four prove it") {
+    std::set<Gaps> places;
+    for (const std::uint32_t bits : wire::start_pattern_bits) {
+        const Gaps gaps = gaps_of_start(bits);
+        const auto first = gaps.begin();
+        const int shortest = *std::min_element(first, first + 4);
+        CHECK(std::count_if(first, first + 4, [=](int gap) { return gap > shortest; }) >= 2);
+        for (auto gap = first; gap + 4 <= gaps.end(); ++gap) {
+            const Gaps place(gap, gap + 4);
+            CAPTURE(bits, place);
+            CHECK((place == Gaps(4, place.front()) || places.insert(place).second));
+        }
+    }
 }
 
 TEST_CASE("alignment: a gap where a frame was lost is no place in the pattern") {

@@ -46,6 +46,26 @@ TEST_CASE("exposure_log: records that are missing") {
     CHECK_FALSE(log.lost_near(Instant::start, 50'000'000, 2));
 }
 
+TEST_CASE("exposure_log: late records were held up when they come together with a prompt one") {
+    ExposureLog log(milliseconds(50));
+    const auto add = [&](std::uint64_t trigger, std::int64_t recorded_ms, bool prompt) {
+        Exposure made = exposure(trigger, static_cast<std::int64_t>(trigger) * 50);
+        made.recorded = HostTime{recorded_ms * 1'000'000};
+        log.add(made, prompt);
+    };
+    add(1, 60, true);
+    add(2, 200, false);
+    add(3, 201, false);
+    CHECK_FALSE(log[2].prompt);
+    add(4, 210, true);
+    CHECK((log[1].prompt && log[2].prompt));
+    // As far apart as their exposures: of a board whose time was set back, and forward again.
+    add(5, 310, false);
+    add(6, 360, false);
+    add(7, 410, true);
+    CHECK_FALSE((log[4].prompt || log[5].prompt));
+}
+
 TEST_CASE("exposure_log: gaps are as small as the closest exposures, at most the period") {
     ExposureLog log(milliseconds(50));
     CHECK(log.smallest_gap_ns() == 50'000'000);

@@ -247,6 +247,17 @@ TEST_CASE("pairing: ids that stay one behind are not confirmed by a single frame
     CHECK(run_world(settings).wrong == 0);
 }
 
+TEST_CASE("pairing: ids that begin anew cost a camera without a clock few frames, and no start") {
+    WorldSettings settings = world(GENERATE(range(1U, 10U)));
+    settings.clock = CameraClock::absent;
+    settings.rate_hz = GENERATE(20.0, 155.0);
+    settings.first_id = 1000;
+    settings.faults[80] = FaultKind::id_restart;
+    const Verdict verdict = run(settings);
+    CHECK(verdict.withheld <= 8);
+    CHECK(verdict.starts == 1);  // the steady one, after the slow
+}
+
 TEST_CASE("pairing: one record that lies costs few frames, and none is published by it") {
     WorldSettings settings = with(FaultKind::lying_record);
     settings.seed = GENERATE(range(1, 60));
@@ -268,21 +279,35 @@ TEST_CASE("pairing: the exposures that are kept reach as far back as frames may 
     CHECK(verdict.withheld == 0);
 }
 
-TEST_CASE("pairing: a reset does not end the start that the board carries out") {
-    struct Nobody final : pairing::Outcome {
-        void paired(const pairing::Arrival& /*a*/, const pairing::Exposure& /*e*/) override {}
-        void frame_unpaired(const pairing::Arrival& /*a*/, EventReason /*r*/,
-                            const pairing::Exposure* /*guess*/) override {}
-        void exposure_unpaired(const pairing::Exposure& /*e*/, EventReason /*r*/) override {}
-        void locked(const pairing::Exposure& /*e*/) override {}
-        void slipped(const pairing::Arrival& /*a*/) override {}
-    } nobody;
+namespace {
+
+struct Nobody final : pairing::Outcome {
+    void paired(const pairing::Arrival& /*a*/, const pairing::Exposure& /*e*/) override {}
+    void frame_unpaired(const pairing::Arrival& /*a*/, EventReason /*r*/,
+                        const pairing::Exposure* /*guess*/) override {}
+    void exposure_unpaired(const pairing::Exposure& /*e*/, EventReason /*r*/) override {}
+    void locked(const pairing::Exposure& /*e*/) override {}
+    void slipped(const pairing::Arrival& /*a*/) override {}
+};
+
+}  // namespace
+
+TEST_CASE("pairing: a start ends when the board has carried it out, or was asked for steady ones") {
+    Nobody nobody;
     pairing::Limits limits;
     pairing::Pairing paired(limits, nobody);
     const HostTime begin{1'000'000'000'000};
-    paired.start_requested(pairing::Start::pattern, begin);
-    paired.reset();
-    const Duration carried_out = limits.pattern_duration + limits.latest_arrival;
+    Duration carried_out = limits.pattern_duration + limits.latest_arrival;
+    SECTION("a reset does not end it") {
+        paired.start_requested(pairing::Start::pattern, begin);
+        paired.reset();
+    }
+    SECTION("a slow one") {
+        paired.start_requested(pairing::Start::slow, begin - seconds(3));
+        paired.start_requested(pairing::Start::steady, begin);
+        paired.reset();
+        carried_out = limits.latest_arrival;
+    }
     for (int i = 0; i < 12; ++i) {
         pairing::Arrival arrival;
         arrival.block_id = static_cast<std::uint64_t>(i) + 1;

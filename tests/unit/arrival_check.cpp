@@ -17,7 +17,7 @@ TEST_CASE("arrival_check: nothing comes from the future, and nothing from long a
         return doubt ? doubt->reason : EventReason::none;
     };
     CHECK(check(-seconds(1000)) == EventReason::none);  // the clock is unknown
-    bench.exchange(now);
+    bench.synchronise(now);
     CHECK(check(-seconds(1000)) == EventReason::not_yet);
     CHECK(check(-milliseconds(2)) == EventReason::not_yet);
     CHECK(check(Duration{}) == EventReason::none);

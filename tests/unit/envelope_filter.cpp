@@ -60,6 +60,25 @@ TEST_CASE("envelope_filter: nothing is known before the first exchange, and boun
     CHECK(std::abs(error_ns(filter, link, exchange.arrived)) <=
           static_cast<double>(filter.last_round_trip().ns) / 2);
     CHECK(filter.translate(exchange.answered).state == ClockState::converging);
+    CHECK_FALSE(filter.confirmed());
+    filter.add(link.exchange(HostTime{1'100'000'000}));
+    CHECK(filter.confirmed());
+    CHECK(filter.restarts() == 0);
+}
+
+TEST_CASE("envelope_filter: a first exchange that lies is not believed when the next contradicts") {
+    EnvelopeFilter filter;
+    Link link(30, 1);
+    Exchange lie = link.exchange(HostTime{1'000'000'000});
+    const Duration shift = GENERATE(milliseconds(5), -milliseconds(5));
+    lie.received = lie.received + shift;
+    lie.answered = lie.answered + shift;
+    filter.add(lie);
+    filter.add(link.exchange(HostTime{1'100'000'000}));
+    CHECK_FALSE(filter.confirmed());
+    filter.add(link.exchange(HostTime{1'200'000'000}));
+    CHECK(filter.confirmed());
+    CHECK(std::abs(error_ns(filter, link, HostTime{1'200'000'000})) < 1e6);
 }
 
 TEST_CASE("envelope_filter: follows skewed clocks through delays with heavy tails") {

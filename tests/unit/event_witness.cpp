@@ -11,7 +11,7 @@ using namespace versavis::daemon;
 TEST_CASE("event_witness: pulses of PPS are a second apart, and no event comes from the future") {
     test::Pipelines bench;
     const HostTime begin{40'000'000'000};
-    bench.exchange(begin);
+    bench.synchronise(begin);
     EventWitness witness(bench.translator);
     const auto doubted = [&](wire::EventKind kind, std::int64_t pulse, Duration off) {
         const HostTime at = begin + seconds(pulse);

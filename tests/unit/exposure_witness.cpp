@@ -81,6 +81,13 @@ TEST_CASE("exposure_witness: lost records, skipped triggers and late ones are no
     CHECK_FALSE(bench.believes(late));
     late.flags |= wire::exposure_late;
     CHECK(bench.believes(late));
+    // It excuses nothing in those after it.
+    wire::Exposure displaced = record(27, fixed, fixed);
+    displaced.trigger = 24;
+    displaced.trigger_ns += 500'000;
+    displaced.start_ns += 500'000;
+    displaced.end_ns += 500'000;
+    CHECK_FALSE(bench.believes(displaced));
     wire::Exposure next = record(27, fixed, fixed);
     next.trigger = 24;
     CHECK(bench.believes(next));

@@ -25,6 +25,12 @@ class Pipelines {
         translator.add({host - microseconds(10), board, board, host + microseconds(10)});
     }
 
+    /// From here on board time can be translated.
+    void synchronise(HostTime host) {
+        exchange(host);
+        exchange(host);  // they agree
+    }
+
     static BoardTime to_board(HostTime host) { return {host.ns - 1'000'000'000}; }
 
     ring::Writer writer(const ring::Shape& shape) const {

@@ -124,7 +124,7 @@ TEST_CASE("stamp_guard: an estimate that goes back further than its sigma explai
         return stream.guard.guard(*stamp, stamp->sigma_ns);
     };
     const std::int64_t begin_ns = stream.now().ns;
-    exchange(begin_ns, 2'000'000);
+    for (int i = 0; i < 2; ++i) exchange(begin_ns, 2'000'000);
     REQUIRE(publish({begin_ns + 300'000'000}));
     for (int i = 1; i <= 20; ++i) exchange(begin_ns + i * 10'000'000, 0);
     CHECK_FALSE(publish({begin_ns + 300'100'000}));

@@ -32,6 +32,20 @@ TEST_CASE("witness: what does not follow is doubted and not remembered") {
     CHECK_FALSE(witness.judge(2, 0));
 }
 
+TEST_CASE("witness: where neighbours are asked for, the first message is not confirmed") {
+    Witness<Counting> witness{Counting{}, 2};
+    CHECK_FALSE(witness.judge(50, 0));
+    CHECK_FALSE(witness.confirmed());
+    CHECK_FALSE(witness.judge(1, 0));
+    CHECK_FALSE(witness.confirmed());
+    CHECK_FALSE(witness.judge(2, 0));
+    CHECK(witness.confirmed());
+    CHECK(witness.judge(50, 0));
+    CHECK(witness.confirmed());
+    witness.forget();
+    CHECK_FALSE(witness.confirmed());
+}
+
 TEST_CASE("witness: three in a row that agree are a step, once the clock was compared again") {
     Witness<Counting> witness{Counting{}};
     witness.judge(1, 10);

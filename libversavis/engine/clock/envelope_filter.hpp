@@ -56,6 +56,7 @@ class EnvelopeFilter {
     HostEstimate translate(BoardTime board) const;
 
     bool initialised() const { return begun_; }
+    bool confirmed() const { return confirmed_; }  ///< a second exchange agrees with the first
     std::uint64_t exchanges() const { return exchanges_; }
     std::uint64_t one_way_messages() const { return one_way_messages_; }
     std::uint64_t restarts() const { return restarts_; }
@@ -93,6 +94,7 @@ class EnvelopeFilter {
     void remember_round_trip(BoardTime now, Duration round_trip);
 
     bool begun_ = false;
+    bool confirmed_ = false;
     bool reset_ = false;  ///< what was known before is void but for the skew
     Duration base_;       ///< host minus board time that the belief's offset counts from
     BoardTime reference_;

@@ -81,14 +81,14 @@ void Translator::pps_pulse(BoardTime at) {
     const std::lock_guard lock(mutex_);
     HostEstimate estimate = filter_.translate(at);
     estimate.time = estimate.time + filter_.presumed_asymmetry();  // measured, it is not presumed
-    if (!filter_.initialised() || estimate.state != ClockState::locked) return;
+    if (!filter_.confirmed() || estimate.state != ClockState::locked) return;
     pps_.pulse(at, estimate, output_.read(), output_.kernel_state().synchronised);
     correct_link();
 }
 
 void Translator::pps_label(BoardTime at, std::int64_t utc_ns) {
     const std::lock_guard lock(mutex_);
-    if (!filter_.initialised()) return;
+    if (!filter_.confirmed()) return;
     const bool tai = output_.kind() == OutputClockKind::tai;
     const Duration ahead = tai ? seconds(output_.kernel_state().tai_offset_s) : Duration{};
     pps_.label(at, OutputTime{utc_ns} + ahead, filter_.translate(at), output_.read());
@@ -122,13 +122,13 @@ std::optional<OutputEstimate> Translator::by_pps(BoardTime board, OutputTime by_
 
 std::optional<HostEstimate> Translator::to_host(BoardTime board) const {
     const std::lock_guard lock(mutex_);
-    if (!filter_.initialised()) return std::nullopt;
+    if (!filter_.confirmed()) return std::nullopt;
     return filter_.translate(board);
 }
 
 std::optional<Stamp> Translator::translate(BoardTime board) {
     const std::lock_guard lock(mutex_);
-    if (!filter_.initialised()) return std::nullopt;
+    if (!filter_.confirmed()) return std::nullopt;
     const HostEstimate estimate = filter_.translate(board);
     const OutputReading output = output_.read();
     const OutputTime by_link{estimate.time.ns + output.minus_host.ns};
@@ -142,7 +142,7 @@ std::optional<Stamp> Translator::translate(BoardTime board) {
 
 std::optional<BoardSecond> Translator::next_second(HostTime now) {
     const std::lock_guard lock(mutex_);
-    if (!filter_.initialised()) return std::nullopt;
+    if (!filter_.confirmed()) return std::nullopt;
     const OutputReading output = output_.read();
     const Duration offset = output.minus_host;
     BoardSecond second;

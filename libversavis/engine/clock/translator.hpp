@@ -107,10 +107,10 @@ class Translator {
     /// What an earlier measurement at this port said; none: nothing is known of this port.
     void use_asymmetry(const std::optional<Asymmetry>& stored);
 
-    /// None before the first exchange.
+    /// None before two exchanges agree.
     std::optional<Stamp> translate(BoardTime board);
 
-    /// The first whole second of the output clock after `now`. None before the first exchange.
+    /// The first whole second of the output clock after `now`. None before two exchanges agree.
     std::optional<BoardSecond> next_second(HostTime now);
 
     /// Host time alone, without reading the output clock.

@@ -6,6 +6,15 @@
 
 namespace versavis::pairing {
 
+namespace {
+
+// Records that come closer than this, in periods, were held up together: the last late one is late
+// by a quarter at least. At half, most ends of a stall are not seen as such; at twice, a step of
+// the board's time passes for one.
+constexpr double held_up_together = 0.75;
+
+}  // namespace
+
 std::int64_t Record::instant_ns(Instant instant) const {
     switch (instant) {
         case Instant::middle: return middle(exposure.start, end).ns;
@@ -26,7 +35,18 @@ void ExposureLog::add(const Exposure& exposure, bool prompt) {
         length = std::min(told, last_length_);
     records_.push_back({exposure, exposure.start + length, exposure.end_on_host - (told - length),
                         false, recorded_, silent_, prompt});
+    if (prompt) explain_late_ones();
     measure();
+}
+
+/// Records that the link held up come together with the first that it did not. Those of a board
+/// whose time was set back, and forward again, come as far apart as their exposures.
+void ExposureLog::explain_late_ones() {
+    const Duration together{part_of(period_.ns, held_up_together)};
+    for (std::size_t i = records_.size() - 1; i > 0 && !records_[i - 1].prompt; --i) {
+        if (records_[i].exposure.recorded - records_[i - 1].exposure.recorded >= together) return;
+        records_[i - 1].prompt = true;
+    }
 }
 
 Record ExposureLog::pop_front() {

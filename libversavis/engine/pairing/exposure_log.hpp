@@ -22,7 +22,8 @@ struct Record {
     std::uint64_t recorded = 0;  ///< records until this one, itself included
     std::uint64_t silent = 0;    ///< those of them without an exposure
 
-    bool prompt = true;  ///< reached the host as soon as others did
+    bool prompt =
+        true;  ///< reached the host as soon as others did, or was held up with one that did
 
     std::int64_t instant_ns(Instant instant) const;
 };
@@ -55,6 +56,7 @@ class ExposureLog {
 
  private:
     void measure();
+    void explain_late_ones();
 
     Duration period_;
     Duration smallest_gap_;

@@ -463,6 +463,13 @@ const Record* Pairing::by_ids(const Arrival& arrival) const {
     return found;
 }
 
+bool Pairing::ids_far_off(const Arrival& arrival, const Record& record) const {
+    const std::uint64_t sent = record.exposure.trigger - proved_->record.exposure.trigger;
+    const std::uint64_t counted = arrival.block_id - proved_->arrival.block_id;
+    return std::abs(static_cast<std::int64_t>(counted - sent)) >
+           static_cast<std::int64_t>(ids_back);
+}
+
 /// Which kind of evidence stepped, if the others agree on frame after frame?
 bool Pairing::decide_checking() {
     const Arrival arrival = arrivals_.front();
@@ -478,7 +485,10 @@ bool Pairing::decide_checking() {
         relock(*late);  // nothing stepped after all
         return true;
     }
-    const Record* clocked = by_clock(arrival);
+    // Without a camera clock, arrivals alone say where the frames are. They may be off by the few
+    // periods by which the board's time stepped; a counter that began anew is off by more.
+    const bool anew = late != nullptr && ids_far_off(arrival, *late);
+    const Record* clocked = by_clock_ ? by_clock(arrival) : anew ? late : nullptr;
     // A late record may be of a board whose time was set back: then clock and arrival have stepped.
     const bool ids_may_have_stepped = clocked != nullptr && clocked == late && clocked->prompt &&
                                       !clocked->used && clocked->exposure.exposed;
@@ -560,7 +570,10 @@ std::optional<Start> Pairing::wanted_start(HostTime now) const {
 
 void Pairing::start_requested(Start start, HostTime now) {
     start_ = start;
-    if (start == Start::steady) return;
+    if (start == Start::steady) {  // and ends the slow one
+        start_carried_out_ = std::min(start_carried_out_, now + limits_.latest_arrival);
+        return end_start_soon();
+    }
     ++fruitless_starts_;
     frames_since_start_ = 0;
     // A start costs triggers: what does not help is asked for less and less often.

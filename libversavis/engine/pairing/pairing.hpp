@@ -139,6 +139,7 @@ class Pairing {
     bool out_of_order(const Arrival& arrival) const;
     bool verified(const Arrival& arrival, const Record& record) const;
     bool ids_agree(const Arrival& arrival, const Record& record) const;
+    bool ids_far_off(const Arrival& arrival, const Record& record) const;
     bool ids_exact(const Arrival& arrival, const Record& record) const;
     std::int64_t lateness_ns(const Arrival& arrival, const Record& record) const;
     bool latency_trusted() const;
