@@ -152,11 +152,12 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
     const clock::ClockContact contact = translator_.contact();
     follow_clock(contact.life);
     const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
-    if (const auto doubt = contradicts_arrival(newest, received, translator_)) return doubt;
+    const auto arrival = contradicts_arrival(newest, received, translator_);
     const WitnessedExposure exposure{record, check_.told_at(received)};
     const auto doubt = witness_.judge(exposure, contact.exchanges);
+    if (arrival) return arrival;
     if (!doubt) translator_.clock_continues();
-    if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
+    if (!doubt || contact.contradicted || !witness_.stepped(contact.exchanges)) return doubt;
     witness_.adopt(exposure);
     adopt_step(record, *doubt);
     return std::nullopt;
@@ -165,9 +166,7 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
 /// What pairing knows of the board's time is void when the estimate of that time is.
 void CameraPipeline::follow_clock(std::uint32_t life) {
     const auto before = std::exchange(clock_life_, life);
-    if (!before || before == life) return;
-    witness_.forget();
-    begin_anew();
+    if (before && before != life) begin_anew();
 }
 
 void CameraPipeline::adopt_step(const wire::Exposure& record, const Doubt& doubt) {

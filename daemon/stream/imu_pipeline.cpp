@@ -101,13 +101,12 @@ std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
 std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
     const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
     const clock::ClockContact contact = translator_.contact();
-    if (contact.life != clock_life_) witness_.forget();
-    clock_life_ = contact.life;
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
-    if (const auto doubt = contradicts_arrival(departed, received, translator_)) return doubt;
+    const auto arrival = contradicts_arrival(departed, received, translator_);
     const auto doubt = witness_.judge(pulse, contact.exchanges);
+    if (arrival) return arrival;
     if (!doubt) translator_.clock_continues();
-    if (!doubt || !witness_.stepped(contact.exchanges)) return doubt;
+    if (!doubt || contact.contradicted || !witness_.stepped(contact.exchanges)) return doubt;
     // The part was set up anew, or the board lost count.
     witness_.adopt(pulse);
     last_number_.reset();

@@ -74,7 +74,6 @@ class ImuPipeline {
     clock::Translator& translator_;
     EventJournal& events_;
     Witness<PulseHistory> witness_;
-    std::uint32_t clock_life_ = 0;
     StampGuard guard_;
     std::optional<std::uint64_t> last_number_;
     ImuReport report_;

@@ -15,7 +15,7 @@ std::vector<std::uint64_t> gaps(const std::vector<wire::Exposure>& records, std:
 }
 
 const std::vector<std::uint64_t> patterns[] = {{1, 2, 1, 3, 2, 2, 3, 3, 1, 1, 1, 1},
-                                               {1, 3, 1, 1, 3, 2, 1, 1, 4, 2, 1, 1}};
+                                               {2, 2, 1, 1, 3, 2, 1, 1, 4, 2, 1, 1}};
 
 }  // namespace
 

@@ -165,8 +165,8 @@ TEST_CASE("imu_pipeline: when the clock begins anew, so do numbers and times") {
         {bench.instant(23) - microseconds(10), board, board, bench.instant(23) + microseconds(10)});
     bench.run(24, 30, step);
     const auto items = bench.published();
-    REQUIRE(items.size() == 5);
-    CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(25)) <=
+    REQUIRE(items.size() == 6);
+    CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(24)) <=
           microseconds(20));
 }
 

@@ -57,6 +57,7 @@ class EnvelopeFilter {
 
     bool initialised() const { return begun_; }
     bool confirmed() const { return confirmed_; }  ///< a second exchange agrees with the first
+    bool contradicted() const { return contradictions_ > 0 || !confirmed_; }  ///< by the newest
     std::uint64_t exchanges() const { return exchanges_; }
     std::uint64_t one_way_messages() const { return one_way_messages_; }
     std::uint64_t restarts() const { return restarts_; }

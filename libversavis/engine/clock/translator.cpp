@@ -59,7 +59,7 @@ void Translator::begin_epoch() {
 
 ClockContact Translator::contact() const {
     const std::lock_guard lock(mutex_);
-    return {clock_life(), filter_.exchanges()};
+    return {clock_life(), filter_.exchanges(), filter_.contradicted()};
 }
 
 void Translator::clock_continues() {

@@ -70,6 +70,7 @@ struct ClockReport {
 struct ClockContact {
     std::uint32_t life = 0;       ///< estimates before this one
     std::uint64_t exchanges = 0;  ///< of all estimates
+    bool contradicted = false;    ///< the newest exchange and the estimate disagree: one is wrong
 };
 
 /// Output clock against host clock at one moment, and the epoch of stamps that are made by it.
