@@ -74,9 +74,10 @@ class Witness {
     /// pass; at twice, a true step costs twice as many messages.
     static constexpr int rivals_to_step = 3;
 
-    /// An estimate that is contradicted begins anew with the third exchange. At half, a step of the
-    /// board's clock passes for one of the stream; at twice, a true one costs 0.3 s more.
-    static constexpr std::uint64_t exchanges_to_confirm = 3;
+    /// An estimate that is contradicted begins anew with the third exchange, and lies may agree for
+    /// a moment. At half, a step of the board's clock passes for one of the stream; at twice, a
+    /// true one costs 0.4 s more.
+    static constexpr std::uint64_t exchanges_to_confirm = 4;
 
     History blank_;
     History believed_;

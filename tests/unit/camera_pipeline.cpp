@@ -348,7 +348,7 @@ TEST_CASE(
     bench.start();
     bench.lie = [](wire::Exposure& record) { shift(record, microseconds(1500)); };
     for (std::uint64_t tick = 12; tick < 20; ++tick) CHECK_FALSE(bench.trigger(tick));
-    for (std::int64_t tick = 12; tick < 15; ++tick)
+    for (std::int64_t tick = 12; tick < 16; ++tick)
         bench.exchange(bench.begin + bench.period * tick);
     const auto before = bench.translator.output_now().epoch;
     CHECK(bench.trigger(20));

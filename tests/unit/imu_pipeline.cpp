@@ -139,7 +139,7 @@ TEST_CASE("imu_pipeline: samples that agree in a new phase are taken once the cl
     const auto before = bench.published();
     const Duration phase = milliseconds(2);
     for (std::uint32_t i = 20; i < 30; ++i) CHECK_FALSE(bench.add(i, i, -phase));
-    for (int i = 20; i < 23; ++i) bench.exchange(bench.instant(i));
+    for (int i = 20; i < 24; ++i) bench.exchange(bench.instant(i));
     bench.run(30, 40, -phase);
     const auto after = bench.published();
     REQUIRE(after.size() == 10);

@@ -50,8 +50,8 @@ TEST_CASE("witness: three in a row that agree are a step, once the clock was com
     Witness<Counting> witness{Counting{}};
     witness.judge(1, 10);
     for (const int number : {50, 51, 52}) CHECK(witness.judge(number, 10));
-    CHECK_FALSE(witness.stepped(12));
-    CHECK(witness.stepped(13));
+    CHECK_FALSE(witness.stepped(13));
+    CHECK(witness.stepped(14));
     witness.adopt(52);
     CHECK_FALSE(witness.judge(53, 13));
     CHECK_FALSE(witness.stepped(99));
