@@ -225,10 +225,15 @@ void Liar::observe(Packet& packet) {
 
 const Kind* Liar::choose(const Packet& packet) {
     if (lies_ >= orders_.most || held_) return nullptr;
+    const bool resting = std::any_of(lasting_.begin(), lasting_.end(), [&](const Lasting& l) {
+        return l.type == packet.type && l.camera == camera_of(packet);
+    });
     std::vector<const Kind*> fitting;
-    for (const Kind* kind : orders_.kinds)
+    for (const Kind* kind : orders_.kinds) {
+        if (resting && (kind->way == Way::late || kind->way == Way::freeze)) continue;
         for (const Victim& victim : kind->victims)
             if (victim.type == packet.type) fitting.push_back(kind);
+    }
     if (fitting.empty() || uniform() >= orders_.rate) return nullptr;
     return fitting[below(fitting.size())];
 }
@@ -248,6 +253,10 @@ bool Liar::continue_lies(Packet& packet, HostTime now) {
     }
     for (Lasting& lasting : lasting_) {
         if (lasting.type != packet.type || lasting.camera != camera_of(packet)) continue;
+        if (lasting.left == 0) {
+            --lasting.rest;
+            continue;
+        }
         if (lasting.kind->way == Way::freeze)
             set(packet, lasting.fields[0], lasting.amount_ns);
         else
@@ -259,7 +268,7 @@ bool Liar::continue_lies(Packet& packet, HostTime now) {
         --lasting.left;
         lied_on = true;
     }
-    std::erase_if(lasting_, [](const Lasting& lasting) { return lasting.left == 0; });
+    std::erase_if(lasting_, [](const Lasting& lasting) { return lasting.rest == 0; });
     return lied_on;
 }
 
@@ -335,7 +344,8 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
                                 camera_of(packet),
                                 {field},
                                 get(packet, field),
-                                1 + static_cast<unsigned>(below(lasting_messages))});
+                                1 + static_cast<unsigned>(below(lasting_messages)),
+                                lasting_messages});
             note(kind, packet, now,
                  fmt::format("{} stays for {} more", field.name, lasting_.back().left));
             return true;
@@ -343,8 +353,8 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
         case Way::late: {
             const std::int64_t by = small_shift_ns();
             if (!shift(victim.fields, by, packet)) return false;
-            lasting_.push_back(
-                {&kind, packet.type, camera_of(packet), victim.fields, by, lasting_messages - 1});
+            lasting_.push_back({&kind, packet.type, camera_of(packet), victim.fields, by,
+                                lasting_messages - 1, lasting_messages});
             if (packet.type == Type::clock_answer)
                 follow_ups_[static_cast<std::uint32_t>(get(packet, clock_answer::id))] = by;
             note(kind, packet, now,

@@ -92,6 +92,7 @@ class Liar {
         std::vector<Field> fields;
         std::int64_t amount_ns;  ///< for Way::freeze: the value
         unsigned left;
+        unsigned rest;  ///< messages after it without another such lie: one for ever is the truth
     };
 
     void observe(Packet& packet);
