@@ -154,10 +154,10 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
     const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
     const auto arrival = contradicts_arrival(newest, received, translator_);
     const WitnessedExposure exposure{record, check_.told_at(received)};
-    const auto doubt = witness_.judge(exposure, contact.exchanges);
-    if (arrival) return arrival;
+    const auto doubt = witness_.judge(exposure, contact.exchanges, arrival);
     if (!doubt) translator_.clock_continues();
-    if (!doubt || contact.contradicted || !witness_.stepped(contact.exchanges)) return doubt;
+    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+        return doubt;
     witness_.adopt(exposure);
     adopt_step(record, *doubt);
     return std::nullopt;

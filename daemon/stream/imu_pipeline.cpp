@@ -103,10 +103,10 @@ std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime 
     const clock::ClockContact contact = translator_.contact();
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
     const auto arrival = contradicts_arrival(departed, received, translator_);
-    const auto doubt = witness_.judge(pulse, contact.exchanges);
-    if (arrival) return arrival;
+    const auto doubt = witness_.judge(pulse, contact.exchanges, arrival);
     if (!doubt) translator_.clock_continues();
-    if (!doubt || contact.contradicted || !witness_.stepped(contact.exchanges)) return doubt;
+    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+        return doubt;
     // The part was set up anew, or the board lost count.
     witness_.adopt(pulse);
     last_number_.reset();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/pulse_history.hpp"
 
+#include <algorithm>
+
 namespace versavis::daemon {
 
 std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
@@ -10,7 +12,9 @@ std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
         return Doubt{EventReason::implausible_number, pulse.number, newest_->number + 1};
     const Duration off = pulse.at - newest_->at - pace_.value() * pulses;
     const Duration wander = (pace_.value() / wander_parts_ + pace_.uncertainty()) * (pulses - 1);
-    if (absolute(off) <= pace_.tolerance() + wander) return std::nullopt;
+    // Further off it might as well be the pulse beside that.
+    const Duration furthest = pace_.value() / 2;
+    if (absolute(off) <= std::min(pace_.tolerance() + wander, furthest)) return std::nullopt;
     return Doubt{EventReason::implausible_time, pulse.at.ns, (pulse.at - off).ns};
 }
 

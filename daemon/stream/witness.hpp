@@ -21,14 +21,22 @@ class Witness {
         : blank_(std::move(blank)), believed_(blank_), rival_(blank_), to_confirm_(to_confirm) {}
 
     /// None: the message is believed, and remembered. `exchanges`: of the clock until now.
+    /// `arrival`: what speaks against it already; then it can only be one of several that agree.
     template <class Message>
-    std::optional<Doubt> judge(const Message& message, std::uint64_t exchanges) {
-        const auto doubt = believed_.doubt(message);
-        if (doubt && !confirmed()) forget();  // which of them lies, nobody can tell
-        if (!doubt || !confirmed()) {
+    std::optional<Doubt> judge(const Message& message, std::uint64_t exchanges,
+                               const std::optional<Doubt>& arrival = std::nullopt) {
+        if (arrival && !confirmed()) return arrival;
+        auto doubt = believed_.doubt(message);
+        if (doubt && !confirmed()) {  // which of them lies, nobody can tell
+            believed_.rebase();
+            agreed_ = 0;
+            doubt = believed_.doubt(message);
+        }
+        if (!doubt) {
+            if (arrival) return arrival;
             believed_.learn(message);
             rivals_ = 0;
-            ++agreed_;
+            if (!confirmed()) ++agreed_;
             return std::nullopt;
         }
         if (rivals_ > 0 && rival_.doubt(message)) rivals_ = 0;
@@ -37,7 +45,7 @@ class Witness {
             rival_since_ = exchanges;
         }
         rival_.learn(message);
-        return doubt;
+        return arrival ? arrival : doubt;
     }
 
     /// The newest one that was believed has others beside it.

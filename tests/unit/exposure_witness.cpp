@@ -29,6 +29,14 @@ wire::Exposure record(std::uint64_t tick, Duration exposure, Duration expected) 
     return made;
 }
 
+wire::Exposure displaced(wire::Exposure made, std::uint64_t trigger, Duration by) {
+    made.trigger = trigger;
+    made.trigger_ns += by.ns;
+    made.start_ns += by.ns;
+    made.end_ns += by.ns;
+    return made;
+}
+
 struct Bench {
     bool believes(const wire::Exposure& made, Duration told = {}) {
         return !contradicts_itself(made, configuration) &&
@@ -73,21 +81,12 @@ TEST_CASE("exposure_witness: lost records, skipped triggers and late ones are no
     CHECK_FALSE(bench.believes(skipped));
     for (int i = 0; i < 3; ++i) bench.witness.believed().trigger_skipped();
     CHECK(bench.believes(skipped));
-    wire::Exposure late = record(26, fixed, fixed);
-    late.trigger = 23;
-    late.trigger_ns += 1'500'000;
-    late.start_ns += 1'500'000;
-    late.end_ns += 1'500'000;
+    wire::Exposure late = displaced(record(26, fixed, fixed), 23, microseconds(1500));
     CHECK_FALSE(bench.believes(late));
     late.flags |= wire::exposure_late;
     CHECK(bench.believes(late));
     // It excuses nothing in those after it.
-    wire::Exposure displaced = record(27, fixed, fixed);
-    displaced.trigger = 24;
-    displaced.trigger_ns += 500'000;
-    displaced.start_ns += 500'000;
-    displaced.end_ns += 500'000;
-    CHECK_FALSE(bench.believes(displaced));
+    CHECK_FALSE(bench.believes(displaced(record(27, fixed, fixed), 24, microseconds(500))));
     wire::Exposure next = record(27, fixed, fixed);
     next.trigger = 24;
     CHECK(bench.believes(next));

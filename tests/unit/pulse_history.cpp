@@ -34,6 +34,13 @@ TEST_CASE("pulse_history: times follow from numbers, over 32 bits and over gaps"
     CHECK(history.doubt({number(50), at(50) + microseconds(50)})->expected == at(50).ns);
 }
 
+TEST_CASE("pulse_history: while the pace is hardly known, a gap is no room for another number") {
+    const PulseHistory history = after(3);
+    CHECK_FALSE(history.doubt({60, BoardTime{} + milliseconds(5) * 60}));
+    CHECK(history.doubt({60, BoardTime{} + milliseconds(5) * 61}));
+    CHECK(history.doubt({60, BoardTime{} + milliseconds(5) * 59}));
+}
+
 TEST_CASE("pulse_history: no number and no time overflows") {
     const PulseHistory history = after(50);
     for (const std::uint32_t number : {50U, 0U, 0x7FFFFFFFU, 0x80000000U, 0xFFFFFFFFU})

@@ -46,6 +46,29 @@ TEST_CASE("witness: where neighbours are asked for, the first message is not con
     CHECK_FALSE(witness.confirmed());
 }
 
+TEST_CASE("witness: what contradicts the usual is doubted although nothing is known before it") {
+    struct Positive : Counting {
+        std::optional<Doubt> doubt(int number) const {
+            if (number < 0) return Doubt{EventReason::implausible_number, number, 0};
+            return Counting::doubt(number);
+        }
+    };
+    Witness<Positive> witness{Positive{}, GENERATE(1, 3)};
+    CHECK(witness.judge(-5, 0));
+    CHECK_FALSE(witness.judge(1, 0));
+}
+
+TEST_CASE("witness: what arrival contradicts is never believed, but may be of a step") {
+    Witness<Counting> witness{Counting{}};
+    const Doubt late{EventReason::implausible_time, 0, 0};
+    CHECK(witness.judge(50, 0, late));
+    CHECK_FALSE(witness.judge(1, 0));
+    CHECK(witness.judge(2, 0, late));
+    CHECK_FALSE(witness.judge(2, 0));
+    for (const int number : {60, 61, 62}) CHECK(witness.judge(number, 0, late));
+    CHECK(witness.stepped(4));
+}
+
 TEST_CASE("witness: three in a row that agree are a step, once the clock was compared again") {
     Witness<Counting> witness{Counting{}};
     witness.judge(1, 10);

@@ -487,8 +487,8 @@ bool Pairing::decide_checking() {
     }
     // Without a camera clock, arrivals alone say where the frames are. They may be off by the few
     // periods by which the board's time stepped; a counter that began anew is off by more.
-    const bool anew = late != nullptr && ids_far_off(arrival, *late);
-    const Record* clocked = by_clock_ ? by_clock(arrival) : anew ? late : nullptr;
+    const bool anew = !by_clock_ && late != nullptr && ids_far_off(arrival, *late);
+    const Record* clocked = anew ? late : by_clock(arrival);
     // A late record may be of a board whose time was set back: then clock and arrival have stepped.
     const bool ids_may_have_stepped = clocked != nullptr && clocked == late && clocked->prompt &&
                                       !clocked->used && clocked->exposure.exposed;
