@@ -3,12 +3,8 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
-#include <fstream>
-#include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <thread>
 
@@ -17,6 +13,7 @@
 #include "judge.hpp"
 #include "metric.hpp"
 #include "scene.hpp"
+#include "true_times.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::bench {
@@ -25,13 +22,7 @@ namespace {
 
 constexpr Duration latency_time = seconds(10);
 
-using Arrivals = std::map<std::uint64_t, HostTime>;  ///< by the serial in the pixels
-
-std::uint64_t serial_of(const void* pixels) {
-    rig::FrameMark mark{};
-    std::memcpy(&mark, pixels, sizeof mark);
-    return mark.magic == rig::FrameMark::expected_magic ? mark.serial : 0;
-}
+using Arrivals = TimesBySerial;
 
 /// Frames in the callback of Aravis's stream thread, and in a thread that waits for it.
 struct Bare {
@@ -62,7 +53,8 @@ void on_frame(void* user, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
     if (buffer == nullptr) return;
     if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) {
         std::size_t size = 0;
-        const std::uint64_t serial = serial_of(arv_buffer_get_data(buffer, &size));
+        const void* pixels = arv_buffer_get_data(buffer, &size);
+        const std::uint64_t serial = rig::FrameMark::serial_in(pixels, size);
         bare.in_callback[serial] = now;
         const std::lock_guard lock(bare.mutex);
         bare.ready.push_back(serial);
@@ -105,7 +97,8 @@ Arrivals by_reader(test::Stack& stack) {
     const HostTime end = host_now() + latency_time;
     while (host_now() < end) {
         const auto item = stream.wait(seconds(1));
-        if (item.found == Found::item) arrivals[serial_of(item.payload)] = host_now();
+        if (item.found == Found::item)
+            arrivals[rig::FrameMark::serial_in(item.payload, item.payload_size)] = host_now();
     }
     return arrivals;
 }
@@ -122,17 +115,6 @@ double median_us(const Arrivals& arrivals, const Arrivals& departures) {
     return latencies[latencies.size() / 2];
 }
 
-Arrivals departures(const std::string& truth_path) {
-    Arrivals departures;
-    std::ifstream file(truth_path);
-    for (std::string line; std::getline(file, line);) {
-        const auto record = nlohmann::json::parse(line, nullptr, false);
-        if (!record.is_discarded() && record["type"] == "departure")
-            departures[record["serial"]] = HostTime{record["at_ns"]};
-    }
-    return departures;
-}
-
 std::vector<Metric> latency() {
     test::Stack stack({"benchlat", 41, 1, 20, "", "", "", 1920, 1200});
     stack.start_rig();
@@ -141,7 +123,7 @@ std::vector<Metric> latency() {
     stack.start_service();
     stack.wait_for_status(test::healthy);
     const Arrivals read = by_reader(stack);
-    const Arrivals left = departures(stack.truth_path());
+    const Arrivals left = true_times(stack.truth_path(), "cam0", "departure", "at_ns");
     const double callback_us = median_us(bare.in_callback, left);
     const double waiter_us = median_us(bare.by_waiter, left);
     const double read_us = median_us(read, left);

@@ -25,7 +25,8 @@ Benches all_benches(const double& seconds) {
             {"end_to_end", versavis::bench::bench_end_to_end},
             {"firmware", versavis::bench::bench_firmware},
             {"link", versavis::bench::bench_link},
-            {"output_clock", versavis::bench::bench_output_clock}};
+            {"output_clock", versavis::bench::bench_output_clock},
+            {"recovery", versavis::bench::bench_recovery}};
 }
 
 nlohmann::json run(const Benches& benches, const std::string& only) {
@@ -53,11 +54,7 @@ int main(int argc, char** argv) {
     std::string json_path;
     double seconds = 30;
     const Benches benches = all_benches(seconds);
-    app.add_option(
-           "name", only,
-           "ring, cameras, clock, end_to_end, firmware, link or output_clock; without it, all")
-        ->check(CLI::IsMember(
-            {"ring", "cameras", "clock", "end_to_end", "firmware", "link", "output_clock"}));
+    app.add_option("name", only, "One of them; without it, all")->check(CLI::IsMember(benches));
     app.add_option("--seconds", seconds, "How long three cameras run")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

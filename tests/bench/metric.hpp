@@ -36,6 +36,9 @@ std::vector<Metric> bench_cameras(double seconds);
 /// How late a board's bytes are stamped under load, against one thread that reads and works.
 std::vector<Metric> bench_link();
 
+/// How soon a camera delivers verified frames again after it, or the board, rebooted.
+std::vector<Metric> bench_recovery();
+
 /// Instructions and memory of the firmware's core.
 std::vector<Metric> bench_firmware();
 

@@ -96,16 +96,14 @@ class Recorder {
         Recording& recording = recordings_[name];
         if (item.found == Found::lost) recording.missed += item.lost;
         if (item.found != Found::item) return;
-        FrameMark mark{};
-        if (item.payload_size >= sizeof mark) std::memcpy(&mark, item.payload, sizeof mark);
+        const std::uint64_t serial = FrameMark::serial_in(item.payload, item.payload_size);
         if ((item.data.flags & flag_suspect) != 0)
             return;  // the service says itself that it may be wrong
         if (!stream.intact(item))
             ++recording.missed;
         else
-            recording.items.push_back({mark.magic == FrameMark::expected_magic ? mark.serial : 0,
-                                       item.data.trigger, to_host_ns(item.time),
-                                       item.data.sigma_ns});
+            recording.items.push_back(
+                {serial, item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
     }
 
     void take(const Received<ImuMetadata>& item) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace versavis::rig {
 
@@ -23,6 +24,12 @@ std::uint8_t cell_brightness(std::uint64_t x, std::uint64_t y, std::uint64_t see
 }
 
 }  // namespace
+
+std::uint64_t FrameMark::serial_in(const void* pixels, std::size_t size) {
+    FrameMark mark{};
+    if (size >= sizeof mark) std::memcpy(&mark, pixels, sizeof mark);
+    return mark.magic == expected_magic ? mark.serial : 0;
+}
 
 double Motion::pitch_rad(HostTime at) const {
     return amplitude_rad * std::sin(nodding_rad_s * seconds(at - zero_));

@@ -16,6 +16,9 @@ struct FrameMark {
     static constexpr std::uint64_t expected_magic = 0x4B52414D47495256;  // "VRIGMARK"
     std::uint64_t magic;
     std::uint64_t serial;
+
+    /// Of the exposure that the frame shows; 0 if it has no mark.
+    static std::uint64_t serial_in(const void* pixels, std::size_t size);
 };
 
 class Motion {
