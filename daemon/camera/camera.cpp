@@ -254,7 +254,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
         return failed(done.error());
     ArvDevice* device = arv_camera_get_device(camera);
     const Duration exposure = fixed_exposure(device, setup);
-    pipeline_.set_camera_exposure(exposure, host_now());
+    pipeline_.set_camera_exposure(exposure, {});  // it takes no frame yet
     if (configuration_.auto_exposure.enabled) {
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);

@@ -25,10 +25,13 @@ std::optional<Doubt> contradicts_arrival(BoardTime at, HostTime received,
     const auto estimate = translator.to_host(at);
     if (!estimate) return std::nullopt;
     const Duration age = received - estimate->time;
-    if (age < -(ahead_slack + estimate->sigma * ahead_sigmas))
+    // As the estimate is good for now: far from now it is so bad that it explains any lie.
+    const auto present = translator.to_host(at + age);
+    if (!present) return std::nullopt;
+    const Duration uncertainty = present->sigma * ahead_sigmas;
+    if (age < -(ahead_slack + uncertainty))
         return Doubt{EventReason::not_yet, at.ns, (at + age).ns};
-    if (age > oldest + estimate->sigma * ahead_sigmas)
-        return Doubt{EventReason::too_old, at.ns, (at + age).ns};
+    if (age > oldest + uncertainty) return Doubt{EventReason::too_old, at.ns, (at + age).ns};
     return std::nullopt;
 }
 

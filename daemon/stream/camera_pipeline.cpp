@@ -17,6 +17,11 @@ constexpr std::uint32_t slots_for_readers = 2;
 /// pattern could be asked for again before it ended; at twice, a lost start costs two pulses more.
 constexpr int pattern_margin = 2;
 
+/// Majority of records that agree, after nothing was known, until those that do not are doubted
+/// rather than they themselves. At half, one lie at the beginning makes the truth wait until it is
+/// a step; at twice, lies soon after make more searches.
+constexpr int records_to_confirm = 3;
+
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
     limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
@@ -37,7 +42,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       events_(events),
       frames_(configuration),
       evidence_(translator),
-      witness_(ExposureHistory(configuration)),
+      witness_(ExposureHistory(configuration), records_to_confirm),
       completion_(configuration),
       check_(configuration),
       triggers_(configuration),
@@ -155,6 +160,7 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
     const auto arrival = contradicts_arrival(newest, received, translator_);
     const WitnessedExposure exposure{record, check_.told_at(received)};
     const auto doubt = witness_.judge(exposure, contact.exchanges, arrival);
+    if (witness_.overturned()) begin_anew();  // which of them lied, nobody can tell
     if (!doubt) translator_.clock_continues();
     if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
         return doubt;

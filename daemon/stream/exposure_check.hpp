@@ -12,7 +12,8 @@ class ExposureCheck {
  public:
     explicit ExposureCheck(const CameraConfiguration& configuration);
 
-    /// The camera exposes for about so long from `since` on; 0: its exposure changes by itself.
+    /// The camera exposes for about so long from `since` on, for slow ones some frames later; 0:
+    /// its exposure changes by itself.
     void set_camera_exposure(Duration exposure, HostTime since);
 
     /// True when the exposure line shows another exposure than the camera tells.

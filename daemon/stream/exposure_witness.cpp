@@ -190,8 +190,12 @@ void ExposureHistory::learn(const WitnessedExposure& exposure) {
     length_.learn(length);
 }
 
+bool ExposureHistory::repeats(const WitnessedExposure& exposure) const {
+    return of_newest_trigger(exposure.record) && !disputes_newest(exposure.record);
+}
+
 bool ExposureHistory::disputes_newest(const wire::Exposure& record) const {
-    return newest_ && newest_->trigger == record.trigger &&
+    return of_newest_trigger(record) &&
            (newest_->start_ns != record.start_ns || newest_->end_ns != record.end_ns ||
             newest_->trigger_ns != record.trigger_ns);
 }

@@ -45,10 +45,17 @@ class ExposureHistory {
     /// The board said that the next grid point has no trigger.
     void trigger_skipped() { ++skips_; }
 
-    /// True when the newest one was of the same trigger, and told something else.
+    /// The newest one was of the same trigger, and told the same.
+    bool repeats(const WitnessedExposure& exposure) const;
+
+    /// It was of the same trigger, and told something else.
     bool disputes_newest(const wire::Exposure& record) const;
 
  private:
+    bool of_newest_trigger(const wire::Exposure& record) const {
+        return newest_ && newest_->trigger == record.trigger;
+    }
+
     /// Exposures that the expected one of a trigger may be among. At half, a change of exposure
     /// that takes effect late looks like a trigger off its grid; at twice, the allowance for it
     /// lasts twice as long.

@@ -16,10 +16,10 @@ constexpr std::int64_t rate_parts = 4;
 /// after a second's gap may be off by 0.2 ms; at twice, parts that warm up are doubted after a gap.
 constexpr std::int64_t wander_parts = 10'000;
 
-/// Samples in a row that agree, after the clock or the board began anew, until one is published:
-/// the first has no neighbour. At half (1), a lie at that moment passes; at twice, each beginning
-/// costs three samples more.
-constexpr int samples_to_confirm = 3;
+/// Majority of samples that agree, after the clock or the board began anew, until one is published:
+/// the first have no neighbours. At half, a lie that lasts 20 samples from the first on passes; at
+/// twice, each beginning costs 32 samples more.
+constexpr int samples_to_confirm = 32;
 
 PulseHistory history(const ImuConfiguration& configuration) {
     const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
@@ -79,19 +79,19 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
         journal(EventKind::message_doubted, sample, *doubted);
         return false;
     }
-    const std::uint64_t number = extended(sample.number);
-    if (witness_.confirmed() && last_number_ && number > *last_number_)
-        report_.lost += number - *last_number_ - 1;
-    last_number_ = number;
     const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay);
-    if (stamp && witness_.confirmed())
-        publish(sample, number, *stamp);
-    else
+    if (!stamp || !witness_.confirmed()) {
         ++report_.no_clock;
+        return witness_.confirmed();
+    }
+    const std::uint64_t number = extended(sample.number);
+    if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
+    last_number_ = number;
+    publish(sample, number, *stamp);
     return true;
 }
 
-/// 32 bits on the wire are extended by the number before, which may be a lie while it is alone.
+/// 32 bits on the wire are extended by the number before.
 std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
     if (!last_number_) return number;
     const auto step = static_cast<std::int32_t>(number - static_cast<std::uint32_t>(*last_number_));

@@ -32,7 +32,7 @@ struct ImuReport {
     std::string model;
     std::uint64_t published = 0;
     std::uint64_t lost = 0;      ///< numbers that never arrived
-    std::uint64_t no_clock = 0;  ///< withheld: before the clock and two neighbours are known
+    std::uint64_t no_clock = 0;  ///< withheld: before the clock and its neighbours are known
     std::uint64_t faulty = 0;    ///< published with a sensor error
     std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
     HostTime last_sample;        ///< without an error
@@ -48,7 +48,7 @@ class ImuPipeline {
     ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
                 clock::Translator& translator, EventJournal& events);
 
-    /// False: the sample is doubted, and nothing may be made of its time.
+    /// False: the sample is doubted, or not confirmed yet: nothing may be made of its time.
     bool add(const wire::ImuSample& sample, HostTime received);
     void board_restarted();
 

@@ -27,6 +27,9 @@ class PulseHistory {
 
     std::optional<Doubt> doubt(const Pulse& pulse) const;
     void learn(const Pulse& pulse);
+    bool repeats(const Pulse& pulse) const {
+        return newest_ && newest_->number == pulse.number && newest_->at == pulse.at;
+    }
     void rebase() { newest_.reset(); }
 
  private:

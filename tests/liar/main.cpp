@@ -38,6 +38,7 @@ struct Settings {
     std::uint64_t seed = 1;
     std::vector<std::string> kinds;
     bool brief = false;
+    unsigned starts = 1;
     double rate_hz = 100;
     unsigned cameras = 3;
     unsigned subnet = 90;
@@ -91,7 +92,7 @@ class Run {
         }
         std::erase_if(chosen, [](const Kind* kind) { return kind->way == Way::step; });
         if (!chosen.empty() && liar_.damaged() < settings_.messages) {
-            tell_from_the_start(chosen);
+            for (unsigned i = 0; i < settings_.starts; ++i) tell_from_the_start(chosen);
             tell_at_random(chosen);
         }
         return finish();
@@ -205,7 +206,7 @@ class Run {
     void tell(const Kind& kind, const Row&) {
         const bool steps = kind.way == Way::step;
         const std::uint32_t epoch = judge_->epoch();
-        const int singles = settings_.brief ? 2 : steps ? 1 : 5;
+        const int singles = steps ? 1 : settings_.brief ? 2 : 5;  // two steps may cancel out
         for (int i = 0; i < singles; ++i) {
             const std::uint64_t before = liar_.damaged();
             liar_.obey({{&kind}, 1, 1});
@@ -225,11 +226,14 @@ class Run {
         }
     }
 
-    /// The service hears no word of truth before the first lie. A clock that lies for seconds from
-    /// its first word on is another clock.
+    /// The service hears no word of truth before the first lie. What is off by the same amount from
+    /// its first word on, for as long as a start takes, is another truth: of clock and exposures no
+    /// such lies. Samples of an IMU must agree for longer than they last.
     void tell_from_the_start(std::vector<const Kind*> chosen) {
         Row row{"from the start"};
-        std::erase_if(chosen, [](const Kind* kind) { return kind->name == "late-exchange"; });
+        std::erase_if(chosen, [](const Kind* kind) {
+            return kind->way == Way::late && kind->victims.front().type != Type::imu_sample;
+        });
         if (chosen.empty()) return;
         const auto lies = [&] {
             stack_.service().terminate();
@@ -357,6 +361,8 @@ int main(int argc, char** argv) {
     app.add_option("--seed", settings.seed, "Of the liar's choices")->capture_default_str();
     app.add_option("--kind", settings.kinds, "Only this kind of lie; may be repeated");
     app.add_flag("--brief", settings.brief, "Each kind twice, one after the other, then at random");
+    app.add_option("--starts", settings.starts, "How often the service starts while it is lied to")
+        ->capture_default_str();
     app.add_option("--rate-hz", settings.rate_hz, "Of each camera")->capture_default_str();
     app.add_option("--cameras", settings.cameras, "How many")
         ->check(CLI::Range(1, 4))

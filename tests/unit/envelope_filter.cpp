@@ -216,6 +216,17 @@ TEST_CASE("envelope_filter: absurd stamps are left out") {
     CHECK(std::abs(error_ns(filter, link, HostTime{10'000'000'000})) < 100e3);
 }
 
+TEST_CASE("envelope_filter: a message from years ahead is not explained by the error of years") {
+    const Link link(20, 1);
+    EnvelopeFilter filter;
+    const auto host = [](int i) { return HostTime{} + milliseconds(1000 + i); };
+    for (int i = 0; i < 4; ++i) filter.add(Link(20, 1).exchange(host(i)));
+    const Duration ahead{std::int64_t{1} << GENERATE(30, 40, 53, 58)};
+    filter.add(OneWay{link.board(host(5)) + ahead, host(5) + microseconds(60)});
+    CHECK(filter.one_way_messages() == 0);
+    CHECK(absolute(filter.translate(link.board(host(6))).time - host(6)) < microseconds(200));
+}
+
 TEST_CASE("envelope_filter: a measured asymmetry takes the place of the presumed one") {
     // To the host delays thin out towards 50 us, to the board they break off there.
     EnvelopeFilter filter;

@@ -46,6 +46,9 @@ TEST_CASE("exposure_check: a new exposure is given time to hold, one in the fram
     // Half a second and five periods of 50 ms.
     CHECK_FALSE(check.contradicts({}, exposure(milliseconds(9), begin + milliseconds(750))));
     CHECK(check.contradicts({}, exposure(milliseconds(9), begin + milliseconds(751))));
+    check.set_camera_exposure(milliseconds(2), {});  // before the first frame
+    CHECK(check.contradicts({}, exposure(milliseconds(9), begin)));
+    check.set_camera_exposure(milliseconds(2), begin);
     pairing::Arrival with_chunk;
     with_chunk.exposure = milliseconds(2);
     CHECK(check.contradicts(with_chunk, exposure(milliseconds(9), begin)));

@@ -10,6 +10,9 @@ using namespace versavis::daemon;
 
 namespace {
 
+/// Samples without which none is published.
+constexpr std::uint32_t neighbours = 31;
+
 wire::ImuSample sample(std::uint32_t number, BoardTime at, std::uint16_t flags = 0) {
     wire::ImuSample sample{};
     sample.kind = wire::ImuKind::adis16448b;
@@ -61,34 +64,34 @@ TEST_CASE(
     "imu_pipeline: nothing before the clock is known, numbers go on over 32 bits, losses are "
     "counted") {
     Bench bench(false);
-    CHECK(bench.add(0xFFFFFFFD, 0));
-    CHECK(bench.pipeline.report().no_clock == 1);
+    for (std::uint32_t i = 0; i < neighbours; ++i) bench.add(0xFFFFFFFE - neighbours + i, i);
+    CHECK(bench.pipeline.report().no_clock == neighbours);
     bench.synchronise(bench.begin);
-    for (std::uint32_t i = 1; i < 3; ++i) bench.add(0xFFFFFFFD + i, i);
-    CHECK(bench.pipeline.report().no_clock == 2);
-    bench.add(2, 5);
-    bench.add(3, 6, {}, wire::imu_check_failed);
+    for (std::uint32_t i = 0; i < 2; ++i) CHECK(bench.add(0xFFFFFFFE + i, neighbours + i));
+    CHECK(bench.pipeline.report().no_clock == neighbours);
+    bench.add(2, neighbours + 4);
+    bench.add(3, neighbours + 5, {}, wire::imu_check_failed);
     const auto items = bench.published();
-    REQUIRE(items.size() == 3);
-    CHECK(unpack<ImuMetadata>(items[0].metadata).number == 0xFFFFFFFFU);
-    CHECK(unpack<ImuMetadata>(items[1].metadata).number == 0x100000002U);
-    CHECK((unpack<ImuMetadata>(items[2].metadata).flags & flag_sensor_error) != 0);
+    REQUIRE(items.size() == 4);
+    CHECK(unpack<ImuMetadata>(items[1].metadata).number == 0xFFFFFFFFU);
+    CHECK(unpack<ImuMetadata>(items[2].metadata).number == 0x100000002U);
+    CHECK((unpack<ImuMetadata>(items[3].metadata).flags & flag_sensor_error) != 0);
     CHECK(bench.pipeline.report().lost == 2);
     CHECK(bench.pipeline.report().faulty == 1);
     bench.pipeline.board_restarted();
-    for (std::uint32_t i = 0; i < 3; ++i) bench.add(i, 8 + i);
-    CHECK(unpack<ImuMetadata>(bench.published().at(0).metadata).number == 2);
+    for (std::uint32_t i = 0; i <= neighbours; ++i) bench.add(i, 50 + i);
+    CHECK(unpack<ImuMetadata>(bench.published().at(0).metadata).number == neighbours);
     CHECK(bench.pipeline.report().lost == 2);
 }
 
 TEST_CASE("imu_pipeline: a sample from the future is withheld, and those after it are not") {
     Bench bench;
     const Duration lie = GENERATE(seconds(1000), milliseconds(20));
-    bench.run(0, 20);
-    CHECK_FALSE(bench.add(20, 20, lie));
-    bench.run(21, 30);
+    bench.run(0, 40);
+    CHECK_FALSE(bench.add(40, 40, lie));
+    bench.run(41, 50);
     const auto items = bench.published();
-    REQUIRE(items.size() == 27);
+    REQUIRE(items.size() == 49 - neighbours);
     for (std::size_t i = 0; i < items.size(); ++i) {
         const auto metadata = unpack<ImuMetadata>(items[i].metadata);
         CHECK(metadata.flags == 0);
@@ -99,17 +102,42 @@ TEST_CASE("imu_pipeline: a sample from the future is withheld, and those after i
     CHECK(bench.pipeline.report().lost == 1);
     const auto event = unpack<EventMetadata>(bench.reader("events").next().metadata);
     CHECK(event.kind == EventKind::message_doubted);
-    CHECK(event.value == (test::Pipelines::to_board(bench.instant(20)) + lie).ns);
+    CHECK(event.value == (test::Pipelines::to_board(bench.instant(40)) + lie).ns);
 }
 
 TEST_CASE("imu_pipeline: a lie that comes first is not published, and misleads nobody") {
     Bench bench;
     bench.add(GENERATE(2U, 1U << 30U), 0);
-    bench.run(1, 20);
+    bench.run(1, 50);
     const auto items = bench.published();
-    REQUIRE(items.size() == 17);
-    CHECK(unpack<ImuMetadata>(items[0].metadata).number == 3);
+    REQUIRE(items.size() == 49 - neighbours);
+    CHECK(unpack<ImuMetadata>(items[0].metadata).number == neighbours + 1);
     CHECK(bench.pipeline.report().lost == 0);
+}
+
+TEST_CASE("imu_pipeline: samples that lie alike from the first on for a while are not published") {
+    Bench bench;
+    bench.run(0, 20, -milliseconds(4));
+    bench.run(20, 100);
+    for (const ring::Item& item : bench.published()) {
+        const auto metadata = unpack<ImuMetadata>(item.metadata);
+        CHECK(absolute(metadata.host_time - bench.instant(static_cast<int>(metadata.number))) <=
+              microseconds(1));
+    }
+    CHECK(bench.pipeline.report().published >= 25);
+}
+
+TEST_CASE("imu_pipeline: lies among those of a new phase do not keep it out") {
+    Bench bench;
+    bench.run(0, 40);
+    const Duration phase = milliseconds(2);
+    for (std::uint32_t i = 40; i < 100; ++i) {
+        bench.add(i, i, i % 4 == 0 ? -milliseconds(i) : -phase);
+        if (i % 10 == 0) bench.exchange(bench.instant(i));
+    }
+    bench.published();
+    bench.run(100, 110, -phase);
+    CHECK(bench.published().size() == 10);
 }
 
 TEST_CASE("imu_pipeline: a sample that lies by less than a period, or by number, is withheld") {
@@ -124,7 +152,7 @@ TEST_CASE("imu_pipeline: a sample that lies by less than a period, or by number,
 
 TEST_CASE("imu_pipeline: held stamps and those of a clock without contact say so") {
     Bench bench;
-    bench.run(0, 4);
+    bench.run(0, neighbours + 2);
     const std::int64_t later = 4000 / 5;  // four seconds without contact
     bench.add(later, later);
     const auto items = bench.published();
@@ -135,12 +163,12 @@ TEST_CASE("imu_pipeline: held stamps and those of a clock without contact say so
 
 TEST_CASE("imu_pipeline: samples that agree in a new phase are taken once the clock agrees, too") {
     Bench bench;
-    bench.run(0, 20);
+    bench.run(0, 40);
     const auto before = bench.published();
     const Duration phase = milliseconds(2);
-    for (std::uint32_t i = 20; i < 30; ++i) CHECK_FALSE(bench.add(i, i, -phase));
-    for (int i = 20; i < 24; ++i) bench.exchange(bench.instant(i));
-    bench.run(30, 40, -phase);
+    for (std::uint32_t i = 40; i < 50; ++i) CHECK_FALSE(bench.add(i, i, -phase));
+    for (int i = 40; i < 44; ++i) bench.exchange(bench.instant(i));
+    bench.run(50, 60, -phase);
     const auto after = bench.published();
     REQUIRE(after.size() == 10);
     CHECK(unpack<ImuMetadata>(after[0].metadata).epoch ==
@@ -149,24 +177,24 @@ TEST_CASE("imu_pipeline: samples that agree in a new phase are taken once the cl
 
 TEST_CASE("imu_pipeline: when the clock begins anew, so do numbers and times") {
     Bench bench;
-    bench.run(0, 20);
+    bench.run(0, 40);
     bench.published();
     const Duration step = -milliseconds(50);
-    for (std::uint32_t i = 20; i < 23; ++i) {
+    for (std::uint32_t i = 40; i < 43; ++i) {
         CHECK_FALSE(bench.add(i, i, step));
         const BoardTime board = test::Pipelines::to_board(bench.instant(i)) + step;
         bench.translator.add({bench.instant(i) - microseconds(10), board, board,
                               bench.instant(i) + microseconds(10)});
     }
-    bench.add(23, 23, step);
+    bench.add(43, 43, step);
     CHECK(bench.published().empty());  // one exchange of the new clock is not enough
-    const BoardTime board = test::Pipelines::to_board(bench.instant(23)) + step;
+    const BoardTime board = test::Pipelines::to_board(bench.instant(43)) + step;
     bench.translator.add(
-        {bench.instant(23) - microseconds(10), board, board, bench.instant(23) + microseconds(10)});
-    bench.run(24, 30, step);
+        {bench.instant(43) - microseconds(10), board, board, bench.instant(43) + microseconds(10)});
+    bench.run(44, 50, step);
     const auto items = bench.published();
     REQUIRE(items.size() == 6);
-    CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(24)) <=
+    CHECK(absolute(unpack<ImuMetadata>(items[0].metadata).host_time - bench.instant(44)) <=
           microseconds(20));
 }
 
@@ -184,16 +212,17 @@ TEST_CASE(
     auto reader = bench.reader("imu0");
     const HostTime begin{50'000'000'000};
     bench.synchronise(begin);
-    for (std::uint32_t i = 0; i < 3; ++i) {
+    for (std::uint32_t i = 0; i <= neighbours; ++i) {
         const HostTime at = begin + milliseconds(30) + milliseconds(5) * i;
         pipeline.add(sample(i, test::Pipelines::to_board(at)), at + milliseconds(1));
     }
+    const HostTime newest = begin + milliseconds(30) + milliseconds(5) * neighbours;
     const ring::Item item = reader.next();
     const auto metadata = unpack<ImuMetadata>(item.metadata);
-    CHECK(absolute(metadata.host_time - (begin + milliseconds(40) - delay)) < microseconds(1));
+    CHECK(absolute(metadata.host_time - (newest - delay)) < microseconds(1));
     CHECK(item.time.ns == metadata.host_time.ns);
     // The board's own stamp stays as it is, beside what was taken off.
-    CHECK(metadata.board_time == test::Pipelines::to_board(begin + milliseconds(40)));
+    CHECK(metadata.board_time == test::Pipelines::to_board(newest));
     CHECK(absolute(metadata.filter_delay - delay) < microseconds(1));
     CHECK((metadata.sigma_ns >= 100'000) == !override_us);
     CHECK(pipeline.report().filter.source ==

@@ -17,6 +17,7 @@ struct Counting {
         return Doubt{EventReason::implausible_number, number, *newest + 1};
     }
     void learn(int number) { newest = number; }
+    bool repeats(int number) const { return newest == number; }
     void rebase() { newest.reset(); }
 };
 
@@ -44,6 +45,37 @@ TEST_CASE("witness: where neighbours are asked for, the first message is not con
     CHECK(witness.confirmed());
     witness.forget();
     CHECK_FALSE(witness.confirmed());
+}
+
+TEST_CASE("witness: among the first messages the majority is believed") {
+    Witness<Counting> witness{Counting{}, 3};
+    CHECK_FALSE(witness.judge(1, 0));
+    CHECK_FALSE(witness.overturned());
+    CHECK(witness.judge(1, 0));  // once more is not against it
+    CHECK_FALSE(witness.overturned());
+    CHECK_FALSE(witness.judge(50, 0));
+    CHECK(witness.overturned());
+    CHECK_FALSE(witness.judge(51, 0));
+    CHECK_FALSE(witness.overturned());
+    CHECK(witness.judge(7, 0));
+    CHECK_FALSE(witness.overturned());
+    CHECK_FALSE(witness.judge(52, 0));
+    CHECK_FALSE(witness.confirmed());
+    CHECK_FALSE(witness.judge(53, 0));
+    CHECK(witness.confirmed());
+}
+
+TEST_CASE("witness: lies among those that agree do not keep a step out, nor does one make it") {
+    Witness<Counting> witness{Counting{}};
+    witness.judge(1, 0);
+    int number = 50;
+    for (std::uint64_t exchanges = 0; exchanges < 8; ++exchanges) {
+        for (int i = 0; i < 4; ++i) CHECK(witness.judge(number++, exchanges));
+        CHECK(witness.judge(-1000 * number, exchanges));
+        CHECK_FALSE(witness.stepped(exchanges));
+    }
+    CHECK(witness.judge(number, 8));
+    CHECK(witness.stepped(8));
 }
 
 TEST_CASE("witness: what contradicts the usual is doubted although nothing is known before it") {

@@ -215,10 +215,10 @@ bool EnvelopeFilter::goes_back(BoardTime board) const {
 }
 
 /// True when a message would have arrived before it was sent, by more than the estimate's own error
-/// explains.
+/// explains: the error at the host's stamp, as the board's may be so far off that any error would.
 bool EnvelopeFilter::contradicts(const Passage& passage, const DelayEdge& edge) {
     const double delay = delay_ns(passage, edge);
-    const Duration since = passage.at - reference_;
+    const Duration since = passage.at - reference_ + rounded(edge.sign() * delay);
     if (delay >= -contradicting * std::sqrt(belief_.offset_variance_after(since))) return false;
     contradiction_ = rounded(-delay) + last_round_trip_;  // it took some time, too
     return true;
