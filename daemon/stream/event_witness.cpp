@@ -9,7 +9,7 @@ namespace {
 
 /// How far the second pulse may be off a second from the first: the board's crystal, a receiver
 /// that settles. At half, receivers that settle slowly lose pulses; at twice, such a lie may pass.
-constexpr Duration first_pps_tolerance = milliseconds(1);
+constexpr Duration first_pps_tolerance = microseconds(200);
 
 /// Over lost pulses the board's crystal drifts by no more than 10 ppm. At half, one that warms up
 /// is doubted after a gap; at twice, such a pulse may be off by 20 us per second of the gap.

@@ -2,6 +2,7 @@
 // Believes a message when it agrees with those before it, and a change when several messages agree.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -41,7 +42,7 @@ class Witness {
         if (doubt) vote(message, exchanges);
         if (arrival || doubt) return arrival ? arrival : doubt;
         believed_.learn(message);
-        votes_ /= 2;
+        votes_ = std::max(votes_ - votes_of_truth, 0);
         return std::nullopt;
     }
 
@@ -91,6 +92,11 @@ class Witness {
     /// a moment. At half, a step of the board's clock passes for one of the stream; at twice, a
     /// true one costs 0.4 s more.
     static constexpr std::uint64_t exchanges_to_confirm = 4;
+
+    /// Votes against a rival that a message has which fits what is believed. At half, lies among
+    /// the truth add up to a step; at twice, lies that happen to fit a wrong belief make it last
+    /// longer.
+    static constexpr int votes_of_truth = 8;
 
     template <class Message>
     std::optional<Doubt> judge_unconfirmed(const Message& message) {

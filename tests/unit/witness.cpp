@@ -78,6 +78,18 @@ TEST_CASE("witness: lies among those that agree do not keep a step out, nor does
     CHECK(witness.stepped(8));
 }
 
+TEST_CASE("witness: lies that agree among themselves, in between the truth, are no step") {
+    Witness<Counting> witness{Counting{}};
+    witness.judge(1, 0);
+    for (int i = 2; i < 40; i += 2) {
+        CHECK(witness.judge(100 + i, 10ULL * i));
+        CHECK(witness.judge(101 + i, 10ULL * i));
+        CHECK_FALSE(witness.stepped(10ULL * i));
+        CHECK_FALSE(witness.judge(i, 0));
+        CHECK_FALSE(witness.judge(i + 1, 0));
+    }
+}
+
 TEST_CASE("witness: what contradicts the usual is doubted although nothing is known before it") {
     struct Positive : Counting {
         std::optional<Doubt> doubt(int number) const {
