@@ -128,6 +128,19 @@ TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {
     CHECK(filter.restarts() >= 1);
 }
 
+TEST_CASE("envelope_filter: exchanges at once that contradict it count as one") {
+    EnvelopeFilter filter;
+    Link link(20, 5);
+    HostTime t{0};
+    for (; t.ns < 30'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
+    Link liar = link;
+    liar.jump(milliseconds(18));
+    for (int i = 0; i < 4; ++i) filter.add(liar.exchange(t + milliseconds(i)));
+    CHECK(filter.restarts() == 0);
+    for (int i = 0; i < 10; ++i) filter.add(link.exchange(t + milliseconds(100) * i));
+    CHECK(std::abs(error_ns(filter, link, t)) < 100e3);
+}
+
 TEST_CASE("envelope_filter: an exchange that took no time is not believed") {
     EnvelopeFilter filter;
     filter.add(Exchange{{1000}, {500}, {2500}, {1500}});

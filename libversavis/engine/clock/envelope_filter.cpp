@@ -77,6 +77,11 @@ constexpr double start_scale_of_round_trip = 0.5;
 // Fewer slots count as converging. Half or twice: `locked` comes after half or twice the time.
 constexpr std::uint64_t slots_to_lock = 10;
 
+// Contradictions that follow each other sooner count as one, as no other message may have come in
+// between: a link begins with several exchanges at once. Half: an IMU of 20 Hz may not have spoken.
+// Twice: a step is followed 0.1 s later.
+constexpr std::int64_t same_contradiction_ns = 50'000'000;
+
 // With fewer slots than these, the board's other messages are no witness for the estimate. Half:
 // one that two equal lies began lasts for 3 s more often. Twice: so do lies soon after a beginning.
 constexpr std::uint64_t slots_to_trust = 4;
@@ -137,6 +142,10 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     const bool old = goes_back(std::min(exchange.received, exchange.answered));
     if (contradicts(up, up_) || contradicts(down, down_)) {
         if (!confirmed_) return restart(exchange, round_trip);  // one of the two is wrong
+        if (contradictions_ > 0 &&
+            (exchange.arrived - last_contradiction_).ns < same_contradiction_ns)
+            return;
+        last_contradiction_ = exchange.arrived;
         ++contradictions_;
         // An estimate that just began may itself be what is wrong.
         if (!continued_ || slots_ < slots_to_trust) ++unwitnessed_contradictions_;

@@ -114,6 +114,7 @@ class EnvelopeFilter {
     double recent_surprises_ = 0;  ///< fading
     int contradictions_ = 0;       ///< exchanges in a row
     int unwitnessed_contradictions_ = 0;
+    HostTime last_contradiction_;
     bool continued_ = false;  ///< since the newest exchange
     Duration contradiction_;  ///< by which the newest was impossible
     std::uint64_t slots_ = 0;
