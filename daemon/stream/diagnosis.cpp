@@ -182,6 +182,19 @@ bool not_followed(const CameraView& camera) {
                  camera.frames()));
 }
 
+std::string unproved_hint(const CameraView& c) {
+    const std::uint64_t proved = c.it.recent.published - c.it.recent.suspect;
+    if (proved == 0)
+        return fmt::format(
+            "none of the last {} frames was proved, for they do not follow the triggers of output "
+            "{}: are trigger cables swapped? check TriggerSource",
+            c.frames(), c.it.configuration.output);
+    return fmt::format(
+        "only {} of the last {} frames were proved: others, or the board's records, are late or "
+        "lost; lower the load of the host, or check network and cables",
+        std::min(proved, c.frames()), c.frames());
+}
+
 std::string count_of(std::uint64_t part, std::uint64_t whole) {
     return fmt::format("{} of the last {} frames", part, whole);
 }
@@ -323,14 +336,7 @@ constexpr Rule camera_rules[] = {
              "'strobe_line' and its LineSource, or set check_exposure = false",
              c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
      }},
-    {Fault::unproved, not_followed,
-     [](const CameraView& c) {
-         return fmt::format(
-             "{} of the last {} frames were proved, for they do not follow the "
-             "triggers of output {}: are trigger cables swapped? check "
-             "TriggerSource",
-             c.it.recent.published - c.it.recent.suspect, c.frames(), c.it.configuration.output);
-     }},
+    {Fault::unproved, not_followed, unproved_hint},
     {Fault::rate_too_high,
      [](const CameraView& c) {
          return answers_some(c) && (!c.strobe() || !c.triggered() || !frames_missing(c));

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <set>
 
+#include "../support/judged.hpp"
 #include "../support/process.hpp"
 #include "../support/stack.hpp"
 #include "../support/temporary_directory.hpp"
@@ -21,11 +22,10 @@ using namespace versavis::test;
 namespace {
 
 rig::Verdict judge(const Stack& stack, double seconds) {
-    auto verdict = rig::judge(stack.scenario(), stack.judging(seconds));
-    if (!verdict) FAIL(verdict.error().message());
-    INFO(rig::to_table(*verdict));
-    for (const auto& [name, stream] : verdict->streams) CHECK(stream.wrong_pairs == 0);
-    return *verdict;
+    const rig::Verdict verdict = judged(stack, seconds);
+    INFO(rig::to_table(verdict));
+    for (const auto& [name, stream] : verdict.streams) CHECK(stream.wrong_pairs == 0);
+    return verdict;
 }
 
 std::string fault(const std::string& camera, const std::string& kind, int at,

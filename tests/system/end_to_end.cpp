@@ -10,6 +10,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "../support/judged.hpp"
 #include "../support/stack.hpp"
 #include "judge.hpp"
 
@@ -19,14 +20,13 @@ using namespace versavis::test;
 namespace {
 
 rig::Verdict judge(const Stack& stack, double seconds) {
-    auto verdict = rig::judge(stack.scenario(), stack.judging(seconds));
-    if (!verdict) FAIL(verdict.error().message());
-    INFO(rig::to_table(*verdict));
-    for (const auto& [name, stream] : verdict->streams) {
+    const rig::Verdict verdict = judged(stack, seconds);
+    INFO(rig::to_table(verdict));
+    for (const auto& [name, stream] : verdict.streams) {
         CHECK(stream.wrong_pairs == 0);
         CHECK(stream.items > 0);
     }
-    return *verdict;
+    return verdict;
 }
 
 /// Reads until `condition` is true of an item; throws when none arrives in time.

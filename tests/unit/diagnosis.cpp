@@ -293,6 +293,9 @@ TEST_CASE("diagnosis: triggers of another output") {
     swapped.refuse(EventReason::unproved, 20);
     swapped.cam().pipeline.pairing = pairing::State::searching;
     check(swapped.camera(), Fault::unproved, "swapped");
+    Bench busy;
+    busy.refuse(EventReason::unproved, 15);
+    check(busy.camera(), Fault::unproved, "only 5 of the last 20 frames were proved");
     Bench unknown;
     unknown.cam().delivery = {false, true, false, now - seconds(50), 17};
     check(unknown.camera(), Fault::too_slow, "17.0 of 20 Hz");

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "../support/judged.hpp"
 #include "../support/stack.hpp"
 #include "judge.hpp"
 #include "usb_bridge.hpp"
@@ -28,10 +29,9 @@ TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes b
     CHECK(status["board"]["serial"] == "RIG0001");
     CHECK(bridge.line_state_set());
 
-    const auto verdict = rig::judge(stack.scenario(), stack.judging(4));
-    REQUIRE(verdict);
-    INFO(rig::to_table(*verdict));
-    CHECK(verdict->ok);
+    const rig::Verdict verdict = judged(stack, 4);
+    INFO(rig::to_table(verdict));
+    CHECK(verdict.ok);
 
     bridge.unplug();
     const auto unplugged = stack.wait_for_status(board_absent);

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <thread>
 
+#include "../support/judged.hpp"
 #include "../support/stack.hpp"
 #include "board_host.hpp"
 #include "judge.hpp"
@@ -57,11 +58,10 @@ class UsbRig {
 };
 
 void judge(const Stack& stack) {
-    const auto verdict = rig::judge(stack.scenario(), stack.judging(3));
-    REQUIRE(verdict);
-    INFO(rig::to_table(*verdict));
-    CHECK(verdict->streams.at("cam0").wrong_pairs == 0);
-    CHECK(verdict->streams.at("cam0").items > 40);
+    const rig::Verdict verdict = judged(stack, 3);
+    INFO(rig::to_table(verdict));
+    CHECK(verdict.streams.at("cam0").wrong_pairs == 0);
+    CHECK(verdict.streams.at("cam0").items > 40);
 }
 
 }  // namespace
