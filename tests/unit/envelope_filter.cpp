@@ -133,10 +133,12 @@ TEST_CASE("envelope_filter: exchanges at once that contradict it count as one") 
     Link link(20, 5);
     HostTime t{0};
     for (; t.ns < 30'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
+    const std::uint64_t before = filter.comparisons();
     Link liar = link;
     liar.jump(milliseconds(18));
     for (int i = 0; i < 4; ++i) filter.add(liar.exchange(t + milliseconds(i)));
     CHECK(filter.restarts() == 0);
+    CHECK(filter.comparisons() == before + 1);
     for (int i = 0; i < 10; ++i) filter.add(link.exchange(t + milliseconds(100) * i));
     CHECK(std::abs(error_ns(filter, link, t)) < 100e3);
 }

@@ -77,10 +77,10 @@ constexpr double start_scale_of_round_trip = 0.5;
 // Fewer slots count as converging. Half or twice: `locked` comes after half or twice the time.
 constexpr std::uint64_t slots_to_lock = 10;
 
-// Contradictions that follow each other sooner count as one, as no other message may have come in
-// between: a link begins with several exchanges at once. Half: an IMU of 20 Hz may not have spoken.
-// Twice: a step is followed 0.1 s later.
-constexpr std::int64_t same_contradiction_ns = 50'000'000;
+// Exchanges that follow each other sooner are one comparison of the clocks, as no other message may
+// have come in between: a link begins with several exchanges at once. Half: an IMU of 20 Hz may not
+// have spoken. Twice: a step is followed 0.1 s later.
+constexpr std::int64_t same_comparison_ns = 50'000'000;
 
 // With fewer slots than these, the board's other messages are no witness for the estimate. Half:
 // one that two equal lies began lasts for 3 s more often. Twice: so do lies soon after a beginning.
@@ -134,6 +134,11 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     if (round_trip.ns <= 0) return;
     last_round_trip_ = round_trip;
     ++exchanges_;
+    const bool anew = absolute(exchange.arrived - last_comparison_).ns >= same_comparison_ns;
+    if (anew) {
+        ++comparisons_;
+        last_comparison_ = exchange.arrived;
+    }
     if (!begun_) return begin(exchange, round_trip);
     const Passage down = to_board(exchange.sent, exchange.received);
     const Passage up = to_host(exchange.answered, exchange.arrived);
@@ -142,10 +147,7 @@ void EnvelopeFilter::add(const Exchange& exchange) {
     const bool old = goes_back(std::min(exchange.received, exchange.answered));
     if (contradicts(up, up_) || contradicts(down, down_)) {
         if (!confirmed_) return restart(exchange, round_trip);  // one of the two is wrong
-        if (contradictions_ > 0 &&
-            (exchange.arrived - last_contradiction_).ns < same_contradiction_ns)
-            return;
-        last_contradiction_ = exchange.arrived;
+        if (contradictions_ > 0 && !anew) return;
         ++contradictions_;
         // An estimate that just began may itself be what is wrong.
         if (!continued_ || slots_ < slots_to_trust) ++unwitnessed_contradictions_;

@@ -59,6 +59,7 @@ class EnvelopeFilter {
     bool confirmed() const { return confirmed_; }  ///< a second exchange agrees with the first
     bool contradicted() const { return contradictions_ > 0 || !confirmed_; }  ///< by the newest
     std::uint64_t exchanges() const { return exchanges_; }
+    std::uint64_t comparisons() const { return comparisons_; }  ///< without those at once
     std::uint64_t one_way_messages() const { return one_way_messages_; }
     std::uint64_t restarts() const { return restarts_; }
     std::uint64_t surprises() const { return surprises_; }  ///< delays well below the edge
@@ -114,11 +115,12 @@ class EnvelopeFilter {
     double recent_surprises_ = 0;  ///< fading
     int contradictions_ = 0;       ///< exchanges in a row
     int unwitnessed_contradictions_ = 0;
-    HostTime last_contradiction_;
+    HostTime last_comparison_;
     bool continued_ = false;  ///< since the newest exchange
     Duration contradiction_;  ///< by which the newest was impossible
     std::uint64_t slots_ = 0;
     std::uint64_t exchanges_ = 0;
+    std::uint64_t comparisons_ = 0;
     std::uint64_t one_way_messages_ = 0;
     std::uint64_t restarts_ = 0;
     std::uint64_t surprises_ = 0;

@@ -59,7 +59,7 @@ void Translator::begin_epoch() {
 
 ClockContact Translator::contact() const {
     const std::lock_guard lock(mutex_);
-    return {clock_life(), filter_.exchanges(), filter_.contradicted()};
+    return {clock_life(), filter_.comparisons(), filter_.contradicted()};
 }
 
 void Translator::clock_continues() {

@@ -69,7 +69,7 @@ struct ClockReport {
 /// How far the estimate of the board's clock has come.
 struct ClockContact {
     std::uint32_t life = 0;       ///< estimates before this one
-    std::uint64_t exchanges = 0;  ///< of all estimates
+    std::uint64_t exchanges = 0;  ///< of all estimates; those at once are one
     bool contradicted = false;    ///< the newest exchange and the estimate disagree: one is wrong
 };
 
