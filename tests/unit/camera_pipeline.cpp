@@ -252,6 +252,17 @@ TEST_CASE("camera_pipeline: of a record that comes twice the first counts") {
     CHECK(bench.pipeline.report().records_doubted == std::size(pattern));
 }
 
+TEST_CASE("camera_pipeline: what a first record that lied may have misled begins anew") {
+    Bench bench(camera(20));
+    bench.lie = [](wire::Exposure& record) { record.trigger += 5; };
+    CHECK(bench.trigger(0));
+    bench.lie = [](wire::Exposure&) {};
+    CHECK(bench.pipeline.report().triggers_without_frame == 0);
+    CHECK(bench.trigger(1));
+    CHECK(bench.pipeline.report().records_doubted == 0);
+    CHECK(bench.pipeline.report().triggers_without_frame == 1);
+}
+
 TEST_CASE("camera_pipeline: of two records of a trigger that differ neither is believed") {
     Bench bench(camera(20));
     bench.start();

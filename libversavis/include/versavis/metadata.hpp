@@ -105,7 +105,7 @@ enum class EventReason : std::uint32_t {
     frame_incomplete = 1,     ///< packets were lost on the way
     frame_missing = 2,        ///< nothing arrived in time
     exposure_missing = 3,     ///< the board's record did not arrive in time
-    unproved = 4,             ///< pairing was not locked, and could not prove it
+    unproved = 4,             ///< pairing could not prove it; a first PPS has none beside it
     mismatch = 5,             ///< the evidence contradicts the pairing
     no_clock = 7,             ///< board time could not be translated
     wrong_size = 8,           ///< the frame is not of the size the camera announced
