@@ -20,6 +20,10 @@ std::optional<EventKind> event_kind(wire::EventKind kind) {
         case wire::EventKind::imu_failed: return EventKind::imu_failed;
         case wire::EventKind::imu_silent: return EventKind::imu_silent;
         case wire::EventKind::utc_label: return EventKind::utc_label;
+        case wire::EventKind::triggers_skipped: return EventKind::triggers_skipped;
+        case wire::EventKind::sync_lost: return EventKind::sync_lost;
+        case wire::EventKind::sync_taken: return EventKind::sync_taken;
+        case wire::EventKind::stored: return EventKind::configuration_stored;
     }
     return std::nullopt;
 }
@@ -38,6 +42,7 @@ EventReason skip_reason(std::uint16_t detail) {
 EventSource source_of(wire::EventKind kind) {
     switch (kind) {
         case wire::EventKind::trigger_skipped:
+        case wire::EventKind::triggers_skipped:
         case wire::EventKind::stray_edge: return EventSource::camera;
         case wire::EventKind::imu_ready:
         case wire::EventKind::imu_failed:
@@ -56,6 +61,7 @@ std::optional<JournalEntry> journal_entry(const wire::Event& event) {
     entry.value = event.value;
     entry.board_time = BoardTime{event.time_ns};
     if (event.kind == wire::EventKind::trigger_skipped) entry.reason = skip_reason(event.detail);
+    if (event.kind == wire::EventKind::triggers_skipped) entry.reason = EventReason::too_late;
     return entry;
 }
 

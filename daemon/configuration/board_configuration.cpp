@@ -100,6 +100,10 @@ Words words(wire::ConfigurationField field) {
         case Field::sync_rate: return {"sync_rate_hz", 1e6};
         case Field::port_options: return {"imu_output' or 'nmea", 0};
         case Field::nmea_baud: return {"nmea_baud", 1};
+        case Field::glitch: return {"glitch_us", 10};
+        case Field::test_rate: return {"test_rate_hz", 1e3};
+        case Field::test_output: return {"test_output", 0};
+        case Field::present: return {"name", 0};
     }
     return {"an unknown key", 0};
 }

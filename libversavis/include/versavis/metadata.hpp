@@ -97,6 +97,10 @@ enum class EventKind : std::uint32_t {
     message_doubted = 22,  ///< its witnesses contradict a message of the board: it was not used
     stream_stepped = 23,   ///< several messages agree against all before: a new epoch begins
     output_clock_stepped = 24,  ///< value: ns by which its offset to the host's clock changed
+    triggers_skipped = 25,  ///< grid points in a row that were too late; value: tick of the first
+    sync_lost = 26,         ///< pulses of the sync input do not fit the grid; value: ns off it
+    sync_taken = 27,        ///< the grid follows the sync pulses; value: ns that it moves for that
+    configuration_stored = 28,  ///< on the board; value: 1 when it is safe, 0 when that failed
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
