@@ -69,16 +69,21 @@ void Transmitter::follow_up() {
     follow_ups_.push(wire::ClockFollowUp{watched_id_, 0, left});
 }
 
-void Transmitter::pump() {
+bool Transmitter::pump() {
+    follow_up();
     const std::size_t waiting = waiting_packets();
     if (waiting > high_water_) high_water_ = waiting;
-    for (std::size_t space = link_.free_space(); space > 0; space = link_.free_space()) {
-        follow_up();
-        if (written_ == frame_.size && !stage()) return;
+    std::size_t budget = bytes_a_pump;
+    for (;;) {
+        const std::size_t free = link_.free_space();
+        const std::size_t space = free < budget ? free : budget;
+        if (space == 0) return budget == 0 && (written_ < frame_.size || waiting_packets() != 0);
+        if (written_ == frame_.size && !stage()) return false;
         const std::size_t left = frame_.size - written_;
         const std::size_t size = left < space ? left : space;
         link_.write(frame_.bytes + written_, size);
         written_ += size;
+        budget -= size;
         if (!answering_ || written_ < frame_.size) continue;
         link_.watch_departure();
         watched_id_ = answer_id_;

@@ -149,7 +149,7 @@ enum class ConfigurationField : std::uint8_t {
     glitch = 22,
     test_rate = 23,
     test_output = 24,
-    present = 25,  ///< this board has none; value: 1, range 0 to 0
+    present = 25,  ///< what this board does not have; value: bit of Present, the range is empty
 };
 
 /// One field that the board refuses; one packet for each, before the answer.
@@ -173,6 +173,7 @@ struct ConfigurationAnswer {
     ConfigurationStatus status;
     std::uint8_t refused;  ///< number of refusals
     std::uint8_t reserved[2];
+    std::int64_t origin_ns;  ///< where the grid began: board time of its zero, as things are
     Configuration
         taken;  ///< what is in force after this answer, with the IMU rates that the parts have
 };
@@ -180,6 +181,6 @@ struct ConfigurationAnswer {
 static_assert(sizeof(CameraConfiguration) == 48 && sizeof(ImuConfiguration) == 8);
 static_assert(sizeof(IlluminationConfiguration) == 16 && sizeof(PortConfiguration) == 24);
 static_assert(sizeof(Configuration) == 256 && sizeof(Refusal) == 32 &&
-              sizeof(ConfigurationAnswer) == 264);
+              sizeof(ConfigurationAnswer) == 272);
 
 }  // namespace versavis::wire

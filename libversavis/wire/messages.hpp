@@ -137,7 +137,7 @@ struct ImuSample {
     std::int16_t magnetic[3];
     std::int16_t temperature;
     std::uint16_t pressure;
-    std::uint16_t accel_age;  ///< with imu_accel_stamped: accelerometer before time_ns, in 32 ns
+    std::int16_t accel_age;  ///< with imu_accel_stamped: accelerometer before time_ns, in 32 ns
     std::uint32_t
         departure_ns;  ///< from time_ns to when this packet began to leave the board; 0: unknown
 };

@@ -14,7 +14,8 @@ namespace versavis::scenario {
 
 class Scenario : public World {
  public:
-    explicit Scenario(std::uint64_t seed = 1) : World(seed) {
+    explicit Scenario(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {})
+        : World(seed, model) {
         if (std::getenv("VERSAVIS_VCD") != nullptr) record_trace();
     }
     Scenario(const Scenario&) = delete;

@@ -105,7 +105,7 @@ class PlayedBoard final : public ByteStream {
             send(message, now);
         } else if (packet.read(configuration)) {
             Judge judge(*this, configuration.id);
-            firmware::check(configuration, judge);
+            firmware::check(configuration, {wire::present_all, 8'000'000}, judge);
             wire::ConfigurationAnswer message{};
             message.id = configuration.id;
             if (judge.refused) message.status = wire::ConfigurationStatus::refused;

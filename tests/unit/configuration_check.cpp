@@ -297,7 +297,7 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
         if (!configuration) continue;
         ++accepted;
         Refusals refusals;
-        firmware::check(board_configuration(*configuration), refusals);
+        firmware::check(board_configuration(*configuration), {wire::present_all, 8'000'000}, refusals);
         INFO(text);
         for (const wire::Refusal& refusal : refusals.all) FAIL(describe(*configuration, refusal));
     }

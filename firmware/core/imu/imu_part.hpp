@@ -57,6 +57,10 @@ class ImuPart {
     /// What identifies the part, as reported by an `imu_ready` event.
     virtual std::uint16_t identity() const = 0;
     virtual std::uint32_t fastest_millihertz() const = 0;
+    /// On the I2C bus; 0: it is not made for that.
+    virtual std::uint32_t fastest_i2c_millihertz() const { return 0; }
+    /// Its accelerometer has a data-ready line of its own.
+    virtual bool has_accel_ready() const { return false; }
     virtual std::uint8_t strongest_filter() const = 0;
     /// Its slowest rate not below `wanted_millihertz`, or its fastest.
     virtual std::uint32_t rate(std::uint32_t wanted_millihertz) const = 0;

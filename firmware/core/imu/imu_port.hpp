@@ -36,6 +36,7 @@ class ImuPort {
         sample.number = number_++;
         if (overrun_) sample.flags |= wire::imu_overrun;
         overrun_ = false;
+        if (repeats(sample)) sample.flags |= wire::imu_repeated;
         const bool failed = (sample.flags & wire::imu_check_failed) != 0;
         if (failed || (sample.flags & wire::imu_self_test_failed) != 0) ++errors_;
         failures_ = failed ? failures_ + 1 : 0;
@@ -57,7 +58,21 @@ class ImuPort {
     std::uint8_t port_;
 
  private:
+    /// The same words as in the sample before: it was not updated.
+    bool repeats(const wire::ImuSample& sample) {
+        bool same = true;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            same = same && gyro_before_[axis] == sample.gyro[axis] &&
+                   accel_before_[axis] == sample.accel[axis];
+            gyro_before_[axis] = sample.gyro[axis];
+            accel_before_[axis] = sample.accel[axis];
+        }
+        return same;
+    }
+
     ChannelReports& reports_;
+    std::int32_t gyro_before_[3] = {};
+    std::int32_t accel_before_[3] = {};
     std::uint32_t number_ = 0;
     std::uint32_t errors_ = 0;
     std::uint32_t restarts_ = 0;

@@ -28,6 +28,10 @@ constexpr std::size_t pressure_at = 52;
 constexpr Nanoseconds base_period = 1'250'000;  // of its own samples
 constexpr Nanoseconds power_up_time = 300'000'000;
 
+/// Edges closer to the one before are its echoes; the part's are a base period apart. At half, long
+/// reflections count double; at four times, two samples might be one.
+constexpr Nanoseconds longest_echo = 300'000;
+
 std::uint32_t word32(const std::uint8_t* bytes) {
     std::uint32_t word = 0;
     std::memcpy(&word, bytes, sizeof word);
@@ -169,6 +173,7 @@ void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
 }
 
 void Vn100::ready_edge(Nanoseconds at) {
+    if (at - edges_[0] < longest_echo) return;
     for (std::size_t i = max_edges - 1; i > 0; --i) edges_[i] = edges_[i - 1];
     edges_[0] = at;
 }

@@ -38,7 +38,8 @@ struct Interval {
 
 class World {
  public:
-    explicit World(std::uint64_t seed = 1);
+    /// The board runs on `model`; without one, on what the variable VERSAVIS_PORT names.
+    explicit World(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {});
 
     /// A motion that is easy to recognise, and slow compared with every IMU.
     static devices::Inertial motion(Nanoseconds at);
@@ -51,6 +52,8 @@ class World {
     devices::Vn100Device& add_vn100(double rate_hz, bool data_ready);
     void add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns,
                     Nanoseconds width = 100 * us);
+    /// No more pulses from any source.
+    void stop_pulses() { pulses_.clear(); }
     /// Endless edges at an input, `period` apart.
     void add_noise(std::uint8_t input, Nanoseconds period, Nanoseconds from, Nanoseconds to);
 
@@ -98,7 +101,17 @@ class World {
 
     /// True time of a grid point.
     Nanoseconds grid_time(unsigned camera, std::uint64_t tick) const;
-    /// Middle of a measured exposure relative to its grid point.
+    /// The calls of the port take time: what does not fit may come late, and says so.
+    bool is_slow() const { return model_.call_ns > 0; }
+    /// How far what the port does may be from what was asked, as coarse as it is: half a grain of
+    /// an output, a step between two words, and a grain of the stamps.
+    Nanoseconds rounding() const;
+    /// As the port stamps it.
+    Nanoseconds stamped(Nanoseconds at) const {
+        return at / model_.edge_grain_ns * model_.edge_grain_ns;
+    }
+    /// Middle of a measured exposure relative to its grid point, as exact as the port allows; 0 for
+    /// one that says it was late on a slow port.
     Nanoseconds grid_error(const wire::Exposure& record) const;
     const wire::Exposure& record(unsigned camera, std::uint64_t trigger);
 
@@ -116,11 +129,10 @@ class World {
  private:
     void outputs_changed(Nanoseconds at, std::uint32_t pins);
     void make_board(wire::ResetCause cause);
-    void step(Nanoseconds until);
     void show(const std::string& line, Nanoseconds at, bool level);
     void read_link();
     Nanoseconds next_event() const;
-    void fire_events();
+    void fire_events(Nanoseconds at);
     void fire_spi_ready();
     void fire_uart_sample();
     void uart_sent(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
@@ -133,6 +145,7 @@ class World {
     void judge_light(std::string& out);
 
     std::uint64_t seed_;
+    firmware::PortModel model_;
     Nanoseconds now_ = 0;
     std::vector<std::uint8_t> flash_;
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
