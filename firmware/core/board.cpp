@@ -83,7 +83,8 @@ void Board::poll() {
     more_ = false;
     // First what happened, then what is wanted: edges belong to what was in force when they
     // arrived.
-    outputs_blocked_ = !outputs_.commit(began);
+    // What is overdue leaves before anybody waits for its effect.
+    outputs_.commit(began - OutputQueue::horizon / 2);
     spi_imu_.collect(began);
     poll_edges(began);
     poll_configuration(began);

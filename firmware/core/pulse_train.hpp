@@ -27,8 +27,9 @@ class PulseTrain {
         if (clock_ != nullptr) at_ = clock_->board_time(grid_.next());
     }
 
+    /// Before each commit of the outputs: pulses are decided further ahead than words are committed.
     void poll(Nanoseconds now) {
-        if (next_wake() > now) return;
+        if (clock_ == nullptr || at_ > now + furthest) return;
         // A late pulse would be taken for one on time: it is left out.
         if (at_ < now + soonest) skip(now);
         while (at_ <= now + furthest && outputs_.has_room(output_)) {
@@ -42,8 +43,9 @@ class PulseTrain {
 
  private:
     /// A pulse is decided this long before it leaves, at most: many at once where they are fast. At
-    /// half, 10 kHz takes a poll for each few; at twice, the room of the output does not hold them.
+    /// half, words for other outputs overtake it; at twice, the room of the output does not hold it.
     static constexpr Nanoseconds furthest = 1'200'000;
+    static_assert(furthest > OutputQueue::horizon);
     /// At half, a slow poll leaves pulses out; at twice, fast trains take more polls.
     static constexpr Nanoseconds wake_ahead = 700'000;
     /// What is decided later than that may leave late. At half, a port with a horizon of its own
