@@ -10,8 +10,18 @@ NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nano
     : environment_(std::move(environment)),
       now_(boot),
       fed_(boot),
-      board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this},
-             identity) {}
+      board_(hardware(identity), identity) {}
+
+Hal NativeBoard::hardware(const Identity& identity) {
+    const Hal hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this};
+    return environment_.tap == nullptr ? hal : environment_.tap->tap(hal, identity);
+}
+
+void NativeBoard::poll() {
+    if (environment_.tap != nullptr) environment_.tap->poll_begins(now_);
+    board_.poll();
+    if (environment_.tap != nullptr) environment_.tap->poll_ended(board_.next_wake());
+}
 
 void NativeBoard::set_input(std::uint8_t input, bool level) {
     const std::uint32_t bit = 1U << input;
@@ -56,7 +66,7 @@ void NativeBoard::run_until(Nanoseconds until) {
         now_ = std::max(now_, wake);
         attention_ = false;
         advance_hardware();
-        board_.poll();
+        poll();
         // What is not read in time is lost.
         while (!uart_bytes_.empty() && uart_bytes_.front().at <= now_) uart_bytes_.pop_front();
     }

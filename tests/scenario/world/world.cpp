@@ -14,7 +14,9 @@ Nanoseconds PulseSource::next() const {
     return origin + std::llround(static_cast<double>(count) * period_ns);
 }
 
-World::World(std::uint64_t seed) : seed_(seed) { make_board(wire::ResetCause::power_on); }
+World::World(std::uint64_t seed, firmware::CoreTap* tap) : seed_(seed), tap_(tap) {
+    make_board(wire::ResetCause::power_on);
+}
 
 devices::Inertial World::motion(Nanoseconds at) {
     const double t = static_cast<double>(at) * 1e-9;
@@ -36,6 +38,7 @@ void World::make_board(wire::ResetCause cause) {
     environment.uart_sent = [this](auto at, auto baud, auto bytes) { uart_sent(at, baud, bytes); };
     environment.reboot = [this](bool) { ++reboots_; };
     environment.flash = &flash_;
+    environment.tap = tap_;
     pins_ = 0;
     const auto nonce =
         static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);

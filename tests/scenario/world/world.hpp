@@ -38,7 +38,8 @@ struct Interval {
 
 class World {
  public:
-    explicit World(std::uint64_t seed = 1);
+    /// `tap` sees what the core of the board does.
+    explicit World(std::uint64_t seed = 1, firmware::CoreTap* tap = nullptr);
 
     /// A motion that is easy to recognise, and slow compared with every IMU.
     static devices::Inertial motion(Nanoseconds at);
@@ -133,6 +134,7 @@ class World {
     void judge_light(std::string& out);
 
     std::uint64_t seed_;
+    firmware::CoreTap* tap_;
     Nanoseconds now_ = 0;
     std::vector<std::uint8_t> flash_;
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
