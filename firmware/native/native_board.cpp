@@ -13,10 +13,14 @@ NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nano
       random_(model.seed),
       now_(boot),
       fed_(boot),
-      board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this,
-                 PortFacts{model.present, model.fastest_imu_millihertz, model.output_grain_bits,
-                           model.output_step_ns}},
-             identity) {}
+      board_(hardware(identity), identity) {}
+
+Hal NativeBoard::hardware(const Identity& identity) {
+    const PortFacts facts{model_.present, model_.fastest_imu_millihertz, model_.output_grain_bits,
+                          model_.output_step_ns};
+    const Hal hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this, facts};
+    return environment_.tap == nullptr ? hal : environment_.tap->tap(hal, identity);
+}
 
 Nanoseconds NativeBoard::draw(Nanoseconds most) {
     return most == 0 ? 0 : static_cast<Nanoseconds>(random_() % static_cast<std::uint64_t>(most));
@@ -113,7 +117,9 @@ void NativeBoard::poll_core() {
     advance_to(now_ + draw(model_.wake_ns));
     attention_ = false;
     const Nanoseconds began = now_;
+    if (environment_.tap != nullptr) environment_.tap->poll_begins(now_);
     board_.poll();
+    if (environment_.tap != nullptr) environment_.tap->poll_ended(board_.next_wake());
     // What nobody reads is lost.
     while (!uart_bytes_.empty() && uart_bytes_.front().at <= began) uart_bytes_.pop_front();
 }

@@ -22,6 +22,18 @@ namespace versavis::firmware {
 /// to 3.
 enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
+/// Stands between the core and its hardware, and sees each poll.
+struct CoreTap {
+    /// Returns the hardware that the core of this board gets instead of `hal`.
+    virtual Hal tap(const Hal& hal, const Identity& identity) = 0;
+    virtual void poll_begins(Nanoseconds now) = 0;
+    /// The core wants the next one at `next_wake`.
+    virtual void poll_ended(Nanoseconds next_wake) = 0;
+
+ protected:
+    ~CoreTap() = default;
+};
+
 /// What is connected to the board. Called from run_until(), with the instants at which the hardware
 /// would act. A function that is not set is not connected.
 struct Environment {
@@ -40,6 +52,7 @@ struct Environment {
     std::function<void(Nanoseconds at)> fire;
     /// What the board stores, and finds when it starts.
     std::vector<std::uint8_t>* flash = nullptr;
+    CoreTap* tap = nullptr;
 };
 
 /// Events happen at the instants of the model, not when the process wakes up: a late call of
@@ -152,6 +165,7 @@ class NativeBoard final : Clock64,
         NativeBoard& board;
     };
 
+    Hal hardware(const Identity& identity);
     void spend();
     Nanoseconds draw(Nanoseconds most);
     Nanoseconds next_attention() const;

@@ -41,8 +41,8 @@ Nanoseconds PulseSource::next() const {
     return origin + std::llround(static_cast<double>(count) * period_ns);
 }
 
-World::World(std::uint64_t seed, std::optional<firmware::PortModel> model)
-    : seed_(seed), model_(model.value_or(named_model(seed))) {
+World::World(std::uint64_t seed, std::optional<firmware::PortModel> model, firmware::CoreTap* tap)
+    : seed_(seed), model_(model.value_or(named_model(seed))), tap_(tap) {
     make_board(wire::ResetCause::power_on);
 }
 
@@ -72,6 +72,7 @@ void World::make_board(wire::ResetCause cause) {
     environment.next_event = [this] { return next_event(); };
     environment.fire = [this](auto at) { fire_events(at); };
     environment.flash = &flash_;
+    environment.tap = tap_;
     pins_ = 0;
     const auto nonce =
         static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);

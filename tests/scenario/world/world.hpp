@@ -38,8 +38,10 @@ struct Interval {
 
 class World {
  public:
-    /// The board runs on `model`; without one, on what the variable VERSAVIS_PORT names.
-    explicit World(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {});
+    /// The board runs on `model`; without one, on what the variable VERSAVIS_PORT names. `tap` sees
+    /// what its core does.
+    explicit World(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {},
+                   firmware::CoreTap* tap = nullptr);
 
     /// A motion that is easy to recognise, and slow compared with every IMU.
     static devices::Inertial motion(Nanoseconds at);
@@ -146,6 +148,7 @@ class World {
 
     std::uint64_t seed_;
     firmware::PortModel model_;
+    firmware::CoreTap* tap_;
     Nanoseconds now_ = 0;
     std::vector<std::uint8_t> flash_;
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
