@@ -81,17 +81,21 @@ Board::Board(const Hal& hal, const Identity& identity)
 void Board::poll() {
     const Nanoseconds began = hal_.clock.now();
     more_ = false;
+    // What is overdue leaves before anybody waits for its effect.
+    if (began >= timers_) outputs_.commit(began - OutputQueue::horizon / 2);
     // First what happened, then what is wanted: edges belong to what was in force when they
     // arrived.
-    // What is overdue leaves before anybody waits for its effect.
-    outputs_.commit(began - OutputQueue::horizon / 2);
     spi_imu_.collect(began);
     poll_edges(began);
-    poll_configuration(began);
+    if (configuring_) poll_configuration(began);
     poll_link();
     const Nanoseconds now = hal_.clock.now();
-    poll_cameras(now);
-    poll_outputs(now);
+    const bool timed = stirred_ || now >= timers_;
+    if (timed) {
+        poll_cameras(now);
+        poll_outputs(now);
+    }
+    stirred_ = configuring_ || outputs_blocked_;
     poll_imus(now);
     poll_nmea();
     poll_storage();
@@ -101,6 +105,7 @@ void Board::poll() {
     polled_ = hal_.clock.now();
     const Nanoseconds took = polled_ - (due_ < began && due_ != 0 ? due_ : began);
     if (took > health_.loop_max_ns) health_.loop_max_ns = static_cast<std::uint32_t>(took);
+    if (timed) timers_ = find_timers();
     due_ = more_ ? polled_ : find_next_wake();
 }
 
@@ -111,22 +116,29 @@ void Board::poll_cameras(Nanoseconds now) {
     test_.poll(now);
 }
 
-Nanoseconds Board::find_next_wake() const {
+/// When cameras, light and outputs have something to do if nothing stirs them before.
+Nanoseconds Board::find_timers() const {
     const Nanoseconds lag = polled_ - settled_;
     Nanoseconds wake = polled_ + feed_interval;
     const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
-    if (greeted_) sooner(next_health_);
-    if (configuring_ && configure_at_ > polled_) sooner(configure_at_);
     for (const CameraChannel& camera : cameras_) sooner(camera.next_wake(lag));
     sooner(light_.next_wake(lag));
-    sooner(spi_imu_.next_wake(lag));
-    sooner(uart_imu_.next_wake());
-    sooner(noise_.next_wake());
     // When the hardware's queue is full, the next word that leaves it calls.
     if (outputs_blocked_) return wake;
     sooner(sync_.next_wake());
     sooner(test_.next_wake());
     sooner(outputs_.next_wake());
+    return wake;
+}
+
+Nanoseconds Board::find_next_wake() const {
+    Nanoseconds wake = timers_;
+    const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
+    if (greeted_) sooner(next_health_);
+    if (configuring_ && configure_at_ > polled_) sooner(configure_at_);
+    sooner(spi_imu_.next_wake(polled_ - settled_));
+    sooner(uart_imu_.next_wake());
+    sooner(noise_.next_wake());
     return wake;
 }
 
@@ -141,6 +153,7 @@ void Board::poll_link() {
     for (unsigned i = 0; i < packets_a_poll; ++i) {
         const std::size_t size = hal_.link.read(bytes, received);
         if (size == 0) return;
+        stirred_ = true;
         decoder_.feed(bytes, size, [&](const wire::Packet& packet) { handle(packet, received); });
     }
     more_ = true;

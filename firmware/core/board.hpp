@@ -44,6 +44,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void refuse(const wire::Refusal& refusal) override;
     void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) override;
 
+    Nanoseconds find_timers() const;
     Nanoseconds find_next_wake() const;
     void poll_link();
     void poll_edges(Nanoseconds now);
@@ -113,8 +114,11 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     bool greeted_ = false;
     bool storing_ = false;
     bool outputs_blocked_ = false;
-    bool more_ = false;        ///< to do at once
-    Nanoseconds settled_ = 0;  ///< all edges before are known
+    bool more_ = false;          ///< to do at once
+    bool stirred_ = true;        ///< cameras, light and outputs may have something to do
+    std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled
+    Nanoseconds timers_ = 0;     ///< when they have something to do in any case
+    Nanoseconds settled_ = 0;    ///< all edges before are known
     Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
     Nanoseconds due_ = 0;  ///< when poll() has something to do next

@@ -13,7 +13,7 @@ constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
 /// Bounds the work of one poll. At half, a burst of edges takes more polls; at twice, other work
 /// waits longer.
-constexpr unsigned edges_a_poll = 32;
+constexpr unsigned edges_a_poll = 24;
 
 }  // namespace
 
@@ -39,8 +39,13 @@ void Board::poll_edges(Nanoseconds now) {
         more_ = true;
     else
         settled = hal_.edges.settled();
-    for (unsigned i = 0; i < camera_count; ++i) settle_exposures(i, settled);
-    for (const CameraChannel& camera : cameras_) settled = camera.settled(settled);
+    for (unsigned i = 0; i < camera_count && bouncing_ != 0; ++i) {
+        if ((bouncing_ >> i & 1U) == 0) continue;
+        settle_exposures(i, settled);
+        if (!cameras_[i].is_bouncing())
+            bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << i));
+        settled = cameras_[i].settled(settled);
+    }
     if (settled > settled_) settled_ = settled;
     if (lost == 0) return;
     edges_lost();
@@ -53,6 +58,7 @@ void Board::edges_lost() {
     light_.edges_lost();
     spi_imu_.edges_lost();
     exposing_ = 0;
+    stirred_ = true;
 }
 
 void Board::take_edge(const Edge& edge, Nanoseconds now) {
@@ -68,6 +74,7 @@ void Board::take_edge(const Edge& edge, Nanoseconds now) {
         const auto input = static_cast<wire::PulseInput>(edge.input - input_pulse);
         const bool falling = (configuration_.ports.falling >> input & 1U) != 0;
         if (edge.level == falling) return;
+        stirred_ = true;
         if (echoes_[input].take(edge.at))
             take_pulse(input, edge.at);
         else
@@ -80,10 +87,12 @@ void Board::take_exposure_edge(const Edge& edge) {
     CameraChannel& camera = cameras_[edge.input];
     settle_exposures(edge.input, edge.at);
     camera.edge(edge.at, edge.level);
+    stirred_ = true;
     const bool exposing = camera.exposing(edge.level);
     light_.edge(edge.input, exposing);
     const auto bit = static_cast<std::uint8_t>(1U << edge.input);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
+    bouncing_ = static_cast<std::uint8_t>(bouncing_ | bit);
     if (!exposing) switch_slaves();
 }
 
@@ -92,6 +101,7 @@ void Board::settle_exposures(unsigned camera, Nanoseconds settled) {
     Nanoseconds at = 0;
     bool exposing = false;
     if (!master.take_edge(settled, at, exposing)) return;
+    stirred_ = true;
     const std::uint64_t tick = master.tick_at(at);
     master.exposure_edge(at, exposing);
     for (CameraChannel& slave : cameras_)

@@ -60,6 +60,8 @@ class CameraChannel {
     bool take_edge(Nanoseconds settled, Nanoseconds& at, bool& exposing) {
         return filter_.take(settled, at, exposing);
     }
+    /// An edge waits for whether it counts.
+    bool is_bouncing() const { return filter_.next_wake() != never; }
     /// Before this instant no more edge will count.
     Nanoseconds settled(Nanoseconds settled) const { return filter_.settled(settled); }
     /// The exposure line of this camera changed, or that of this slave's master: `tick` is that of

@@ -27,7 +27,8 @@ class PulseTrain {
         if (clock_ != nullptr) at_ = clock_->board_time(grid_.next());
     }
 
-    /// Before each commit of the outputs: pulses are decided further ahead than words are committed.
+    /// Before each commit of the outputs: pulses are decided further ahead than words are
+    /// committed.
     void poll(Nanoseconds now) {
         if (clock_ == nullptr || at_ > now + furthest) return;
         // A late pulse would be taken for one on time: it is left out.
@@ -43,7 +44,8 @@ class PulseTrain {
 
  private:
     /// A pulse is decided this long before it leaves, at most: many at once where they are fast. At
-    /// half, words for other outputs overtake it; at twice, the room of the output does not hold it.
+    /// half, words for other outputs overtake it; at twice, the room of the output does not hold
+    /// it.
     static constexpr Nanoseconds furthest = 1'200'000;
     static_assert(furthest > OutputQueue::horizon);
     /// At half, a slow poll leaves pulses out; at twice, fast trains take more polls.

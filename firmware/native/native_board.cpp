@@ -18,7 +18,8 @@ NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nano
 Hal NativeBoard::hardware(const Identity& identity) {
     const PortFacts facts{model_.present, model_.fastest_imu_millihertz, model_.output_grain_bits,
                           model_.output_step_ns};
-    const Hal hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this, facts};
+    const Hal hal{*this, *this, *this, *this, *this, uart_,
+                  *this, *this, *this, *this, *this, facts};
     return environment_.tap == nullptr ? hal : environment_.tap->tap(hal, identity);
 }
 

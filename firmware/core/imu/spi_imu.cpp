@@ -88,7 +88,6 @@ void SpiImu::adapt(ImuTransfer& transfer) const {
 
 void SpiImu::arm(Nanoseconds now) {
     job_.pause = part_->pause();
-    for (unsigned i = 0; i < job_.count; ++i) adapt(job_.transfers[i]);
     const bool at_edge = job_.input != not_routed;
     if (!at_edge) job_.after = max(job_.after, ended_ + job_.pause);
     job_until_ = at_edge ? never : max(job_.after, now) + transfer_limit;
@@ -102,6 +101,8 @@ void SpiImu::next_step(Nanoseconds now) {
     job_.count = 1;
     job_.transfers[0] = {};
     part_->access(setup_[step_], job_.transfers[0]);
+    adapt(job_.transfers[0]);
+    job_reads_ = false;
     readings_ = 0;
     arm(now);
     if (job_state_ == Job::none)
@@ -148,10 +149,13 @@ void SpiImu::arm_reading(std::uint8_t input, Nanoseconds after, unsigned reading
     job_.input = input;
     job_.after = after;
     job_.count = static_cast<std::uint8_t>(readings);
-    for (unsigned i = 0; i < readings; ++i) {
+    const bool begins = readings_ == 0;
+    for (unsigned i = 0; i < readings && !(begins && job_reads_); ++i) {
         job_.transfers[i] = {};
         part_->reading(readings_ + i, job_.transfers[i]);
+        adapt(job_.transfers[i]);
     }
+    job_reads_ = begins;
     arm(now);
     if (job_state_ != Job::none) return;
     readings_ = 0;
@@ -193,10 +197,9 @@ void SpiImu::stamp_accel(Nanoseconds started, wire::ImuSample& sample) const {
 }
 
 void SpiImu::collect(Nanoseconds now) {
-    ImuReply replies[max_transfers];
-    if (job_state_ != Job::armed || !bus_.complete(replies)) return;
+    if (job_state_ != Job::armed || !bus_.complete(fresh_)) return;
     job_state_ = Job::collected;
-    for (unsigned i = 0; i < job_.count; ++i) replies_[readings_++] = replies[i];
+    for (unsigned i = 0; i < job_.count; ++i) replies_[readings_++] = fresh_[i];
     ended_ = replies_[readings_ - 1].ended;
     if (state_ == State::set_up) {
         job_state_ = Job::none;

@@ -76,12 +76,14 @@ class SpiImu final : public ImuPort {
     Nanoseconds patience_ = 0;  ///< how long its data-ready edge may fail to come
     ImuJob job_;
     Job job_state_ = Job::none;
-    Nanoseconds job_until_ = 0;  ///< when it must have ended; never: it waits for an edge
-    unsigned readings_ = 0;      ///< of the sample that is being read
-    ImuReply replies_[max_readings];
-    Nanoseconds ended_ = 0;    ///< when the newest transfer did
-    Nanoseconds period_ = 0;   ///< of the edges, as the part was told
-    unsigned fast_edges_ = 0;  ///< edges in a row that came sooner
+    bool job_reads_ = false;          ///< its transfers are those that begin a sample
+    Nanoseconds job_until_ = 0;       ///< when it must have ended; never: it waits for an edge
+    unsigned readings_ = 0;           ///< of the sample that is being read
+    ImuReply fresh_[max_transfers];   ///< of the newest job
+    ImuReply replies_[max_readings];  ///< of the sample that is being read
+    Nanoseconds ended_ = 0;           ///< when the newest transfer did
+    Nanoseconds period_ = 0;          ///< of the edges, as the part was told
+    unsigned fast_edges_ = 0;         ///< edges in a row that came sooner
     ReadyEdges ready_edges_;
     ReadyEdges accel_edges_;
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed

@@ -56,12 +56,15 @@ bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowes
 
 }  // namespace
 
+/// The steps of eight bits at once, by the structure of the polynomial: x^12 + x^5 + 1.
 std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size) {
     std::uint32_t crc = 0;
     for (std::size_t i = 0; i < size; ++i) {
-        crc ^= std::uint32_t{data[i]} << 8U;
-        for (int bit = 0; bit < 8; ++bit)
-            crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
+        crc = (crc >> 8U | crc << 8U) & 0xFFFFU;
+        crc ^= data[i];
+        crc ^= (crc & 0xFFU) >> 4U;
+        crc ^= crc << 12U & 0xFFFFU;
+        crc ^= (crc & 0xFFU) << 5U;
     }
     return static_cast<std::uint16_t>(crc);
 }
