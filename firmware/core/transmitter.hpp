@@ -75,7 +75,7 @@ class Transmitter {
     std::size_t waiting_packets() const;
     void follow_up();
     void stamp();
-    bool stage();
+    void stage();
     template <class Queue>
     bool stage_first_of(Queue& queue);
 

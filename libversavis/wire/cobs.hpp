@@ -19,11 +19,13 @@ constexpr std::size_t cobs_encode(const std::uint8_t* data, std::size_t size, st
     std::uint8_t* next = out + 1;
     const std::uint8_t* const end = data + size;
     while (data != end) {
-        const std::uint8_t byte = *data++;
-        if (byte != 0) *next++ = byte;
-        const std::ptrdiff_t code = next - code_at;
-        if (byte == 0 || (code == 0xFF && data != end)) {
-            *code_at = static_cast<std::uint8_t>(code);
+        // The place of a zero is that of the next code.
+        const std::uint8_t byte = *next++ = *data++;
+        if (byte == 0) {
+            *code_at = static_cast<std::uint8_t>(next - 1 - code_at);
+            code_at = next - 1;
+        } else if (next - code_at == 0xFF && data != end) {
+            *code_at = 0xFF;
             code_at = next++;
         }
     }
