@@ -59,8 +59,8 @@ inline std::unique_ptr<devices::SpiImuDevice> make_imu(
 /// World::motion() with a tremble, so that no two samples of a sensor are the same.
 inline devices::Inertial trembling(Nanoseconds at) {
     devices::Inertial felt = World::motion(at);
-    felt.gyro_deg_s[0] += 0.5 * std::sin(static_cast<double>(at) * 1e-6);
-    felt.accel_g[0] += 0.01 * std::cos(static_cast<double>(at) * 1e-6);
+    felt.gyro_deg_s[0] += 5 * std::sin(static_cast<double>(at) * 1e-6);
+    felt.accel_g[0] += 0.1 * std::cos(static_cast<double>(at) * 1e-6);
     return felt;
 }
 
