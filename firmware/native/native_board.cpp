@@ -64,9 +64,13 @@ void NativeBoard::uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds 
 
 Nanoseconds NativeBoard::transfer_end(Nanoseconds at, const ImuTransfer& transfer) const {
     const bool spi = transfer.bus == ImuTransfer::Bus::spi;
-    // On I2C each byte is acknowledged, and a read sends the address twice.
+    if (!spi && i2c_held_) return at + i2c_patience;
+    // On I2C each byte is acknowledged, and a read sends the address twice, each after a start; a
+    // stop ends both.
+    const bool read = transfer.bus == ImuTransfer::Bus::i2c_read;
     const Nanoseconds bits =
-        spi ? Nanoseconds{transfer.size} * 8 : (Nanoseconds{transfer.size} + 2) * 9;
+        spi ? Nanoseconds{transfer.size} * 8
+            : (Nanoseconds{transfer.size} + (read ? 2 : 1)) * 9 + (read ? 3 : 2);
     const Nanoseconds gaps = Nanoseconds{transfer.size} / 2 * transfer.word_gap_ns;
     return at + bits * 1'000'000'000 / std::max<std::uint32_t>(transfer.clock_hz, 1) + gaps;
 }
@@ -285,9 +289,12 @@ bool NativeBoard::complete(ImuReply (&replies)[max_transfers]) {
         replies[i] = {};
         replies[i].started = at;
         replies[i].ended = transfer_end(at, transfer);
-        if (environment_.imu_transfer)
-            replies[i].refused = !environment_.imu_transfer(
-                at, transfer, std::span(replies[i].bytes, transfer.size));
+        const bool spi = transfer.bus == ImuTransfer::Bus::spi;
+        bool acknowledged = !i2c_held_;
+        if (environment_.imu_transfer && (spi || !i2c_held_))
+            acknowledged =
+                environment_.imu_transfer(at, transfer, std::span(replies[i].bytes, transfer.size));
+        replies[i].refused = !spi && !acknowledged;
         at = replies[i].ended + done.job.pause;
     }
     return true;

@@ -39,7 +39,7 @@ struct CoreTap {
 struct Environment {
     std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
     /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
-    /// False: no part acknowledged; only on I2C.
+    /// False: no part acknowledged; it counts on I2C only.
     std::function<bool(Nanoseconds at, const ImuTransfer& transfer,
                        std::span<std::uint8_t> received)>
         imu_transfer;
@@ -96,6 +96,9 @@ class NativeBoard final : Clock64,
     /// From now on no IMU transfer completes, or all of them do again.
     void set_imu_bus_stuck(bool stuck) { imu_bus_stuck_ = stuck; }
 
+    /// From now on another part holds the I2C bus, or has released it.
+    void set_i2c_held(bool held) { i2c_held_ = held; }
+
     /// When run_until() has something to do next, if no bytes come.
     Nanoseconds next_wake() const;
     /// Of the core; beyond run_until() while it worked for longer.
@@ -111,6 +114,9 @@ class NativeBoard final : Clock64,
     std::vector<std::uint16_t> read_imu_output(std::span<const std::uint16_t> words);
 
     static constexpr Nanoseconds routing_latency = 50;
+    /// At half, a part that stretches its clock is given up; at twice, it is more than the HAL
+    /// says.
+    static constexpr Nanoseconds i2c_patience = 10'000'000;
     static constexpr Nanoseconds watchdog_limit = 1'000'000'000;
 
  private:
@@ -205,6 +211,7 @@ class NativeBoard final : Clock64,
     std::optional<ArmedJob> armed_;
     Nanoseconds ready_at_[input_count] = {};  ///< newest edges of data-ready inputs
     bool imu_bus_stuck_ = false;
+    bool i2c_held_ = false;
     bool stalled_ = false;
     std::uint32_t baud_ = 115'200;
     std::deque<UartBytes> uart_bytes_;

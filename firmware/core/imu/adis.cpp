@@ -55,12 +55,12 @@ std::uint32_t Adis::rate(std::uint32_t wanted_millihertz) const {
                           : facts_.fastest_millihertz / (code + 1U);
 }
 
-void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
-    const std::uint16_t code = rate_code(rate_millihertz);
+void Adis::setup(const PartSettings& settings, Setup& setup) const {
+    const std::uint16_t code = rate_code(settings.rate_millihertz);
     // In octaves the rate is in the high byte, beside the bit that selects the internal clock.
     const auto rate =
         static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
-    const auto filters = static_cast<std::uint16_t>(facts_.filter_base | filter);
+    const auto filters = static_cast<std::uint16_t>(facts_.filter_base | settings.filter);
     constexpr std::uint32_t settle_us = 300;
     setup.write(0, facts_.command_register, reset_command, facts_.reset_us);
     setup.expect(0, facts_.product_register, facts_.product);
@@ -68,7 +68,7 @@ void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setu
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
     setup.write(0, facts_.filter_register, filters,
-                settle_us);  // changing the range may change the filter
+                settle_us);  // changing the range may change the settings.filter
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }

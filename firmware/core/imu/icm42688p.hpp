@@ -14,7 +14,7 @@ class Icm42688p final : public ByteRegisterPart {
     std::uint32_t fastest_i2c_millihertz() const override { return 1'000'000; }
     std::uint8_t strongest_filter() const override { return 7; }
     std::uint32_t rate(std::uint32_t wanted_millihertz) const override;
-    void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
+    void setup(const PartSettings& settings, Setup& setup) const override;
     unsigned readings() const override { return 2; }
     void reading(unsigned index, ImuTransfer& transfer) const override;
     Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const override;

@@ -27,8 +27,11 @@ class ImuPort {
         overrun_ = overrun_ || samples > 0;
     }
 
-    /// A reading failed its check and gives no sample.
-    void count_error() { ++errors_; }
+    /// A reading failed its check and gives no sample. False: too many failed in a row.
+    bool count_error() {
+        ++errors_;
+        return ++failures_ < max_failures;
+    }
 
     /// Gives the sample its number and flags. False: too many failed in a row.
     bool finish(wire::ImuSample& sample) {

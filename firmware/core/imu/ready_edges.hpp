@@ -22,16 +22,23 @@ class ReadyEdges {
             return false;
         }
         stamps_[count_++ % kept] = at;
+        if (known_ < kept) ++known_;
         return true;
     }
+
+    /// Some edges were not passed on: those from before say nothing about what is read from here
+    /// on.
+    void forget() { known_ = 0; }
 
     /// Edges so far, modulo 2^32.
     std::uint32_t count() const { return count_; }
     Nanoseconds newest() const { return stamps_[(count_ - 1) % kept]; }
+    /// Edges up to this instant are echoes of the newest one.
+    Nanoseconds quiet_until() const { return count_ == 0 ? 0 : newest() + width_ - 1; }
 
     /// The newest edge not after `at`. False: none of those that are kept.
     bool find(Nanoseconds at, Nanoseconds& stamp, std::uint32_t& number) const {
-        for (std::uint32_t back = 0; back < kept && back < count_; ++back) {
+        for (std::uint32_t back = 0; back < known_; ++back) {
             number = count_ - back;
             stamp = stamps_[(number - 1) % kept];
             if (stamp <= at) return true;
@@ -55,6 +62,7 @@ class ReadyEdges {
     Nanoseconds width_ = 0;
     Nanoseconds stamps_[kept] = {};
     std::uint32_t count_ = 0;
+    std::uint32_t known_ = 0;  ///< of the newest of them
     std::uint32_t echoes_ = 0;
 };
 

@@ -5,6 +5,8 @@ namespace versavis::firmware {
 
 namespace {
 
+constexpr Nanoseconds mhz_ns = 1'000'000'000'000;
+
 /// A reading on a grid is armed this long ahead, of 1 ms at the highest rate. At half, a slow poll
 /// misses it; at twice, the highest rate leaves no time between two readings.
 constexpr Nanoseconds set_ahead = 500'000;
@@ -23,6 +25,15 @@ constexpr unsigned max_fast_edges = 20;
 /// Added to twenty periods. At half, a slow poll restarts fast parts; at twice, silence is told
 /// late.
 constexpr Nanoseconds silence_floor = 100'000'000;
+
+/// Around the bytes of the accelerometer: how far a port's clock pauses between bytes. At half,
+/// such a port may name the wrong edge; at twice, more samples do not know which it was.
+constexpr Nanoseconds accel_margin = 2'000;
+
+/// Clocks of accelerometers are exact to a sixteenth. At half, a coarse clock goes unstamped; at
+/// twice, the edge before a lost one is taken for it more often.
+constexpr Nanoseconds accel_tolerance = 16;
+constexpr Nanoseconds accel_age_step = 32;
 
 constexpr std::uint16_t while_running = 0xFFFF;
 
@@ -59,13 +70,14 @@ void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds 
     if (part_ == nullptr) return;
     if (!paced_by_part())
         grid_ = Grid(now + set_ahead, std::int64_t{configuration.rate_millihertz} * 1000);
-    patience_ = silence_floor + 20'000'000'000'000 / configuration.rate_millihertz;  // 20 samples
+    patience_ = silence_floor + 20 * mhz_ns / configuration.rate_millihertz;  // 20 samples
     setup_ = {};
     const std::uint32_t rate = part_rate(*part_, configuration);
-    part_->setup(rate, configuration.filter, setup_);
-    period_ = 1'000'000'000'000 / rate;
+    part_->setup({rate, configuration.filter, has(wire::imu_accel_ready)}, setup_);
+    period_ = mhz_ns / rate;
     ready_edges_.configure(period_);
-    accel_edges_.configure(period_);
+    accel_period_ = part_->accel_millihertz() == 0 ? 0 : mhz_ns / part_->accel_millihertz();
+    accel_edges_.configure(accel_period_);
     served_ = 0;
     begin_setup(max(now, power_up_time));
 }
@@ -132,6 +144,8 @@ void SpiImu::run(Nanoseconds now) {
     expect_edge(now);
     after_ = now;
     served_ = ready_edges_.count();
+    served_at_ = now;
+    edges_lost_ = false;
     fast_edges_ = 0;
     report_event(wire::EventKind::imu_ready, now, part_->identity());
 }
@@ -173,25 +187,61 @@ void SpiImu::ready_edge(Nanoseconds at, Nanoseconds now) {
     if (job_state_ == Job::armed && job_until_ == never) job_until_ = now + transfer_limit;
 }
 
+void SpiImu::edges_lost() {
+    ready_edges_.forget();
+    accel_edges_.forget();
+    edges_lost_ = true;
+}
+
+/// The part took new data while it was read.
+bool SpiImu::mixes(const ImuReply& reply) const {
+    Nanoseconds stamp = 0;
+    std::uint32_t before = 0;
+    std::uint32_t newest = 0;
+    return ready_edges_.find(reply.started, stamp, before) &&
+           ready_edges_.find(reply.ended, stamp, newest) && newest != before;
+}
+
 /// The data is that of the newest edge before the reading; samples of earlier edges were never
-/// read. False: that edge is not known any more.
+/// read. False: that edge is not known any more, or its sample was read already.
 bool SpiImu::stamp(Nanoseconds started, wire::ImuSample& sample) {
     std::uint32_t edge = 0;
     if (!ready_edges_.find(started, sample.time_ns, edge) ||
         static_cast<std::int32_t>(edge - served_) <= 0)
         return false;
-    miss(edge - served_ - 1);
+    std::uint32_t due = edge - served_;
+    if (edges_lost_) {
+        // How many there were is told by the period of the part.
+        const Nanoseconds since = sample.time_ns - served_at_;
+        const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
+        due = periods > due ? periods : due;
+    }
+    edges_lost_ = false;
+    miss(due - 1);
     served_ = edge;
+    served_at_ = sample.time_ns;
     sample.flags |= wire::imu_stamped;
     return true;
 }
 
-void SpiImu::stamp_accel(Nanoseconds started, wire::ImuSample& sample) const {
+/// The values are those of the newest edge before they were read, unless the next one came
+/// meanwhile.
+void SpiImu::stamp_accel(wire::ImuSample& sample) const {
+    if (!has(wire::imu_accel_ready)) return;
+    const AccelBytes bytes = part_->accel_bytes();
+    const ImuReply& reply = replies_[bytes.reading];
+    const Nanoseconds size = job_.transfers[bytes.reading].size;
+    const Nanoseconds length = reply.ended - reply.started;
+    const Nanoseconds first = reply.started + length * bytes.first / size - accel_margin;
+    const Nanoseconds end = reply.started + length * bytes.end / size + accel_margin;
     Nanoseconds taken = 0;
+    Nanoseconds newest = 0;
     std::uint32_t edge = 0;
-    if (!has(wire::imu_accel_ready) || !accel_edges_.find(started, taken, edge)) return;
-    const Nanoseconds age = (sample.time_ns - taken) / 32;
-    if (age < INT16_MIN || age > INT16_MAX) return;
+    if (!accel_edges_.find(first, taken, edge) || !accel_edges_.find(end, newest, edge)) return;
+    // The edge of older values was lost, or the wire is.
+    const Nanoseconds oldest = accel_period_ + accel_period_ / accel_tolerance;
+    const Nanoseconds age = (sample.time_ns - taken) / accel_age_step;
+    if (newest != taken || first - taken > oldest || age < INT16_MIN || age > INT16_MAX) return;
     sample.accel_age = static_cast<std::int16_t>(age);
     sample.flags |= wire::imu_accel_stamped;
 }
@@ -207,23 +257,35 @@ void SpiImu::collect(Nanoseconds now) {
     }
 }
 
+bool SpiImu::refused() const {
+    for (unsigned i = 0; i < readings_; ++i)
+        if (replies_[i].refused) return true;
+    return false;
+}
+
+/// A reading gives no sample; its number will be missing.
+bool SpiImu::drop(wire::EventKind kind, Nanoseconds now) {
+    readings_ = 0;
+    if (!count_error()) fail(kind, now, 0, while_running);
+    return false;
+}
+
 bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     job_state_ = Job::none;
     sample = {};
+    if (refused()) return drop(wire::EventKind::imu_silent, now);
     if (part_->parse(replies_, readings_, sample) == Verdict::unsure) {
         arm_reading(not_routed, now, 1, now);
         return false;
     }
-    for (unsigned i = 0; i < readings_; ++i)
-        if (replies_[i].refused) sample.flags |= wire::imu_check_failed;
     // Of the readings that were compared, the first: an update may precede it.
     const ImuReply& reply = replies_[readings_ - part_->readings()];
-    const Nanoseconds accel_read = replies_[readings_ - 1].started;
     readings_ = 0;
     sample.kind = part_->kind();
     sample.time_ns = reply.started;
+    if (paced_by_part() && mixes(reply)) return drop(wire::EventKind::imu_failed, now);
     if (paced_by_part() && !stamp(reply.started, sample)) return false;
-    stamp_accel(accel_read, sample);
+    stamp_accel(sample);
     if (!finish(sample)) fail(wire::EventKind::imu_failed, now, 0, while_running);
     return true;
 }
@@ -260,8 +322,11 @@ bool SpiImu::poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample)
     } else if (fast_edges_ >= max_fast_edges) {
         // A part that has reset itself continues at another rate.
         fail(wire::EventKind::imu_failed, now, 0, while_running);
-    } else if (job_state_ == Job::none) {
-        arm_reading(input_imu_ready, after_, part_->readings(), now);
+    } else if (job_state_ == Job::none && now >= ended_ + part_->pause()) {
+        // An edge that came already starts it at once: the part must have had its pause. Neither
+        // the newest edge nor its echoes, whether they have come or not, start a reading.
+        arm_reading(input_imu_ready, max(after_, ready_edges_.quiet_until()), part_->readings(),
+                    now);
     }
     return taken;
 }
@@ -273,6 +338,8 @@ Nanoseconds SpiImu::next_wake(Nanoseconds lag) const {
     if (job_state_ == Job::collected) sooner(replies_[readings_ - 1].started + 1 + lag);
     if (state_ == State::set_up && job_state_ == Job::none) sooner(resume_);
     if (state_ == State::running) sooner(paced_by_part() ? silent_at_ : grid_.next() - set_ahead);
+    if (state_ == State::running && paced_by_part() && job_state_ == Job::none)
+        sooner(ended_ + part_->pause());
     return wake;
 }
 

@@ -20,10 +20,8 @@ class SpiImu final : public ImuPort {
     /// The data-ready line rose, or that of the accelerometer.
     void ready_edge(Nanoseconds at, Nanoseconds now);
     void accel_edge(Nanoseconds at) { accel_edges_.add(at); }
-    /// Some edges were not passed on: so many samples were not read, at least.
-    void edges_lost() {
-        if (state_ == State::running && paced_by_part()) miss();
-    }
+    /// Some edges were not passed on: until the next one, nobody knows which sample is read.
+    void edges_lost();
 
     /// Collects what was read. Call it before the edges are passed on: those that came before the
     /// reading are then known in poll().
@@ -61,8 +59,11 @@ class SpiImu final : public ImuPort {
     void arm(Nanoseconds now);
     void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings, Nanoseconds now);
     bool take(Nanoseconds now, wire::ImuSample& sample);
+    bool refused() const;
+    bool drop(wire::EventKind kind, Nanoseconds now);
+    bool mixes(const ImuReply& reply) const;
     bool stamp(Nanoseconds started, wire::ImuSample& sample);
-    void stamp_accel(Nanoseconds started, wire::ImuSample& sample) const;
+    void stamp_accel(wire::ImuSample& sample) const;
     void pace(Nanoseconds now);
 
     ImuBus& bus_;
@@ -83,10 +84,13 @@ class SpiImu final : public ImuPort {
     ImuReply replies_[max_readings];  ///< of the sample that is being read
     Nanoseconds ended_ = 0;           ///< when the newest transfer did
     Nanoseconds period_ = 0;          ///< of the edges, as the part was told
-    unsigned fast_edges_ = 0;         ///< edges in a row that came sooner
+    Nanoseconds accel_period_ = 0;
+    unsigned fast_edges_ = 0;  ///< edges in a row that came sooner
     ReadyEdges ready_edges_;
     ReadyEdges accel_edges_;
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed
+    Nanoseconds served_at_ = 0;  ///< the newest of them
+    bool edges_lost_ = false;    ///< since then
     Nanoseconds silent_at_ = 0;  ///< when the next edge must have come
     Nanoseconds after_ = 0;      ///< the newest edge of the line, echoes included
 };

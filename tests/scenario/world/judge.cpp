@@ -174,6 +174,7 @@ void World::judge_imu(unsigned port, std::string& out) {
             taken = times.time(times.index_at(taken));
         }
         if ((sample.flags & wire::imu_check_failed) != 0) continue;
+        if ((sample.flags & wire::imu_accel_stamped) != 0) judge_accel_age(sample, out);
         const ImuMetadata si = imu::to_si(model, sample);
         const wire::ImuScale scale = wire::imu_scale(sample.kind);
         const devices::Inertial felt = motion(taken - filtered_for.ns);
@@ -191,6 +192,18 @@ void World::judge_imu(unsigned port, std::string& out) {
             complain(out, "IMU {} sample {}: temperature is {}", port, sample.number,
                      si.temperature);
     }
+}
+
+/// The accelerometer's values were read soon after the stamp; their age is in 32 ns.
+void World::judge_accel_age(const wire::ImuSample& sample, std::string& out) const {
+    const auto reads = spi_imu_->accel_reads();
+    const auto read =
+        std::lower_bound(reads.begin(), reads.end(), std::pair(sample.time_ns, INT64_MIN));
+    if (read == reads.end()) return complain(out, "sample {} was not read", sample.number);
+    const Nanoseconds age = sample.time_ns - stamped(read->second);
+    if (!accel_ready_wired_ || std::abs(age - Nanoseconds{sample.accel_age} * 32) >= 32)
+        complain(out, "sample {}: its accelerometer's values are {} ns old, not {}", sample.number,
+                 age, sample.accel_age * 32);
 }
 
 void World::judge_pulses(std::string& out) {

@@ -60,6 +60,8 @@ void World::make_board(wire::ResetCause cause) {
     firmware::Environment environment;
     environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
     environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+        const bool spi = transfer.bus == firmware::ImuTransfer::Bus::spi;
+        if (spi_imu_ && !dead_bus_ && !spi) return spi_imu_->i2c(at, transfer, received);
         if (spi_imu_ && !dead_bus_) {
             spi_imu_->transfer(at, transfer, received);
             return true;
@@ -110,6 +112,7 @@ void World::add_imu(std::unique_ptr<devices::SpiImuDevice> device, wire::ImuKind
                              data_ready ? std::uint8_t{wire::imu_data_ready} : std::uint8_t{0}, 0,
                              static_cast<std::uint32_t>(std::lround(rate_hz * 1e3))};
     if (data_ready) next_ready_ = now_ + ms;
+    next_accel_ready_ = now_ + ms;
 }
 
 devices::Vn100Device& World::add_vn100(double rate_hz, bool data_ready) {
@@ -215,7 +218,7 @@ void World::read_link() {
 }
 
 Nanoseconds World::next_event() const {
-    Nanoseconds next = std::min({next_read_, next_ready_, next_sample_});
+    Nanoseconds next = std::min({next_read_, next_ready_, next_accel_ready_, next_sample_});
     for (const PulseSource& source : pulses_) next = std::min(next, source.next());
     return next;
 }
@@ -224,9 +227,7 @@ void World::fire_spi_ready() {
     if (now_ < next_ready_) return;
     if (ready_fires_ && spi_imu_->signals(now_)) {
         const double period = spi_imu_->updates().period_ns;
-        board_->schedule_edge({now_, firmware::input_imu_ready, true});
-        board_->schedule_edge(
-            {now_ + std::llround(std::min(1e5, period / 4)), firmware::input_imu_ready, false});
+        pulse_ready(firmware::input_imu_ready, std::llround(std::min(1e5, period / 4)));
         ready_times_[0].push_back(now_);
         show("imu_ready", now_, true);
         show("imu_ready", now_ + std::llround(std::min(1e5, period / 4)), false);
@@ -234,6 +235,25 @@ void World::fire_spi_ready() {
     ready_fires_ = spi_imu_->signals(now_);
     const devices::UpdateTimes times = spi_imu_->updates();
     next_ready_ = ready_fires_ ? times.time(times.index_at(now_) + 1) : now_ + ms;
+}
+
+/// A pulse of a data-ready line, with its echo.
+void World::pulse_ready(std::uint8_t input, Nanoseconds width) {
+    board_->schedule_edge({now_, input, true});
+    if (ready_echo_ != 0) {
+        board_->schedule_edge({now_ + ready_echo_ / 2, input, false});
+        board_->schedule_edge({now_ + ready_echo_, input, true});
+    }
+    board_->schedule_edge({now_ + std::max(width, 2 * ready_echo_), input, false});
+}
+
+void World::fire_accel_ready() {
+    if (now_ < next_accel_ready_) return;
+    if (accel_ready_fires_ && spi_imu_->accel_signals(now_) && accel_ready_wired_)
+        pulse_ready(firmware::input_accel_ready, 50 * us);
+    accel_ready_fires_ = spi_imu_->accel_signals(now_);
+    const devices::UpdateTimes times = spi_imu_->accel_updates();
+    next_accel_ready_ = accel_ready_fires_ ? times.time(times.index_at(now_) + 1) : now_ + ms;
 }
 
 void World::fire_uart_sample() {
@@ -265,6 +285,7 @@ void World::fire_events(Nanoseconds at) {
         next_read_ += read_interval_;
     }
     fire_spi_ready();
+    fire_accel_ready();
     fire_uart_sample();
     for (PulseSource& source : pulses_) {
         const Nanoseconds pulse = source.next();

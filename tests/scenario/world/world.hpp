@@ -98,7 +98,11 @@ class World {
     const std::vector<Nanoseconds>& rises(unsigned pin) const { return rises_[pin]; }
     int reboots() const { return reboots_; }
     devices::SpiImuDevice& spi_imu() { return *spi_imu_; }
-    /// The SPI bus reads only this byte, or what the part sends.
+    /// Every data-ready edge of IMU 0 is followed by another one after so long; 0: none is.
+    void set_ready_echo(Nanoseconds after) { ready_echo_ = after; }
+    /// The accelerometer's data-ready line is cut, or whole.
+    void set_accel_ready_wired(bool wired) { accel_ready_wired_ = wired; }
+    /// The SPI bus reads only this byte, or what the part sends; on I2C nobody acknowledges.
     void set_dead_bus(std::optional<std::uint8_t> level) { dead_bus_ = level; }
 
     /// True time of a grid point.
@@ -136,6 +140,8 @@ class World {
     Nanoseconds next_event() const;
     void fire_events(Nanoseconds at);
     void fire_spi_ready();
+    void fire_accel_ready();
+    void pulse_ready(std::uint8_t input, Nanoseconds width);
     void fire_uart_sample();
     void uart_sent(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
 
@@ -143,6 +149,7 @@ class World {
     void judge_record(const wire::Exposure& record, const TruePulse& pulse, std::string& out) const;
     void judge_ticks(unsigned camera, std::string& out);
     void judge_imu(unsigned port, std::string& out);
+    void judge_accel_age(const wire::ImuSample& sample, std::string& out) const;
     void judge_pulses(std::string& out);
     void judge_light(std::string& out);
 
@@ -158,6 +165,10 @@ class World {
     std::vector<PulseSource> pulses_;
     Nanoseconds next_ready_ = firmware::never;
     bool ready_fires_ = false;
+    Nanoseconds next_accel_ready_ = firmware::never;
+    bool accel_ready_fires_ = false;
+    bool accel_ready_wired_ = true;
+    Nanoseconds ready_echo_ = 0;
     Nanoseconds next_sample_ = firmware::never;
     std::vector<Nanoseconds> ready_times_[2];
     HostModel host_;
