@@ -20,6 +20,11 @@ import textwrap
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+import source_copy  # noqa: E402
+
 HERE = "tests/sensitivity"
 FACTORS = (0.5, 2)
 TYPES = {"double", "float", "int", "unsigned", "long", "std::size_t", "std::int32_t",
@@ -198,31 +203,17 @@ class Copy:
                     None)
 
     def write(self):
-        listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "-z"], cwd=ROOT,
-                                check=True, capture_output=True, text=True).stdout
-        files = {path for path in listed.split("\0") if path and (ROOT / path).is_file()}
-        for old in self.source.rglob("*"):
-            if old.is_file() and str(old.relative_to(self.source)) not in files:
-                old.unlink()
         self.constants, self.skipped = [], []
-        for path in sorted(files):
-            content = (ROOT / path).read_bytes()
-            match = re.fullmatch(r"libversavis/engine/(pairing|clock)/([^/]+\.[ch]pp)", path)
-            if match:
-                text, constants, skipped = rewrite(content.decode(), *match.groups(),
-                                                   self.reason_against)
-                content = text.replace("{scale}", str(self.source / HERE / "scale.hpp"), 1).encode()
-                self.constants += constants
-                self.skipped += skipped
-            self.write_changed(self.source / path, content, (ROOT / path).stat().st_mode)
+        source_copy.copy(ROOT, self.source, self.with_variables)
 
-    @staticmethod
-    def write_changed(path, content, mode):
-        if path.is_file() and path.read_bytes() == content:
-            return
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-        path.chmod(mode)
+    def with_variables(self, path, content):
+        match = re.fullmatch(r"libversavis/engine/(pairing|clock)/([^/]+\.[ch]pp)", path)
+        if not match:
+            return content
+        text, constants, skipped = rewrite(content.decode(), *match.groups(), self.reason_against)
+        self.constants += constants
+        self.skipped += skipped
+        return text.replace("{scale}", str(self.source / HERE / "scale.hpp"), 1).encode()
 
     def make(self, folders):
         """Compiles; what the compiler needs as a constant becomes one again."""
