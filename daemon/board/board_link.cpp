@@ -64,6 +64,16 @@ std::string text(const char* padded, std::size_t capacity) {
     return {padded, strnlen(padded, capacity)};
 }
 
+/// Why a board of another major version cannot be used, and what to do.
+std::string describe_mismatch(const wire::BoardHello& hello) {
+    const bool older = hello.major < wire::protocol_major;
+    return fmt::format("it speaks protocol {}.{}, this service {}.{}: {}", hello.major, hello.minor,
+                       wire::protocol_major, wire::protocol_minor,
+                       older ? "flash the firmware of this release of the service"
+                             : "install the service of its firmware's release, or flash the "
+                               "firmware of this one");
+}
+
 }  // namespace
 
 const char* to_string(BoardState state) {
@@ -216,10 +226,7 @@ Expected<> BoardLink::handshake() {
         if (!done && attempt == hello_attempts - 1) return done;
     }
     if (hello_.major != wire::protocol_major) {
-        set_state(
-            BoardState::incompatible,
-            fmt::format("it speaks protocol {}.{}, this service {}.{}: update its firmware",
-                        hello_.major, hello_.minor, wire::protocol_major, wire::protocol_minor));
+        set_state(BoardState::incompatible, describe_mismatch(hello_));
         return failure("board", "incompatible protocol");
     }
     const std::lock_guard lock(report_mutex_);
@@ -251,7 +258,7 @@ Expected<> BoardLink::configure() {
 
 /// A few exchanges in a row, so that the first frame can be stamped.
 Expected<> BoardLink::synchronise() {
-    clock_.begin(hello_.minor);
+    clock_.begin();
     while (clock_.answers() < exchanges_to_start) {
         const unsigned before = clock_.answers();
         if (auto sent = send(clock_.request()); !sent) return sent;
@@ -298,6 +305,8 @@ Expected<> BoardLink::read(Duration timeout) {
 
 void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::BoardHello hello{};
+    wire::HelloVersion version{};
+    if (packet.read(version) && version.major != wire::protocol_major) return take(version);
     if (packet.read(hello)) return take(hello, packet.header, received);
     if (!greeted_ || anew_ || !of_this_life(packet.header)) return;
     last_packet_ = received;
@@ -364,6 +373,16 @@ void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, 
         counters_.board_restarted();
     }
     last_life_ = nonce_;
+}
+
+/// It is there, and of another major version: more cannot be read of its hello.
+void BoardLink::take(const wire::HelloVersion& other) {
+    // Flashed while the link stayed open; else the second answer to two hellos.
+    anew_ = anew_ || (greeted_ && hello_.major == wire::protocol_major);
+    greeted_ = true;
+    hello_ = {};
+    hello_.major = other.major;
+    hello_.minor = other.minor;
 }
 
 void BoardLink::note(const std::optional<Doubt>& doubt) {

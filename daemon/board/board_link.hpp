@@ -106,6 +106,7 @@ class BoardLink {
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
     void take(const wire::BoardHello& hello, const wire::Header& header, HostTime received);
+    void take(const wire::HelloVersion& other);
     void take_answer(const wire::Packet& packet);
     bool same_life(const wire::BoardHello& hello, std::uint32_t nonce, HostTime received) const;
     bool of_this_life(const wire::Header& header);

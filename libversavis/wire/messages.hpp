@@ -66,6 +66,12 @@ enum Present : std::uint32_t {
     present_all = (1U << 19U) - 1U,
 };
 
+/// The first bytes of a board_hello, in every version.
+struct HelloVersion {
+    std::uint8_t major;
+    std::uint8_t minor;
+};
+
 struct BoardHello {
     static constexpr Type type = Type::board_hello;
     std::uint8_t major;
