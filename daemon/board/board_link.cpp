@@ -7,6 +7,7 @@
 #include <random>
 
 #include "configuration/board_configuration.hpp"
+#include "configuration/board_parts.hpp"
 
 namespace versavis::daemon {
 
@@ -235,11 +236,18 @@ Expected<> BoardLink::handshake() {
     report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
     report_.nonce = nonce_;
     report_.capabilities = hello_.capabilities;
+    report_.present = hello_.present;
+    report_.fastest_imu_millihertz = hello_.fastest_imu_millihertz;
     ++report_.connections;
     return {};
 }
 
 Expected<> BoardLink::configure() {
+    // The board would refuse it, too, but cannot say what it has instead.
+    if (const auto missing = missing_parts(file_, hello_); !missing.empty()) {
+        set_state(BoardState::refused, fmt::format("{}", fmt::join(missing, "; ")));
+        return failure("board", "lacks what its configuration asks for");
+    }
     answered_ = false;
     refusals_.clear();
     ++configuration_.id;

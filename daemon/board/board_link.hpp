@@ -55,7 +55,9 @@ struct BoardReport {
     std::string serial;
     std::string firmware;
     std::uint32_t nonce = 0;
-    std::uint32_t capabilities = 0;  ///< bits of wire::Capability
+    std::uint32_t capabilities = 0;            ///< bits of wire::Capability
+    std::uint32_t present = 0;                 ///< bits of wire::Present
+    std::uint32_t fastest_imu_millihertz = 0;  ///< samples that it can read
     std::uint64_t connections = 0;
     std::uint64_t packets = 0;
     std::uint64_t lost_packets = 0;

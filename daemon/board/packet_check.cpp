@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/packet_check.hpp"
 
+#include <bit>
+
 namespace versavis::daemon {
 
 namespace {
@@ -17,6 +19,9 @@ constexpr std::int64_t latest_ns = std::int64_t{1} << 60U;
 /// The year 2200. At half, labels end in 2085; at twice, they do not fit int64 in nanoseconds.
 constexpr std::int64_t latest_label_s = 7'258'118'400;
 
+constexpr std::uint32_t camera_parts = (1U << wire::camera_count) - 1U;
+static_assert(wire::present_camera0 == 1U, "the first bits of what is present are cameras");
+
 bool in_life(std::int64_t ns) { return ns >= 0 && ns <= latest_ns; }
 
 }  // namespace
@@ -30,7 +35,11 @@ bool SequenceWatch::add(std::uint32_t sequence) {
     return follows;
 }
 
-bool possible(const wire::BoardHello& message) { return in_life(message.board_time_ns); }
+/// A trigger board has outputs, and says twice which.
+bool possible(const wire::BoardHello& message) {
+    const int outputs = std::popcount(message.present & camera_parts);
+    return in_life(message.board_time_ns) && outputs > 0 && outputs == message.cameras;
+}
 
 bool possible(const wire::Exposure& message) {
     const auto edge = [](std::int64_t ns) { return ns == wire::no_time || in_life(ns); };

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "configuration/board_parts.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -114,7 +116,7 @@ Words words(wire::ConfigurationField field) {
         case Field::glitch: return {"glitch_us", 10};
         case Field::test_rate: return {"test_rate_hz", 1e3};
         case Field::test_output: return {"test_output", 0};
-        case Field::present: return {"name", 0};
+        case Field::present: return {"a part", 0};
     }
     return {"an unknown key", 0};
 }
@@ -229,6 +231,8 @@ wire::Configuration board_configuration(const Configuration& configuration) {
 }
 
 std::string describe(const Configuration& configuration, const wire::Refusal& refusal) {
+    if (refusal.field == wire::ConfigurationField::present)
+        return describe_missing(configuration, refusal);
     const auto [key, board_units] = words(refusal.field);
     const std::string name = named(configuration, refusal.field, refusal.value);
     const std::string value = board_units != 0
@@ -236,10 +240,9 @@ std::string describe(const Configuration& configuration, const wire::Refusal& re
                               : name.empty() ? "not known to it"
                                              : fmt::format("\"{}\"", name);
     const TomlEntry* entry = refused_entry(configuration, refusal);
-    const bool written = entry != nullptr && !entry->title.empty();
-    return fmt::format(
-        "{}'{}'{} is {}: the board takes {}", written ? entry->place_of(key).text() + ": " : "",
-        key, written ? " of " + entry->title : "", value, allowed(configuration, refusal));
+    return fmt::format("{} is {}: the board takes {}",
+                       (entry == nullptr ? TomlEntry{} : *entry).reference(key), value,
+                       allowed(configuration, refusal));
 }
 
 }  // namespace versavis::daemon

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "configuration/board_parts.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -55,10 +57,13 @@ const char* state(const ImuStatus& imu, const Status& status) {
 
 json board_json(const BoardReport& board, bool needed) {
     const wire::Health& health = board.health;
+    const bool known = board.connections > 0;
     return {{"state", needed ? to_string(board.state) : "unused"},
             {"port", board.port},
             {"serial", board.serial},
             {"firmware", board.firmware},
+            {"present", known ? json(part_names(board.present)) : json(nullptr)},
+            {"fastest_imu_hz", known ? json(board.fastest_imu_millihertz * 1e-3) : json(nullptr)},
             {"nonce", board.nonce},
             {"connections", board.connections},
             {"packets", board.packets},

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <catch2/catch.hpp>
 #include <condition_variable>
 #include <cstring>
@@ -129,10 +130,11 @@ class PlayedBoard final : public ByteStream {
         wire::BoardHello message{};
         message.major = manner_.version.major;
         message.minor = manner_.version.minor;
-        message.cameras = wire::camera_count;
+        message.cameras = static_cast<std::uint8_t>(std::popcount(manner_.present & 0xFU));
         message.capabilities = wire::capability_host_grid;
         message.board_time_ns = now.ns;
         message.present = manner_.present;
+        message.fastest_imu_millihertz = 8'000'000;
         std::strcpy(message.serial, "PLAYED");
         std::strcpy(message.firmware, "versavis 0.1");
         if (manner_.hello_size == sizeof message) return send(message, now);
@@ -245,14 +247,15 @@ clock::ClockReport connect(const Manner& manner) {
 }
 
 /// What is told of a board of which nothing can be made.
-BoardReport end_of_connection(const Configuration& configuration, const Manner& manner) {
+BoardReport end_of_connection(const Configuration& configuration, const Manner& manner,
+                              std::vector<wire::Type>* heard = nullptr) {
     Clock clock;
     Listener listener;
     std::promise<BoardReport> closed;
     std::once_flag first;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
-            auto board = std::make_unique<PlayedBoard>(manner);
+            auto board = std::make_unique<PlayedBoard>(manner, heard);
             board->closed = [&] {
                 std::call_once(first, [&] { closed.set_value(link.report()); });
             };
@@ -494,6 +497,27 @@ TEST_CASE("board_link: what the board refuses is told in the words of the file")
           path +
               ":4:11: 'rate_hz' of [[camera]] \"left\" is 2000 Hz: the board takes 0.1 to 1000 Hz; "
               "change the configuration");
+}
+
+TEST_CASE("board_link: what the board lacks is told with what it has, and it is not asked") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.write(
+        "v.toml",
+        "[[camera]]\nname = \"left\"\ndevice = \"x\"\noutput = 2\n[board]\nkeep_configuration = "
+        "true\n");
+    Manner manner;
+    manner.present = wire::present_camera0 * 3U | wire::present_memory;
+    std::vector<wire::Type> heard;
+    const BoardReport report = end_of_connection(*load_configuration(path), manner, &heard);
+    CHECK(report.state == BoardState::refused);
+    CHECK(report.hint ==
+          path +
+              ":4:10: 'output' of [[camera]] \"left\" is 2: the board (versavis 0.1, "
+              "serial PLAYED) has outputs 0 and 1; use one that it has, or another "
+              "board");
+    CHECK(report.present == manner.present);
+    CHECK(report.fastest_imu_millihertz == 8'000'000);
+    CHECK(std::count(heard.begin(), heard.end(), wire::Type::configuration) == 0);
 }
 
 TEST_CASE("board_link: a board of another major version is told by it, and what to do") {

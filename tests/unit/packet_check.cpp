@@ -7,6 +7,17 @@
 using namespace versavis;
 using namespace versavis::daemon;
 
+namespace {
+
+wire::BoardHello board() {
+    wire::BoardHello hello{};
+    hello.cameras = wire::camera_count;
+    hello.present = wire::present_all;
+    return hello;
+}
+
+}  // namespace
+
 TEST_CASE("packet_check: gaps are losses, also where the number wraps") {
     SequenceWatch watch;
     watch.begin(0xFFFFFFFD);
@@ -51,13 +62,32 @@ TEST_CASE("packet_check: times before the boot or beyond any life cannot be") {
         wire::Event event{};
         event.time_ns = ns;
         CHECK_FALSE(possible(event));
-        wire::BoardHello hello{};
+        wire::BoardHello hello = board();
         hello.board_time_ns = ns;
         CHECK_FALSE(possible(hello));
         CHECK_FALSE(possible(wire::ClockAnswer{1, 0, ns, 0}));
         CHECK_FALSE(possible(wire::ClockAnswer{1, 0, 0, ns}));
         CHECK_FALSE(possible(wire::ClockFollowUp{1, 0, ns}));
     }
+}
+
+TEST_CASE("packet_check: a board has outputs, as many as it says") {
+    CHECK(possible(board()));
+    wire::BoardHello hello = board();
+    hello.present = wire::present_spi | wire::present_light;
+    hello.cameras = 0;
+    CHECK_FALSE(possible(hello));
+    hello.cameras = 1;
+    CHECK_FALSE(possible(hello));
+    hello.present |= wire::present_camera0 << 2U;  // outputs need not begin with the first
+    CHECK(possible(hello));
+    hello.present |= wire::present_camera0;
+    CHECK_FALSE(possible(hello));
+    hello.cameras = 2;
+    CHECK(possible(hello));
+    hello.present = ~0U;  // what a newer board has
+    hello.cameras = wire::camera_count;
+    CHECK(possible(hello));
 }
 
 TEST_CASE("packet_check: a sentence of the year 2300 labels nothing") {

@@ -117,6 +117,22 @@ TEST_CASE("status: the text for a person names what is wrong and what to do") {
     CHECK_THAT(text, Catch::Contains("check its cable"));
 }
 
+TEST_CASE("status: what a board has is named, and of one that was never met nothing is claimed") {
+    Status status = healthy();
+    auto document = nlohmann::json::parse(to_json(status));
+    CHECK(document["board"]["present"].is_null());
+    CHECK(document["board"]["fastest_imu_hz"].is_null());
+    CHECK_THAT(client::status_text(document), !Catch::Contains("it has"));
+    status.board.connections = 1;
+    status.board.present = wire::present_camera0 | wire::present_spi | wire::present_ready0 << 1U;
+    status.board.fastest_imu_millihertz = 2'048'500;
+    document = nlohmann::json::parse(to_json(status));
+    CHECK(document["board"]["present"] == nlohmann::json({"camera0", "spi", "imu1_ready"}));
+    CHECK(document["board"]["fastest_imu_hz"] == 2048.5);
+    CHECK_THAT(client::status_text(document),
+               Catch::Contains("it has camera0, spi, imu1_ready; IMUs up to 2048.5 Hz\n"));
+}
+
 TEST_CASE("status: sigma of a clock that is not known is no number, least of all zero") {
     Status status = healthy();
     status.clock.state = GENERATE(clock::ClockState::init, clock::ClockState::reset);
