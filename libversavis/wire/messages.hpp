@@ -130,6 +130,10 @@ enum ImuFlag : std::uint16_t {
     imu_accel_stamped = 1U << 5U,  ///< the accelerometer's age is known by an edge of its own
 };
 
+/// Of an accelerometer's age, of which 16 bits hold 1 ms either way. At half, only parts faster
+/// than 1 kHz fit; at twice, an age is off by up to 64 ns.
+inline constexpr std::int32_t accel_age_unit_ns = 32;
+
 /// Raw sensor words, sign-extended; the host scales them.
 struct ImuSample {
     static constexpr Type type = Type::imu_sample;

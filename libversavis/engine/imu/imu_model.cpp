@@ -142,6 +142,11 @@ ImuMetadata to_si(const ImuModel& model, const wire::ImuSample& sample) {
         scale.pressure_pa == 0 ? none : static_cast<float>(sample.pressure * scale.pressure_pa);
     const bool faulty = (sample.flags & (wire::imu_check_failed | wire::imu_self_test_failed)) != 0;
     metadata.flags = faulty ? std::uint32_t{flag_sensor_error} : 0;
+    if ((sample.flags & wire::imu_repeated) != 0) metadata.flags |= flag_repeated;
+    if ((sample.flags & wire::imu_accel_stamped) != 0) {
+        metadata.flags |= flag_accel_age;
+        metadata.accel_age_ns = sample.accel_age * wire::accel_age_unit_ns;
+    }
     return metadata;
 }
 

@@ -43,7 +43,8 @@ struct FilterDelay {
 /// without the part's data-ready line.
 FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready);
 
-/// Fills the physical quantities of `sample`; times, number and epoch are the caller's.
+/// Fills the physical quantities of `sample` and the age of its acceleration; times, number and
+/// epoch are the caller's.
 ImuMetadata to_si(const ImuModel& model, const wire::ImuSample& sample);
 
 }  // namespace versavis::imu
