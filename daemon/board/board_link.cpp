@@ -356,6 +356,7 @@ void BoardLink::take_answer(const wire::Packet& packet) {
         refusals_.push_back(describe(file_, refusal));
     if (packet.read(answer_)) answered_ = answer_.id == configuration_.id;
     if (!packet.read(health)) return;
+    if (!possible(health)) return count_impossible();
     const std::lock_guard lock(report_mutex_);
     report_.health = counters_.since_start(health);
 }

@@ -65,6 +65,7 @@ struct BoardReport {
     std::uint64_t exchanges_doubted = 0;  ///< answers to clock requests that cannot be true
     std::uint64_t impossible = 0;         ///< packets with a number, nonce or time that cannot be
     std::uint64_t dropped_bytes = 0;      ///< the service did not take them in time
+    bool unkept = false;                  ///< it could not store its configuration
     wire::Health health{};                ///< its counters began with the service
 };
 

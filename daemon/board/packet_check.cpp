@@ -46,12 +46,26 @@ bool possible(const wire::Exposure& message) {
     return in_life(message.trigger_ns) && edge(message.start_ns) && edge(message.end_ns);
 }
 
-bool possible(const wire::ImuSample& message) { return in_life(message.time_ns); }
+bool possible(const wire::ImuSample& message) {
+    const bool aged = (message.flags & wire::imu_accel_stamped) != 0;
+    return in_life(message.time_ns) && (aged || message.accel_age == 0);
+}
 
 bool possible(const wire::Event& message) {
-    const bool label = message.kind == wire::EventKind::utc_label;
-    return in_life(message.time_ns) &&
-           (!label || (message.value >= 0 && message.value <= latest_label_s));
+    if (!in_life(message.time_ns)) return false;
+    switch (message.kind) {
+        case wire::EventKind::utc_label:
+            return message.value >= 0 && message.value <= latest_label_s;
+        case wire::EventKind::triggers_skipped: return message.detail > 0;
+        case wire::EventKind::stored: return message.value == 0 || message.value == 1;
+        default: return true;
+    }
+}
+
+bool possible(const wire::Health& message) {
+    return in_life(message.board_time_ns) && message.pps_state <= wire::PpsState::good &&
+           message.sync_state <= wire::SyncState::followed &&
+           message.reset_cause <= wire::ResetCause::software;
 }
 
 bool possible(const wire::ClockAnswer& message) {

@@ -255,4 +255,18 @@ std::string describe_missing(const Configuration& configuration, const wire::Ref
     return message(*need, "the board");
 }
 
+std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
+    const auto told = [](const TomlEntry& entry, const char* key, const char* what) {
+        return fmt::format(
+            "{} is true: the board's firmware does not {}; flash a newer one, or set "
+            "{} = false",
+            entry.reference(key), what, key);
+    };
+    if (configuration.clock.align && !has(capabilities, wire::capability_host_grid))
+        return told(configuration.clock.entry, "align", "let the host place its grid");
+    if (configuration.ports.nmea && !has(capabilities, wire::capability_nmea))
+        return told(configuration.ports.entry, "nmea", "read NMEA");
+    return "";
+}
+
 }  // namespace versavis::daemon

@@ -21,4 +21,7 @@ std::vector<std::string> missing_parts(const Configuration& configuration,
 /// The same for a part that the board refused as one that it lacks.
 std::string describe_missing(const Configuration& configuration, const wire::Refusal& refusal);
 
+/// What the firmware of this board is too old for, and what to do; empty: nothing.
+std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities);
+
 }  // namespace versavis::daemon

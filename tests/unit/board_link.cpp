@@ -462,8 +462,19 @@ TEST_CASE("board_link: times that cannot be reach nobody") {
     hello.major = wire::protocol_major;
     hello.board_time_ns = std::numeric_limits<std::int64_t>::max();
     board.send(hello);
+    wire::Health report{};
+    report.glitches = 1;
+    report.sync_state = wire::SyncState::lost;
+    board.send(report);  // counters begin with the first one
+    report.glitches = 4;
+    board.send(report);
+    report.glitches = 9;
+    report.sync_state = static_cast<wire::SyncState>(77);
+    board.send(report);
     running.settle();
-    CHECK(running.link.report().impossible == 4);
+    CHECK(running.link.report().impossible == 5);
+    CHECK(running.link.report().health.glitches == 3);
+    CHECK(running.link.report().health.sync_state == wire::SyncState::lost);
     CHECK(running.listener.counts().samples == 1);
     CHECK(running.listener.counts().exposures == 0);
     CHECK(running.listener.counts().connected == 1);

@@ -267,3 +267,20 @@ TEST_CASE("board_parts: each bit has a name of its own, and those of newer board
           std::vector<std::string>{"light", "sync_input", "memory"});
     CHECK(part_names(0).empty());
 }
+
+TEST_CASE("board_parts: what an older firmware cannot do is told by its key") {
+    const std::string text =
+        camera + "[clock]\nalign = true\n[ports]\ninputs = [\"pps\"]\nnmea = true\n";
+    const auto told = [&](std::uint32_t capabilities) {
+        return missing_capability(load(text), capabilities);
+    };
+    CHECK(told(wire::capability_host_grid | wire::capability_nmea).empty());
+    CHECK_THAT(told(wire::capability_nmea),
+               Catch::EndsWith("v.toml:5:9: 'align' of [clock] is true: the board's firmware does "
+                               "not let the host place its grid; flash a newer one, or set align = "
+                               "false"));
+    CHECK_THAT(told(wire::capability_host_grid),
+               Catch::EndsWith("v.toml:8:8: 'nmea' of [ports] is true: the board's firmware does "
+                               "not read NMEA; flash a newer one, or set nmea = false"));
+    CHECK(missing_capability(load(camera), 0).empty());
+}
