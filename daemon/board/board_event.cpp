@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/board_event.hpp"
 
+#include <fmt/format.h>
+
 namespace versavis::daemon {
 
 namespace {
@@ -51,6 +53,34 @@ EventSource source_of(wire::EventKind kind) {
     }
 }
 
+std::uint64_t skipped_triggers(const wire::Event& event) {
+    if (event.kind == wire::EventKind::trigger_skipped) return 1;
+    return event.kind == wire::EventKind::triggers_skipped ? event.detail : 0;
+}
+
+std::optional<BoardRemark> remark(const wire::Event& event) {
+    const double us = static_cast<double>(event.value) * 1e-3;
+    switch (event.kind) {
+        case wire::EventKind::sync_lost:
+            return BoardRemark{
+                LogLevel::warning,
+                fmt::format("a pulse of the sync input is {:.3f} us off the grid, which does not "
+                            "follow it: check its cable, and that 'sync_rate_hz' is that of the "
+                            "board which sends the pulses",
+                            us)};
+        case wire::EventKind::sync_taken:
+            return BoardRemark{
+                LogLevel::info,
+                fmt::format("the grid follows the pulses of the sync input, and moves by {:.3f} us "
+                            "for that",
+                            us)};
+        case wire::EventKind::stored:
+            if (event.value != 0) return BoardRemark{LogLevel::info, "it keeps its configuration"};
+            return BoardRemark{LogLevel::warning, unkept_configuration};
+        default: return std::nullopt;
+    }
+}
+
 std::optional<JournalEntry> journal_entry(const wire::Event& event) {
     const auto kind = event_kind(event.kind);
     if (!kind) return std::nullopt;
@@ -61,7 +91,10 @@ std::optional<JournalEntry> journal_entry(const wire::Event& event) {
     entry.value = event.value;
     entry.board_time = BoardTime{event.time_ns};
     if (event.kind == wire::EventKind::trigger_skipped) entry.reason = skip_reason(event.detail);
-    if (event.kind == wire::EventKind::triggers_skipped) entry.reason = EventReason::too_late;
+    if (event.kind == wire::EventKind::triggers_skipped) {
+        entry.reason = EventReason::too_late;
+        entry.count = event.detail;
+    }
     return entry;
 }
 

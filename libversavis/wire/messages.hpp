@@ -66,6 +66,12 @@ enum Present : std::uint32_t {
     present_all = (1U << 19U) - 1U,
 };
 
+/// The first bytes of a board_hello, in every version.
+struct HelloVersion {
+    std::uint8_t major;
+    std::uint8_t minor;
+};
+
 struct BoardHello {
     static constexpr Type type = Type::board_hello;
     std::uint8_t major;
@@ -123,6 +129,10 @@ enum ImuFlag : std::uint16_t {
     imu_repeated = 1U << 4U,  ///< it holds the same data as the sample before, or the part says so
     imu_accel_stamped = 1U << 5U,  ///< the accelerometer's age is known by an edge of its own
 };
+
+/// Of an accelerometer's age, of which 16 bits hold 1 ms either way. At half, only parts faster
+/// than 1 kHz fit; at twice, an age is off by up to 64 ns.
+inline constexpr std::int32_t accel_age_unit_ns = 32;
 
 /// Raw sensor words, sign-extended; the host scales them.
 struct ImuSample {

@@ -142,3 +142,37 @@ TEST_CASE("packet: an unknown type is passed on, a known one of the wrong size i
     CHECK(decoded(decoder, send(static_cast<std::uint8_t>(Type::exposure))).empty());
     CHECK(decoder.errors() == 1);
 }
+
+TEST_CASE("packet: a hello of another major version is passed on, whatever its size") {
+    const auto send = [](std::uint8_t major, std::size_t payload) {
+        Bytes raw(sizeof(Header) + payload + crc_size);
+        raw[0] = static_cast<std::uint8_t>(Type::board_hello);
+        if (payload > 0) raw[sizeof(Header)] = major;
+        if (payload > 1) raw[sizeof(Header) + 1] = 7;
+        const std::uint32_t crc = crc32(raw.data(), raw.size() - crc_size);
+        std::memcpy(raw.data() + raw.size() - crc_size, &crc, crc_size);
+        Bytes bytes(cobs_bound(raw.size()));
+        bytes.resize(cobs_encode(raw.data(), raw.size(), bytes.data()));
+        bytes.push_back(0);
+        return bytes;
+    };
+    const auto told = [&](std::uint8_t major, std::size_t payload) {
+        Decoder decoder;
+        const Bytes bytes = send(major, payload);
+        HelloVersion version{};
+        decoder.feed(bytes.data(), bytes.size(), [&](const Packet& packet) {
+            CHECK(packet.read(version));
+            BoardHello hello{};
+            CHECK(packet.read(hello) == (payload == sizeof hello));
+        });
+        CHECK(decoder.errors() == (version.major == 0 ? 1 : 0));
+        return version.major * 256 + version.minor;
+    };
+    for (const std::size_t payload : {std::size_t{2}, std::size_t{48}, sizeof(BoardHello)})
+        CHECK(told(2, payload) == 0x207);
+    CHECK(told(4, 100) == 0x407);
+    CHECK(told(protocol_major, sizeof(BoardHello)) == protocol_major * 256 + 7);
+    CHECK(told(protocol_major, 48) == 0);
+    CHECK(told(2, 1) == 0);
+    CHECK(told(2, 0) == 0);
+}
