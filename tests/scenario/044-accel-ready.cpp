@@ -71,6 +71,24 @@ TEST_CASE("044-accel-ready-cut: without the wire no sample says how old its acce
     CHECK(world.judge() == "");
 }
 
+TEST_CASE("044-accel-ready-loose: an edge that did not arrive is not taken for the one before") {
+    const bool often = GENERATE(false, true);  // every other edge is lost
+    Scenario world;
+    add_bmi088(world, 2000);
+    REQUIRE(world.begin());
+    world.run(second);
+    for (int i = 0; i < 100; ++i) {
+        world.set_accel_ready_wired(false);
+        world.run(often ? 700 * us : 3 * ms);
+        world.set_accel_ready_wired(true);
+        world.run((often ? 600 * us : 7 * ms) + i * 13 * us);
+    }
+    CHECK(world.judge() == "");
+    const double stamped = stamped_part(world.inbox().samples[0]);
+    CHECK(stamped > 0.75);
+    CHECK(stamped < 0.93);
+}
+
 TEST_CASE("044-accel-ready-not-asked: the part's line stays as it is after a reset") {
     Scenario world;
     world.add_imu(make_imu(wire::ImuKind::bmi088), wire::ImuKind::bmi088, 1000, true);
@@ -88,11 +106,11 @@ TEST_CASE("044-accel-ready-lost: no age is of an edge before others that were lo
     add_bmi088(world, 1000);
     REQUIRE(world.begin());
     world.run(second);
-    for (int i = 0; i < 20; ++i) {
-        world.stall_board(20 * ms + i * 100 * us);
-        world.run(50 * ms);
+    for (int i = 0; i < 200; ++i) {
+        world.stall_board(20 * ms + i * 7 * us);
+        world.run(20 * ms);
     }
     CHECK(world.inbox().healths.back().lost_edges > 100);
     CHECK(world.judge() == "");
-    CHECK(stamped_part(world.inbox().samples[0]) > 0.9);
+    CHECK(stamped_part(world.inbox().samples[0]) > 0.8);
 }

@@ -140,7 +140,9 @@ TEST_CASE("spi_imu: a reading whose edge is not known gives no sample, and the n
     REQUIRE(world.read());
     const std::uint32_t number = world.sample.number;
     const Nanoseconds before = world.sample.time_ns;
-    world.now += 3 * ms;  // three edges came and were lost; the reading is that of the last
+    world.now += ms;
+    world.edge(world.now);  // it is known, but not that of the reading
+    world.now += 2 * ms;    // two edges came and were lost; the reading is that of the last
     world.imu.edges_lost();
     world.bus.run(world.now + 1'000);
     world.now += 50'000;

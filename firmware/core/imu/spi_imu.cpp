@@ -31,7 +31,7 @@ constexpr Nanoseconds silence_floor = 100'000'000;
 constexpr Nanoseconds accel_margin = 2'000;
 
 /// Clocks of accelerometers are exact to a sixteenth. At half, a coarse clock goes unstamped; at
-/// twice, the edge before a lost one is taken for it more often.
+/// twice, a clock that jumps is believed.
 constexpr Nanoseconds accel_tolerance = 16;
 constexpr Nanoseconds accel_age_step = 32;
 
@@ -224,8 +224,8 @@ bool SpiImu::stamp(Nanoseconds started, wire::ImuSample& sample) {
     return true;
 }
 
-/// The values are those of the newest edge before they were read, unless the next one came
-/// meanwhile.
+/// The values are those of the newest edge before they were read, if the edge before that shows
+/// that no other one was due by then.
 void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     if (!has(wire::imu_accel_ready)) return;
     const AccelBytes bytes = part_->accel_bytes();
@@ -235,13 +235,18 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     const Nanoseconds first = reply.started + length * bytes.first / size - accel_margin;
     const Nanoseconds end = reply.started + length * bytes.end / size + accel_margin;
     Nanoseconds taken = 0;
+    Nanoseconds before = 0;
     Nanoseconds newest = 0;
     std::uint32_t edge = 0;
-    if (!accel_edges_.find(first, taken, edge) || !accel_edges_.find(end, newest, edge)) return;
-    // The edge of older values was lost, or the wire is.
-    const Nanoseconds oldest = accel_period_ + accel_period_ / accel_tolerance;
+    if (!accel_edges_.find(first, taken, edge) || !accel_edges_.find(taken - 1, before, edge) ||
+        !accel_edges_.find(end, newest, edge) || newest != taken)
+        return;
+    const Nanoseconds period = taken - before;
+    const Nanoseconds off = period - accel_period_;
+    const Nanoseconds tolerance = accel_period_ / accel_tolerance;
+    if (off > tolerance || -off > tolerance || end >= taken + period) return;
     const Nanoseconds age = (sample.time_ns - taken) / accel_age_step;
-    if (newest != taken || first - taken > oldest || age < INT16_MIN || age > INT16_MAX) return;
+    if (age < INT16_MIN || age > INT16_MAX) return;
     sample.accel_age = static_cast<std::int16_t>(age);
     sample.flags |= wire::imu_accel_stamped;
 }
