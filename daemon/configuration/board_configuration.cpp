@@ -179,6 +179,19 @@ std::string allowed(const Configuration& configuration, const wire::Refusal& ref
     return names.empty() ? "no such value" : fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// The first of the options that the board does not take, by its key.
+std::string describe_options(const wire::Refusal& refusal, const TomlEntry& entry) {
+    const std::int64_t refused = refusal.value & ~refusal.maximum;
+    const auto told = [&](const char* key, const char* value) {
+        return fmt::format("{} is {}: the board does not take that of this part, as it is wired",
+                           entry.reference(key), value);
+    };
+    if ((refused & wire::imu_accel_ready) != 0) return told("accel_ready", "true");
+    if ((refused & wire::imu_i2c) != 0) return told("bus", "\"i2c\"");
+    if ((refused & wire::imu_i2c_second) != 0) return told("i2c_address", "the second");
+    return told("data_ready", "true");
+}
+
 }  // namespace
 
 wire::Configuration board_configuration(const Configuration& configuration) {
@@ -239,9 +252,11 @@ std::string describe(const Configuration& configuration, const wire::Refusal& re
                                   ? quantity(key, static_cast<double>(refusal.value) / board_units)
                               : name.empty() ? "not known to it"
                                              : fmt::format("\"{}\"", name);
-    const TomlEntry* entry = refused_entry(configuration, refusal);
-    return fmt::format("{} is {}: the board takes {}",
-                       (entry == nullptr ? TomlEntry{} : *entry).reference(key), value,
+    const TomlEntry* found = refused_entry(configuration, refusal);
+    const TomlEntry entry = found == nullptr ? TomlEntry{} : *found;
+    if (refusal.field == wire::ConfigurationField::imu_options)
+        return describe_options(refusal, entry);
+    return fmt::format("{} is {}: the board takes {}", entry.reference(key), value,
                        allowed(configuration, refusal));
 }
 

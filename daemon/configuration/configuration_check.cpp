@@ -368,6 +368,10 @@ void check_imu_wiring(const ImuConfiguration& imu, Findings& findings) {
     else if (imu.bus == ImuBus::i2c && !has_i2c)
         findings.add(imu.entry, "bus", fmt::format("the {} has no I2C", model.name),
                      "set bus = \"spi\"; of all parts only the icm42688p can be on I2C");
+    else if (imu.bus == ImuBus::i2c && !imu.data_ready)
+        findings.add(imu.entry, "bus",
+                     "a reading takes so long on I2C that the data-ready line must begin it",
+                     "wire that line and set data_ready = true, or put the part on the SPI");
     if (imu.entry.has("i2c_address") && imu.bus != ImuBus::i2c)
         findings.add(imu.entry, "i2c_address", "'i2c_address' is of a part on I2C",
                      has_i2c ? "set bus = \"i2c\", or remove the key" : "remove the key");

@@ -30,7 +30,7 @@ firmware::Environment babbling(std::span<const std::uint8_t> bytes) {
 std::uint8_t imu_options(wire::ImuKind kind, std::uint8_t choice) {
     unsigned options = choice & wire::imu_data_ready;
     if (kind == wire::ImuKind::bmi088 && options != 0) options |= wire::imu_accel_ready;
-    if (kind == wire::ImuKind::icm42688p && (choice & 2U) != 0)
+    if (kind == wire::ImuKind::icm42688p && options != 0 && (choice & 2U) != 0)
         options |= wire::imu_i2c | (choice & wire::imu_i2c_second);
     return static_cast<std::uint8_t>(options);
 }

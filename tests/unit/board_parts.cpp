@@ -141,8 +141,8 @@ TEST_CASE("board_parts: the bus of an IMU, and its data-ready lines") {
           "v.toml:1:1: 'bus' of [[imu]] is \"spi\": " + own_name +
               " has I2C and a UART for IMUs; set bus = \"i2c\" and rewire the part, or use another "
               "board\n");
-    CHECK(missing(icm + "bus = \"i2c\"\n", wire::present_i2c) ==
-          "v.toml:3:7: 'bus' of [[imu]] is \"i2c\": " + own_name +
+    CHECK(missing(icm + "data_ready = true\nbus = \"i2c\"\n", wire::present_i2c) ==
+          "v.toml:4:7: 'bus' of [[imu]] is \"i2c\": " + own_name +
               " has SPI and a UART for IMUs; set bus = \"spi\" and rewire the part, or use another "
               "board\n");
     CHECK_THAT(missing(icm, wire::present_spi | wire::present_i2c),

@@ -162,11 +162,12 @@ TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the bo
     const auto first = [](const std::string& table) {
         return board_configuration(*load("[[imu]]\n" + table)).imus[0].options;
     };
-    const std::string icm = "model = \"icm42688p\"\nbus = \"i2c\"\n";
+    const std::string icm = "model = \"icm42688p\"\ndata_ready = true\nbus = \"i2c\"\n";
+    const unsigned i2c = wire::imu_data_ready | wire::imu_i2c;
     CHECK(first("model = \"icm42688p\"\nbus = \"spi\"\n") == 0);
-    CHECK(first(icm) == wire::imu_i2c);
-    CHECK(first(icm + "i2c_address = 0x68\n") == wire::imu_i2c);
-    CHECK(first(icm + "i2c_address = 0x69\n") == (wire::imu_i2c | wire::imu_i2c_second));
+    CHECK(first(icm) == i2c);
+    CHECK(first(icm + "i2c_address = 0x68\n") == i2c);
+    CHECK(first(icm + "i2c_address = 0x69\n") == (i2c | wire::imu_i2c_second));
     CHECK(first("model = \"bmi088\"\ndata_ready = true\naccel_ready = true\n") ==
           (wire::imu_data_ready | wire::imu_accel_ready));
 }
