@@ -317,7 +317,7 @@ Routing::Switched Board::apply_routes(bool force) {
         if (cameras_[i].trigger_inverted()) routes.inverted_triggers |= bit;
     }
     const std::uint8_t test = configuration_.ports.test;
-    if (test >= wire::test_imu0) {
+    if (test >= wire::test_imu0 && test < wire::test_rate) {
         const auto port = static_cast<std::uint8_t>(test - wire::test_imu0);
         if ((configuration_.imus[port].options & wire::imu_data_ready) != 0)
             routes.test_input = static_cast<std::uint8_t>(input_imu_ready + port);

@@ -3,8 +3,6 @@
 
 namespace versavis::firmware {
 
-constexpr std::uint8_t OutputQueue::rooms[];
-
 Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold) {
     at = (at + grain_ / 2) & ~(grain_ - 1);
     if (at < committed_until_ + step_) at = committed_until_ + step_;
