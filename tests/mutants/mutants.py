@@ -215,8 +215,8 @@ class Build:
         self.durations = {}  # of each file of test cases: processor time, s
         self.reached = {}    # of each source, by line: the files of test cases that get there
         self.code = {}       # of each library's object, by header: the lines of which it has code
-        self.environment = {name: value for name, value in os.environ.items()
-                            if name != "VERSAVIS_VCD"} | {"LC_ALL": "C", "RC_PARAMS": "seed=1"}
+        self.environment = {name: value for name, value in os.environ.items() if not
+                            name.startswith("VERSAVIS_")} | {"LC_ALL": "C", "RC_PARAMS": "seed=1"}
 
     def make(self, progress):
         self.files = source_copy.copy(self.root, self.source)
