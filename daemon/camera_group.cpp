@@ -95,8 +95,8 @@ std::optional<clock::Stamp> CameraGroup::add(const wire::Exposure& record, HostT
     return unit != nullptr ? unit->pipeline->add(record, received) : std::nullopt;
 }
 
-void CameraGroup::trigger_skipped(unsigned output) {
-    if (const Unit* unit = at_output(output)) unit->pipeline->trigger_skipped();
+void CameraGroup::triggers_skipped(unsigned output, std::uint64_t count) {
+    if (const Unit* unit = at_output(output)) unit->pipeline->triggers_skipped(count);
 }
 
 void CameraGroup::name_source(JournalEntry& entry) const {

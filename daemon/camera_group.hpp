@@ -42,7 +42,7 @@ class CameraGroup {
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
     /// The board said that this output got no trigger.
-    void trigger_skipped(unsigned output);
+    void triggers_skipped(unsigned output, std::uint64_t count);
 
     /// Names an event of the camera at output `entry.source`, which becomes the camera's number.
     void name_source(JournalEntry& entry) const;

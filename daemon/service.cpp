@@ -4,6 +4,7 @@
 #include "board/board_event.hpp"
 #include "camera/line_delays.hpp"
 #include "configuration/board_configuration.hpp"
+#include "configuration/board_parts.hpp"
 #include "log.hpp"
 #include "state_directory.hpp"
 #include "stream/diagnosis.hpp"
@@ -23,15 +24,6 @@ constexpr std::uint32_t clock_items = 65536;
 /// For cameras that are mute when the service is to end. At half, one that is busy stays under
 /// control for some seconds; at twice, the end takes longer than the two seconds it may.
 constexpr Duration stop_patience = seconds(1);
-
-/// What is asked of a board whose firmware is too old for it, and what to do; empty: nothing.
-std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
-    if (configuration.clock.align && (capabilities & wire::capability_host_grid) == 0)
-        return "its grid cannot be aligned by the host: update its firmware, or set align = false";
-    if (configuration.ports.nmea && (capabilities & wire::capability_nmea) == 0)
-        return "it does not read NMEA: update its firmware, or set nmea = false";
-    return "";
-}
 
 /// Of all rings: readers of these are handed over.
 std::vector<std::string> ring_names(const Configuration& configuration) {
@@ -180,7 +172,9 @@ void Service::board_event(const wire::Event& event, HostTime received) {
         entry->expected = doubt->expected;
     }
     const EventSource source = source_of(event.kind);
-    if (event.kind == wire::EventKind::trigger_skipped) cameras_->trigger_skipped(event.source);
+    if (const auto count = skipped_triggers(event)) cameras_->triggers_skipped(event.source, count);
+    if (event.kind == wire::EventKind::stored) unkept_ = event.value == 0;
+    if (const auto told = remark(event)) log(told->level, "board", "{}", told->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
@@ -228,6 +222,7 @@ Status Service::collect_status(HostTime now) {
     status.now = now;
     status.board_needed = board_needed();
     status.board = board_->report();
+    status.board.unkept = unkept_;
     if (status.board.state == BoardState::running && status.board.hint.empty())
         status.board.hint = missing_capability(configuration_, status.board.capabilities);
     status.clock = translator_.report();

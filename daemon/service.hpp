@@ -2,6 +2,7 @@
 // The whole service: board link, cameras and IMUs wired to their rings.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -79,6 +80,7 @@ class Service final : private BoardListener {
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
     std::unique_ptr<BoardLink> board_;
     std::unique_ptr<CameraGroup> cameras_;
+    std::atomic<bool> unkept_{false};  ///< the board could not store its configuration
     HostTime started_;
 };
 

@@ -21,7 +21,7 @@ wire::Health BoardCounters::since_start(const wire::Health& report) {
          {&Health::dropped_exposures, &Health::dropped_clock_answers, &Health::dropped_events,
           &Health::dropped_imu_samples, &Health::dropped_logs, &Health::receive_errors,
           &Health::imu_restarts, &Health::late_outputs, &Health::lost_edges, &Health::stray_edges,
-          &Health::skipped_triggers, &Health::noisy_inputs})
+          &Health::skipped_triggers, &Health::noisy_inputs, &Health::glitches})
         counted.*counter = grow(sum_.*counter, before.*counter, report.*counter);
     for (std::size_t port = 0; port < wire::imu_count; ++port)
         counted.imu_errors[port] =

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
+#include "log.hpp"
 #include "stream/event_journal.hpp"
 #include "wire/messages.hpp"
 
@@ -12,6 +14,21 @@ namespace versavis::daemon {
 /// Whose number `source` of such an event is.
 enum class EventSource { board, camera, imu };
 EventSource source_of(wire::EventKind kind);
+
+/// Triggers that were not sent, by this event.
+std::uint64_t skipped_triggers(const wire::Event& event);
+
+/// What to do about a configuration that the board was to keep, and does not.
+inline constexpr const char* unkept_configuration =
+    "it could not keep its configuration, and begins with an older one at its next power-up: "
+    "restart the service to try again, or set keep_configuration = false";
+
+/// What the log has of an event that tells of the board itself.
+struct BoardRemark {
+    LogLevel level = LogLevel::info;
+    std::string text;
+};
+std::optional<BoardRemark> remark(const wire::Event& event);
 
 /// Source and name are the board's own. None: a newer board tells what this version does not know.
 std::optional<JournalEntry> journal_entry(const wire::Event& event);

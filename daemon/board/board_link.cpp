@@ -7,6 +7,7 @@
 #include <random>
 
 #include "configuration/board_configuration.hpp"
+#include "configuration/board_parts.hpp"
 
 namespace versavis::daemon {
 
@@ -62,6 +63,16 @@ constexpr std::uint8_t all_cameras = 0xFF;
 
 std::string text(const char* padded, std::size_t capacity) {
     return {padded, strnlen(padded, capacity)};
+}
+
+/// Why a board of another major version cannot be used, and what to do.
+std::string describe_mismatch(const wire::BoardHello& hello) {
+    const bool older = hello.major < wire::protocol_major;
+    return fmt::format("it speaks protocol {}.{}, this service {}.{}: {}", hello.major, hello.minor,
+                       wire::protocol_major, wire::protocol_minor,
+                       older ? "flash the firmware of this release of the service"
+                             : "install the service of its firmware's release, or flash the "
+                               "firmware of this one");
 }
 
 }  // namespace
@@ -216,10 +227,7 @@ Expected<> BoardLink::handshake() {
         if (!done && attempt == hello_attempts - 1) return done;
     }
     if (hello_.major != wire::protocol_major) {
-        set_state(
-            BoardState::incompatible,
-            fmt::format("it speaks protocol {}.{}, this service {}.{}: update its firmware",
-                        hello_.major, hello_.minor, wire::protocol_major, wire::protocol_minor));
+        set_state(BoardState::incompatible, describe_mismatch(hello_));
         return failure("board", "incompatible protocol");
     }
     const std::lock_guard lock(report_mutex_);
@@ -228,11 +236,18 @@ Expected<> BoardLink::handshake() {
     report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
     report_.nonce = nonce_;
     report_.capabilities = hello_.capabilities;
+    report_.present = hello_.present;
+    report_.fastest_imu_millihertz = hello_.fastest_imu_millihertz;
     ++report_.connections;
     return {};
 }
 
 Expected<> BoardLink::configure() {
+    // The board would refuse it, too, but cannot say what it has instead.
+    if (const auto missing = missing_parts(file_, hello_); !missing.empty()) {
+        set_state(BoardState::refused, fmt::format("{}", fmt::join(missing, "; ")));
+        return failure("board", "lacks what its configuration asks for");
+    }
     answered_ = false;
     refusals_.clear();
     ++configuration_.id;
@@ -251,7 +266,7 @@ Expected<> BoardLink::configure() {
 
 /// A few exchanges in a row, so that the first frame can be stamped.
 Expected<> BoardLink::synchronise() {
-    clock_.begin(hello_.minor);
+    clock_.begin();
     while (clock_.answers() < exchanges_to_start) {
         const unsigned before = clock_.answers();
         if (auto sent = send(clock_.request()); !sent) return sent;
@@ -298,6 +313,8 @@ Expected<> BoardLink::read(Duration timeout) {
 
 void BoardLink::take(const wire::Packet& packet, HostTime received) {
     wire::BoardHello hello{};
+    wire::HelloVersion version{};
+    if (packet.read(version) && version.major != wire::protocol_major) return take(version);
     if (packet.read(hello)) return take(hello, packet.header, received);
     if (!greeted_ || anew_ || !of_this_life(packet.header)) return;
     last_packet_ = received;
@@ -339,6 +356,7 @@ void BoardLink::take_answer(const wire::Packet& packet) {
         refusals_.push_back(describe(file_, refusal));
     if (packet.read(answer_)) answered_ = answer_.id == configuration_.id;
     if (!packet.read(health)) return;
+    if (!possible(health)) return count_impossible();
     const std::lock_guard lock(report_mutex_);
     report_.health = counters_.since_start(health);
 }
@@ -364,6 +382,16 @@ void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, 
         counters_.board_restarted();
     }
     last_life_ = nonce_;
+}
+
+/// It is there, and of another major version: more cannot be read of its hello.
+void BoardLink::take(const wire::HelloVersion& other) {
+    // Flashed while the link stayed open; else the second answer to two hellos.
+    anew_ = anew_ || (greeted_ && hello_.major == wire::protocol_major);
+    greeted_ = true;
+    hello_ = {};
+    hello_.major = other.major;
+    hello_.minor = other.minor;
 }
 
 void BoardLink::note(const std::optional<Doubt>& doubt) {

@@ -55,7 +55,9 @@ struct BoardReport {
     std::string serial;
     std::string firmware;
     std::uint32_t nonce = 0;
-    std::uint32_t capabilities = 0;  ///< bits of wire::Capability
+    std::uint32_t capabilities = 0;            ///< bits of wire::Capability
+    std::uint32_t present = 0;                 ///< bits of wire::Present
+    std::uint32_t fastest_imu_millihertz = 0;  ///< samples that it can read
     std::uint64_t connections = 0;
     std::uint64_t packets = 0;
     std::uint64_t lost_packets = 0;
@@ -63,6 +65,7 @@ struct BoardReport {
     std::uint64_t exchanges_doubted = 0;  ///< answers to clock requests that cannot be true
     std::uint64_t impossible = 0;         ///< packets with a number, nonce or time that cannot be
     std::uint64_t dropped_bytes = 0;      ///< the service did not take them in time
+    bool unkept = false;                  ///< it could not store its configuration
     wire::Health health{};                ///< its counters began with the service
 };
 
@@ -106,6 +109,7 @@ class BoardLink {
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
     void take(const wire::BoardHello& hello, const wire::Header& header, HostTime received);
+    void take(const wire::HelloVersion& other);
     void take_answer(const wire::Packet& packet);
     bool same_life(const wire::BoardHello& hello, std::uint32_t nonce, HostTime received) const;
     bool of_this_life(const wire::Header& header);

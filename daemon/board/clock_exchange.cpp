@@ -14,8 +14,6 @@ constexpr Duration request_timeout = milliseconds(500);
 constexpr double earliest_part = 0.75;
 constexpr double latest_part = 1.25;
 
-constexpr std::uint8_t first_minor_with_follow_up = 2;
-
 std::optional<Doubt> contradicts_causality(const clock::Exchange& exchange) {
     const Duration waited = exchange.arrived - exchange.sent;
     const Duration held = exchange.answered - exchange.received;
@@ -31,8 +29,7 @@ ClockExchange::ClockExchange(double rate_hz, clock::Translator& translator, Cloc
       translator_(translator),
       recorder_(recorder) {}
 
-void ClockExchange::begin(std::uint8_t board_minor) {
-    follow_ups_ = board_minor >= first_minor_with_follow_up;
+void ClockExchange::begin() {
     answers_ = 0;
     request_open_ = false;
     exchange_.reset();
@@ -68,7 +65,6 @@ std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTi
     const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
     if (const auto doubt = contradicts_causality(exchange)) return doubt;
     exchange_ = exchange;
-    if (!follow_ups_) settle();
     return std::nullopt;
 }
 
@@ -85,7 +81,7 @@ std::optional<Doubt> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
     return std::nullopt;
 }
 
-/// The departure from a board before 2.2 is unknown.
+/// A board whose link cannot tell leaves the departure open.
 void ClockExchange::take(const wire::ImuSample& sample, HostTime received) {
     if (sample.departure_ns == 0) return;
     const clock::OneWay message{BoardTime{sample.time_ns} + Duration{sample.departure_ns},

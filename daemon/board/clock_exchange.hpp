@@ -18,8 +18,8 @@ class ClockExchange {
  public:
     ClockExchange(double rate_hz, clock::Translator& translator, ClockRecorder& recorder);
 
-    /// With a board of this minor version of the protocol: nothing that was asked before counts.
-    void begin(std::uint8_t board_minor);
+    /// A conversation begins: nothing that was asked before counts.
+    void begin();
 
     /// Drops an answer that waits for its follow-up: the board may have begun a new life.
     void abandon() { exchange_.reset(); }
@@ -53,7 +53,6 @@ class ClockExchange {
     clock::Translator& translator_;
     ClockRecorder& recorder_;
     std::mt19937 random_{std::random_device{}()};
-    bool follow_ups_ = false;
     std::uint32_t request_id_ = 0;
     HostTime request_sent_;
     bool request_open_ = false;

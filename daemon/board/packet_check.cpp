@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/packet_check.hpp"
 
+#include <bit>
+
 namespace versavis::daemon {
 
 namespace {
@@ -17,6 +19,9 @@ constexpr std::int64_t latest_ns = std::int64_t{1} << 60U;
 /// The year 2200. At half, labels end in 2085; at twice, they do not fit int64 in nanoseconds.
 constexpr std::int64_t latest_label_s = 7'258'118'400;
 
+constexpr std::uint32_t camera_parts = (1U << wire::camera_count) - 1U;
+static_assert(wire::present_camera0 == 1U, "the first bits of what is present are cameras");
+
 bool in_life(std::int64_t ns) { return ns >= 0 && ns <= latest_ns; }
 
 }  // namespace
@@ -30,19 +35,37 @@ bool SequenceWatch::add(std::uint32_t sequence) {
     return follows;
 }
 
-bool possible(const wire::BoardHello& message) { return in_life(message.board_time_ns); }
+/// A trigger board has outputs, and says twice which.
+bool possible(const wire::BoardHello& message) {
+    const int outputs = std::popcount(message.present & camera_parts);
+    return in_life(message.board_time_ns) && outputs > 0 && outputs == message.cameras;
+}
 
 bool possible(const wire::Exposure& message) {
     const auto edge = [](std::int64_t ns) { return ns == wire::no_time || in_life(ns); };
     return in_life(message.trigger_ns) && edge(message.start_ns) && edge(message.end_ns);
 }
 
-bool possible(const wire::ImuSample& message) { return in_life(message.time_ns); }
+bool possible(const wire::ImuSample& message) {
+    const bool aged = (message.flags & wire::imu_accel_stamped) != 0;
+    return in_life(message.time_ns) && (aged || message.accel_age == 0);
+}
 
 bool possible(const wire::Event& message) {
-    const bool label = message.kind == wire::EventKind::utc_label;
-    return in_life(message.time_ns) &&
-           (!label || (message.value >= 0 && message.value <= latest_label_s));
+    if (!in_life(message.time_ns)) return false;
+    switch (message.kind) {
+        case wire::EventKind::utc_label:
+            return message.value >= 0 && message.value <= latest_label_s;
+        case wire::EventKind::triggers_skipped: return message.detail > 0;
+        case wire::EventKind::stored: return message.value == 0 || message.value == 1;
+        default: return true;
+    }
+}
+
+bool possible(const wire::Health& message) {
+    return in_life(message.board_time_ns) && message.pps_state <= wire::PpsState::good &&
+           message.sync_state <= wire::SyncState::followed &&
+           message.reset_cause <= wire::ResetCause::software;
 }
 
 bool possible(const wire::ClockAnswer& message) {

@@ -30,10 +30,12 @@ class SequenceWatch {
 
 /// Times of the board lie between its boot and a bound far beyond the life of any, so that no
 /// arithmetic with them overflows; a label of a pulse names a second that int64 can hold in ns.
+/// What else a message says must agree within it.
 bool possible(const wire::BoardHello& message);
 bool possible(const wire::Exposure& message);
 bool possible(const wire::ImuSample& message);
 bool possible(const wire::Event& message);
+bool possible(const wire::Health& message);
 bool possible(const wire::ClockAnswer& message);
 bool possible(const wire::ClockFollowUp& message);
 

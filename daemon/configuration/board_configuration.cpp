@@ -7,12 +7,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "configuration/board_parts.hpp"
+
 namespace versavis::daemon {
 
 namespace {
 
 /// A period in nanoseconds times its rate in micro-hertz.
 constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
+
+/// The same with its rate in milli-hertz.
+constexpr std::int64_t millihertz_ns = 1'000'000'000'000;
 
 /// Longest latency of a camera that boards take. At half, slow cameras would be told too short a
 /// latency; at twice, boards would refuse it.
@@ -37,6 +42,11 @@ std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
 std::uint32_t micro_hertz(double hertz) {
     return static_cast<std::uint32_t>(std::llround(hertz * 1e6));
 }
+
+std::uint32_t milli_hertz(double hertz) {
+    return static_cast<std::uint32_t>(std::llround(hertz * 1e3));
+}
+
 /// The wire has 32 bits for it. Rounding to whole nanoseconds, here and of the period,
 /// must not carry it beyond what the board takes.
 std::uint32_t short_ns(double us, std::int64_t maximum = longest_ns) {
@@ -56,6 +66,8 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     out.latency_ns = short_ns(camera.latency_us + camera.board_output_ns * 1e-3,
                               std::min(period_ns - 1, longest_latency_ns));
     out.gap_ns = short_ns(camera.gap_us, period_ns - 1);
+    out.glitch =
+        static_cast<std::uint8_t>(std::llround(camera.glitch_us * 1e3 / wire::glitch_unit_ns));
     out.exposure_ns = std::llround(camera.exposure_us * 1e3);
     out.max_exposure_ns = std::llround(camera.max_exposure_us * 1e3);
     return out;
@@ -65,8 +77,9 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
 std::int64_t longest_test_pulse_ns(const wire::Configuration& board) {
     const std::uint8_t test = board.ports.test;
     if (test == wire::test_none) return longest_ns;
+    if (test == wire::test_rate) return millihertz_ns / board.ports.test_rate_millihertz / 2;
     if (test >= wire::test_imu0)
-        return 1'000'000'000'000 / board.imus[test - wire::test_imu0].rate_millihertz / 2;
+        return millihertz_ns / board.imus[test - wire::test_imu0].rate_millihertz / 2;
     return uhz_ns / board.cameras[test - wire::test_camera0].rate_uhz / 2;
 }
 
@@ -100,31 +113,23 @@ Words words(wire::ConfigurationField field) {
         case Field::sync_rate: return {"sync_rate_hz", 1e6};
         case Field::port_options: return {"imu_output' or 'nmea", 0};
         case Field::nmea_baud: return {"nmea_baud", 1};
+        case Field::glitch: return {"glitch_us", 10};
+        case Field::test_rate: return {"test_rate_hz", 1e3};
+        case Field::test_output: return {"test_output", 0};
+        case Field::present: return {"a part", 0};
     }
     return {"an unknown key", 0};
-}
-
-const CameraConfiguration* camera_at(const Configuration& configuration, std::int64_t output) {
-    for (const CameraConfiguration& camera : configuration.cameras)
-        if (camera.trigger == TriggerSource::board && camera.output == output) return &camera;
-    return nullptr;
-}
-
-const ImuConfiguration* imu_at(const Configuration& configuration, std::int64_t port) {
-    for (const ImuConfiguration& imu : configuration.imus)
-        if (imu.port() == port) return &imu;
-    return nullptr;
 }
 
 /// The table that is refused; null: the file has none.
 const TomlEntry* refused_entry(const Configuration& configuration, const wire::Refusal& refusal) {
     switch (refusal.part) {
         case wire::ConfigurationPart::camera: {
-            const CameraConfiguration* camera = camera_at(configuration, refusal.index);
+            const CameraConfiguration* camera = find_camera_at(configuration, refusal.index);
             return camera == nullptr ? nullptr : &camera->entry;
         }
         case wire::ConfigurationPart::imu: {
-            const ImuConfiguration* imu = imu_at(configuration, refusal.index);
+            const ImuConfiguration* imu = find_imu_at(configuration, refusal.index);
             return imu == nullptr ? nullptr : &imu->entry;
         }
         case wire::ConfigurationPart::illumination: return &configuration.illumination.entry;
@@ -137,7 +142,7 @@ const TomlEntry* refused_entry(const Configuration& configuration, const wire::R
 std::string named(const Configuration& configuration, wire::ConfigurationField field,
                   std::int64_t value) {
     const auto camera_name = [&](std::int64_t output) {
-        const CameraConfiguration* camera = camera_at(configuration, output);
+        const CameraConfiguration* camera = find_camera_at(configuration, output);
         return camera == nullptr ? "" : camera->name;
     };
     if (field == wire::ConfigurationField::master) return camera_name(value);
@@ -145,9 +150,14 @@ std::string named(const Configuration& configuration, wire::ConfigurationField f
         const imu::ImuModel* model = imu::find_model(static_cast<wire::ImuKind>(value));
         return model == nullptr ? "" : model->name;
     }
-    if (field != wire::ConfigurationField::test) return "";
+    if (field == wire::ConfigurationField::test_output) {
+        for (const auto& [name, output] : test_outputs)
+            if (output == value) return name;
+        return "";
+    }
+    if (field != wire::ConfigurationField::test || value == wire::test_rate) return "";
     if (value < wire::test_imu0) return camera_name(value - wire::test_camera0);
-    const ImuConfiguration* imu = imu_at(configuration, value - wire::test_imu0);
+    const ImuConfiguration* imu = find_imu_at(configuration, value - wire::test_imu0);
     return imu == nullptr ? "" : imu->name;
 }
 
@@ -169,6 +179,19 @@ std::string allowed(const Configuration& configuration, const wire::Refusal& ref
     return names.empty() ? "no such value" : fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// The first of the options that the board does not take, by its key.
+std::string describe_options(const wire::Refusal& refusal, const TomlEntry& entry) {
+    const std::int64_t refused = refusal.value & ~refusal.maximum;
+    const auto told = [&](const char* key, const char* value) {
+        return fmt::format("{} is {}: the board does not take that of this part, as it is wired",
+                           entry.reference(key), value);
+    };
+    if ((refused & wire::imu_accel_ready) != 0) return told("accel_ready", "true");
+    if ((refused & wire::imu_i2c) != 0) return told("bus", "\"i2c\"");
+    if ((refused & wire::imu_i2c_second) != 0) return told("i2c_address", "the second");
+    return told("data_ready", "true");
+}
+
 }  // namespace
 
 wire::Configuration board_configuration(const Configuration& configuration) {
@@ -186,9 +209,12 @@ wire::Configuration board_configuration(const Configuration& configuration) {
     for (const ImuConfiguration& imu : configuration.imus) {
         wire::ImuConfiguration& port = out.imus[imu.port()];
         port.kind = imu.model->kind;
-        port.rate_millihertz = static_cast<std::uint32_t>(std::llround(imu.rate_hz * 1e3));
+        port.rate_millihertz = milli_hertz(imu.rate_hz);
         port.filter = static_cast<std::uint8_t>(imu.filter);
         if (imu.data_ready) port.options |= wire::imu_data_ready;
+        if (imu.accel_ready) port.options |= wire::imu_accel_ready;
+        if (imu.bus == ImuBus::i2c) port.options |= wire::imu_i2c;
+        if (imu.i2c_address == second_i2c_address) port.options |= wire::imu_i2c_second;
     }
     for (const std::string& name : configuration.illumination.cameras)
         out.illumination.cameras |=
@@ -207,6 +233,10 @@ wire::Configuration board_configuration(const Configuration& configuration) {
         out.ports.nmea_baud = configuration.ports.nmea_baud;
     }
     out.ports.test = test_source(configuration).value_or(wire::test_none);
+    if (out.ports.test == wire::test_rate) {
+        out.ports.test_rate_millihertz = milli_hertz(configuration.ports.test_rate_hz);
+        out.ports.test_output = configuration.ports.test_output;
+    }
     out.ports.sync_rate_uhz = micro_hertz(configuration.ports.sync_rate_hz);
     out.ports.pulse_ns = short_ns(configuration.ports.pulse_us, longest_test_pulse_ns(out));
     if (configuration.board.keep_configuration) out.flags |= wire::configuration_store;
@@ -214,17 +244,20 @@ wire::Configuration board_configuration(const Configuration& configuration) {
 }
 
 std::string describe(const Configuration& configuration, const wire::Refusal& refusal) {
+    if (refusal.field == wire::ConfigurationField::present)
+        return describe_missing(configuration, refusal);
     const auto [key, board_units] = words(refusal.field);
     const std::string name = named(configuration, refusal.field, refusal.value);
     const std::string value = board_units != 0
                                   ? quantity(key, static_cast<double>(refusal.value) / board_units)
                               : name.empty() ? "not known to it"
                                              : fmt::format("\"{}\"", name);
-    const TomlEntry* entry = refused_entry(configuration, refusal);
-    const bool written = entry != nullptr && !entry->title.empty();
-    return fmt::format(
-        "{}'{}'{} is {}: the board takes {}", written ? entry->place_of(key).text() + ": " : "",
-        key, written ? " of " + entry->title : "", value, allowed(configuration, refusal));
+    const TomlEntry* found = refused_entry(configuration, refusal);
+    const TomlEntry entry = found == nullptr ? TomlEntry{} : *found;
+    if (refusal.field == wire::ConfigurationField::imu_options)
+        return describe_options(refusal, entry);
+    return fmt::format("{} is {}: the board takes {}", entry.reference(key), value,
+                       allowed(configuration, refusal));
 }
 
 }  // namespace versavis::daemon

@@ -41,6 +41,11 @@ constexpr double slowest_edge_us = 1000;
 /// half, a slow filter is refused; at twice, a figure of the camera's line is taken here.
 constexpr double slowest_board_ns = 100'000;
 
+/// Longest and shortest filter of an exposure line: what the wire's 8 bits of 0.1 us hold. Half
+/// would refuse what works; twice does not fit.
+constexpr double longest_glitch_us = 25.5;
+constexpr double shortest_glitch_us = 0.1;
+
 /// Filter delay of an IMU. At half, strong filters at low rates are refused; at twice, milliseconds
 /// by mistake are taken for microseconds more often.
 constexpr double longest_filter_us = 1e6;
@@ -75,8 +80,18 @@ void read_clock(TableReader& reader, ClockConfiguration& clock) {
         {{"off", PpsLabels::off}, {"host", PpsLabels::host}, {"nmea", PpsLabels::nmea}});
 }
 
+/// The camera's own exposure, where the file sets it.
+void check_exposure_feature(TableReader& reader, std::string_view key, const toml::node& node,
+                            const CameraConfiguration& camera) {
+    const auto us = node.is_number() ? node.value<double>() : std::nullopt;
+    if ((key != "ExposureTime" && key != "ExposureTimeAbs") || !us) return;
+    if (const auto hidden = hidden_exposure(camera, key, *us))
+        reader.fail(key, hidden->what, hidden->cure);
+}
+
 void read_features(TableReader& reader, const toml::table& table, CameraConfiguration& camera) {
     for (const auto& [key, node] : table) {
+        check_exposure_feature(reader, key.str(), node, camera);
         std::ostringstream text;
         if (const auto* string = node.as_string())
             text << string->get();
@@ -117,6 +132,7 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
         reader.fail(reader.has("strobe_rising_us") ? "strobe_rising_us" : "strobe_falling_us",
                     "the delays of both edges of the exposure line are needed",
                     "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
+    reader.read("glitch_us", camera.glitch_us, shortest_glitch_us, longest_glitch_us);
     reader.choose<bool>("exposure", camera.exposure_by_pulse, {{"timed", false}, {"pulse", true}});
 }
 
@@ -176,7 +192,10 @@ ImuConfiguration read_imu(TableReader& reader) {
     imu.model = models.front().second;
     reader.read("name", imu.name);
     reader.choose<const imu::ImuModel*>("model", imu.model, models);
+    reader.choose<ImuBus>("bus", imu.bus, {{"spi", ImuBus::spi}, {"i2c", ImuBus::i2c}});
+    reader.read("i2c_address", imu.i2c_address, 0, 0xFF);
     reader.read("data_ready", imu.data_ready);
+    reader.read("accel_ready", imu.accel_ready);
     reader.read("rate_hz", imu.rate_hz, 1, 8000);
     reader.read("filter", imu.filter, 0, 7);
     if (reader.has("filter_delay_us"))
@@ -199,7 +218,9 @@ void read_ports(TableReader& reader, PortConfiguration& ports) {
     reader.read("nmea", ports.nmea);
     reader.read("nmea_baud", ports.nmea_baud, 1200, 921600);
     reader.read("test", ports.test);
-    reader.read("sync_rate_hz", ports.sync_rate_hz, 0, 10);
+    reader.read("test_rate_hz", ports.test_rate_hz, 0, fastest_test_hz);
+    reader.choose<std::uint8_t>("test_output", ports.test_output, test_outputs);
+    reader.read("sync_rate_hz", ports.sync_rate_hz, 0, fastest_sync_hz);
     reader.read("pulse_us", ports.pulse_us, 1, 1e4);
 }
 
@@ -242,6 +263,14 @@ void complete(Configuration& configuration) {
         }
         complete(camera);
     }
+}
+
+/// Pulses that leave room for a pause, where nothing is said of their width.
+void complete_ports(Configuration& configuration) {
+    PortConfiguration& ports = configuration.ports;
+    const double rate_hz = test_pulse_rate_hz(configuration);
+    if (rate_hz > 0 && !ports.entry.has("pulse_us"))
+        ports.pulse_us = std::min(ports.pulse_us, 1e6 / rate_hz * usual_part_of_period);
 }
 
 /// One table of the file, if it is there.
@@ -303,6 +332,7 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
     top.finish();
     configuration.entry = top.entry();
     complete(configuration);
+    complete_ports(configuration);
     add_problems(configuration, file.problems);
     if (!file.problems.empty()) return Unexpected(std::move(file.problems));
     return configuration;
@@ -315,8 +345,22 @@ const CameraConfiguration* find_triggered_camera(const Configuration& configurat
     return nullptr;
 }
 
+const CameraConfiguration* find_camera_at(const Configuration& configuration, std::int64_t output) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.trigger == TriggerSource::board && camera.output == output) return &camera;
+    return nullptr;
+}
+
+const ImuConfiguration* find_imu_at(const Configuration& configuration, std::int64_t port) {
+    for (const ImuConfiguration& imu : configuration.imus)
+        if (imu.port() == port) return &imu;
+    return nullptr;
+}
+
 std::optional<std::uint8_t> test_source(const Configuration& configuration) {
-    if (configuration.ports.test.empty()) return std::uint8_t{wire::test_none};
+    if (configuration.ports.test.empty())
+        return std::uint8_t{configuration.ports.test_rate_hz > 0 ? wire::test_rate
+                                                                 : wire::test_none};
     if (const CameraConfiguration* camera =
             find_triggered_camera(configuration, configuration.ports.test))
         return static_cast<std::uint8_t>(wire::test_camera0 + camera->output);
@@ -324,6 +368,15 @@ std::optional<std::uint8_t> test_source(const Configuration& configuration) {
         if (imu.name == configuration.ports.test)
             return static_cast<std::uint8_t>(wire::test_imu0 + imu.port());
     return std::nullopt;
+}
+
+double test_pulse_rate_hz(const Configuration& configuration) {
+    const std::string& test = configuration.ports.test;
+    if (test.empty()) return configuration.ports.test_rate_hz;
+    if (const auto* camera = find_triggered_camera(configuration, test)) return camera->rate_hz;
+    for (const ImuConfiguration& imu : configuration.imus)
+        if (imu.name == test) return imu.rate_hz;
+    return 0;
 }
 
 imu::FilterDelay ImuConfiguration::filter_delay() const {

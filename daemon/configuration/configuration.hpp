@@ -84,6 +84,7 @@ struct CameraConfiguration {
     /// Delay of its exposure line's edges and their sigma; empty: as in the preset.
     std::vector<double> strobe_rising_us;
     std::vector<double> strobe_falling_us;
+    double glitch_us = 5;       ///< its exposure line must keep a level so long to count
     double board_input_ns = 0;  ///< of the board's exposure input for this camera
     double board_output_ns = 0;
     double grid_slew_ppm = 0;  ///< at most; 0: the grid runs freely
@@ -112,19 +113,28 @@ Duration from_us(double us);
 /// From one trigger of the camera to the next.
 Duration period_of(const CameraConfiguration& camera);
 
+enum class ImuBus { spi, i2c };
+
+/// The addresses that parts on I2C can be set to by a pin.
+constexpr unsigned first_i2c_address = 0x68;
+constexpr unsigned second_i2c_address = 0x69;
+
 struct ImuConfiguration {
     TomlEntry entry;
     std::string name = "imu0";
     const imu::ImuModel* model = nullptr;
+    ImuBus bus = ImuBus::spi;  ///< of a part on port 0
+    unsigned i2c_address = first_i2c_address;
     double rate_hz = 200;
     unsigned filter = 0;
     bool data_ready = false;
+    bool accel_ready = false;               ///< so is the data-ready line of its accelerometer
     std::optional<double> filter_delay_us;  ///< none: as the model has it
 
     /// From the motion to the sample that shows it.
     imu::FilterDelay filter_delay() const;
 
-    /// IMU port of the board: 0 SPI, 1 UART.
+    /// IMU port of the board: 0 SPI or I2C, 1 UART.
     std::uint8_t port() const { return model->kind == wire::ImuKind::vn100 ? 1 : 0; }
 };
 
@@ -140,6 +150,20 @@ struct IlluminationConfiguration {
 /// Inputs whose edges become events, in the order of the board's bits.
 inline const std::vector<std::string> pulse_input_names{"pps", "aux0", "aux1", "sync"};
 
+/// Outputs that test pulses of a rate of their own can leave at.
+inline const std::vector<std::pair<std::string, std::uint8_t>> test_outputs{
+    {"test", wire::test_at_test},
+    {"sync", wire::test_at_sync},
+    {"trigger0", wire::test_at_camera0},
+    {"trigger1", wire::test_at_camera0 + 1},
+    {"trigger2", wire::test_at_camera0 + 2},
+    {"trigger3", wire::test_at_camera0 + 3}};
+
+/// Fastest pulses at the sync output and of the test. Half would refuse what boards do; twice is
+/// more than they do.
+constexpr double fastest_sync_hz = 10;
+constexpr double fastest_test_hz = 10'000;
+
 struct PortConfiguration {
     TomlEntry entry;
     std::vector<std::string> inputs;   ///< of pulse_input_names
@@ -147,8 +171,10 @@ struct PortConfiguration {
     bool imu_output = false;
     bool nmea = false;  ///< a GNSS receiver at the UART names the PPS pulses
     unsigned nmea_baud = 9600;
-    std::string test;         ///< name of a camera or an IMU; empty: none
-    double sync_rate_hz = 0;  ///< 0: none
+    std::string test;                               ///< name of a camera or an IMU; empty: none
+    double test_rate_hz = 0;                        ///< of test pulses that show neither; 0: none
+    std::uint8_t test_output = wire::test_at_test;  ///< where these leave
+    double sync_rate_hz = 0;                        ///< 0: none
     double pulse_us = 100;
 };
 
@@ -174,7 +200,14 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
 const CameraConfiguration* find_triggered_camera(const Configuration& configuration,
                                                  const std::string& name);
 
-/// What `test` names, as the board has it; none: there is nothing of that name.
+/// The camera that the board triggers at this output, and the IMU at this port; null: none.
+const CameraConfiguration* find_camera_at(const Configuration& configuration, std::int64_t output);
+const ImuConfiguration* find_imu_at(const Configuration& configuration, std::int64_t port);
+
+/// What the test pulses show, as the board has it; none: there is nothing of the name of `test`.
 std::optional<std::uint8_t> test_source(const Configuration& configuration);
+
+/// Rate of the test pulses; 0: there are none.
+double test_pulse_rate_hz(const Configuration& configuration);
 
 }  // namespace versavis::daemon

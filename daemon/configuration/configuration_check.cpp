@@ -26,6 +26,10 @@ constexpr double longest_arrival_without_clock_ms = 900;
 /// refused; at twice, readings would overlap.
 constexpr double fastest_on_grid_hz = 1000;
 
+/// Slowest pulses of sync and test. At half, a cycle takes longer than any check of a cable; at
+/// twice, rates that boards have are refused.
+constexpr double slowest_pulses_hz = 0.1;
+
 class Findings {
  public:
     explicit Findings(TomlProblems& problems) : problems_(problems) {}
@@ -283,6 +287,25 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
     }
 }
 
+/// What would last too short for the board to see.
+void check_glitch(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const auto seen = [&](const TomlEntry& entry, const char* key, double us) {
+            if (!entry.has(key)) return;
+            if (const auto hidden = hidden_exposure(camera, key, us))
+                findings.add(entry, key, hidden->what, hidden->cure,
+                             TomlRange{camera.glitch_us, std::nullopt});
+        };
+        seen(camera.entry, "exposure_us", camera.exposure_us);
+        seen(camera.entry, "max_exposure_us", camera.max_exposure_us);
+        if (camera.exposure_by_pulse && camera.master.empty())
+            seen(camera.entry, "pulse_us", camera.pulse_us);
+        if (!camera.auto_exposure.enabled) continue;
+        seen(camera.auto_exposure.entry, "min_us", camera.auto_exposure.min_us);
+        seen(camera.auto_exposure.entry, "max_us", camera.auto_exposure.max_us);
+    }
+}
+
 void check_auto_exposure(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras) {
         const AutoExposureConfiguration& control = camera.auto_exposure;
@@ -334,9 +357,48 @@ void check_presets(const Configuration& configuration, Findings& findings) {
         check_preset(camera, *presets, findings);
 }
 
+/// The bus of a part, and its lines.
+void check_imu_wiring(const ImuConfiguration& imu, Findings& findings) {
+    const imu::ImuModel& model = *imu.model;
+    const bool serial = imu.port() == 1;
+    const bool has_i2c = model.fastest_i2c_hz > 0;
+    if (imu.entry.has("bus") && serial)
+        findings.add(imu.entry, "bus", fmt::format("the {} is on the UART", model.name),
+                     "remove the key");
+    else if (imu.bus == ImuBus::i2c && !has_i2c)
+        findings.add(imu.entry, "bus", fmt::format("the {} has no I2C", model.name),
+                     "set bus = \"spi\"; of all parts only the icm42688p can be on I2C");
+    else if (imu.bus == ImuBus::i2c && !imu.data_ready)
+        findings.add(imu.entry, "bus",
+                     "a reading takes so long on I2C that the data-ready line must begin it",
+                     "wire that line and set data_ready = true, or put the part on the SPI");
+    if (imu.entry.has("i2c_address") && imu.bus != ImuBus::i2c)
+        findings.add(imu.entry, "i2c_address", "'i2c_address' is of a part on I2C",
+                     has_i2c ? "set bus = \"i2c\", or remove the key" : "remove the key");
+    if (imu.i2c_address != first_i2c_address && imu.i2c_address != second_i2c_address)
+        findings.add(imu.entry, "i2c_address",
+                     fmt::format("'i2c_address' is 0x{:02X}, and must be 0x{:02X} or 0x{:02X}",
+                                 imu.i2c_address, first_i2c_address, second_i2c_address),
+                     "see which of them its address pin chooses");
+    if (!imu.accel_ready) return;
+    if (!model.accel_ready)
+        findings.add(imu.entry, "accel_ready",
+                     fmt::format("the {} has no data-ready line of its accelerometer", model.name),
+                     "remove the key; of all parts only the bmi088 has one");
+    else if (!imu.data_ready)
+        findings.add(imu.entry, "accel_ready",
+                     "'accel_ready' needs the data-ready line of the gyro, which paces the samples",
+                     "wire that line and set data_ready = true, or remove the key");
+}
+
 void check_imus(const Configuration& configuration, Findings& findings) {
     for (const ImuConfiguration& imu : configuration.imus) {
         const imu::ImuModel& model = *imu.model;
+        check_imu_wiring(imu, findings);
+        if (imu.bus == ImuBus::i2c && model.fastest_i2c_hz > 0)
+            findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_i2c_hz,
+                           fmt::format("the fastest of the {} on I2C", model.name),
+                           "lower it, or put the part on the SPI");
         findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_hz,
                        fmt::format("the fastest of the {}", model.name), "lower it");
         if (!imu.data_ready)
@@ -349,10 +411,12 @@ void check_imus(const Configuration& configuration, Findings& findings) {
         configuration.imus,
         [](const ImuConfiguration& a, const ImuConfiguration& b) { return a.port() == b.port(); },
         [&](const ImuConfiguration& first, const ImuConfiguration& second) {
-            findings.add(second.entry, "model",
-                         fmt::format("the board has one {} port for IMUs, taken by {}",
-                                     second.port() == 0 ? "SPI" : "UART", at_line(first.entry)),
-                         "a vn100 is on the UART, all others on the SPI; remove one of the tables");
+            findings.add(
+                second.entry, "model",
+                fmt::format("the board has one port for IMUs on {}, taken by {}",
+                            second.port() == 0 ? "SPI or I2C" : "the UART", at_line(first.entry)),
+                "a vn100 is on the UART, all others on SPI or I2C; remove one of the "
+                "tables");
         });
 }
 
@@ -379,42 +443,66 @@ void check_inputs(const Configuration& configuration, Findings& findings) {
                          "add it to 'inputs', or remove it");
 }
 
-const ImuConfiguration* imu_at(const Configuration& configuration, unsigned port) {
-    for (const ImuConfiguration& imu : configuration.imus)
-        if (imu.port() == port) return &imu;
-    return nullptr;
-}
-
 void check_uart_and_imu_output(const Configuration& configuration, Findings& findings) {
     const PortConfiguration& ports = configuration.ports;
     if (ports.nmea && !contains(ports.inputs, "pps"))
         findings.add(ports.entry, "nmea",
                      "'nmea' names the pulses of the PPS input, which is not enabled",
                      "add \"pps\" to 'inputs'");
-    if (ports.nmea && imu_at(configuration, 1) != nullptr)
+    if (ports.nmea && find_imu_at(configuration, 1) != nullptr)
         findings.add(ports.entry, "nmea", "'nmea' needs the UART, which the vn100 has",
                      "remove one of them");
-    if (ports.imu_output && imu_at(configuration, 0) == nullptr)
-        findings.add(ports.entry, "imu_output", "'imu_output' needs an IMU on the SPI",
+    if (ports.imu_output && find_imu_at(configuration, 0) == nullptr)
+        findings.add(ports.entry, "imu_output", "'imu_output' needs an IMU on SPI or I2C",
                      "add a table [[imu]] of any model but vn100, or remove the key");
 }
 
-/// Rate of what the test output shows; 0: it shows nothing.
-double tested_rate_hz(const Configuration& configuration) {
-    if (const auto* camera = find_triggered_camera(configuration, configuration.ports.test))
-        return camera->rate_hz;
-    for (const ImuConfiguration& imu : configuration.imus)
-        if (imu.name == configuration.ports.test) return imu.rate_hz;
-    return 0;
+/// Outputs that nothing else uses, as `test_output` names them.
+std::vector<std::string> free_test_outputs(const Configuration& configuration) {
+    std::vector<std::string> free{"test"};
+    if (configuration.ports.sync_rate_hz == 0) free.emplace_back("sync");
+    for (unsigned output = 0; output < wire::camera_count; ++output)
+        if (find_camera_at(configuration, output) == nullptr)
+            free.push_back(fmt::format("trigger{}", output));
+    return free;
+}
+
+/// Pulses of a rate of their own.
+void check_test_rate(const Configuration& configuration, Findings& findings) {
+    const PortConfiguration& ports = configuration.ports;
+    if (ports.test_rate_hz == 0 && ports.test_output != wire::test_at_test)
+        findings.add(
+            ports.entry, "test_output",
+            "'test_output' is where the pulses of 'test_rate_hz' leave, and there are none",
+            "set 'test_rate_hz', or remove the key");
+    if (ports.test_rate_hz == 0) return;
+    if (ports.test_rate_hz < slowest_pulses_hz)
+        findings.add(ports.entry, "test_rate_hz",
+                     "'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz", "raise it",
+                     TomlRange{slowest_pulses_hz, fastest_test_hz});
+    if (!ports.test.empty())
+        findings.add(ports.entry, "test_rate_hz",
+                     fmt::format("the test pulses show '{}' already ('test')", clipped(ports.test)),
+                     "remove one of the two keys");
+    if (ports.test_output == wire::test_at_sync && ports.sync_rate_hz != 0)
+        findings.add(ports.entry, "test_output", "the sync output has the pulses of 'sync_rate_hz'",
+                     "set sync_rate_hz = 0, or choose another output");
+    if (ports.test_output < wire::test_at_camera0 || ports.test_output >= wire::test_at_sync)
+        return;
+    const unsigned output = ports.test_output - unsigned{wire::test_at_camera0};
+    if (const CameraConfiguration* camera = find_camera_at(configuration, output))
+        findings.add(ports.entry, "test_output",
+                     fmt::format("output {} triggers {}", output, at_line(camera->entry)),
+                     fmt::format("free: {}", fmt::join(free_test_outputs(configuration), ", ")));
 }
 
 void check_pulse_outputs(const Configuration& configuration, Findings& findings) {
     const PortConfiguration& ports = configuration.ports;
-    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < 0.1)
+    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < slowest_pulses_hz)
         findings.add(ports.entry, "sync_rate_hz",
                      "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz", "raise it",
-                     TomlRange{0.1, 10});
-    const ImuConfiguration* uart = imu_at(configuration, 1);
+                     TomlRange{slowest_pulses_hz, fastest_sync_hz});
+    const ImuConfiguration* uart = find_imu_at(configuration, 1);
     if (!test_source(configuration))
         findings.add(
             ports.entry, "test",
@@ -423,30 +511,33 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
     else if (uart != nullptr && uart->name == ports.test && !uart->data_ready)
         findings.add(ports.entry, "test", "the ticks of a vn100 are known by its data-ready line",
                      "wire that line and set data_ready = true, or test something else");
-    if (const double rate = tested_rate_hz(configuration); rate != 0)
+    if (const double rate = test_pulse_rate_hz(configuration); rate != 0)
         findings.limit(ports.entry, "pulse_us", ports.pulse_us, 1e6 / rate / 2,
-                       fmt::format("half the period of '{}', which 'test' shows", ports.test),
+                       ports.test.empty()
+                           ? std::string("half the period of 'test_rate_hz'")
+                           : fmt::format("half the period of '{}', which 'test' shows", ports.test),
                        "lower it");
 }
 
-constexpr void (*rules[])(const Configuration&, Findings&){check_that_it_serves,
-                                                           check_instance,
-                                                           check_link,
-                                                           check_pps,
-                                                           check_names,
-                                                           check_devices,
-                                                           check_outputs,
-                                                           check_masters,
-                                                           check_camera_times,
-                                                           check_auto_exposure,
-                                                           check_presets,
-                                                           check_imus,
-                                                           check_illumination,
-                                                           check_inputs,
-                                                           check_uart_and_imu_output,
-                                                           check_pulse_outputs};
+constexpr void (*rules[])(const Configuration&, Findings&){
+    check_that_it_serves, check_instance,     check_link,          check_pps,
+    check_names,          check_devices,      check_outputs,       check_masters,
+    check_camera_times,   check_glitch,       check_auto_exposure, check_presets,
+    check_imus,           check_illumination, check_inputs,        check_uart_and_imu_output,
+    check_test_rate,      check_pulse_outputs};
 
 }  // namespace
+
+std::optional<HiddenExposure> hidden_exposure(const CameraConfiguration& camera,
+                                              std::string_view key, double us) {
+    const bool watched = camera.trigger == TriggerSource::board && camera.strobe != Strobe::none;
+    if (!watched || us >= camera.glitch_us) return std::nullopt;
+    return HiddenExposure{
+        fmt::format("'{}' is {:.10g} us, and must be at least {:.10g} us ('glitch_us'): the board "
+                    "takes what is shorter on the exposure line for a disturbance",
+                    key, us, camera.glitch_us),
+        "lower 'glitch_us', or expose for longer"};
+}
 
 double longest_arrival_ms(const CameraConfiguration& camera) {
     const double kept =

@@ -195,9 +195,9 @@ void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
     if (witness_.believed().disputes_newest(record)) middles_.erase(record.trigger);
 }
 
-void CameraPipeline::trigger_skipped() {
+void CameraPipeline::triggers_skipped(std::uint64_t count) {
     const std::lock_guard lock(mutex_);
-    witness_.believed().trigger_skipped();
+    witness_.believed().triggers_skipped(count);
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {

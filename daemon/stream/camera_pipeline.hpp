@@ -91,7 +91,7 @@ class CameraPipeline final : private pairing::Outcome {
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
     /// The board sent no trigger for one grid point, and said so.
-    void trigger_skipped();
+    void triggers_skipped(std::uint64_t count);
 
     /// Camera or board began a new life.
     void reset();

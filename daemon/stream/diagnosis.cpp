@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "board/board_event.hpp"
 #include "stream/status.hpp"
 
 namespace versavis::daemon {
@@ -195,6 +196,20 @@ std::string unproved_hint(const CameraView& c) {
         std::min(proved, c.frames()), c.frames());
 }
 
+/// Of exposures that the board does not see.
+std::string unseen_hint(const CameraView& c) {
+    const Duration exposure = c.it.pipeline.told_exposure;
+    const double glitch_us = c.it.configuration.glitch_us;
+    if (exposure.ns > 0 && exposure < from_us(glitch_us))
+        return fmt::format(
+            "frames come, but the board takes their exposures of {:.1f} us for a disturbance of "
+            "the "
+            "line: lower 'glitch_us', which is {:g} us, or expose for longer",
+            static_cast<double>(exposure.ns) * 1e-3, glitch_us);
+    return "frames come, but their exposures are not being measured: check the exposure line, "
+           "'strobe_line' and 'max_exposure_us', or set strobe = \"none\"";
+}
+
 std::string count_of(std::uint64_t part, std::uint64_t whole) {
     return fmt::format("{} of the last {} frames", part, whole);
 }
@@ -348,13 +363,7 @@ constexpr Rule camera_rules[] = {
              rates(c));
      }},
     {Fault::no_frames, frames_missing, missing_hint},
-    {Fault::strobe_missing, strobe_missing,
-     [](const CameraView& /*c*/) {
-         return std::string(
-             "frames come, but their exposures are not being measured: check the "
-             "exposure line, 'strobe_line' and 'max_exposure_us', or set strobe = "
-             "\"none\"");
-     }},
+    {Fault::strobe_missing, strobe_missing, unseen_hint},
     {Fault::too_slow, [](const CameraView& c) { return !c.full(); },
      [](const CameraView& c) {
          return fmt::format("{} are delivered: 'versavis tail events' says what is missing",
@@ -382,6 +391,16 @@ Fault fault_of(const ImuFailure& failure) {
     if (failure.kind == wire::EventKind::imu_silent) return Fault::imu_silent;
     if (failure.step == imu_step_running) return Fault::imu_failed;
     return answered_by_nobody(failure.answer) ? Fault::imu_missing : Fault::imu_wrong;
+}
+
+/// Of a board that runs: what is no fault of it, and to be known all the same.
+std::string board_remark(const BoardReport& board) {
+    if (!board.hint.empty()) return board.hint;
+    if (board.unkept) return unkept_configuration;
+    if (board.health.sync_state == wire::SyncState::lost)
+        return "the pulses of the sync input do not fit the grid, which runs on by itself: check "
+               "their cable, and that 'sync_rate_hz' is that of the board which sends them";
+    return "";
 }
 
 }  // namespace
@@ -482,7 +501,7 @@ Diagnosis diagnose_board(const Status& status) {
                         fmt::format("nothing came from it for {:.1f} s: check its cable and power",
                                     static_cast<double>(status.clock.since_contact.ns) * 1e-9),
                         known, in_time);
-    return conclude(Fault::none, board.hint, known, in_time);
+    return conclude(Fault::none, board_remark(board), known, in_time);
 }
 
 Diagnosis diagnose_clock(const Status& status) {

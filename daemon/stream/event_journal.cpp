@@ -14,6 +14,7 @@ void EventJournal::add(const JournalEntry& entry) {
     metadata.reason = entry.reason;
     metadata.value = entry.value;
     metadata.expected = entry.expected;
+    metadata.count = entry.count;
     metadata.board_time = entry.board_time.value_or(BoardTime{});
     metadata.host_time = stamp->host;
     metadata.sigma_ns = entry.suspect ? sigma_unknown : stamp->sigma_ns;

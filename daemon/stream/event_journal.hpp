@@ -20,6 +20,7 @@ struct JournalEntry {
     std::optional<BoardTime> board_time{};  ///< none: it happened on the host, now
     std::int64_t expected = 0;              ///< of a message that was doubted
     bool suspect = false;                   ///< its board time is doubted
+    std::uint32_t count = 0;                ///< of triggers_skipped: how many
 };
 
 /// Thread-safe.

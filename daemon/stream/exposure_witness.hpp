@@ -42,8 +42,8 @@ class ExposureHistory {
     /// The grid may have moved; triggers are counted as before.
     void forget_grid() { grid_known_ = false; }
 
-    /// The board said that the next grid point has no trigger.
-    void trigger_skipped() { ++skips_; }
+    /// The board said that so many of the next grid points have no trigger.
+    void triggers_skipped(std::uint64_t count) { skips_ += count; }
 
     /// The newest one was of the same trigger, and told the same.
     bool repeats(const WitnessedExposure& exposure) const;

@@ -40,6 +40,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
                          clock::Translator& translator, EventJournal& events)
     : model_(*configuration.model),
       port_(configuration.port()),
+      accel_ready_(configuration.accel_ready),
       filter_(configuration.filter_delay()),
       ring_(std::move(ring)),
       translator_(translator),
@@ -99,6 +100,9 @@ std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
 }
 
 std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
+    // No line, no age.
+    if ((sample.flags & wire::imu_accel_stamped) != 0 && !accel_ready_)
+        return Doubt{EventReason::implausible_flags, sample.flags, 0};
     const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
     const clock::ClockContact contact = translator_.contact();
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
@@ -142,6 +146,7 @@ void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
         ++report_.faulty;
     else
         report_.last_sample = stamp.host;
+    if ((metadata.flags & flag_repeated) != 0) ++report_.repeated;
     ring_.publish(guarded->time, pack(metadata));
     ++report_.published;
 }

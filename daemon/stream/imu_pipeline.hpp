@@ -34,7 +34,8 @@ struct ImuReport {
     std::uint64_t lost = 0;      ///< numbers that never arrived
     std::uint64_t no_clock = 0;  ///< withheld: before the clock and its neighbours are known
     std::uint64_t faulty = 0;    ///< published with a sensor error
-    std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number or time
+    std::uint64_t repeated = 0;  ///< published with the data of the sample before
+    std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number, time or flags
     HostTime last_sample;        ///< without an error
     imu::FilterDelay filter;
     double rate_hz = 0;  ///< configured
@@ -69,6 +70,7 @@ class ImuPipeline {
     std::mutex mutex_;
     const imu::ImuModel& model_;
     std::uint8_t port_;
+    bool accel_ready_;
     imu::FilterDelay filter_;
     ring::Writer ring_;
     clock::Translator& translator_;

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "configuration/board_parts.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -44,6 +46,15 @@ const char* to_string(wire::PpsState state) {
     return "unknown";
 }
 
+const char* to_string(wire::SyncState state) {
+    switch (state) {
+        case wire::SyncState::none: return "none";
+        case wire::SyncState::lost: return "lost";
+        case wire::SyncState::followed: return "followed";
+    }
+    return "unknown";
+}
+
 /// What is not known is null: a zero would be a claim.
 json known(bool is_known, Duration value) { return is_known ? json(value.ns) : json(nullptr); }
 /// Of an IMU, which the board drives.
@@ -55,10 +66,14 @@ const char* state(const ImuStatus& imu, const Status& status) {
 
 json board_json(const BoardReport& board, bool needed) {
     const wire::Health& health = board.health;
+    const bool known = board.connections > 0;
+    const bool good_pps = health.pps_state == wire::PpsState::good;
     return {{"state", needed ? to_string(board.state) : "unused"},
             {"port", board.port},
             {"serial", board.serial},
             {"firmware", board.firmware},
+            {"present", known ? json(part_names(board.present)) : json(nullptr)},
+            {"fastest_imu_hz", known ? json(board.fastest_imu_millihertz * 1e-3) : json(nullptr)},
             {"nonce", board.nonce},
             {"connections", board.connections},
             {"packets", board.packets},
@@ -79,6 +94,7 @@ json board_json(const BoardReport& board, bool needed) {
             {"late_outputs", health.late_outputs},
             {"lost_edges", health.lost_edges},
             {"stray_edges", health.stray_edges},
+            {"glitches", health.glitches},
             {"noisy_inputs", health.noisy_inputs},
             {"skipped_triggers", health.skipped_triggers},
             {"imu_errors", health.imu_errors[0] + health.imu_errors[1]},
@@ -86,7 +102,8 @@ json board_json(const BoardReport& board, bool needed) {
             {"loop_max_ns", health.loop_max_ns},
             {"reset_cause", to_string(health.reset_cause)},
             {"pps", to_string(health.pps_state)},
-            {"pps_error_ppb", health.pps_error_ppb}};
+            {"pps_error_ppb", good_pps ? json(health.pps_error_ppb) : json(nullptr)},
+            {"sync", to_string(health.sync_state)}};
 }
 
 json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
@@ -200,6 +217,7 @@ std::string to_json(const Status& status) {
                             {"lost", imu.report.lost},
                             {"no_clock", imu.report.no_clock},
                             {"faulty", imu.report.faulty},
+                            {"repeated", imu.report.repeated},
                             {"doubted", imu.report.doubted},
                             {"filter_delay_ns", imu.report.filter.delay.ns},
                             {"filter_delay_sigma_ns", imu.report.filter.sigma.ns},

@@ -10,12 +10,28 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds health_interval = 1'000'000'000;
+
+/// Of the watchdog's second. At half, an idle board wakes more often; at twice, one slow poll is
+/// enough for it to bite.
 constexpr Nanoseconds feed_interval = 200'000'000;
-constexpr Nanoseconds stuck_limit =
-    500'000'000;  // the output hardware makes progress, or the watchdog bites
-constexpr Nanoseconds unseen_step = 1'000;         // of the grid: pulse trains need not restart
-constexpr Nanoseconds longest_wait = 200'000'000;  // for exposures, before a new configuration
+
+/// The output hardware makes progress, or the watchdog bites. At half, a long pulse train may look
+/// stuck; at twice, pulses stay away for longer.
+constexpr Nanoseconds stuck_limit = 500'000'000;
+
+/// Of the grid: pulse trains need not restart for less.
+constexpr Nanoseconds unseen_step = 1'000;
+
+/// For exposures, before a new configuration. At half, records of long exposures are cut; at twice,
+/// a line that is stuck delays a configuration for longer.
+constexpr Nanoseconds longest_wait = 200'000'000;
+
+/// Between stray edges that are reported; all are counted.
 constexpr Nanoseconds stray_interval = 100'000'000;
+
+/// Bounds the work of one poll. At half, bytes of the host wait longer; at twice, polls take
+/// longer.
+constexpr unsigned packets_a_poll = 4;
 
 constexpr std::uint32_t capabilities =
     wire::capability_exposure_compensation | wire::capability_imu | wire::capability_start_pattern |
@@ -25,6 +41,20 @@ constexpr std::uint32_t capabilities =
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
+unsigned test_output(const wire::PortConfiguration& ports) {
+    if (ports.test_output == wire::test_at_test) return output_test;
+    return ports.test_output == wire::test_at_sync ? output_sync
+                                                   : ports.test_output - wire::test_at_camera0;
+}
+
+/// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. At half,
+/// contacts that bounce count double; at twice, nothing changes.
+constexpr EchoFilter pps_echo(1'000'000);
+
+/// Of the auxiliary inputs. At half, contacts that bounce count double; at twice, pulses of 20 kHz
+/// are lost.
+constexpr EchoFilter aux_echo(10'000);
+
 }  // namespace
 
 Board::Board(const Hal& hal, const Identity& identity)
@@ -32,7 +62,7 @@ Board::Board(const Hal& hal, const Identity& identity)
       identity_(identity),
       transmitter_(hal_.link, hal_.clock, identity.nonce),
       noise_(hal_.edges),
-      outputs_(hal_.outputs),
+      outputs_(hal_.outputs, *this, hal_.facts),
       cameras_{{0, grid_clock_, outputs_, *this},
                {1, grid_clock_, outputs_, *this},
                {2, grid_clock_, outputs_, *this},
@@ -40,8 +70,9 @@ Board::Board(const Hal& hal, const Identity& identity)
       light_(outputs_, *this),
       spi_imu_(0, hal_.imu_bus, *this),
       uart_imu_(1, hal_.imu_uart, *this),
-      sync_(output_sync, outputs_),
-      test_(output_test, outputs_) {
+      sync_(outputs_),
+      test_(outputs_),
+      echoes_{pps_echo, aux_echo, aux_echo, pps_echo} {
     health_.reset_cause = identity.reset_cause;
     noise_.listen(0);
     restore();
@@ -49,42 +80,65 @@ Board::Board(const Hal& hal, const Identity& identity)
 
 void Board::poll() {
     const Nanoseconds began = hal_.clock.now();
+    more_ = false;
+    // What is overdue leaves before anybody waits for its effect.
+    if (began >= timers_) outputs_.commit(began - OutputQueue::horizon / 2);
     // First what happened, then what is wanted: edges belong to what was in force when they
     // arrived.
-    poll_outputs(began);
+    spi_imu_.collect(began);
     poll_edges(began);
+    if (configuring_) poll_configuration(began);
     poll_link();
     const Nanoseconds now = hal_.clock.now();
-    for (CameraChannel& camera : cameras_) camera.poll(now);
-    light_.poll(now);
-    sync_.poll(now);
-    test_.poll(now);
-    poll_outputs(now);
-    poll_configuration(now);
+    const bool timed = stirred_ || now >= timers_;
+    if (timed) {
+        poll_cameras(now);
+        poll_outputs(now);
+    }
+    stirred_ = configuring_ || outputs_blocked_;
     poll_imus(now);
     poll_nmea();
+    poll_storage();
     poll_health(now);
-    transmitter_.pump();
+    if (transmitter_.pump()) more_ = true;
+    if (configuring_ && outputs_.empty() && (all_idle() || now >= configure_at_)) more_ = true;
     polled_ = hal_.clock.now();
     const Nanoseconds took = polled_ - (due_ < began && due_ != 0 ? due_ : began);
     if (took > health_.loop_max_ns) health_.loop_max_ns = static_cast<std::uint32_t>(took);
-    due_ = find_next_wake();
+    if (timed) timers_ = find_timers();
+    due_ = more_ ? polled_ : find_next_wake();
+}
+
+void Board::poll_cameras(Nanoseconds now) {
+    for (CameraChannel& camera : cameras_) camera.poll(now, settled_);
+    light_.poll(now, settled_);
+    sync_.poll(now);
+    test_.poll(now);
+}
+
+/// When cameras, light and outputs have something to do if nothing stirs them before.
+Nanoseconds Board::find_timers() const {
+    const Nanoseconds lag = polled_ - settled_;
+    Nanoseconds wake = polled_ + feed_interval;
+    const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
+    for (const CameraChannel& camera : cameras_) sooner(camera.next_wake(lag));
+    sooner(light_.next_wake(lag));
+    // When the hardware's queue is full, the next word that leaves it calls.
+    if (outputs_blocked_) return wake;
+    sooner(sync_.next_wake());
+    sooner(test_.next_wake());
+    sooner(outputs_.next_wake());
+    return wake;
 }
 
 Nanoseconds Board::find_next_wake() const {
-    Nanoseconds wake = polled_ + feed_interval;
+    Nanoseconds wake = timers_;
     const auto sooner = [&wake](Nanoseconds at) { wake = at < wake ? at : wake; };
     if (greeted_) sooner(next_health_);
     if (configuring_ && configure_at_ > polled_) sooner(configure_at_);
-    for (const CameraChannel& camera : cameras_) sooner(camera.next_wake());
-    sooner(light_.next_wake());
-    sooner(sync_.next_wake());
-    sooner(test_.next_wake());
-    sooner(spi_imu_.next_wake());
+    sooner(spi_imu_.next_wake(polled_ - settled_));
     sooner(uart_imu_.next_wake());
     sooner(noise_.next_wake());
-    // When the hardware's queue is full, the next word that leaves it calls.
-    if (!outputs_.empty() && !outputs_blocked_) sooner(outputs_.next() - OutputQueue::horizon + 1);
     return wake;
 }
 
@@ -94,10 +148,15 @@ void Board::send(const T& message) {
 }
 
 void Board::poll_link() {
-    std::uint8_t bytes[64];
+    std::uint8_t bytes[link_packet_size];
     Nanoseconds received = 0;
-    while (const std::size_t size = hal_.link.read(bytes, sizeof bytes, received))
+    for (unsigned i = 0; i < packets_a_poll; ++i) {
+        const std::size_t size = hal_.link.read(bytes, received);
+        if (size == 0) return;
+        stirred_ = true;
         decoder_.feed(bytes, size, [&](const wire::Packet& packet) { handle(packet, received); });
+    }
+    more_ = true;
 }
 
 void Board::handle(const wire::Packet& packet, Nanoseconds received) {
@@ -146,10 +205,13 @@ wire::BoardHello Board::introduction() const {
     wire::BoardHello answer{};
     answer.major = wire::protocol_major;
     answer.minor = wire::protocol_minor;
-    answer.cameras = camera_count;
+    for (unsigned i = 0; i < camera_count; ++i)
+        if ((hal_.facts.present & wire::present_camera0 << i) != 0) ++answer.cameras;
     answer.reset_cause = identity_.reset_cause;
     answer.capabilities = capabilities;
     answer.board_time_ns = hal_.clock.now();
+    answer.present = hal_.facts.present;
+    answer.fastest_imu_millihertz = hal_.facts.fastest_imu_millihertz;
     std::memcpy(answer.serial, identity_.serial, sizeof answer.serial);
     const char version[] = "versavis " VERSAVIS_VERSION;
     static_assert(sizeof version <= sizeof answer.firmware);
@@ -162,7 +224,7 @@ void Board::configure(const wire::Configuration& configuration) {
         return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
     refused_ = 0;
     checked_id_ = configuration.id;
-    check(configuration, *this);
+    check(configuration, hal_.facts, *this);
     if (refused_ != 0)
         return answer_configuration(configuration.id, wire::ConfigurationStatus::refused);
     wanted_ = configuration;
@@ -172,6 +234,7 @@ void Board::configure(const wire::Configuration& configuration) {
     sync_.stop();
     test_.stop();
     configuring_ = true;
+    more_ = true;
     configure_at_ = hal_.clock.now() + longest_wait;
 }
 
@@ -187,6 +250,7 @@ void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus sta
     answer.id = id;
     answer.status = status;
     answer.refused = refused_;
+    answer.origin_ns = grid_clock_.board_time(0);
     answer.taken = configuration_;
     refused_ = 0;
     send(answer);
@@ -215,12 +279,14 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     for (unsigned port = 0; port < wire::imu_count; ++port)
         if ((configuration.imus[port].options & wire::imu_data_ready) != 0)
             inputs |= 1U << (input_imu_ready + port);
+    if ((configuration.imus[0].options & wire::imu_accel_ready) != 0)
+        inputs |= 1U << input_accel_ready;
     noise_.listen(inputs);
     exposing_ = 0;
-    slaves_ = 0;
+    slaves_ = routed_ = 0;
     light_.configure(configuration.illumination, now);
     grid_clock_.begin(now, 0);
-    apply_routes();
+    apply_routes(true);
     begin_trains(now);
 }
 
@@ -237,7 +303,7 @@ void Board::apply_imus(const wire::Configuration& configuration, Nanoseconds now
     if (changed(1, Vn100::true_rate(uart.rate_millihertz))) uart_imu_.configure(uart, now);
 }
 
-void Board::apply_routes() {
+Routing::Switched Board::apply_routes(bool force) {
     Routes routes;
     routes.light_cameras = configuration_.illumination.cameras;
     routes.light_limit = configuration_.illumination.max_on_ns;
@@ -247,7 +313,7 @@ void Board::apply_routes() {
         if (!cameras_[i].has_strobe())
             routes.light_cameras = static_cast<std::uint8_t>(routes.light_cameras & ~bit);
         if (!cameras_[i].exposing(true)) routes.inverted_exposures |= bit;
-        if (cameras_[i].running()) routes.master[i] = cameras_[i].master();
+        if ((routed_ >> i & 1U) != 0) routes.master[i] = cameras_[i].master();
         if (cameras_[i].trigger_inverted()) routes.inverted_triggers |= bit;
     }
     const std::uint8_t test = configuration_.ports.test;
@@ -256,7 +322,7 @@ void Board::apply_routes() {
         if ((configuration_.imus[port].options & wire::imu_data_ready) != 0)
             routes.test_input = static_cast<std::uint8_t>(input_imu_ready + port);
     }
-    hal_.routing.route(routes);
+    return hal_.routing.route(routes, force);
 }
 
 void Board::begin_trains(Nanoseconds now) {
@@ -264,11 +330,20 @@ void Board::begin_trains(Nanoseconds now) {
     sync_.stop();
     test_.stop();
     if (ports.sync_rate_uhz != 0)
-        sync_.begin(Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
+        sync_.begin(output_sync, Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
+    if (ports.test == wire::test_rate)
+        test_.begin(test_output(ports), Grid(0, std::int64_t{ports.test_rate_millihertz} * 1000),
+                    board_clock_, ports.pulse_ns, now);
     const bool paced = (configuration_.imus[0].options & wire::imu_data_ready) == 0;
     if (ports.test == wire::test_imu0 && paced &&
         configuration_.imus[0].kind != wire::ImuKind::none)
-        test_.begin(spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
+        test_.begin(output_test, spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
+}
+
+/// Whatever is placed on the grid is placed anew.
+void Board::grid_moved() {
+    for (CameraChannel& camera : cameras_) camera.grid_moved();
+    sync_.moved();
 }
 
 /// The stored configuration is in force from power-up: the IMU and its output need no host.
@@ -277,7 +352,7 @@ void Board::restore() {
     std::uint8_t bytes[sizeof stored];
     if (hal_.persist.load(bytes, sizeof bytes) != sizeof stored) return;
     std::memcpy(&stored, bytes, sizeof stored);
-    check(stored, *this);
+    check(stored, hal_.facts, *this);
     if (refused_ == 0) apply(stored, hal_.clock.now());
     refused_ = 0;
 }
@@ -318,8 +393,10 @@ void Board::align(const wire::AlignGrid& wanted) {
         return send(wire::Log{wire::LogLevel::warning, "align_grid is out of range: ignored"});
     }
     const Nanoseconds off = grid_clock_.misplaced(wanted.board_ns);
-    if (any_running() || (off <= unseen_step && -off <= unseen_step))
-        return grid_clock_.align(wanted.board_ns, wanted.pace_ppb, wanted.max_slew_ppb, now);
+    if (any_running() || (off <= unseen_step && -off <= unseen_step)) {
+        grid_clock_.align(wanted.board_ns, wanted.pace_ppb, wanted.max_slew_ppb, now);
+        return grid_moved();
+    }
     grid_clock_.place(wanted.board_ns, wanted.pace_ppb);
     begin_trains(now);
 }
@@ -339,22 +416,26 @@ void Board::start_cameras(std::uint8_t cameras, std::uint8_t flags) {
 }
 
 /// A slave is switched on and off while its master is not exposing, so that each of its pulses is
-/// whole and counted.
+/// whole and counted. The port looks at the line itself: an edge may not be known here yet.
 void Board::switch_slaves() {
-    bool changed = false;
     for (unsigned i = 0; i < camera_count; ++i) {
         CameraChannel& slave = cameras_[i];
-        const bool wanted = (slaves_ >> i & 1U) != 0 && slave.enabled();
+        const auto bit = static_cast<std::uint8_t>(1U << i);
+        const bool wanted = (slaves_ & bit) != 0 && slave.enabled();
         if (!slave.is_slave() || slave.running() == wanted ||
             (exposing_ >> slave.master() & 1U) != 0)
             continue;
-        if (wanted)
-            slave.start(hal_.clock.now(), 0);
-        else
-            slave.stop();
-        changed = true;
+        routed_ = static_cast<std::uint8_t>(wanted ? routed_ | bit : routed_ & ~bit);
+        const Routing::Switched switched = apply_routes(false);
+        if (switched.at == never) {
+            // The master's next end brings us back.
+            routed_ = static_cast<std::uint8_t>(routed_ ^ bit);
+        } else if (wanted) {
+            slave.route(switched.at, switched.clean);
+        } else {
+            slave.unroute(switched.at, switched.clean);
+        }
     }
-    if (changed) apply_routes();
 }
 
 void Board::stop(std::uint8_t cameras) {
@@ -369,13 +450,16 @@ void Board::poll_outputs(Nanoseconds now) {
     outputs_blocked_ = !outputs_.commit(now);
     if (!outputs_blocked_) output_progress_ = now;
     if (now - output_progress_ < stuck_limit) hal_.watchdog.feed();
-    OutputSchedule::Late late{};
-    while (outputs_.take_late(late)) {
-        ++health_.late_outputs;
-        for (CameraChannel& camera : cameras_) camera.left_late(late.asked, late.left);
-        light_.left_late(late.asked, late.left);
-        event(wire::EventKind::output_late, 0, late.asked, late.left - late.asked, 0);
-    }
+}
+
+void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) {
+    const bool late = outputs_.is_late(asked, left);
+    if (output < camera_count && level != cameras_[output].trigger_inverted())
+        cameras_[output].moved(asked, left, late);
+    if (output == output_light_gate) light_.moved(level, asked, left);
+    if (!late) return;
+    ++health_.late_outputs;
+    event(wire::EventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked, 0);
 }
 
 void Board::poll_configuration(Nanoseconds now) {
@@ -387,13 +471,22 @@ void Board::poll_configuration(Nanoseconds now) {
     configuring_ = false;
     apply(wanted_, now);
     if ((wanted_.flags & wire::configuration_store) != 0)
-        hal_.persist.store(reinterpret_cast<const std::uint8_t*>(&wanted_), sizeof wanted_);
+        storing_ =
+            hal_.persist.store(reinterpret_cast<const std::uint8_t*>(&wanted_), sizeof wanted_);
     answer_configuration(wanted_.id, wire::ConfigurationStatus::taken);
+}
+
+void Board::poll_storage() {
+    if (!storing_) return;
+    const Persist::Outcome outcome = hal_.persist.take_outcome();
+    if (outcome == Persist::Outcome::busy) return;
+    storing_ = false;
+    event(wire::EventKind::stored, 0, polled_, outcome == Persist::Outcome::stored ? 1 : 0, 0);
 }
 
 void Board::poll_imus(Nanoseconds now) {
     wire::ImuSample sample;
-    if (spi_imu_.poll(now, sample)) {
+    if (spi_imu_.poll(now, settled_, sample)) {
         send(sample);
         ImuImage image;
         const bool serves = (configuration_.ports.options & wire::port_imu_output) != 0;
@@ -416,7 +509,10 @@ void Board::poll_health(Nanoseconds now) {
     health_.output_queue_max = static_cast<std::uint32_t>(outputs_.take_high_water());
     health_.link_queue_max = transmitter_.take_high_water();
     health_.pps_state = pps_.state(now);
-    health_.pps_error_ppb = pps_.error_ppb();
+    health_.pps_error_ppb = pps_.error_ppb(now);
+    health_.sync_state = grid_clock_.sync_state(now);
+    for (CameraChannel& camera : cameras_) health_.glitches += camera.take_glitches();
+    health_.glitches += spi_imu_.take_glitches();
     send(health_);
     health_.loop_max_ns = 0;
 }

@@ -24,14 +24,14 @@ struct Identity {
     char serial[16] = {};
 };
 
-class Board final : private ChannelReports, private RefusalSink {
+class Board final : private ChannelReports, private RefusalSink, private OutputMoves {
  public:
     Board(const Hal& hal, const Identity& identity);
     Board(const Board&) = delete;
     Board& operator=(const Board&) = delete;
 
-    /// Does all that is due. Call it at next_wake(); when bytes or edges have arrived or an output
-    /// word has left; and when a transfer has completed.
+    /// Does what is due, a bounded part of it at once: when more is, next_wake() has passed
+    /// already. Call it at next_wake(), and when the HAL says so.
     void poll();
 
     Nanoseconds next_wake() const { return due_; }
@@ -42,17 +42,23 @@ class Board final : private ChannelReports, private RefusalSink {
                std::uint16_t detail) override;
     void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) override;
     void refuse(const wire::Refusal& refusal) override;
+    void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) override;
 
+    Nanoseconds find_timers() const;
     Nanoseconds find_next_wake() const;
     void poll_link();
     void poll_edges(Nanoseconds now);
+    void poll_cameras(Nanoseconds now);
     void poll_outputs(Nanoseconds now);
+    void poll_storage();
     void poll_configuration(Nanoseconds now);
     void poll_imus(Nanoseconds now);
     void poll_nmea();
     void poll_health(Nanoseconds now);
     void take_edge(const Edge& edge, Nanoseconds now);
-    void take_exposure_edge(const Edge& edge, Nanoseconds now);
+    void take_exposure_edge(const Edge& edge);
+    void settle_exposures(unsigned camera, Nanoseconds settled);
+    void grid_moved();
     void take_pulse(wire::PulseInput input, Nanoseconds at);
     void handle(const wire::Packet& packet, Nanoseconds received);
     void greet(const wire::HostHello& hello);
@@ -60,7 +66,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void configure(const wire::Configuration& configuration);
     void apply(const wire::Configuration& configuration, Nanoseconds now);
     void apply_imus(const wire::Configuration& configuration, Nanoseconds now);
-    void apply_routes();
+    Routing::Switched apply_routes(bool force);
     void apply_nmea();
     void begin_trains(Nanoseconds now);
     void restore();
@@ -71,6 +77,7 @@ class Board final : private ChannelReports, private RefusalSink {
     void align(const wire::AlignGrid& wanted);
     void switch_slaves();
     void edges_lost();
+    void follow_sync(Nanoseconds at);
     bool any_running() const;
     bool all_idle() const;
     template <class T>
@@ -90,6 +97,7 @@ class Board final : private ChannelReports, private RefusalSink {
     PulseTrain sync_;
     PulseTrain test_;
     PpsMonitor pps_;
+    EchoFilter echoes_[wire::pulse_input_count];
     NmeaReader nmea_;
     wire::Decoder decoder_;
     wire::Configuration configuration_{};  ///< in force
@@ -102,8 +110,15 @@ class Board final : private ChannelReports, private RefusalSink {
     std::uint8_t refused_ = 0;
     std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
     std::uint8_t slaves_ = 0;    ///< slaves that are to run
+    std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
     bool greeted_ = false;
+    bool storing_ = false;
     bool outputs_blocked_ = false;
+    bool more_ = false;          ///< to do at once
+    bool stirred_ = true;        ///< cameras, light and outputs may have something to do
+    std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled
+    Nanoseconds timers_ = 0;     ///< when they have something to do in any case
+    Nanoseconds settled_ = 0;    ///< all edges before are known
     Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
     Nanoseconds due_ = 0;  ///< when poll() has something to do next

@@ -11,6 +11,10 @@ constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: two crystals differ by
 constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
+/// Bounds the work of one poll. At half, a burst of edges takes more polls; at twice, other work
+/// waits longer.
+constexpr unsigned edges_a_poll = 24;
+
 }  // namespace
 
 void Board::poll_edges(Nanoseconds now) {
@@ -19,7 +23,9 @@ void Board::poll_edges(Nanoseconds now) {
     const std::uint32_t lost = hal_.edges.take_lost();
     if (lost != 0) edges_lost();
     Edge edge{};
-    while (hal_.edges.pop(edge)) {
+    unsigned count = 0;
+    while (count < edges_a_poll && hal_.edges.pop(edge)) {
+        ++count;
         if (noise_.take(edge)) {
             take_edge(edge, now);
             continue;
@@ -28,6 +34,19 @@ void Board::poll_edges(Nanoseconds now) {
         if (edge.input < camera_count) edges_lost();
         event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
     }
+    Nanoseconds settled = edge.at;
+    if (count == edges_a_poll)
+        more_ = true;
+    else
+        settled = hal_.edges.settled();
+    for (unsigned i = 0; i < camera_count && bouncing_ != 0; ++i) {
+        if ((bouncing_ >> i & 1U) == 0) continue;
+        settle_exposures(i, settled);
+        if (!cameras_[i].is_bouncing())
+            bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << i));
+        settled = cameras_[i].settled(settled);
+    }
+    if (settled > settled_) settled_ = settled;
     if (lost == 0) return;
     edges_lost();
     health_.lost_edges += lost;
@@ -37,34 +56,56 @@ void Board::poll_edges(Nanoseconds now) {
 void Board::edges_lost() {
     for (CameraChannel& camera : cameras_) camera.edges_lost();
     light_.edges_lost();
+    spi_imu_.edges_lost();
     exposing_ = 0;
+    stirred_ = true;
 }
 
 void Board::take_edge(const Edge& edge, Nanoseconds now) {
-    if (edge.input < camera_count) return take_exposure_edge(edge, now);
-    if (edge.input >= input_pulse) {
+    if (edge.input < camera_count) {
+        take_exposure_edge(edge);
+    } else if (edge.input == input_imu_ready) {
+        spi_imu_.ready_edge(edge.at, now);
+    } else if (edge.input == input_imu_ready + 1) {
+        uart_imu_.ready_edge(edge.at);
+    } else if (edge.input == input_accel_ready) {
+        spi_imu_.accel_edge(edge.at);
+    } else {
         const auto input = static_cast<wire::PulseInput>(edge.input - input_pulse);
         const bool falling = (configuration_.ports.falling >> input & 1U) != 0;
-        if (edge.level != falling) take_pulse(input, edge.at);
-    } else if (edge.level && edge.input == input_imu_ready) {
-        spi_imu_.ready_edge(edge.at, now);
-    } else if (edge.level) {
-        uart_imu_.ready_edge(edge.at);
+        if (edge.level == falling) return;
+        stirred_ = true;
+        if (echoes_[input].take(edge.at))
+            take_pulse(input, edge.at);
+        else
+            ++health_.glitches;
     }
 }
 
-void Board::take_exposure_edge(const Edge& edge, Nanoseconds now) {
-    CameraChannel& master = cameras_[edge.input];
-    const bool exposing = master.exposing(edge.level);
-    const std::uint64_t tick = master.tick_at(edge.at);
-    master.edge(edge.at, edge.level);
-    for (CameraChannel& slave : cameras_)
-        if (slave.enabled() && slave.master() == edge.input)
-            slave.master_edge(edge.at, exposing, tick);
-    light_.edge(edge.input, exposing, now);
+/// Light and slaves follow the line itself, bounces included; records wait until it has settled.
+void Board::take_exposure_edge(const Edge& edge) {
+    CameraChannel& camera = cameras_[edge.input];
+    settle_exposures(edge.input, edge.at);
+    camera.edge(edge.at, edge.level);
+    stirred_ = true;
+    const bool exposing = camera.exposing(edge.level);
+    light_.edge(edge.input, exposing);
     const auto bit = static_cast<std::uint8_t>(1U << edge.input);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
+    bouncing_ = static_cast<std::uint8_t>(bouncing_ | bit);
     if (!exposing) switch_slaves();
+}
+
+void Board::settle_exposures(unsigned camera, Nanoseconds settled) {
+    CameraChannel& master = cameras_[camera];
+    Nanoseconds at = 0;
+    bool exposing = false;
+    if (!master.take_edge(settled, at, exposing)) return;
+    stirred_ = true;
+    const std::uint64_t tick = master.tick_at(at);
+    master.exposure_edge(at, exposing);
+    for (CameraChannel& slave : cameras_)
+        if (slave.enabled() && slave.master() == camera) slave.master_edge(at, exposing, tick);
 }
 
 void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
@@ -83,10 +124,7 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     event(wire::EventKind::sync_pulse, 0, at, number, 0);
     const Nanoseconds since = at - last_sync_;
     last_sync_ = at;
-    if (on_sync_.cameras == 0 || configuring_) {
-        grid_clock_.sync_pulse(at);
-        return;
-    }
+    if (on_sync_.cameras == 0 || configuring_) return follow_sync(at);
     if (!any_running()) {
         // Two edges a period apart are pulses; a single one may be anything.
         const std::uint32_t rate = configuration_.ports.sync_rate_uhz;
@@ -99,6 +137,15 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
     }
     start_cameras(on_sync_.cameras, on_sync_.flags);
     on_sync_ = {};
+}
+
+void Board::follow_sync(Nanoseconds at) {
+    const GridClock::SyncPulse pulse = grid_clock_.sync_pulse(at, any_running());
+    if (pulse.what == GridClock::Sync::lost) event(wire::EventKind::sync_lost, 0, at, pulse.off, 0);
+    if (pulse.what == GridClock::Sync::taken)
+        event(wire::EventKind::sync_taken, 0, at, pulse.off, 0);
+    if (pulse.what == GridClock::Sync::followed || pulse.what == GridClock::Sync::taken)
+        grid_moved();
 }
 
 void Board::apply_nmea() {

@@ -5,11 +5,21 @@ namespace versavis::firmware {
 
 namespace {
 
-constexpr Nanoseconds start_delay =
-    5'000'000;  // from the command to the first grid point, at least
+/// From the command to the first grid point, at least. At half, two cameras that are started by two
+/// commands may begin at different grid points more often; at twice, starts take longer.
+constexpr Nanoseconds start_delay = 5'000'000;
+
+/// A start of exposure is waited for one period, but at least and at most this long. At half, slow
+/// cameras are given up; at twice, a record waits longer.
 constexpr Nanoseconds start_timeout_floor = 2'000'000;
 constexpr Nanoseconds start_timeout_limit = 50'000'000;
+
+/// A trigger that is later than this, or than a sixteenth of the period, is skipped. At half, a
+/// slow poll skips triggers; at twice, exposures lie further from their grid points.
 constexpr Nanoseconds latest_trigger = 1'000'000;
+
+/// Most that the detail of an event can count.
+constexpr std::int64_t most_told = 65'535;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
@@ -23,6 +33,9 @@ void CameraChannel::configure(const wire::CameraConfiguration& configuration, Na
     expected_ = min(configuration.exposure_ns, configuration.max_exposure_ns);
     expected_since_ = 0;
     announcements_.clear();
+    routed_from_ = routed_until_ = never;
+    filter_.configure(configuration.glitch == 0 ? wire::default_glitch_ns
+                                                : configuration.glitch * wire::glitch_unit_ns);
     if (enabled()) grid_ = Grid(configuration.phase_ns, configuration.rate_uhz);
     wire::CameraConfiguration tracked = configuration;
     // A slave without an exposure line of its own is tracked by that of its master.
@@ -34,23 +47,42 @@ void CameraChannel::configure(const wire::CameraConfiguration& configuration, Na
 }
 
 void CameraChannel::start(Nanoseconds now, std::uint8_t flags) {
-    if (!enabled()) return;
-    if (!running_ && !is_slave()) {
+    if (!enabled() || is_slave()) return;
+    if (!running_) {
         grid_ = Grid(configuration_.phase_ns, configuration_.rate_uhz);
-        grid_.skip_before(clock_.grid_time(now));
-        while (decision_time() < now || grid_.tick() < next_tick_ ||
-               clock_.board_time(grid_.next()) < now + start_delay)
-            grid_.advance();
+        const Nanoseconds ahead =
+            OutputQueue::horizon + lead_ + configuration_.latency_ns + expected_exposure() / 2;
+        const Nanoseconds first = now + max(ahead, start_delay);
+        grid_.skip_before(clock_.grid_time(first));
+        if (grid_.tick() < next_tick_)
+            grid_.advance_by(static_cast<std::int64_t>(next_tick_ - grid_.tick()));
+        while (clock_.board_time(grid_.next()) < first) grid_.advance();
     }
     running_ = true;
-    uncounted_ = false;
     start_flags_ = flags;
     first_tick_ = grid_.tick();
+    plan();
+}
+
+void CameraChannel::stop() { running_ = false; }
+
+void CameraChannel::route(Nanoseconds at, bool clean) {
+    running_ = true;
+    uncounted_ = !clean;
+    routed_from_ = at;
+    routed_until_ = never;
+}
+
+void CameraChannel::unroute(Nanoseconds at, bool clean) {
+    running_ = false;
+    uncounted_ = uncounted_ || !clean;
+    routed_until_ = at;
 }
 
 void CameraChannel::announce(std::uint64_t trigger, Nanoseconds exposure) {
     const bool clipped = exposure > configuration_.max_exposure_ns;
     announcements_.add({trigger, clipped ? configuration_.max_exposure_ns : exposure, clipped});
+    plan();
 }
 
 Nanoseconds CameraChannel::expected_exposure() const {
@@ -58,42 +90,80 @@ Nanoseconds CameraChannel::expected_exposure() const {
     return announced != nullptr ? announced->exposure : expected_;
 }
 
-Nanoseconds CameraChannel::trigger_time() const {
-    return clock_.board_time(grid_.next()) - expected_exposure() / 2 - configuration_.latency_ns;
+/// Whatever the time of the next trigger depends on may have changed.
+void CameraChannel::plan() {
+    if (running_ && !is_slave())
+        trigger_at_ =
+            clock_.board_time(grid_.next()) - expected_exposure() / 2 - configuration_.latency_ns;
+}
+
+void CameraChannel::advance(std::int64_t ticks) {
+    grid_.advance_by(ticks);
+    next_tick_ = grid_.tick();
+    plan();
 }
 
 /// False for the gaps of the start pattern and of the slow start.
 bool CameraChannel::wanted(std::uint64_t tick) const {
     const std::uint64_t since_start = tick - first_tick_;
-    if ((start_flags_ & wire::start_slow) != 0) {
+    if ((start_flags_ & wire::start_slow) != 0)
         return since_start % wire::slow_start_ticks(configuration_.rate_uhz, camera_) == 0;
-    }
     if ((start_flags_ & wire::start_pattern) == 0 || since_start >= wire::start_pattern_length)
         return true;
     return (wire::start_pattern_bits[camera_] >> since_start & 1U) != 0;
 }
 
-void CameraChannel::decide(Nanoseconds now) {
-    const Nanoseconds at = trigger_time();
-    if (wanted(grid_.tick())) {
-        if (at < now - min(latest_trigger, period() / 16))
-            skip(wire::SkipReason::late, at);
-        else if (tracker_.busy_until(now) + configuration_.gap_ns > at ||
-                 pulse_end_ + OutputQueue::shortest_pause > at)
-            skip(wire::SkipReason::busy, at);
-        else if (tracker_.full() || !outputs_.has_room())
-            skip(wire::SkipReason::full, at);
-        else
-            send_trigger(at, now);
+/// How many of the next `ticks` are wanted, without a loop over them.
+std::int64_t CameraChannel::wanted_among(std::uint64_t since_start, std::int64_t ticks) const {
+    const std::uint64_t end = since_start + static_cast<std::uint64_t>(ticks);
+    if ((start_flags_ & wire::start_slow) != 0) {
+        const std::uint64_t interval = wire::slow_start_ticks(configuration_.rate_uhz, camera_);
+        const auto before = [interval](std::uint64_t tick) {
+            return (tick + interval - 1) / interval;
+        };
+        return static_cast<std::int64_t>(before(end) - before(since_start));
     }
-    grid_.advance();
-    next_tick_ = grid_.tick();
+    if ((start_flags_ & wire::start_pattern) == 0) return ticks;
+    std::int64_t gaps = 0;
+    for (std::uint64_t tick = since_start; tick < end && tick < wire::start_pattern_length; ++tick)
+        if ((wire::start_pattern_bits[camera_] >> tick & 1U) == 0) ++gaps;
+    return ticks - gaps;
 }
 
-void CameraChannel::skip(wire::SkipReason reason, Nanoseconds at) {
+void CameraChannel::decide(Nanoseconds now, Nanoseconds settled) {
+    const Nanoseconds late_by = now - min(latest_trigger, period() / 16) - trigger_at_;
+    if (late_by > 0) return skip_late(late_by);
+    if (wanted(grid_.tick())) {
+        if (tracker_.busy_until(settled) + configuration_.gap_ns > trigger_at_ ||
+            pulse_end_ + OutputQueue::shortest_pause > trigger_at_)
+            skip(wire::SkipReason::busy);
+        else if (tracker_.full() || !outputs_.has_room(camera_))
+            skip(wire::SkipReason::full);
+        else
+            send_trigger(now);
+    }
+    advance(1);
+}
+
+void CameraChannel::skip(wire::SkipReason reason) {
     ++skipped_;
-    reports_.event(wire::EventKind::trigger_skipped, camera_, at,
+    reports_.event(wire::EventKind::trigger_skipped, camera_, trigger_at_,
                    static_cast<std::int64_t>(grid_.tick()), static_cast<std::uint16_t>(reason));
+}
+
+/// The next trigger, and those after it that have passed as well.
+void CameraChannel::skip_late(Nanoseconds late_by) {
+    const std::int64_t ticks = min(late_by / period() + 1, most_told);
+    const std::int64_t skipped = wanted_among(grid_.tick() - first_tick_, ticks);
+    if (ticks == 1 && skipped == 1) {
+        skip(wire::SkipReason::late);
+    } else if (skipped > 0) {
+        skipped_ += static_cast<std::uint32_t>(skipped);
+        reports_.event(wire::EventKind::triggers_skipped, camera_, trigger_at_,
+                       static_cast<std::int64_t>(grid_.tick()),
+                       static_cast<std::uint16_t>(skipped));
+    }
+    advance(ticks);
 }
 
 std::uint16_t CameraChannel::phase_flags() const {
@@ -113,14 +183,16 @@ wire::Exposure CameraChannel::new_record(Nanoseconds at, std::uint64_t tick) {
     return record;
 }
 
-void CameraChannel::send_trigger(Nanoseconds at, Nanoseconds now) {
+void CameraChannel::send_trigger(Nanoseconds now) {
     const bool active = !trigger_inverted();
-    const Nanoseconds sent = outputs_.pulse(max(at, now), camera_, active, configuration_.pulse_ns);
+    const Nanoseconds wanted_at = trigger_at_;
+    const Nanoseconds sent =
+        outputs_.pulse(max(wanted_at, now), camera_, active, configuration_.pulse_ns);
     pulse_end_ = sent + configuration_.pulse_ns;
     const Nanoseconds exposure = expected_exposure();
     wire::Exposure record = new_record(sent, grid_.tick());
     record.flags = phase_flags();
-    if (sent > at) record.flags |= wire::exposure_late;
+    if (outputs_.is_late(wanted_at, sent)) record.flags |= wire::exposure_late;
     if (const Announcement* announced = announcements_.find(trigger_)) {
         record.flags |= wire::exposure_announced;
         if (announced->clipped) record.flags |= wire::exposure_clipped;
@@ -132,17 +204,18 @@ void CameraChannel::send_trigger(Nanoseconds at, Nanoseconds now) {
     reports_.exposure_planned(camera_, sent + configuration_.latency_ns, exposure);
 }
 
-void CameraChannel::edge(Nanoseconds at, bool level) {
+void CameraChannel::exposure_edge(Nanoseconds at, bool exposing) {
     if (!has_strobe()) return;  // no exposure line is wired
-    const ExposureTracker::Completed completed = tracker_.edge(at, exposing(level));
+    const ExposureTracker::Completed completed = tracker_.edge(at, exposing);
     // An exposure from before an announcement says nothing about those after it.
-    if (completed.trigger != 0 && completed.trigger >= expected_since_)
-        expected_ = min(completed.duration, configuration_.max_exposure_ns);
+    if (completed.trigger == 0 || completed.trigger < expected_since_) return;
+    expected_ = min(completed.duration, configuration_.max_exposure_ns);
+    plan();
 }
 
 void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tick) {
     const bool own_strobe = has_strobe();
-    if (exposing && running_) {
+    if (exposing && at >= routed_from_ && at < routed_until_) {
         if (tracker_.full()) tracker_.give_up();
         wire::Exposure record = new_record(at, tick);
         if (!own_strobe) record.flags |= wire::exposure_from_master;
@@ -152,14 +225,23 @@ void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tic
     if (!own_strobe && !tracker_.empty()) tracker_.edge(at, exposing);
 }
 
-void CameraChannel::poll(Nanoseconds now) {
-    tracker_.expire(now);
-    if (is_slave()) return;
-    while (running_ && decision_time() <= now) decide(now);
+void CameraChannel::edges_lost() {
+    filter_.edges_lost();
+    tracker_.edges_lost();
+    if (is_slave() && running_) uncounted_ = true;
 }
 
-Nanoseconds CameraChannel::next_wake() const {
-    return min(running_ && !is_slave() ? decision_time() : never, tracker_.next_deadline());
+void CameraChannel::poll(Nanoseconds now, Nanoseconds settled) {
+    // A pulse that has not left yet causes no exposure.
+    if (!outputs_.is_overdue(camera_, settled)) tracker_.expire(settled);
+    for (unsigned i = 0; i < decisions_a_poll; ++i)
+        if (running_ && !is_slave() && decision_time() <= now) decide(now, settled);
+}
+
+Nanoseconds CameraChannel::next_wake(Nanoseconds lag) const {
+    Nanoseconds wake = min(tracker_.next_deadline(), filter_.next_wake());
+    if (wake != never) wake += lag;
+    return running_ && !is_slave() ? min(decision_time(), wake) : wake;
 }
 
 }  // namespace versavis::firmware

@@ -5,6 +5,7 @@
 
 #include "announcements.hpp"
 #include "exposure_tracker.hpp"
+#include "glitch_filter.hpp"
 #include "grid.hpp"
 #include "grid_clock.hpp"
 #include "output_queue.hpp"
@@ -30,7 +31,13 @@ class CameraChannel {
     void start(Nanoseconds now, std::uint8_t flags);
 
     /// Pulses that were already decided are still sent and recorded.
-    void stop() { running_ = false; }
+    void stop();
+
+    /// A slave: pulses of its master are passed on from `at`; until `at`, no longer. Not `clean`:
+    /// one may be cut.
+    void route(Nanoseconds at, bool clean);
+    void unroute(Nanoseconds at, bool clean);
+
     bool running() const { return running_; }
     bool slow() const { return running_ && (start_flags_ & wire::start_slow) != 0; }
     bool is_slave() const { return enabled() && has(wire::camera_slave); }
@@ -41,27 +48,40 @@ class CameraChannel {
 
     /// Restarts the grid, its ticks from 0; only while the camera is not running.
     void grid_began() { next_tick_ = 0; }
+    /// The clock of the grid changed.
+    void grid_moved() { plan(); }
 
     /// From `trigger` on, exposures are expected to last `exposure`, until others are measured.
     void announce(std::uint64_t trigger, Nanoseconds exposure);
 
-    /// Takes an edge of the exposure line; edges come in order.
-    void edge(Nanoseconds at, bool level);
-
-    /// The exposure line of this slave's master changed; `tick` is that of the master.
+    /// An edge of the exposure line; edges come in order.
+    void edge(Nanoseconds at, bool level) { filter_.edge(at, exposing(level)); }
+    /// True, for each edge that counts, once all before `settled` are known.
+    bool take_edge(Nanoseconds settled, Nanoseconds& at, bool& exposing) {
+        return filter_.take(settled, at, exposing);
+    }
+    /// An edge waits for whether it counts.
+    bool is_bouncing() const { return filter_.next_wake() != never; }
+    /// Before this instant no more edge will count.
+    Nanoseconds settled(Nanoseconds settled) const { return filter_.settled(settled); }
+    /// The exposure line of this camera changed, or that of this slave's master: `tick` is that of
+    /// the master.
+    void exposure_edge(Nanoseconds at, bool exposing);
     void master_edge(Nanoseconds at, bool exposing, std::uint64_t tick);
 
-    void edges_lost() {
-        tracker_.edges_lost();
-        uncounted_ = is_slave() && running_;
+    void edges_lost();
+    /// The trigger due at `asked` left at `left`.
+    void moved(Nanoseconds asked, Nanoseconds left, bool late) {
+        tracker_.moved(asked, left, late);
     }
-    void left_late(Nanoseconds asked, Nanoseconds left) { tracker_.left_late(asked, left); }
 
-    /// Decides the triggers that are due and gives up on exposures that did not happen.
-    void poll(Nanoseconds now);
+    /// Decides the triggers that are due and gives up on exposures that did not happen. The edges
+    /// that count before `settled` are known. At most `decisions_a_poll` triggers are decided at
+    /// once.
+    void poll(Nanoseconds now, Nanoseconds settled);
 
-    /// When poll() has something to do next.
-    Nanoseconds next_wake() const;
+    /// When poll() has something to do next; it learns of edges `lag` after they came.
+    Nanoseconds next_wake(Nanoseconds lag) const;
 
     bool enabled() const { return has(wire::camera_enabled); }
     bool exposing(bool level) const { return level != has(wire::camera_strobe_inverted); }
@@ -71,16 +91,23 @@ class CameraChannel {
     bool trigger_inverted() const { return has(wire::camera_trigger_inverted); }
     std::uint64_t tick_at(Nanoseconds at) const { return tracker_.tick_at(at); }
     std::uint32_t skipped() const { return skipped_; }
+    std::uint32_t take_glitches() { return filter_.take_left_out(); }
 
  private:
+    /// At half, a start pattern at 1 kHz takes more polls; at twice, a poll takes longer.
+    static constexpr unsigned decisions_a_poll = 2;
+
     Nanoseconds period() const { return grid_.period(); }
-    Nanoseconds decision_time() const { return trigger_time() - OutputQueue::horizon - lead_; }
+    Nanoseconds decision_time() const { return trigger_at_ - OutputQueue::horizon - lead_; }
     Nanoseconds expected_exposure() const;
-    Nanoseconds trigger_time() const;
+    void plan();
+    void advance(std::int64_t ticks);
     bool wanted(std::uint64_t tick) const;
-    void decide(Nanoseconds now);
-    void skip(wire::SkipReason reason, Nanoseconds at);
-    void send_trigger(Nanoseconds at, Nanoseconds now);
+    std::int64_t wanted_among(std::uint64_t since_start, std::int64_t ticks) const;
+    void decide(Nanoseconds now, Nanoseconds settled);
+    void skip(wire::SkipReason reason);
+    void skip_late(Nanoseconds late_by);
+    void send_trigger(Nanoseconds now);
     std::uint16_t phase_flags() const;
     wire::Exposure new_record(Nanoseconds at, std::uint64_t tick);
     bool has(wire::CameraFlag flag) const { return (configuration_.flags & flag) != 0; }
@@ -90,8 +117,10 @@ class CameraChannel {
     OutputQueue& outputs_;
     ChannelReports& reports_;
     ExposureTracker tracker_;
+    GlitchFilter filter_;
     wire::CameraConfiguration configuration_{};
-    Grid grid_;  ///< in grid time
+    Grid grid_;                   ///< in grid time
+    Nanoseconds trigger_at_ = 0;  ///< of the next grid point, as things are
     bool running_ = false;
     bool uncounted_ = false;  ///< pulses of this slave may have been missed
     std::uint8_t start_flags_ = 0;
@@ -99,6 +128,8 @@ class CameraChannel {
     std::uint64_t first_tick_ = 0;           ///< of this run, where the pattern begins
     std::uint64_t next_tick_ = 0;            ///< the first not decided yet
     Nanoseconds pulse_end_ = INT64_MIN / 2;  ///< of the newest pulse
+    Nanoseconds routed_from_ = never;        ///< of a slave: it gets the pulses between these
+    Nanoseconds routed_until_ = never;
     Nanoseconds lead_ = 0;
     Nanoseconds expected_ = 0;
     std::uint64_t expected_since_ = 0;  ///< trigger that set `expected_`

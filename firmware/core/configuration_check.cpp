@@ -12,6 +12,7 @@ using Field = wire::ConfigurationField;
 using Part = wire::ConfigurationPart;
 
 constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
+constexpr std::int64_t mhz_ns = 1'000'000'000'000;
 constexpr std::int64_t longest_exposure = 10'000'000'000;
 constexpr std::int64_t longest_pulse = 10'000'000;
 
@@ -20,8 +21,8 @@ std::int64_t min(std::int64_t a, std::int64_t b) { return a < b ? a : b; }
 /// One part of the configuration.
 class Checker {
  public:
-    Checker(Part part, std::size_t index, RefusalSink& sink)
-        : part_(part), index_(static_cast<std::uint8_t>(index)), sink_(sink) {}
+    Checker(Part part, std::size_t index, const PortFacts& facts, RefusalSink& sink)
+        : part_(part), index_(static_cast<std::uint8_t>(index)), facts_(facts), sink_(sink) {}
 
     void range(Field field, std::int64_t value, std::int64_t minimum, std::int64_t maximum) {
         if (value >= minimum && value <= maximum) return;
@@ -35,11 +36,27 @@ class Checker {
         sink_.refuse(refusal);
     }
 
+    /// Refuses what is `used` of the board and is not there; `bit` of wire::Present.
+    void need(bool used, unsigned bit) {
+        if (used && (facts_.present >> bit & 1U) == 0)
+            range(Field::present, static_cast<std::int64_t>(bit), 0, -1);
+    }
+
+    const PortFacts& facts() const { return facts_; }
+
  private:
     Part part_;
     std::uint8_t index_;
+    const PortFacts& facts_;
     RefusalSink& sink_;
 };
+
+/// Position of the only bit of `present`.
+constexpr unsigned bit_of(std::uint32_t present) {
+    unsigned bit = 0;
+    while (present >> bit != 1U) ++bit;
+    return bit;
+}
 
 bool enabled(const wire::CameraConfiguration& camera) {
     return (camera.flags & wire::camera_enabled) != 0;
@@ -69,9 +86,9 @@ void check_master(const wire::Configuration& configuration, std::size_t index, C
                   possible);
 }
 
-void check_camera(const wire::Configuration& configuration, std::size_t index, RefusalSink& sink) {
+void check_camera(const wire::Configuration& configuration, std::size_t index, Checker checker) {
     const wire::CameraConfiguration& camera = configuration.cameras[index];
-    Checker checker(Part::camera, index, sink);
+    checker.need(true, bit_of(wire::present_camera0) + static_cast<unsigned>(index));
     const std::int64_t period = camera.rate_uhz == 0 ? INT64_MAX : uhz_ns / camera.rate_uhz;
     checker.range(Field::rate, camera.rate_uhz, 100'000, 1'000'000'000);
     checker.range(Field::phase, camera.phase_ns, 0, period - 1);
@@ -83,35 +100,78 @@ void check_camera(const wire::Configuration& configuration, std::size_t index, R
     check_master(configuration, index, checker);
 }
 
-void check_imu(const wire::ImuConfiguration& imu, std::size_t port, RefusalSink& sink) {
-    if (imu.kind == wire::ImuKind::none) return;
-    Checker checker(Part::imu, port, sink);
-    if (port == 1) {
-        const auto only = static_cast<std::int64_t>(wire::ImuKind::vn100);
-        checker.range(Field::imu_kind, static_cast<std::int64_t>(imu.kind), only, only);
-        checker.range(Field::imu_rate, imu.rate_millihertz, 1'000, vn100::fastest_millihertz);
-        checker.range(Field::imu_filter, imu.filter, 0, 0);
-        return;
-    }
+void check_uart_imu(const wire::ImuConfiguration& imu, Checker checker) {
+    const auto only = static_cast<std::int64_t>(wire::ImuKind::vn100);
+    const bool data_ready = (imu.options & wire::imu_data_ready) != 0;
+    checker.need(true, bit_of(wire::present_uart));
+    checker.need(data_ready, bit_of(wire::present_ready0) + 1);
+    checker.range(Field::imu_kind, static_cast<std::int64_t>(imu.kind), only, only);
+    checker.range(Field::imu_rate, imu.rate_millihertz, 1'000,
+                  min(vn100::fastest_millihertz, checker.facts().fastest_imu_millihertz));
+    checker.range(Field::imu_filter, imu.filter, 0, 0);
+    checker.range(Field::imu_options, imu.options, 0, wire::imu_data_ready);
+}
+
+/// The options that a part can have, as far as the others allow them.
+std::uint8_t possible_options(const ImuPart& part, std::uint8_t options) {
+    unsigned possible = wire::imu_data_ready;
+    if ((options & wire::imu_data_ready) != 0 && part.accel_millihertz() != 0)
+        possible |= wire::imu_accel_ready;
+    // A reading takes so long there that it must begin with the data.
+    if ((options & wire::imu_data_ready) != 0 && part.fastest_i2c_millihertz() != 0)
+        possible |= wire::imu_i2c;
+    if ((possible & options & wire::imu_i2c) != 0) possible |= wire::imu_i2c_second;
+    return static_cast<std::uint8_t>(possible);
+}
+
+void check_spi_imu(const wire::ImuConfiguration& imu, Checker checker) {
     const ImuPart* part = find_part(imu.kind);
     if (part == nullptr)
         return checker.range(Field::imu_kind, static_cast<std::int64_t>(imu.kind), 1,
                              static_cast<std::int64_t>(wire::ImuKind::bmi088));
+    const std::uint8_t possible = possible_options(*part, imu.options);
+    if ((imu.options & ~possible) != 0)
+        return checker.range(Field::imu_options, imu.options, 0, possible & imu.options);
     const bool data_ready = (imu.options & wire::imu_data_ready) != 0;
-    const std::int64_t fastest = part->fastest_millihertz();
+    const bool i2c = (imu.options & wire::imu_i2c) != 0;
+    checker.need(true, bit_of(i2c ? wire::present_i2c : wire::present_spi));
+    checker.need(data_ready, bit_of(wire::present_ready0));
+    checker.need((imu.options & wire::imu_accel_ready) != 0, bit_of(wire::present_accel_ready));
+    const std::int64_t fastest =
+        min(i2c ? part->fastest_i2c_millihertz() : part->fastest_millihertz(),
+            checker.facts().fastest_imu_millihertz);
     checker.range(Field::imu_rate, imu.rate_millihertz, 1'000,
                   data_ready ? fastest : min(fastest, 1'000'000));
     checker.range(Field::imu_filter, imu.filter, 0, part->strongest_filter());
 }
 
-void check_illumination(const wire::IlluminationConfiguration& light, RefusalSink& sink) {
+void check_illumination(const wire::IlluminationConfiguration& light, Checker checker) {
     if (light.cameras == 0) return;
-    Checker checker(Part::illumination, 0, sink);
+    checker.need(true, bit_of(wire::present_light));
     checker.range(Field::cameras, light.cameras, 1, (1 << wire::camera_count) - 1);
     checker.range(Field::lead, light.lead_ns, 0, 1'000'000);
     checker.range(Field::max_on, light.max_on_ns, 10'000 + std::int64_t{light.lead_ns},
                   1'000'000'000);
     checker.range(Field::duty, light.duty_ppm, 1, 1'000'000);
+}
+
+/// Where pulses at a rate of their own leave, and how fast.
+void check_test_rate(const wire::Configuration& configuration, Checker& checker) {
+    const wire::PortConfiguration& ports = configuration.ports;
+    checker.range(Field::test_rate, ports.test_rate_millihertz, 100, 10'000'000);
+    checker.range(Field::test_output, ports.test_output, 0, wire::test_at_sync);
+    if (ports.test_output == wire::test_at_test)
+        return checker.need(true, bit_of(wire::present_test_output));
+    if (ports.test_output == wire::test_at_sync) {
+        checker.need(true, bit_of(wire::present_sync_output));
+        checker.range(Field::test_output, ports.test_output, 0,
+                      ports.sync_rate_uhz == 0 ? wire::test_at_sync : wire::test_at_sync - 1);
+    } else if (ports.test_output < wire::test_at_sync) {
+        const unsigned camera = ports.test_output - wire::test_at_camera0;
+        checker.need(true, bit_of(wire::present_camera0) + camera);
+        if (enabled(configuration.cameras[camera]))  // it uses the output
+            checker.range(Field::test_output, ports.test_output, 0, 0);
+    }
 }
 
 /// What the test output can show, and how wide its pulses may be.
@@ -120,33 +180,44 @@ void check_test(const wire::Configuration& configuration, Checker& checker) {
     const wire::ImuConfiguration& uart_imu = configuration.imus[1];
     const bool uart_ticks =
         (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows its ticks
+    if (ports.test == wire::test_none) return;
     const int last = wire::test_imu0 + (uart_ticks ? 1 : 0);
-    checker.range(Field::test, ports.test, 0, last);
-    if (ports.test == wire::test_none || ports.test > last) return;
     std::int64_t period = longest_pulse * 2;
-    if (ports.test >= wire::test_imu0) {
+    if (ports.test == wire::test_rate) {
+        check_test_rate(configuration, checker);
+        if (ports.test_rate_millihertz != 0) period = mhz_ns / ports.test_rate_millihertz;
+    } else if (ports.test > last) {
+        return checker.range(Field::test, ports.test, 0, last);
+    } else if (ports.test >= wire::test_imu0) {
+        checker.need(true, bit_of(wire::present_test_output));
         const std::uint32_t rate = configuration.imus[ports.test - wire::test_imu0].rate_millihertz;
-        if (rate != 0) period = 1'000'000'000'000 / rate;
+        if (rate != 0) period = mhz_ns / rate;
     } else {
+        checker.need(true, bit_of(wire::present_test_output));
         const std::uint32_t rate = configuration.cameras[ports.test - wire::test_camera0].rate_uhz;
         if (rate != 0) period = uhz_ns / rate;
     }
     checker.range(Field::pulse, ports.pulse_ns, 1'000, min(longest_pulse, period / 2));
 }
 
-void check_ports(const wire::Configuration& configuration, RefusalSink& sink) {
+void check_ports(const wire::Configuration& configuration, Checker checker) {
     const wire::PortConfiguration& ports = configuration.ports;
-    Checker checker(Part::ports, 0, sink);
     checker.range(Field::inputs, ports.inputs, 0, (1 << wire::pulse_input_count) - 1);
+    for (unsigned input = 0; input < wire::pulse_input_count; ++input)
+        checker.need((ports.inputs >> input & 1U) != 0, bit_of(wire::present_pulse0) + input);
     check_test(configuration, checker);
     if (ports.sync_rate_uhz != 0) {
+        checker.need(true, bit_of(wire::present_sync_output));
         checker.range(Field::sync_rate, ports.sync_rate_uhz, 100'000, 10'000'000);
         checker.range(Field::pulse, ports.pulse_ns, 1'000, longest_pulse);
     }
-    if ((ports.options & wire::port_imu_output) != 0 &&
-        configuration.imus[0].kind == wire::ImuKind::none)
-        checker.range(Field::port_options, ports.options, 0, 0);
+    if ((ports.options & wire::port_imu_output) != 0) {
+        checker.need(true, bit_of(wire::present_imu_output));
+        if (configuration.imus[0].kind == wire::ImuKind::none)
+            checker.range(Field::port_options, ports.options, 0, 0);
+    }
     if ((ports.options & wire::port_nmea) == 0) return;
+    checker.need(true, bit_of(wire::present_uart));
     if (configuration.imus[1].kind != wire::ImuKind::none)  // it occupies the UART
         checker.range(Field::port_options, ports.options, 0, wire::port_imu_output);
     if (ports.nmea_baud != 0) checker.range(Field::nmea_baud, ports.nmea_baud, 1'200, 921'600);
@@ -154,12 +225,21 @@ void check_ports(const wire::Configuration& configuration, RefusalSink& sink) {
 
 }  // namespace
 
-void check(const wire::Configuration& configuration, RefusalSink& sink) {
+void check(const wire::Configuration& configuration, const PortFacts& facts, RefusalSink& sink) {
+    const auto checker = [&](Part part, std::size_t index) {
+        return Checker(part, index, facts, sink);
+    };
     for (std::size_t i = 0; i < wire::camera_count; ++i)
-        if (enabled(configuration.cameras[i])) check_camera(configuration, i, sink);
-    for (std::size_t i = 0; i < wire::imu_count; ++i) check_imu(configuration.imus[i], i, sink);
-    check_illumination(configuration.illumination, sink);
-    check_ports(configuration, sink);
+        if (enabled(configuration.cameras[i]))
+            check_camera(configuration, i, checker(Part::camera, i));
+    if (configuration.imus[0].kind != wire::ImuKind::none)
+        check_spi_imu(configuration.imus[0], checker(Part::imu, 0));
+    if (configuration.imus[1].kind != wire::ImuKind::none)
+        check_uart_imu(configuration.imus[1], checker(Part::imu, 1));
+    check_illumination(configuration.illumination, checker(Part::illumination, 0));
+    check_ports(configuration, checker(Part::ports, 0));
+    checker(Part::ports, 0)
+        .need((configuration.flags & wire::configuration_store) != 0, bit_of(wire::present_memory));
 }
 
 }  // namespace versavis::firmware

@@ -2,6 +2,7 @@
 // Checks a configuration from the host against what the board can do.
 #pragma once
 
+#include "hal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {
@@ -14,6 +15,7 @@ struct RefusalSink {
     ~RefusalSink() = default;
 };
 
-void check(const wire::Configuration& configuration, RefusalSink& sink);
+/// `facts`: what the board has.
+void check(const wire::Configuration& configuration, const PortFacts& facts, RefusalSink& sink);
 
 }  // namespace versavis::firmware

@@ -21,11 +21,11 @@ void ExposureTracker::add(const wire::Exposure& record, Nanoseconds expected) {
     flights_[count_++] = {record, expected};
 }
 
-void ExposureTracker::left_late(Nanoseconds asked, Nanoseconds left) {
+void ExposureTracker::moved(Nanoseconds asked, Nanoseconds left, bool late) {
     for (std::size_t i = 0; i < count_; ++i) {
         if (flights_[i].record.trigger_ns != asked) continue;
         flights_[i].record.trigger_ns = left;
-        flights_[i].record.flags |= wire::exposure_late;
+        if (late) flights_[i].record.flags |= wire::exposure_late;
     }
 }
 
@@ -73,10 +73,10 @@ void ExposureTracker::edges_lost() {
     while (count_ > 0 && started(flights_[0])) finish_first(wire::exposure_no_end);
 }
 
-Nanoseconds ExposureTracker::busy_until(Nanoseconds now) const {
+Nanoseconds ExposureTracker::busy_until(Nanoseconds settled) const {
     if (count_ == 0) return last_end_;
     for (std::size_t i = 0; i < count_; ++i)  // overdue: it may last any length of time
-        if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < now)
+        if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < settled)
             return never / 2;
     const Flight& newest = flights_[count_ - 1];
     const Nanoseconds start = started(newest)
@@ -103,8 +103,8 @@ Nanoseconds ExposureTracker::next_deadline() const {
     return count_ == 0 ? never : deadline(flights_[0]);
 }
 
-void ExposureTracker::expire(Nanoseconds now) {
-    while (count_ > 0 && deadline(flights_[0]) <= now) {
+void ExposureTracker::expire(Nanoseconds settled) {
+    while (count_ > 0 && deadline(flights_[0]) <= settled) {
         if (has(wire::camera_no_strobe)) {
             predict_edges(flights_[0]);
             finish_first(wire::exposure_predicted);

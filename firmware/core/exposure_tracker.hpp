@@ -37,8 +37,8 @@ class ExposureTracker {
     /// A trigger that was sent, or is set to leave; times increase.
     void add(const wire::Exposure& record, Nanoseconds expected);
 
-    /// The word due at `asked` left later.
-    void left_late(Nanoseconds asked, Nanoseconds left);
+    /// The trigger due at `asked` left at `left`.
+    void moved(Nanoseconds asked, Nanoseconds left, bool late);
 
     /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure
     /// that it completed, with its duration; trigger 0: it completed none.
@@ -52,14 +52,15 @@ class ExposureTracker {
     /// seen.
     void edges_lost();
 
-    /// Gives up on what did not happen.
-    void expire(Nanoseconds now);
+    /// Gives up on what did not happen; all edges before `settled` were passed on.
+    void expire(Nanoseconds settled);
 
     /// Stops waiting for all of them.
     void give_up();
 
-    /// When the newest exposure will have ended, as far as is known now.
-    Nanoseconds busy_until(Nanoseconds now) const;
+    /// When the newest exposure will have ended, as far as is known; the edges before `settled`
+    /// are.
+    Nanoseconds busy_until(Nanoseconds settled) const;
 
     /// Grid point of the newest trigger before `at`; 0: there was none.
     std::uint64_t tick_at(Nanoseconds at) const;

@@ -13,7 +13,7 @@ namespace versavis::firmware {
 class Grid {
  public:
     Grid() = default;
-    Grid(Nanoseconds origin, std::uint32_t rate_uhz)
+    Grid(Nanoseconds origin, std::int64_t rate_uhz)
         : next_(origin),
           rate_uhz_(rate_uhz),
           whole_(ns_uhz / rate_uhz),
@@ -33,20 +33,26 @@ class Grid {
         }
     }
 
+    /// advance(), `ticks` times.
+    void advance_by(std::int64_t ticks) {
+        for (; ticks > most_at_once; ticks -= most_at_once) advance_by(most_at_once);
+        const std::int64_t carried = carry_ + ticks * remainder_;
+        const std::int64_t whole = carried / rate_uhz_;
+        tick_ += static_cast<std::uint64_t>(ticks);
+        next_ += ticks * whole_ + whole;
+        carry_ = carried - whole * rate_uhz_;
+    }
+
     /// Moves to a tick shortly before `at` in a few steps, however long ago the origin was.
     void skip_before(Nanoseconds at) {
-        while (at - next_ > 2 * (whole_ + 1)) {
-            std::int64_t ticks = (at - next_) / (whole_ + 1);
-            if (ticks > 1'000'000'000) ticks = 1'000'000'000;
-            const std::int64_t carried = carry_ + ticks * remainder_;
-            tick_ += static_cast<std::uint64_t>(ticks);
-            next_ += ticks * whole_ + carried / rate_uhz_;
-            carry_ = carried % rate_uhz_;
-        }
+        while (at - next_ > 2 * (whole_ + 1)) advance_by((at - next_) / (whole_ + 1));
     }
 
  private:
     static constexpr std::int64_t ns_uhz = 1'000'000'000'000'000;
+    /// So that it times a remainder of up to 10^10 stays within 64 bits. At half, a step is made
+    /// twice; ten times as much would overflow.
+    static constexpr std::int64_t most_at_once = 400'000'000;
 
     Nanoseconds next_ = 0;
     std::uint64_t tick_ = 0;

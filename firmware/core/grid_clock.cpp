@@ -6,10 +6,26 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds billion = 1'000'000'000;
-constexpr std::int64_t largest_pace = 2000;  // 1 / 2000: no crystals differ by more than 500 ppm
 
-constexpr std::int64_t largest_change = 20'000;  // 50 ppm: of two crystals that warm up
-constexpr Nanoseconds longest_first_gap = 4;     // in periods, before the pace is known
+/// One part in this many (500 ppm): no two crystals differ by more. At half, false pulses pass more
+/// easily; at twice, bad crystals are never followed.
+constexpr std::int64_t largest_pace = 2'000;
+
+/// One part in this many (50 ppm), of two crystals that warm up. At half, false pulses pass more
+/// easily; at twice, a gap in the pulses loses the sender sooner.
+constexpr std::int64_t largest_change = 20'000;
+
+/// In periods, before the pace is known. At half, a lost first pulse is not forgiven; at twice, the
+/// tolerance is that much wider.
+constexpr Nanoseconds longest_first_gap = 4;
+
+/// The grid goes to a sender that began anew by 1000 ppm. At half, it takes twice as long; at
+/// twice, a line cannot hold it.
+constexpr std::int64_t sync_slew_ppb = 1'000'000;
+
+/// In periods. At half, a few lost pulses are told as the loss of the sender; at twice, it is told
+/// late.
+constexpr Nanoseconds longest_silence = 10;
 
 /// Whole seconds, to the nearest.
 Nanoseconds nearest_second(Nanoseconds at) {
@@ -21,38 +37,84 @@ Nanoseconds nearest_second(Nanoseconds at) {
 }  // namespace
 
 GridLine::GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb)
-    : board_(board), grid_(grid) {
+    : board_(board), grid_(grid), pace_ppb_(pace_ppb) {
     const std::int64_t scaled = pace_ppb * (std::int64_t{1} << 40);
     pace_ = (scaled + (scaled < 0 ? -billion : billion) / 2) / billion;
 }
 
-bool GridClock::sync_pulse(Nanoseconds at) {
-    if (period_ == 0) return false;
+GridClock::SyncPulse GridClock::sync_pulse(Nanoseconds at, bool running) {
+    if (period_ == 0) return {};
     const Nanoseconds since = at - line_.board();
     const Nanoseconds periods = (since + period_ / 2) / period_;
-    if (periods <= 0) return false;
     const Nanoseconds nominal = periods * period_;
     // Pulses may be missing. Once the pace is known, it predicts the next one after any gap.
-    const Nanoseconds off = at - board_time(line_.grid() + nominal);
+    const Nanoseconds off = at - line_.board_time(line_.grid() + nominal);
     Nanoseconds tolerance = (periods > longest_first_gap ? period_ : nominal) / largest_pace;
     if (pace_known_) tolerance = period_ / largest_change;
-    if (off > tolerance || -off > tolerance) return false;
-    line_ = GridLine(at, line_.grid() + nominal, (since - nominal) * 1'000'000 / (nominal / 1000));
-    pace_known_ = true;
-    return true;
+    if (periods <= 0 || off > tolerance || -off > tolerance) return take_rival(at, off, running);
+    const GridLine line(at, line_.grid() + nominal,
+                        (since - nominal) * 1'000'000 / (nominal / 1000));
+    const bool approaches = bend_ != no_bend && grid_time(at) < bend_;
+    if (approaches)
+        steer(line, sync_slew_ppb, at);
+    else
+        line_ = line;
+    pace_known_ = fits_ = true;
+    newest_pulse_ = at;
+    rival_.clear();
+    return {Sync::followed, off};
+}
+
+GridClock::SyncPulse GridClock::take_rival(Nanoseconds at, Nanoseconds off, bool running) {
+    if (!rival_.add(at, period_, largest_pace)) {
+        const bool first = fits_;
+        fits_ = false;
+        return {first ? Sync::lost : Sync::ignored, off};
+    }
+    // Its pulses lie on the multiples of its period that are nearest.
+    const Nanoseconds nominal = rival_.periods() * period_;
+    const std::int64_t pace = (at - rival_.first() - nominal) * 1'000'000 / (nominal / 1000);
+    const Nanoseconds half_later = grid_time(at) + period_ / 2;
+    const Nanoseconds past = half_later % period_;
+    const Nanoseconds nearest = half_later - (past < 0 ? past + period_ : past);
+    const Nanoseconds moves = at - board_time(nearest);
+    const GridLine line(at, nearest, pace);
+    if (running) {
+        steer(line, sync_slew_ppb, at);
+    } else {
+        line_ = line;
+        bend_ = no_bend;
+    }
+    pace_known_ = fits_ = true;
+    newest_pulse_ = at;
+    rival_.clear();
+    return {Sync::taken, moves};
+}
+
+wire::SyncState GridClock::sync_state(Nanoseconds now) const {
+    if (period_ == 0) return wire::SyncState::none;
+    const bool silent = now - newest_pulse_ > longest_silence * period_;
+    return silent || !fits_ ? wire::SyncState::lost : wire::SyncState::followed;
+}
+
+/// From `now` on the grid goes to `target`, at no more than `max_slew_ppb` beyond its pace. What is
+/// already under way keeps its time: the new line starts where the old one is now.
+void GridClock::steer(const GridLine& target, std::int64_t max_slew_ppb, Nanoseconds now) {
+    const Nanoseconds grid = grid_time(now);
+    const Nanoseconds board = board_time(grid);
+    const Nanoseconds offset = target.board_time(grid) - board;
+    const std::int64_t slew = offset < 0 ? -max_slew_ppb : max_slew_ppb;
+    approach_ = GridLine(board, grid, target.pace_ppb() + slew);
+    line_ = target;
+    bend_ = grid + offset * billion / slew;
 }
 
 void GridClock::align(Nanoseconds second, std::int32_t pace_ppb, std::uint32_t max_slew_ppb,
                       Nanoseconds now) {
-    // What is already under way keeps its time: the new line starts where the old one is now.
     const Nanoseconds grid = grid_time(now);
     const GridLine unmoved(board_time(grid), grid, pace_ppb);
     const Nanoseconds whole = nearest_second(unmoved.grid_time(second));
-    const Nanoseconds offset = second - unmoved.board_time(whole);
-    const std::int64_t slew = offset < 0 ? -std::int64_t{max_slew_ppb} : std::int64_t{max_slew_ppb};
-    approach_ = GridLine(unmoved.board(), grid, pace_ppb + slew);
-    line_ = GridLine(second, whole, pace_ppb);
-    bend_ = grid + offset * billion / slew;
+    steer(GridLine(second, whole, pace_ppb), max_slew_ppb, now);
     period_ = 0;
 }
 

@@ -4,6 +4,8 @@
 #pragma once
 
 #include "hal.hpp"
+#include "pulse_rival.hpp"
+#include "wire/messages.hpp"
 
 namespace versavis::firmware {
 
@@ -14,6 +16,8 @@ class GridLine {
     GridLine() = default;
     /// Board time passes faster than grid time by `pace_ppb`: at most 1900 ppm either way.
     GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb);
+
+    std::int64_t pace_ppb() const { return pace_ppb_; }
 
     Nanoseconds board() const { return board_; }
     Nanoseconds grid() const { return grid_; }
@@ -43,12 +47,14 @@ class GridLine {
 
     Nanoseconds board_ = 0;
     Nanoseconds grid_ = 0;
+    std::int64_t pace_ppb_ = 0;
     std::int64_t pace_ = 0;  ///< parts of 2^40
 };
 
 /// Grid time counts from the origin. By itself it runs like board time. While sync pulses arrive,
 /// it runs like the clock of the board that sends them: between two pulses at the pace of the two
-/// before. When aligned, it runs at the pace that the host gives and approaches the host's whole
+/// before. Pulses that do not fit are ignored, until they fit each other: then it slews to them.
+/// When aligned, it runs at the pace that the host gives and approaches the host's whole
 /// seconds without a step.
 class GridClock {
  public:
@@ -58,6 +64,7 @@ class GridClock {
         *this = {};
         line_ = GridLine(origin, 0, 0);
         period_ = sync_period;
+        newest_pulse_ = origin;
     }
 
     Nanoseconds board_time(Nanoseconds grid_time) const {
@@ -70,8 +77,21 @@ class GridClock {
         return (approaches ? approach_ : line_).grid_time(board_time);
     }
 
-    /// False: the pulse is not from the sender, and is ignored.
-    bool sync_pulse(Nanoseconds at);
+    enum class Sync : std::uint8_t {
+        ignored,   ///< no sender is followed, or the pulse is one more that does not fit
+        followed,  ///< it fits
+        lost,      ///< it is the first that does not fit
+        taken,     ///< the grid goes to it, and to those that will fit it
+    };
+    struct SyncPulse {
+        Sync what = Sync::ignored;
+        Nanoseconds off = 0;  ///< from where it was expected to where it came
+    };
+    /// `running`: cameras run, and the grid must not step.
+    SyncPulse sync_pulse(Nanoseconds at, bool running);
+
+    /// lost, too: no pulse came for a while.
+    wire::SyncState sync_state(Nanoseconds now) const;
 
     /// A whole second of grid time belongs at `second`, and from there on board time passes faster
     /// by `pace_ppb`. From `now` on the nearest whole second is moved there, at no more than
@@ -88,11 +108,17 @@ class GridClock {
  private:
     static constexpr Nanoseconds no_bend = INT64_MIN;
 
+    void steer(const GridLine& target, std::int64_t max_slew_ppb, Nanoseconds now);
+    SyncPulse take_rival(Nanoseconds at, Nanoseconds off, bool running);
+
     Nanoseconds period_ = 0;
     GridLine line_;      ///< from the newest pulse, or towards the second given by the host
     GridLine approach_;  ///< until line_ is reached
     Nanoseconds bend_ = no_bend;  ///< grid time from which on line_ holds
     bool pace_known_ = false;
+    bool fits_ = true;              ///< the newest sync pulse did
+    Nanoseconds newest_pulse_ = 0;  ///< of those that fit
+    PulseRival rival_;
 };
 
 }  // namespace versavis::firmware

@@ -31,6 +31,7 @@ void Illumination::configure(const wire::IlluminationConfiguration& configuratio
 void Illumination::stop(Nanoseconds now) {
     plan_count_ = 0;
     exposing_ = 0;
+    over_ = false;
     outputs_.rest(output_light_lead, false, now);
     close_gate(now);
 }
@@ -51,7 +52,6 @@ Nanoseconds Illumination::budget(Nanoseconds at) const {
 void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration,
                         bool has_strobe, Nanoseconds now) {
     if (!lights(camera)) return;
-    forget_past(now);
     if (plan_count_ == max_plans)
         return reports_.event(wire::EventKind::illumination_limited, camera, start, duration);
     const Nanoseconds on = start - configuration_.lead_ns;
@@ -65,7 +65,8 @@ void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds dura
 
 /// The union of the leads of all plans; there is no edge where they overlap.
 void Illumination::set_leads(Nanoseconds now) {
-    outputs_.cancel(output_light_lead);
+    const bool on_now = outputs_.cancel(output_light_lead);
+    if (on_now && plans_[0].on > now) outputs_.set(now, output_light_lead, false);
     for (std::size_t i = 0; i < plan_count_;) {
         const Nanoseconds on = plans_[i].on;
         Nanoseconds off = plans_[i].lead_off;
@@ -75,36 +76,36 @@ void Illumination::set_leads(Nanoseconds now) {
     }
 }
 
-void Illumination::edge(std::uint8_t camera, bool exposing, Nanoseconds now) {
+void Illumination::edge(std::uint8_t camera, bool exposing) {
     if (!lights(camera)) return;
     const std::uint8_t bit = static_cast<std::uint8_t>(1U << camera);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
-    if (exposing_ != 0 || !open() || now < gate_on_) return;
-    forget_past(now);
-    // While another lead is on, the gate stays open; poll() closes it.
-    for (std::size_t i = 0; i < plan_count_; ++i)
-        if (plans_[i].on <= now) return;
-    close_gate(now);
-    open_next(now);
+    over_ = exposing_ == 0;
 }
 
-void Illumination::forget_past(Nanoseconds now) {
+/// Plans whose exposures may still come: an edge that is not known yet may begin one.
+void Illumination::forget_past(Nanoseconds settled) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < plan_count_; ++i)
-        if (plans_[i].lead_off > now) plans_[kept++] = plans_[i];
+        if (plans_[i].lead_off > settled) plans_[kept++] = plans_[i];
     plan_count_ = kept;
 }
 
-void Illumination::open_next(Nanoseconds now) {
-    if (!open() && plan_count_ > 0) open_gate(max(max(plans_[0].on, dark_until_), now), now);
+bool Illumination::exposes_before(Nanoseconds at) const {
+    return plan_count_ > 0 && plans_[0].on <= at;
 }
 
-void Illumination::open_gate(Nanoseconds on, Nanoseconds now) {
+void Illumination::open_next(Nanoseconds now) {
+    if (!open() && plan_count_ > 0) open_gate(max(max(plans_[0].on, dark_until_), now));
+}
+
+void Illumination::open_gate(Nanoseconds on) {
     const Nanoseconds allowed = budget(on);
     if (allowed < shortest_light + configuration_.lead_ns) {
         reports_.event(wire::EventKind::illumination_limited, output_light_gate, on, 0);
-        plans_[0].lead_off = now;  // it stays dark
-        return forget_past(now);
+        --plan_count_;  // it stays dark
+        for (std::size_t i = 0; i < plan_count_; ++i) plans_[i] = plans_[i + 1];
+        return;
     }
     gate_on_ = outputs_.set(on, output_light_gate, true);
     gate_off_ = outputs_.set(gate_on_ + allowed, output_light_gate, false);
@@ -123,14 +124,17 @@ void Illumination::close_gate(Nanoseconds now) {
     gate_off_ = never;
 }
 
-void Illumination::edges_lost() { exposing_ = 0; }
-
-void Illumination::left_late(Nanoseconds asked, Nanoseconds left) {
-    if (asked == last_off_) saved_ -= min(left - asked, configuration_.max_on_ns);
+void Illumination::edges_lost() {
+    exposing_ = 0;
+    over_ = false;
 }
 
-void Illumination::poll(Nanoseconds now) {
-    if (open() && gate_off_ <= now) {
+void Illumination::moved(bool open, Nanoseconds asked, Nanoseconds left) {
+    if (!open && asked == last_off_) saved_ -= min(left - asked, configuration_.max_on_ns);
+}
+
+void Illumination::poll(Nanoseconds now, Nanoseconds settled) {
+    if (open() && gate_off_ <= settled) {
         bool wanted = exposing_ != 0;
         for (std::size_t i = 0; i < plan_count_; ++i)
             wanted = wanted || (plans_[i].on < gate_off_ && plans_[i].lead_off > gate_off_);
@@ -140,15 +144,18 @@ void Illumination::poll(Nanoseconds now) {
             dark_until_ = gate_off_ + configuration_.max_on_ns / 10;
         }
         gate_off_ = never;
-        forget_past(now);
-    } else if (open() && exposing_ == 0 && next_wake() <= now) {
-        forget_past(now);
+        over_ = false;
+    } else if (open() && exposing_ == 0 &&
+               (next_end() <= settled ||
+                (over_ && gate_on_ <= settled && !exposes_before(outputs_.soonest(now))))) {
         close_gate(now);
+        over_ = false;
     }
+    forget_past(settled);
     open_next(now);
 }
 
-Nanoseconds Illumination::next_wake() const {
+Nanoseconds Illumination::next_end() const {
     if (!open()) return never;
     if (exposing_ != 0) return gate_off_;
     // No exposure came: the gate need not stay open.

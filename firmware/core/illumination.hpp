@@ -22,17 +22,22 @@ class Illumination {
     void plan(std::uint8_t camera, Nanoseconds start, Nanoseconds duration, bool has_strobe,
               Nanoseconds now);
 
-    /// An exposure line changed.
-    void edge(std::uint8_t camera, bool exposing, Nanoseconds now);
+    /// An exposure line changed, bounces included.
+    void edge(std::uint8_t camera, bool exposing);
 
     /// The levels of the lines are unknown from here on, until they change.
     void edges_lost();
 
-    /// The word due at `asked` left later: the light was on for longer.
-    void left_late(Nanoseconds asked, Nanoseconds left);
+    /// An edge of the gate due at `asked` left at `left`: the light was on for longer.
+    void moved(bool open, Nanoseconds asked, Nanoseconds left);
 
-    void poll(Nanoseconds now);
-    Nanoseconds next_wake() const;
+    /// All edges before `settled` were passed on: what came later may be unknown.
+    void poll(Nanoseconds now, Nanoseconds settled);
+    /// When poll() has something to do next; it learns of edges `lag` after they came.
+    Nanoseconds next_wake(Nanoseconds lag) const {
+        const Nanoseconds wake = next_end();
+        return wake == never ? never : wake + lag;
+    }
 
  private:
     struct Plan {
@@ -45,11 +50,13 @@ class Illumination {
     bool open() const { return gate_off_ != never; }
     Nanoseconds earned(Nanoseconds span) const;
     Nanoseconds budget(Nanoseconds at) const;
+    bool exposes_before(Nanoseconds at) const;
+    Nanoseconds next_end() const;
     void set_leads(Nanoseconds now);
     void open_next(Nanoseconds now);
-    void open_gate(Nanoseconds on, Nanoseconds now);
+    void open_gate(Nanoseconds on);
     void close_gate(Nanoseconds now);
-    void forget_past(Nanoseconds now);
+    void forget_past(Nanoseconds settled);
 
     OutputQueue& outputs_;
     ChannelReports& reports_;
@@ -57,6 +64,7 @@ class Illumination {
     Plan plans_[max_plans] = {};
     std::size_t plan_count_ = 0;
     std::uint8_t exposing_ = 0;  ///< cameras whose line is active
+    bool over_ = false;          ///< the last exposure of this light has ended
     Nanoseconds gate_on_ = 0;
     Nanoseconds gate_off_ = never;        ///< never: the gate is closed
     Nanoseconds dark_until_ = INT64_MIN;  ///< after the limit was reached

@@ -10,15 +10,31 @@
 
 namespace versavis::firmware {
 
+/// Who is told of edges that left at another instant than set() said.
+struct OutputMoves {
+    virtual void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) = 0;
+
+ protected:
+    ~OutputMoves() = default;
+};
+
 class OutputQueue {
  public:
-    /// Edges due within this time go to the hardware and can no longer be changed.
+    /// Edges due within this time go to the hardware and can no longer be changed. At half, a port
+    /// that fills its hardware every 250 us has little room for a slow poll; at twice, exposures
+    /// are expected from older measurements.
     static constexpr Nanoseconds horizon = 1'000'000;
 
-    explicit OutputQueue(OutputSchedule& hardware) : hardware_(hardware) {}
+    OutputQueue(OutputSchedule& hardware, OutputMoves& moves, const PortFacts& facts)
+        : hardware_(hardware),
+          moves_(moves),
+          grain_(facts.output_grain()),
+          step_(facts.output_step) {}
 
-    /// True while the edges of a camera's pulse, its light and the test output can be set.
-    bool has_room() const { return size_ + 8 <= capacity; }
+    /// True while `edges` more can be set of an output. The rooms of all outputs fit together.
+    bool has_room(unsigned output, unsigned edges = 2) const {
+        return counts_[output] + edges <= rooms[output];
+    }
     bool empty() const { return size_ == 0; }
 
     /// Sets the level of `output` at `at`, or as soon as possible after what was already committed,
@@ -36,14 +52,29 @@ class OutputQueue {
 
     static constexpr Nanoseconds shortest_pause = 10'000;
 
-    /// An edge that leaves later than requested; each is reported once.
-    bool take_late(OutputSchedule::Late& late);
+    /// Later than rounding explains.
+    bool is_late(Nanoseconds asked, Nanoseconds left) const { return left - asked > step_; }
 
-    /// Hands what is due within the horizon to the hardware. False: its queue is full.
+    /// Hands what is due within the horizon to the hardware, at most `words_a_commit` words. False:
+    /// its queue is full.
     bool commit(Nanoseconds now);
 
-    /// Instant of the first edge that is not committed yet; never: none.
-    Nanoseconds next() const { return size_ == 0 ? never : edges_[0].at; }
+    /// When commit() is next needed; never: there is nothing to commit. Earlier calls commit more
+    /// at once.
+    Nanoseconds next_wake() const { return size_ == 0 ? never : edges_[0].at - refill; }
+
+    /// The soonest that an edge set now can have.
+    Nanoseconds soonest(Nanoseconds now) const {
+        return committed_until_ >= now ? committed_until_ + step_ : now;
+    }
+
+    /// True: an edge of `output` that was due before `at` has not been committed.
+    bool is_overdue(unsigned output, Nanoseconds at) const {
+        if (counts_[output] == 0) return false;
+        for (std::size_t i = 0; i < size_ && edges_[i].at < at; ++i)
+            if (edges_[i].output == output) return true;
+        return false;
+    }
 
     /// Removes the edges of `output` that are not committed yet. Returns the level that remains.
     bool cancel(unsigned output);
@@ -65,27 +96,40 @@ class OutputQueue {
     struct PendingEdge {
         Nanoseconds at;
         Nanoseconds asked;
-        Nanoseconds hold;
+        std::uint32_t hold;
         std::uint8_t output;
         bool level;
     };
+    /// When the first edge is that close, it is time to commit. At half, a slow poll makes it late;
+    /// at twice, pulse trains need twice as many polls.
+    static constexpr Nanoseconds refill = 500'000;
+    /// Bounds the work of one poll. At half, a fast pulse train takes two polls; at twice, a poll
+    /// takes longer.
+    static constexpr unsigned words_a_commit = 16;
+    /// Edges of pulses that may wait at an output: what 10 kHz needs for the furthest that a pulse
+    /// train looks ahead. At half, such a train falls short; at twice, memory is wasted.
+    static constexpr std::uint8_t pulse_room = 24;
+    /// Of the light's gate one light and the end of another, of its lead those of eight plans.
+    static constexpr std::uint8_t rooms[output_count] = {
+        pulse_room, pulse_room, pulse_room, pulse_room, 4, 18, pulse_room, pulse_room};
+    static constexpr std::size_t capacity = 6 * pulse_room + 4 + 18;
+
     void insert(const PendingEdge& edge);
     void remove_first(std::size_t count);
-    bool postpone_first(Nanoseconds now);
-
-    static constexpr std::size_t output_count = 8;
-    static constexpr std::size_t late_capacity = 16;
-    static constexpr std::size_t capacity = 64;  // 8 outputs x 2 edges x 3 pulses ahead, with room
+    bool held_back(const PendingEdge& edge, Nanoseconds at);
+    bool push_word();
 
     OutputSchedule& hardware_;
+    OutputMoves& moves_;
+    Nanoseconds grain_;
+    Nanoseconds step_;
     PendingEdge edges_[capacity] = {};
     std::size_t size_ = 0;
+    std::uint8_t counts_[output_count] = {};
     std::size_t high_water_ = 0;
-    Nanoseconds committed_until_ = INT64_MIN;
+    Nanoseconds committed_until_ = INT64_MIN / 2;
     std::uint32_t levels_ = 0;
     Nanoseconds changed_[output_count] = {};  ///< when its level changed last
-    OutputSchedule::Late late_[late_capacity] = {};
-    std::size_t late_count_ = 0;
 };
 
 }  // namespace versavis::firmware

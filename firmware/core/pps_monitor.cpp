@@ -6,24 +6,27 @@ namespace versavis::firmware {
 namespace {
 
 constexpr Nanoseconds second = 1'000'000'000;
+
+/// Pulses this far apart are not compared. At half, a receiver that loses its sky for 5 s starts
+/// over; at twice, a false pulse is believed for longer.
 constexpr Nanoseconds longest_gap = 10 * second;
-constexpr Nanoseconds tolerance_per_second = 200'000;  // 200 ppm: no crystal is off by more
+
+/// One part in this many (200 ppm): no crystal is off by more. At half, a pulse beside the true one
+/// passes more easily; at twice, a bad crystal is never measured.
+constexpr Nanoseconds tolerance = 5'000;
+
+/// At half, the slope of a single second is believed; at twice, the state is late.
 constexpr std::size_t pulses_to_trust = 4;
 
 }  // namespace
 
-void PpsMonitor::pulse(Nanoseconds at) {
-    const Nanoseconds gap = count_ == 0 ? 0 : at - pulses_[count_ - 1];
-    const Nanoseconds seconds = (gap + second / 2) / second;
-    const Nanoseconds off = gap - seconds * second;
-    const bool regular = count_ > 0 && gap <= longest_gap && seconds > 0 &&
-                         off <= seconds * tolerance_per_second &&
-                         -off <= seconds * tolerance_per_second;
-    if (!regular) {
-        // Noise, or a new phase: start over with it. A source that keeps pulsing is trusted again
-        // after a few pulses.
-        count_ = 0;
-    } else if (count_ == capacity) {
+void PpsMonitor::begin(Nanoseconds at) {
+    count_ = 0;
+    add(at, 0);
+}
+
+void PpsMonitor::add(Nanoseconds at, Nanoseconds seconds) {
+    if (count_ == capacity) {
         for (std::size_t i = 1; i < capacity; ++i) {
             pulses_[i - 1] = pulses_[i];
             seconds_[i - 1] = seconds_[i];
@@ -31,13 +34,26 @@ void PpsMonitor::pulse(Nanoseconds at) {
         --count_;
     }
     pulses_[count_] = at;
-    seconds_[count_] = static_cast<std::uint16_t>(regular ? seconds : 0);
+    seconds_[count_] = static_cast<std::uint16_t>(seconds);
     ++count_;
+    rival_.clear();
+}
+
+void PpsMonitor::pulse(Nanoseconds at) {
+    const Nanoseconds gap = count_ == 0 ? never : at - pulses_[count_ - 1];
+    if (gap > longest_gap) return begin(at);
+    const Nanoseconds seconds = (gap + second / 2) / second;
+    const Nanoseconds off = gap - seconds * second;
+    const Nanoseconds allowed = seconds * (second / tolerance);
+    if (seconds == 0 || off > allowed || -off > allowed) {
+        // Noise, or a new phase: a source that keeps its pulses there is followed.
+        if (rival_.add(at, second, tolerance)) begin(at);
+        return;
+    }
+    add(at, seconds);
     Nanoseconds span = 0;
     for (std::size_t i = 1; i < count_; ++i) span += seconds_[i];
-    if (span > 0)
-        error_ppb_ =
-            static_cast<std::int32_t>((pulses_[count_ - 1] - pulses_[0] - span * second) / span);
+    error_ppb_ = static_cast<std::int32_t>((at - pulses_[0] - span * second) / span);
 }
 
 wire::PpsState PpsMonitor::state(Nanoseconds now) const {

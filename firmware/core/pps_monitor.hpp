@@ -3,6 +3,7 @@
 #pragma once
 
 #include "hal.hpp"
+#include "pulse_rival.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {
@@ -14,15 +15,22 @@ class PpsMonitor {
 
     /// none: no good pulse within the last seconds before `now`.
     wire::PpsState state(Nanoseconds now) const;
-    std::int32_t error_ppb() const { return error_ppb_; }
+    /// 0 unless the state is good.
+    std::int32_t error_ppb(Nanoseconds now) const {
+        return state(now) == wire::PpsState::good ? error_ppb_ : 0;
+    }
 
  private:
     static constexpr std::size_t capacity = 33;
+
+    void begin(Nanoseconds at);
+    void add(Nanoseconds at, Nanoseconds seconds);
 
     Nanoseconds pulses_[capacity] = {};     ///< oldest first; whole seconds apart
     std::uint16_t seconds_[capacity] = {};  ///< since the previous pulse
     std::size_t count_ = 0;
     std::int32_t error_ppb_ = 0;
+    PulseRival rival_;
 };
 
 }  // namespace versavis::firmware

@@ -45,14 +45,17 @@ bool Transmitter::stage_first_of(Queue& queue) {
     return true;
 }
 
-bool Transmitter::stage() {
+/// The packet that matters most.
+void Transmitter::stage() {
     stamp();
-    if (stage_first_of(hellos_) || stage_first_of(follow_ups_)) return true;
+    if (stage_first_of(hellos_) || stage_first_of(follow_ups_)) return;
     answering_ = !clock_answers_.empty();
     if (answering_) answer_id_ = clock_answers_.front().id;
-    return stage_first_of(clock_answers_) || stage_first_of(refusals_) ||
-           stage_first_of(answers_) || stage_first_of(exposures_) || stage_first_of(events_) ||
-           stage_first_of(healths_) || stage_first_of(samples_) || stage_first_of(logs_);
+    if (stage_first_of(clock_answers_) || stage_first_of(refusals_) || stage_first_of(answers_) ||
+        stage_first_of(exposures_) || stage_first_of(events_) || stage_first_of(healths_) ||
+        stage_first_of(samples_))
+        return;
+    stage_first_of(logs_);
 }
 
 /// The packet staged next carries the current time.
@@ -69,22 +72,28 @@ void Transmitter::follow_up() {
     follow_ups_.push(wire::ClockFollowUp{watched_id_, 0, left});
 }
 
-void Transmitter::pump() {
+bool Transmitter::pump() {
+    follow_up();
     const std::size_t waiting = waiting_packets();
     if (waiting > high_water_) high_water_ = waiting;
-    for (std::size_t space = link_.free_space(); space > 0; space = link_.free_space()) {
-        follow_up();
-        if (written_ == frame_.size && !stage()) return;
+    std::size_t budget = bytes_a_pump;
+    while (written_ < frame_.size || waiting_packets() != 0) {
+        const std::size_t free = link_.free_space();
+        const std::size_t space = free < budget ? free : budget;
+        if (space == 0) return budget == 0;
+        if (written_ == frame_.size) stage();
         const std::size_t left = frame_.size - written_;
         const std::size_t size = left < space ? left : space;
         link_.write(frame_.bytes + written_, size);
         written_ += size;
+        budget -= size;
         if (!answering_ || written_ < frame_.size) continue;
         link_.watch_departure();
         watched_id_ = answer_id_;
         answering_ = false;
         watching_ = true;
     }
+    return false;
 }
 
 void Transmitter::count_drops(wire::Health& health) const {

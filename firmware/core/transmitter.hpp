@@ -60,21 +60,22 @@ class Transmitter {
     void send(const wire::ImuSample& message) { samples_.push(message); }
     void send(const wire::Log& message) { logs_.push(message); }
 
-    /// Writes as much as the link accepts.
-    void pump();
-
-    /// True: pump() has something to do as soon as the link has room.
-    bool waiting() const { return written_ < frame_.size || waiting_packets() != 0; }
+    /// Writes as much as the link accepts, and at most `bytes_a_pump`. True: it would accept more.
+    bool pump();
 
     void count_drops(wire::Health& health) const;
     /// High-water mark of waiting packets since the last call.
     std::uint32_t take_high_water();
 
  private:
+    /// Bounds the work of one poll: four packets of USB. At half, a poll more is needed for a
+    /// burst; at twice, a poll takes longer.
+    static constexpr std::size_t bytes_a_pump = 256;
+
     std::size_t waiting_packets() const;
     void follow_up();
     void stamp();
-    bool stage();
+    void stage();
     template <class Queue>
     bool stage_first_of(Queue& queue);
 

@@ -6,12 +6,39 @@
 
 namespace versavis::firmware {
 
-NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot)
+NativeBoard::NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot,
+                         const PortModel& model)
     : environment_(std::move(environment)),
+      model_(model),
+      random_(model.seed),
       now_(boot),
       fed_(boot),
-      board_(Hal{*this, *this, *this, *this, *this, uart_, *this, *this, *this, *this, *this},
-             identity) {}
+      board_(hardware(identity), identity) {}
+
+Hal NativeBoard::hardware(const Identity& identity) {
+    const PortFacts facts{model_.present, model_.fastest_imu_millihertz, model_.output_grain_bits,
+                          model_.output_step_ns};
+    const Hal hal{*this, *this, *this, *this, *this, uart_,
+                  *this, *this, *this, *this, *this, facts};
+    return environment_.tap == nullptr ? hal : environment_.tap->tap(hal, identity);
+}
+
+Nanoseconds NativeBoard::draw(Nanoseconds most) {
+    return most == 0 ? 0 : static_cast<Nanoseconds>(random_() % static_cast<std::uint64_t>(most));
+}
+
+/// Time passes in each call of the core, and interrupts come in between.
+void NativeBoard::spend() {
+    if (model_.call_ns == 0) return;
+    Nanoseconds cost = model_.call_ns + draw(model_.jitter_ns);
+    if (draw(8) == 0) cost += draw(model_.interrupt_ns);
+    advance_to(now_ + cost);
+}
+
+Nanoseconds NativeBoard::now() {
+    spend();
+    return now_;
+}
 
 void NativeBoard::set_input(std::uint8_t input, bool level) {
     const std::uint32_t bit = 1U << input;
@@ -24,8 +51,10 @@ void NativeBoard::set_level(std::uint8_t input, bool level) {
 }
 
 void NativeBoard::receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
-    received_.insert(received_.end(), bytes.begin(), bytes.end());
-    received_at_ = at;
+    for (; !bytes.empty(); bytes = bytes.subspan(std::min(bytes.size(), link_packet_size))) {
+        const auto packet = bytes.first(std::min(bytes.size(), link_packet_size));
+        received_.push_back({at, {packet.begin(), packet.end()}});
+    }
     attention_ = true;
 }
 
@@ -33,58 +62,96 @@ void NativeBoard::uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds 
     uart_bytes_.push_back({at, {bytes.begin(), bytes.end()}});
 }
 
-Nanoseconds NativeBoard::burst_end() const {
-    if (!burst_ || imu_bus_stuck_) return never;
-    const ImuTransfer& transfer = burst_->transfer;
-    const Nanoseconds bits = Nanoseconds{transfer.size} * 8;
+Nanoseconds NativeBoard::transfer_end(Nanoseconds at, const ImuTransfer& transfer) const {
+    const bool spi = transfer.bus == ImuTransfer::Bus::spi;
+    if (!spi && i2c_held_) return at + i2c_patience;
+    // On I2C each byte is acknowledged, and a read sends the address twice, each after a start; a
+    // stop ends both.
+    const bool read = transfer.bus == ImuTransfer::Bus::i2c_read;
+    const Nanoseconds bits =
+        spi ? Nanoseconds{transfer.size} * 8
+            : (Nanoseconds{transfer.size} + (read ? 2 : 1)) * 9 + (read ? 3 : 2);
     const Nanoseconds gaps = Nanoseconds{transfer.size} / 2 * transfer.word_gap_ns;
-    return burst_->at + bits * 1'000'000'000 / std::max<std::uint32_t>(transfer.clock_hz, 1) + gaps;
+    return at + bits * 1'000'000'000 / std::max<std::uint32_t>(transfer.clock_hz, 1) + gaps;
+}
+
+Nanoseconds NativeBoard::job_end() const {
+    if (!armed_ || armed_->at == never || imu_bus_stuck_) return never;
+    Nanoseconds at = armed_->at;
+    for (unsigned i = 0; i < armed_->job.count; ++i)
+        at = transfer_end(i == 0 ? at : at + armed_->job.pause, armed_->job.transfers[i]);
+    return at;
+}
+
+/// When the port calls the core.
+Nanoseconds NativeBoard::next_attention() const {
+    if (attention_ || !received_.empty()) return now_;
+    Nanoseconds next = std::min(board_.next_wake(), job_end());
+    const auto edge = std::find_if(stamped_.begin(), stamped_.end(), [](const Edge& waiting) {
+        return !is_data_ready(waiting.input);
+    });
+    if (edge != stamped_.end()) next = std::min(next, edge->at + model_.edge_lag_ns);
+    if (stamped_.size() >= model_.edges / 2)
+        next = std::min(next, stamped_.front().at + model_.edge_lag_ns);
+    if (!uart_bytes_.empty()) next = std::min(next, uart_bytes_.front().at);
+    return next;
+}
+
+Nanoseconds NativeBoard::next_in_hardware() const {
+    Nanoseconds next = light_cut();
+    if (!words_.empty()) next = std::min(next, words_.front().at);
+    if (!edges_.empty()) next = std::min(next, edges_.top().at);
+    if (environment_.next_event) next = std::min(next, environment_.next_event());
+    return next;
 }
 
 Nanoseconds NativeBoard::next_wake() const {
-    if (attention_) return now_;
-    Nanoseconds wake = std::min(board_.next_wake(), burst_end());
-    if (!words_.empty()) wake = std::min(wake, words_.front().at);
-    if (!edges_.empty()) wake = std::min(wake, edges_.top().at);
-    wake = std::min(wake, light_cut());
-    if (!uart_bytes_.empty()) wake = std::min(wake, uart_bytes_.front().at);
-    return wake;
+    return std::min(next_attention(), next_in_hardware());
 }
 
 void NativeBoard::run_until(Nanoseconds until) {
     for (Nanoseconds wake = next_wake(); wake <= until && !stalled_; wake = next_wake()) {
-        now_ = std::max(now_, wake);
-        attention_ = false;
-        advance_hardware();
-        board_.poll();
-        // What is not read in time is lost.
-        while (!uart_bytes_.empty() && uart_bytes_.front().at <= now_) uart_bytes_.pop_front();
+        advance_to(std::max(now_, wake));
+        if (next_attention() <= now_) poll_core();
     }
-    now_ = std::max(now_, until);
-    if (stalled_) advance_hardware();
+    advance_to(until);
     watchdog_bit_ = watchdog_bit_ || now_ - fed_ > watchdog_limit;
 }
 
-/// Words and edges in the order of their times.
-void NativeBoard::advance_hardware() {
-    for (;;) {
+void NativeBoard::poll_core() {
+    advance_to(now_ + draw(model_.wake_ns));
+    attention_ = false;
+    const Nanoseconds began = now_;
+    if (environment_.tap != nullptr) environment_.tap->poll_begins(now_);
+    board_.poll();
+    if (environment_.tap != nullptr) environment_.tap->poll_ended(board_.next_wake());
+    // What nobody reads is lost.
+    while (!uart_bytes_.empty() && uart_bytes_.front().at <= began) uart_bytes_.pop_front();
+}
+
+/// Words, edges and what happens around the board, in the order of their times.
+void NativeBoard::advance_to(Nanoseconds until) {
+    for (Nanoseconds next = next_in_hardware(); next <= until; next = next_in_hardware()) {
+        now_ = std::max(now_, next);
         const Nanoseconds word = words_.empty() ? never : words_.front().at;
         const Nanoseconds edge = edges_.empty() ? never : edges_.top().at;
-        const Nanoseconds cut = light_cut();
-        if (std::min({word, edge, cut}) > now_) return;
-        if (cut <= std::min(word, edge)) {
+        if (light_cut() <= next) {
             light_cut_ = true;
-            drive_pins(cut);
-        } else if (word <= edge) {
+            drive_pins(next);
+        } else if (word <= next) {
             levels_ = words_.front().levels;
             words_.pop_front();
+            attention_ = attention_ || std::exchange(words_full_, false);
             drive_pins(word);
-        } else {
-            const Edge next = edges_.top();
+        } else if (edge <= next) {
+            const Edge due = edges_.top();
             edges_.pop();
-            apply(next);
+            apply(due);
+        } else {
+            environment_.fire(next);
         }
     }
+    now_ = std::max(now_, until);
 }
 
 Nanoseconds NativeBoard::light_cut() const {
@@ -94,13 +161,19 @@ Nanoseconds NativeBoard::light_cut() const {
 void NativeBoard::apply(const Edge& edge) {
     set_input(edge.input, edge.level);
     drive_pins(edge.at + routing_latency);
+    const Nanoseconds stamp = edge.at / model_.edge_grain_ns * model_.edge_grain_ns;
+    if (is_data_ready(edge.input)) {
+        if (!edge.level) return;
+        ready_at_[edge.input] = stamp;
+        if (armed_ && armed_->at == never && armed_->job.input == edge.input &&
+            stamp > armed_->job.after)
+            armed_->at = edge.at + model_.imu_start_ns;
+    }
     if ((listened_ >> edge.input & 1U) == 0) return;
-    const bool data_ready = edge.input >= input_imu_ready && edge.input < input_pulse;
-    if (data_ready && !edge.level) return;
-    if (stamped_.size() == edge_capacity)
+    if (stamped_.size() == model_.edges)
         ++lost_edges_;
     else
-        stamped_.push_back(edge);
+        stamped_.push_back({stamp, edge.input, edge.level});
 }
 
 bool NativeBoard::exposing(unsigned camera) const {
@@ -135,66 +208,117 @@ void NativeBoard::consume(std::size_t size, Nanoseconds at) {
                        transmitted_.begin() + static_cast<std::ptrdiff_t>(size));
     consumed_ += size;
     if (watched_ && consumed_ >= *watched_) {
-        departure_ = at;
+        departure_ = at - model_.departure_ns;
         watched_.reset();
+        attention_ = true;
     }
-    attention_ = attention_ || size > 0;
+    if (size > 0) attention_ = attention_ || std::exchange(link_full_, false);
 }
 
-bool NativeBoard::push(Nanoseconds at, std::uint32_t levels) {
-    if (words_.size() == word_capacity) return false;
-    Nanoseconds leaves = std::max(at, now_);
-    if (!words_.empty()) leaves = std::max(leaves, words_.back().at);
-    if (leaves > at) late_.push_back({at, leaves});
+Nanoseconds NativeBoard::push(Nanoseconds at, std::uint32_t levels) {
+    spend();
+    if (words_.size() == model_.words) {
+        words_full_ = true;
+        return never;
+    }
+    const Nanoseconds grain = Nanoseconds{1} << model_.output_grain_bits;
+    Nanoseconds leaves =
+        std::max({at, now_ + model_.word_lead_ns, last_word_ + model_.output_step_ns});
+    leaves = (leaves + grain - 1) / grain * grain;
+    last_word_ = leaves;
     words_.push_back({leaves, levels});
-    return true;
+    return leaves;
 }
 
-bool NativeBoard::take_late(Late& late) {
-    if (late_.empty()) return false;
-    late = late_.front();
-    late_.pop_front();
-    return true;
+void NativeBoard::listen(std::uint32_t inputs) {
+    spend();
+    listened_ = inputs;
 }
 
 bool NativeBoard::pop(Edge& edge) {
-    if (stamped_.empty()) return false;
+    spend();
+    if (stamped_.empty() || !visible(stamped_.front())) return false;
     edge = stamped_.front();
     stamped_.pop_front();
     return true;
 }
 
-std::uint32_t NativeBoard::take_lost() { return std::exchange(lost_edges_, 0); }
+Nanoseconds NativeBoard::settled() {
+    spend();
+    const Nanoseconds known = now_ - model_.edge_lag_ns;
+    return stamped_.empty() ? known : std::min(known, stamped_.front().at);
+}
 
-void NativeBoard::route(const Routes& routes) {
+std::uint32_t NativeBoard::take_lost() {
+    spend();
+    return std::exchange(lost_edges_, 0);
+}
+
+Routing::Switched NativeBoard::route(const Routes& routes, bool force) {
+    spend();
+    bool clean = true;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        if (routes.master[i] == routes_.master[i]) continue;
+        for (const std::uint8_t master : {routes.master[i], routes_.master[i]})
+            if (master != not_routed && exposing(master)) clean = false;
+    }
+    if (!clean && !force) return {};
     routes_ = routes;
     drive_pins(now_);
+    return {now_ + 1, clean};
 }
 
-bool NativeBoard::start(Nanoseconds at, const ImuTransfer& transfer) {
-    if (burst_) return false;
-    burst_ = Burst{std::max(at, now_), transfer};
+bool NativeBoard::arm(const ImuJob& job) {
+    spend();
+    if (armed_) return false;
+    armed_ = ArmedJob{never, job};
+    if (job.input == not_routed)
+        armed_->at = std::max(job.after, now_);
+    else if (ready_at_[job.input] > job.after)
+        armed_->at = std::max(ready_at_[job.input] + model_.imu_start_ns, now_);
     return true;
 }
 
-bool NativeBoard::complete(ImuReply& reply) {
-    if (burst_end() > now_) return false;
-    const Burst burst = *std::exchange(burst_, std::nullopt);
-    reply = {};
-    reply.started = burst.at;
-    if (environment_.imu_transfer)
-        environment_.imu_transfer(burst.at, burst.transfer,
-                                  std::span(reply.bytes, burst.transfer.size));
+bool NativeBoard::complete(ImuReply (&replies)[max_transfers]) {
+    spend();
+    if (job_end() > now_) return false;
+    const ArmedJob done = *std::exchange(armed_, std::nullopt);
+    Nanoseconds at = done.at;
+    for (unsigned i = 0; i < done.job.count; ++i) {
+        const ImuTransfer& transfer = done.job.transfers[i];
+        replies[i] = {};
+        replies[i].started = at;
+        replies[i].ended = transfer_end(at, transfer);
+        const bool spi = transfer.bus == ImuTransfer::Bus::spi;
+        bool acknowledged = !i2c_held_;
+        if (environment_.imu_transfer && (spi || !i2c_held_))
+            acknowledged =
+                environment_.imu_transfer(at, transfer, std::span(replies[i].bytes, transfer.size));
+        replies[i].refused = !spi && !acknowledged;
+        at = replies[i].ended + done.job.pause;
+    }
     return true;
+}
+
+void NativeBoard::disarm() {
+    spend();
+    armed_.reset();
+}
+
+void NativeBoard::Uart::set_baud(std::uint32_t baud) {
+    board.spend();
+    board.baud_ = baud;
 }
 
 void NativeBoard::Uart::write(const std::uint8_t* data, std::size_t size) {
+    board.spend();
     if (board.environment_.uart_sent)
         board.environment_.uart_sent(board.now_, board.baud_, std::span(data, size));
 }
 
 std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity,
                                     Nanoseconds& received) {
+    board.spend();
     if (board.uart_bytes_.empty() || board.uart_bytes_.front().at > board.now_ || capacity == 0)
         return 0;
     UartBytes& first = board.uart_bytes_.front();
@@ -209,34 +333,43 @@ std::size_t NativeBoard::Uart::read(std::uint8_t* data, std::size_t capacity,
 }
 
 std::size_t NativeBoard::free_space() {
-    return link_capacity_ - std::min(link_capacity_, transmitted_.size());
+    spend();
+    const std::size_t space = link_capacity_ - std::min(link_capacity_, transmitted_.size());
+    link_full_ = space == 0;
+    return space;
 }
 
 void NativeBoard::write(const std::uint8_t* data, std::size_t size) {
+    spend();
     transmitted_.insert(transmitted_.end(), data, data + size);
     written_ += size;
 }
 
 void NativeBoard::watch_departure() {
+    spend();
     watched_ = written_;
     departure_.reset();
 }
 
 bool NativeBoard::take_departure(Nanoseconds& at) {
+    spend();
     if (!departure_) return false;
     at = *std::exchange(departure_, std::nullopt);
     return true;
 }
 
-std::size_t NativeBoard::read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) {
-    const std::size_t size = std::min(capacity, received_.size());
-    std::copy_n(received_.begin(), size, data);
-    received_.erase(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(size));
-    received = received_at_;
-    return size;
+std::size_t NativeBoard::read(std::uint8_t* data, Nanoseconds& received) {
+    spend();
+    if (received_.empty()) return 0;
+    const Packet packet = std::move(received_.front());
+    received_.pop_front();
+    std::copy(packet.bytes.begin(), packet.bytes.end(), data);
+    received = packet.at;
+    return packet.bytes.size();
 }
 
 void NativeBoard::publish(const ImuImage& image) {
+    spend();
     image_ = image;
     if (environment_.imu_output_ready) environment_.imu_output_ready(now_);
 }
@@ -263,17 +396,37 @@ std::vector<std::uint16_t> NativeBoard::read_imu_output(std::span<const std::uin
 }
 
 std::size_t NativeBoard::load(std::uint8_t* data, std::size_t capacity) {
+    spend();
     if (environment_.flash == nullptr) return 0;
     std::copy_n(environment_.flash->begin(), std::min(capacity, environment_.flash->size()), data);
     return environment_.flash->size();
 }
 
-void NativeBoard::store(const std::uint8_t* data, std::size_t size) {
-    if (environment_.flash != nullptr) environment_.flash->assign(data, data + size);
+bool NativeBoard::store(const std::uint8_t* data, std::size_t size) {
+    spend();
+    if (stored_at_ != never) return false;
+    storing_.assign(data, data + size);
+    stored_at_ = now_ + model_.store_ns;
+    return true;
+}
+
+Persist::Outcome NativeBoard::take_outcome() {
+    spend();
+    if (stored_at_ == never) return Outcome::none;
+    if (now_ < stored_at_) return Outcome::busy;
+    stored_at_ = never;
+    if (environment_.flash == nullptr) return Outcome::failed;
+    *environment_.flash = storing_;
+    return Outcome::stored;
 }
 
 void NativeBoard::reboot(bool to_boot_loader) {
     if (environment_.reboot) environment_.reboot(to_boot_loader);
+}
+
+void NativeBoard::feed() {
+    spend();
+    fed_ = now_;
 }
 
 }  // namespace versavis::firmware

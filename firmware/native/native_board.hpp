@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The board in a host process: runs the core event by event, in the time that its owner gives it.
+// The board in a host process: runs the core event by event, in the time that its owner gives it;
+// time passes in its calls as a model of a port has it.
 #pragma once
 
 #include <cstdint>
@@ -7,11 +8,13 @@
 #include <functional>
 #include <optional>
 #include <queue>
+#include <random>
 #include <span>
 #include <vector>
 
 #include "board.hpp"
 #include "hal.hpp"
+#include "port_model.hpp"
 
 namespace versavis::firmware {
 
@@ -19,20 +22,37 @@ namespace versavis::firmware {
 /// to 3.
 enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
+/// Stands between the core and its hardware, and sees each poll.
+struct CoreTap {
+    /// Returns the hardware that the core of this board gets instead of `hal`.
+    virtual Hal tap(const Hal& hal, const Identity& identity) = 0;
+    virtual void poll_begins(Nanoseconds now) = 0;
+    /// The core wants the next one at `next_wake`.
+    virtual void poll_ended(Nanoseconds next_wake) = 0;
+
+ protected:
+    ~CoreTap() = default;
+};
+
 /// What is connected to the board. Called from run_until(), with the instants at which the hardware
 /// would act. A function that is not set is not connected.
 struct Environment {
     std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
     /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
-    std::function<void(Nanoseconds at, const ImuTransfer& transfer,
+    /// False: no part acknowledged; it counts on I2C only.
+    std::function<bool(Nanoseconds at, const ImuTransfer& transfer,
                        std::span<std::uint8_t> received)>
         imu_transfer;
     std::function<void(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes)>
         uart_sent;
     std::function<void(Nanoseconds at)> imu_output_ready;
     std::function<void(bool to_boot_loader)> reboot;
+    /// What else happens around the board, and when next: it also comes while the core works.
+    std::function<Nanoseconds()> next_event;
+    std::function<void(Nanoseconds at)> fire;
     /// What the board stores, and finds when it starts.
     std::vector<std::uint8_t>* flash = nullptr;
+    CoreTap* tap = nullptr;
 };
 
 /// Events happen at the instants of the model, not when the process wakes up: a late call of
@@ -48,7 +68,8 @@ class NativeBoard final : Clock64,
                           Rebooter,
                           Watchdog {
  public:
-    NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot = 0);
+    NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot = 0,
+                const PortModel& model = {});
     NativeBoard(const NativeBoard&) = delete;
     NativeBoard& operator=(const NativeBoard&) = delete;
 
@@ -75,8 +96,13 @@ class NativeBoard final : Clock64,
     /// From now on no IMU transfer completes, or all of them do again.
     void set_imu_bus_stuck(bool stuck) { imu_bus_stuck_ = stuck; }
 
+    /// From now on another part holds the I2C bus, or has released it.
+    void set_i2c_held(bool held) { i2c_held_ = held; }
+
     /// When run_until() has something to do next, if no bytes come.
     Nanoseconds next_wake() const;
+    /// Of the core; beyond run_until() while it worked for longer.
+    Nanoseconds time() const { return now_; }
 
     /// Bytes for the host not consumed yet; when full, the core has to wait.
     std::span<const std::uint8_t> transmitted() const { return transmitted_; }
@@ -88,6 +114,9 @@ class NativeBoard final : Clock64,
     std::vector<std::uint16_t> read_imu_output(std::span<const std::uint16_t> words);
 
     static constexpr Nanoseconds routing_latency = 50;
+    /// At half, a part that stretches its clock is given up; at twice, it is more than the HAL
+    /// says.
+    static constexpr Nanoseconds i2c_patience = 10'000'000;
     static constexpr Nanoseconds watchdog_limit = 1'000'000'000;
 
  private:
@@ -98,49 +127,60 @@ class NativeBoard final : Clock64,
         Nanoseconds at;
         std::uint32_t levels;
     };
-    struct Burst {
+    /// A job of the IMU's bus; `at`: when it starts; never: it waits for its edge.
+    struct ArmedJob {
         Nanoseconds at;
-        ImuTransfer transfer;
+        ImuJob job;
+    };
+    struct Packet {
+        Nanoseconds at;
+        std::vector<std::uint8_t> bytes;
     };
     struct UartBytes {
         Nanoseconds at;
         std::vector<std::uint8_t> bytes;
     };
-    static constexpr std::size_t word_capacity = 64;
-    static constexpr std::size_t edge_capacity = 256;
-
-    Nanoseconds now() override { return now_; }
-    bool push(Nanoseconds at, std::uint32_t levels) override;
-    bool take_late(Late& late) override;
-    void listen(std::uint32_t inputs) override { listened_ = inputs; }
+    Nanoseconds now() override;
+    Nanoseconds push(Nanoseconds at, std::uint32_t levels) override;
+    void listen(std::uint32_t inputs) override;
     bool pop(Edge& edge) override;
+    Nanoseconds settled() override;
     std::uint32_t take_lost() override;
-    void route(const Routes& routes) override;
-    bool start(Nanoseconds at, const ImuTransfer& transfer) override;
-    bool complete(ImuReply& reply) override;
-    void abort() override { burst_.reset(); }
-    std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
+    Switched route(const Routes& routes, bool force) override;
+    bool arm(const ImuJob& job) override;
+    bool complete(ImuReply (&replies)[max_transfers]) override;
+    void disarm() override;
+    std::size_t read(std::uint8_t* data, Nanoseconds& received) override;
     void write(const std::uint8_t* data, std::size_t size) override;
     std::size_t free_space() override;
     void watch_departure() override;
     bool take_departure(Nanoseconds& at) override;
     void publish(const ImuImage& image) override;
     std::size_t load(std::uint8_t* data, std::size_t capacity) override;
-    void store(const std::uint8_t* data, std::size_t size) override;
+    bool store(const std::uint8_t* data, std::size_t size) override;
+    Outcome take_outcome() override;
     void reboot(bool to_boot_loader) override;
-    void feed() override { fed_ = now_; }
+    void feed() override;
 
     /// A class of its own, because its functions have the same names as the link's.
     struct Uart final : ImuUart {
         explicit Uart(NativeBoard& of) : board(of) {}
-        void set_baud(std::uint32_t baud) override { board.baud_ = baud; }
+        void set_baud(std::uint32_t baud) override;
         void write(const std::uint8_t* data, std::size_t size) override;
         std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override;
         NativeBoard& board;
     };
 
-    Nanoseconds burst_end() const;
-    void advance_hardware();
+    Hal hardware(const Identity& identity);
+    void spend();
+    Nanoseconds draw(Nanoseconds most);
+    Nanoseconds next_attention() const;
+    Nanoseconds next_in_hardware() const;
+    void advance_to(Nanoseconds until);
+    void poll_core();
+    Nanoseconds transfer_end(Nanoseconds at, const ImuTransfer& transfer) const;
+    Nanoseconds job_end() const;
+    bool visible(const Edge& edge) const { return edge.at + model_.edge_lag_ns <= now_; }
     void set_input(std::uint8_t input, bool level);
     void apply(const Edge& edge);
     Nanoseconds light_cut() const;
@@ -148,14 +188,17 @@ class NativeBoard final : Clock64,
     bool exposing(unsigned camera) const;
 
     Environment environment_;
+    PortModel model_;
+    std::mt19937_64 random_;
     Uart uart_{*this};
     Nanoseconds now_;
     Nanoseconds fed_;
     bool watchdog_bit_ = false;
     bool attention_ = true;  ///< the core has something to do at once
     std::deque<Word> words_;
+    bool words_full_ = false;  ///< and the core was told so
+    Nanoseconds last_word_ = INT64_MIN / 2;
     std::uint32_t levels_ = 0;  ///< of the schedule
-    std::deque<Late> late_;
     Routes routes_;
     std::uint32_t inputs_ = 0;  ///< levels
     std::uint32_t pins_ = 0;
@@ -165,20 +208,24 @@ class NativeBoard final : Clock64,
     std::priority_queue<Edge, std::vector<Edge>, Later> edges_;
     std::deque<Edge> stamped_;
     std::uint32_t lost_edges_ = 0;
-    std::optional<Burst> burst_;
+    std::optional<ArmedJob> armed_;
+    Nanoseconds ready_at_[input_count] = {};  ///< newest edges of data-ready inputs
     bool imu_bus_stuck_ = false;
+    bool i2c_held_ = false;
     bool stalled_ = false;
     std::uint32_t baud_ = 115'200;
     std::deque<UartBytes> uart_bytes_;
     ImuImage image_;
-    std::deque<std::uint8_t> received_;
-    Nanoseconds received_at_ = 0;
+    std::deque<Packet> received_;
     std::vector<std::uint8_t> transmitted_;
     std::size_t link_capacity_ = std::size_t{64} * 1024;
+    bool link_full_ = false;      ///< and the core was told so
     std::uint64_t written_ = 0;   ///< bytes for the host since boot
     std::uint64_t consumed_ = 0;  ///< of them
     std::optional<std::uint64_t> watched_;
     std::optional<Nanoseconds> departure_;
+    std::vector<std::uint8_t> storing_;
+    Nanoseconds stored_at_ = never;  ///< never: nothing is being stored
     Board board_;
 };
 

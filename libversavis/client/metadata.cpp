@@ -39,6 +39,10 @@ const char* to_string(EventKind kind) {
         case EventKind::message_doubted: return "message_doubted";
         case EventKind::stream_stepped: return "stream_stepped";
         case EventKind::output_clock_stepped: return "output_clock_stepped";
+        case EventKind::triggers_skipped: return "triggers_skipped";
+        case EventKind::sync_lost: return "sync_lost";
+        case EventKind::sync_taken: return "sync_taken";
+        case EventKind::configuration_stored: return "configuration_stored";
     }
     return "unknown";
 }

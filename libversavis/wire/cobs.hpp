@@ -15,23 +15,22 @@ constexpr std::size_t cobs_bound(std::size_t size) { return size + size / 254 + 
 /// Encodes `size` bytes of `data` to `out`, which has room for cobs_bound(size); returns the
 /// encoded size.
 constexpr std::size_t cobs_encode(const std::uint8_t* data, std::size_t size, std::uint8_t* out) {
-    std::size_t code_at = 0;
-    std::size_t written = 1;
-    std::uint8_t code = 1;
-    for (std::size_t i = 0; i < size; ++i) {
-        if (data[i] != 0) {
-            out[written++] = data[i];
-            ++code;
-        }
-        const bool block_full = code == 0xFF && i + 1 < size;
-        if (data[i] == 0 || block_full) {
-            out[code_at] = code;
-            code_at = written++;
-            code = 1;
+    std::uint8_t* code_at = out;
+    std::uint8_t* next = out + 1;
+    const std::uint8_t* const end = data + size;
+    while (data != end) {
+        // The place of a zero is that of the next code.
+        const std::uint8_t byte = *next++ = *data++;
+        if (byte == 0) {
+            *code_at = static_cast<std::uint8_t>(next - 1 - code_at);
+            code_at = next - 1;
+        } else if (next - code_at == 0xFF && data != end) {
+            *code_at = 0xFF;
+            code_at = next++;
         }
     }
-    out[code_at] = code;
-    return written;
+    *code_at = static_cast<std::uint8_t>(next - code_at);
+    return static_cast<std::size_t>(next - out);
 }
 
 /// Decodes `size` encoded bytes (no delimiter) to `out` of `capacity` bytes; returns the decoded

@@ -25,8 +25,14 @@ struct CameraConfiguration {
     std::int64_t exposure_ns;      ///< expected until one has been measured or announced
     std::int64_t max_exposure_ns;  ///< the board gives up on an exposure that lasts longer
     std::uint8_t master;           ///< of a slave: the camera whose exposure line triggers it
-    std::uint8_t reserved[7];
+    std::uint8_t glitch;  ///< the exposure line must keep a level this long, in 100 ns; 0: 5 us
+    std::uint8_t reserved[6];
 };
+
+/// How long an exposure line must keep a level, unless the configuration says otherwise. At half,
+/// strobes that bounce are seen to end at once; at twice, short exposures are not seen.
+inline constexpr std::uint32_t default_glitch_ns = 5'000;
+inline constexpr std::uint32_t glitch_unit_ns = 100;
 
 enum class ImuKind : std::uint8_t {
     none = 0,
@@ -40,11 +46,14 @@ enum class ImuKind : std::uint8_t {
     vn100 = 8,
 };
 
-inline constexpr std::size_t imu_count = 2;  ///< port 0: SPI; port 1: UART
+inline constexpr std::size_t imu_count = 2;  ///< port 0: SPI or I2C; port 1: UART
 
 enum ImuOption : std::uint8_t {
     imu_data_ready =
         1U << 0U,  ///< the part's data-ready line is wired: it paces and stamps the samples
+    imu_accel_ready = 1U << 1U,  ///< and that of its accelerometer, which has a clock of its own
+    imu_i2c = 1U << 2U,          ///< the part is on the I2C bus
+    imu_i2c_second = 1U << 3U,   ///< at the second of its two I2C addresses
 };
 
 struct ImuConfiguration {
@@ -77,18 +86,24 @@ enum PortOption : std::uint8_t {
 };
 
 /// What the test output shows: a grid point of a camera, where the middle of its exposure should
-/// be, or the ticks of an IMU.
-enum TestSource : std::uint8_t { test_none = 0, test_camera0 = 1, test_imu0 = 5 };
+/// be, the ticks of an IMU, or pulses at a rate of its own.
+enum TestSource : std::uint8_t { test_none = 0, test_camera0 = 1, test_imu0 = 5, test_rate = 7 };
+
+/// Where the test pulses leave: at the test output, or at an output that nothing else uses.
+enum TestOutput : std::uint8_t { test_at_test = 0, test_at_camera0 = 1, test_at_sync = 5 };
 
 struct PortConfiguration {
     std::uint8_t inputs;   ///< bit mask of the PulseInputs in use
     std::uint8_t falling;  ///< bit mask of those whose falling edge counts
     std::uint8_t options;  ///< bits of PortOption
-    std::uint8_t test;     ///< TestSource: test_camera0 + camera, or test_imu0 + port
+    std::uint8_t test;     ///< TestSource: test_camera0 + camera, test_imu0 + port, or test_rate
     std::uint32_t
         sync_rate_uhz;  ///< pulses at the sync output, micro-hertz: 0 (none), 100'000 to 10'000'000
     std::uint32_t pulse_ns;   ///< width of pulses at sync and test outputs: 1'000 to 10'000'000
     std::uint32_t nmea_baud;  ///< 1'200 to 921'600; 0: 9'600
+    std::uint32_t test_rate_millihertz;  ///< of test_rate: 100 to 10'000'000
+    std::uint8_t test_output;            ///< TestOutput: of test_rate
+    std::uint8_t reserved[3];
 };
 
 enum ConfigurationFlag : std::uint32_t {
@@ -131,6 +146,10 @@ enum class ConfigurationField : std::uint8_t {
     sync_rate = 19,
     port_options = 20,
     nmea_baud = 21,
+    glitch = 22,
+    test_rate = 23,
+    test_output = 24,
+    present = 25,  ///< what this board does not have; value: bit of Present, the range is empty
 };
 
 /// One field that the board refuses; one packet for each, before the answer.
@@ -154,13 +173,14 @@ struct ConfigurationAnswer {
     ConfigurationStatus status;
     std::uint8_t refused;  ///< number of refusals
     std::uint8_t reserved[2];
+    std::int64_t origin_ns;  ///< where the grid began: board time of its zero, as things are
     Configuration
         taken;  ///< what is in force after this answer, with the IMU rates that the parts have
 };
 
 static_assert(sizeof(CameraConfiguration) == 48 && sizeof(ImuConfiguration) == 8);
-static_assert(sizeof(IlluminationConfiguration) == 16 && sizeof(PortConfiguration) == 16);
-static_assert(sizeof(Configuration) == 248 && sizeof(Refusal) == 32 &&
-              sizeof(ConfigurationAnswer) == 256);
+static_assert(sizeof(IlluminationConfiguration) == 16 && sizeof(PortConfiguration) == 24);
+static_assert(sizeof(Configuration) == 256 && sizeof(Refusal) == 32 &&
+              sizeof(ConfigurationAnswer) == 272);
 
 }  // namespace versavis::wire

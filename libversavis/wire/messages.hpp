@@ -49,6 +49,29 @@ enum Capability : std::uint32_t {
     capability_nmea = 1U << 9U,  ///< NMEA sentences at the UART label the pulses of the PPS input
 };
 
+/// What a board has pins and peripherals for.
+enum Present : std::uint32_t {
+    present_camera0 = 1U << 0U,  ///< trigger output and exposure input; 1 to 3 follow
+    present_light = 1U << 4U,
+    present_sync_output = 1U << 5U,
+    present_test_output = 1U << 6U,
+    present_pulse0 = 1U << 7U,  ///< + PulseInput
+    present_spi = 1U << 11U,
+    present_i2c = 1U << 12U,
+    present_ready0 = 1U << 13U,       ///< data-ready input of IMU 0, and of IMU 1
+    present_accel_ready = 1U << 15U,  ///< second data-ready input of IMU 0
+    present_uart = 1U << 16U,
+    present_imu_output = 1U << 17U,
+    present_memory = 1U << 18U,  ///< keeps a configuration without power
+    present_all = (1U << 19U) - 1U,
+};
+
+/// The first bytes of a board_hello, in every version.
+struct HelloVersion {
+    std::uint8_t major;
+    std::uint8_t minor;
+};
+
 struct BoardHello {
     static constexpr Type type = Type::board_hello;
     std::uint8_t major;
@@ -57,8 +80,10 @@ struct BoardHello {
     ResetCause reset_cause;
     std::uint32_t capabilities;  ///< bits of Capability
     std::int64_t board_time_ns;
-    char serial[16];    ///< zero-padded text
-    char firmware[16];  ///< zero-padded text
+    std::uint32_t present;                 ///< bits of Present
+    std::uint32_t fastest_imu_millihertz;  ///< samples that the board can read
+    char serial[16];                       ///< zero-padded text
+    char firmware[16];                     ///< zero-padded text
 };
 
 enum ExposureFlag : std::uint16_t {
@@ -101,8 +126,13 @@ enum ImuFlag : std::uint16_t {
     imu_self_test_failed = 1U << 1U,  ///< the sensor's own diagnosis
     imu_overrun = 1U << 2U,   ///< samples before were not read in time: their numbers are missing
     imu_stamped = 1U << 3U,   ///< the time is that of the part's data-ready edge
-    imu_repeated = 1U << 4U,  ///< the part says that it had no new data since the sample before
+    imu_repeated = 1U << 4U,  ///< it holds the same data as the sample before, or the part says so
+    imu_accel_stamped = 1U << 5U,  ///< the accelerometer's age is known by an edge of its own
 };
+
+/// Of an accelerometer's age, of which 16 bits hold 1 ms either way. At half, only parts faster
+/// than 1 kHz fit; at twice, an age is off by up to 64 ns.
+inline constexpr std::int32_t accel_age_unit_ns = 32;
 
 /// Raw sensor words, sign-extended; the host scales them.
 struct ImuSample {
@@ -117,7 +147,7 @@ struct ImuSample {
     std::int16_t magnetic[3];
     std::int16_t temperature;
     std::uint16_t pressure;
-    std::uint16_t reserved;
+    std::int16_t accel_age;  ///< with imu_accel_stamped: accelerometer before time_ns, in 32 ns
     std::uint32_t
         departure_ns;  ///< from time_ns to when this packet began to leave the board; 0: unknown
 };
@@ -125,7 +155,7 @@ struct ImuSample {
 enum class EventKind : std::uint8_t {
     trigger_skipped = 1,  ///< detail: SkipReason; value: the grid tick that got no pulse
     stray_edge = 2,       ///< an exposure edge that belongs to no trigger; value: level
-    output_late = 3,      ///< an output word left too late; value: ns late
+    output_late = 3,      ///< an output edge left too late; source: output; value: ns late
     edge_overflow = 4,    ///< edges came faster than they were read; value: edges lost
     pps = 5,              ///< value: pulses of this input since boot
     aux_pulse = 6,        ///< source: 0 or 1; value: pulses of this input since boot
@@ -138,6 +168,11 @@ enum class EventKind : std::uint8_t {
     imu_silent = 12,  ///< no data-ready edge, end of transfer or bytes arrived
     utc_label =
         13,  ///< a sentence labelled the PPS pulse at this time; value: UTC seconds since 1970
+    triggers_skipped =
+        14,           ///< grid points in a row that were too late; value: first; detail: count
+    sync_lost = 15,   ///< pulses of the sync input do not fit the grid; value: ns off it
+    sync_taken = 16,  ///< the grid follows the sync pulses (again); value: ns that it moves
+    stored = 17,      ///< the configuration to store; value: 1 when it is safe, 0 when that failed
 };
 
 enum class SkipReason : std::uint16_t {
@@ -180,6 +215,9 @@ struct ClockFollowUp {
 
 enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
 
+/// Of the grid and the pulses of the sync input.
+enum class SyncState : std::uint8_t { none = 0, lost = 1, followed = 2 };
+
 /// Once a second; counters since boot, high-water marks since the previous report.
 struct Health {
     static constexpr Type type = Type::health;
@@ -201,10 +239,13 @@ struct Health {
     std::uint32_t output_queue_max;  ///< edges that waited
     std::uint32_t link_queue_max;    ///< packets that waited
     std::uint32_t loop_max_ns;       ///< longest delay between something being due and being done
-    std::int32_t pps_error_ppb;      ///< board clock against PPS: positive runs fast
+    std::int32_t pps_error_ppb;  ///< while PPS is good: board clock against it, positive runs fast
     PpsState pps_state;
     ResetCause reset_cause;
-    std::uint16_t ignored;  ///< messages of the host that were out of range, modulo 2^16
+    std::uint16_t ignored;   ///< messages of the host that were out of range, modulo 2^16
+    std::uint32_t glitches;  ///< edges that the filters of the inputs left out
+    SyncState sync_state;
+    std::uint8_t reserved[7];
 };
 
 enum class LogLevel : std::uint8_t { error = 3, warning = 4, info = 6, debug = 7 };
@@ -279,10 +320,10 @@ constexpr std::uint64_t slow_start_ticks(std::uint64_t rate_uhz, unsigned camera
     return (rate_uhz * (4 + camera) + 3'999'999) / 4'000'000;
 }
 
-static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 48);
+static_assert(sizeof(Header) == 12 && sizeof(HostHello) == 4 && sizeof(BoardHello) == 56);
 static_assert(sizeof(Exposure) == 48 && sizeof(ImuSample) == 56 && sizeof(Event) == 24);
 static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 &&
-              sizeof(ClockFollowUp) == 16 && sizeof(Health) == 88 && sizeof(Log) == 96);
+              sizeof(ClockFollowUp) == 16 && sizeof(Health) == 96 && sizeof(Log) == 96);
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
               sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16);
 

@@ -23,16 +23,24 @@ struct Frame {
 };
 
 /// A packet with the right CRC and, if its type is known, the right size: receivers ignore unknown
-/// types. `payload` lives until the decoder's next call.
+/// types. A board_hello of another major version has whatever size that gives it.
+/// `payload` lives until the decoder's next call.
 struct Packet {
     Header header;
     const std::uint8_t* payload;
     std::size_t payload_size;
 
+    /// Which version a board_hello is of, whatever that version made of the rest.
+    bool read(HelloVersion& out) const {
+        if (header.type != Type::board_hello || payload_size < sizeof out) return false;
+        std::memcpy(&out, payload, sizeof out);
+        return true;
+    }
+
     /// The payload as T when the packet is one; false otherwise.
     template <class T>
     bool read(T& out) const {
-        if (header.type != T::type) return false;
+        if (header.type != T::type || payload_size != sizeof(T)) return false;
         std::memcpy(&out, payload, sizeof(T));
         return true;
     }
@@ -94,6 +102,8 @@ class Decoder {
         std::memcpy(&packet.header, decoded_, sizeof packet.header);
         packet.payload = decoded_ + sizeof packet.header;
         packet.payload_size = size - sizeof packet.header - crc_size;
+        HelloVersion version{};
+        if (packet.read(version) && version.major != protocol_major) return true;
         const std::size_t known = payload_size(packet.header.type);
         return known == 0 || known == packet.payload_size;
     }

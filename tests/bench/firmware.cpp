@@ -1,129 +1,144 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Instructions that the firmware's core takes, counted one by one, and its memory.
-#include <sys/ptrace.h>
-#include <sys/user.h>
-#include <sys/wait.h>
-#include <unistd.h>
+// What the firmware's core takes on the chip: cycles of each poll, stack and memory, by loads that
+// were recorded here and run again in the emulator.
+#include <fmt/format.h>
 
 #include <algorithm>
-#include <csignal>
-#include <cstring>
+#include <cstdio>
 #include <stdexcept>
 
-#include "byte_register_device.hpp"
+#include "loads.hpp"
 #include "metric.hpp"
-#include "world.hpp"
+#include "replay.hpp"
 
 namespace versavis::bench {
 
 namespace {
 
-using scenario::ms;
+using emulator::FunctionCost;
+using emulator::Lived;
+using emulator::Load;
+using emulator::Replayed;
+using firmware::Nanoseconds;
 
-constexpr long breakpoint = 0xCC;
-constexpr std::size_t most_calls = 4'000;  // stepping is slow; many periods of the cameras
+constexpr double clock_hz = 125e6;  // PIO then divides a second into steps of exactly 8 ns
+constexpr double kibibyte = 1024;
 
-/// Full load: 8 kHz IMU, four cameras at 200 Hz with light, PPS and clock requests.
-void work_at_full_load(bool traced) {
-    scenario::World world;
-    for (unsigned camera = 0; camera < 4; ++camera) {
-        scenario::CameraSettings settings;
-        settings.exposure = [](auto, auto) { return 2 * ms; };
-        world.add_camera(camera, settings, 200'000'000);
-    }
-    world.add_imu(std::make_unique<devices::Icm42688pDevice>(&scenario::World::motion),
-                  wire::ImuKind::icm42688p, 8000, true);
-    world.configuration.illumination = {15, 0, 0, 100'000, 4'000'000, 900'000};
-    if (!world.begin()) throw std::runtime_error("the board refuses the configuration");
-    world.run(300 * ms);
-    world.set_link(76'923, 64, 128);
-    if (traced) ::raise(SIGSTOP);
-    world.send(wire::ClockRequest{1, 0});
-    world.run(60 * ms);
-}
+// What leaves the processor to the port, and to what comes later.
+constexpr double idle_poll_goal = 1'500;
+constexpr double imu_sample_goal = 6'500;
+// At 125 MHz 0.4 ms: a trigger is committed 1 ms ahead.
+constexpr double worst_poll_goal = 50'000;
+constexpr double cpu_goal_percent = 8;
+constexpr double stack_goal = 1'536;
+constexpr double image_goal_kib = 36;
+constexpr double static_goal_kib = 64;
 
-/// A child that is stepped through: how many instructions each call of `function` takes, what it
-/// calls included.
-class InstructionCounter {
- public:
-    InstructionCounter(void (*work)(bool), std::uintptr_t function)
-        : function_(function), child_(::fork()) {
-        if (child_ == 0) {
-            ::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
-            work(true);
-            ::_exit(0);
-        }
-        if (!stops_with(SIGSTOP))
-            throw std::runtime_error("the firmware cannot be traced on this machine");
-    }
-    ~InstructionCounter() {
-        ::kill(child_, SIGKILL);
-        ::waitpid(child_, nullptr, 0);
-    }
-    InstructionCounter(const InstructionCounter&) = delete;
-    InstructionCounter& operator=(const InstructionCounter&) = delete;
+constexpr std::size_t profiled_functions = 20;
 
-    std::vector<double> count_calls() {
-        std::vector<double> counts;
-        const long original = ::ptrace(PTRACE_PEEKTEXT, child_, function_, nullptr);
-        while (counts.size() < most_calls) {
-            ::ptrace(PTRACE_POKETEXT, child_, function_, (original & ~0xFFL) | breakpoint);
-            ::ptrace(PTRACE_CONT, child_, nullptr, nullptr);
-            if (!stops_with(SIGTRAP)) break;
-            ::ptrace(PTRACE_POKETEXT, child_, function_, original);
-            user_regs_struct registers = read_registers();
-            registers.rip = function_;
-            ::ptrace(PTRACE_SETREGS, child_, nullptr, &registers);
-            counts.push_back(static_cast<double>(step_to_return(registers.rsp)));
-        }
-        return counts;
-    }
-
- private:
-    bool stops_with(int signal) const {
-        int status = 0;
-        return ::waitpid(child_, &status, 0) == child_ && WIFSTOPPED(status) &&
-               WSTOPSIG(status) == signal;
-    }
-    user_regs_struct read_registers() const {
-        user_regs_struct registers{};
-        ::ptrace(PTRACE_GETREGS, child_, nullptr, &registers);
-        return registers;
-    }
-    /// The call is over when the stack is above the return address.
-    long step_to_return(unsigned long long stack) const {
-        long steps = 0;
-        while (read_registers().rsp <= stack) {
-            ::ptrace(PTRACE_SINGLESTEP, child_, nullptr, nullptr);
-            if (!stops_with(SIGTRAP)) break;
-            ++steps;
-        }
-        return steps;
-    }
-
-    std::uintptr_t function_;
-    pid_t child_;
+struct Measured {
+    Lived& lived;
+    Replayed replayed;
 };
 
-std::uintptr_t address_of_poll() {
-    void (firmware::Board::*const poll)() = &firmware::Board::poll;
-    std::uintptr_t address = 0;
-    std::memcpy(&address, &poll, sizeof address);
-    return address;
+std::vector<double> measured_polls(const Measured& measured) {
+    std::vector<double> cycles;
+    const auto& polls = measured.lived.recorder.polls();
+    for (std::size_t i = 0; i < polls.size(); ++i)
+        if (polls[i].measured) cycles.push_back(measured.replayed.polls[i]);
+    if (cycles.empty()) throw std::runtime_error("a load has no poll to measure");
+    std::sort(cycles.begin(), cycles.end());
+    return cycles;
+}
+
+double sum(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double value : values) sum += value;
+    return sum;
+}
+
+/// From a sample's data-ready edge until its packet is handed to the link: cycles of all polls in
+/// between, in the middle of the samples.
+double imu_sample_cycles(const Measured& measured) {
+    const auto& polls = measured.lived.recorder.polls();
+    std::vector<double> cycles;
+    for (const wire::ImuSample& sample : measured.lived.samples) {
+        const Nanoseconds handed = sample.time_ns + sample.departure_ns;
+        const auto before = [](const auto& poll, Nanoseconds at) { return poll.at < at; };
+        auto poll = std::lower_bound(polls.begin(), polls.end(), sample.time_ns, before);
+        double all = 0;
+        for (; poll != polls.end() && poll->at <= handed; ++poll)
+            all += measured.replayed.polls[static_cast<std::size_t>(poll - polls.begin())];
+        if (poll != polls.end() && poll->measured) cycles.push_back(all);
+    }
+    if (cycles.empty()) throw std::runtime_error("no sample was measured");
+    std::sort(cycles.begin(), cycles.end());
+    return cycles[cycles.size() / 2];
+}
+
+void print_functions(const char* by, std::vector<FunctionCost> functions, double all,
+                     double (*cost)(const FunctionCost&)) {
+    std::sort(functions.begin(), functions.end(),
+              [cost](const auto& a, const auto& b) { return cost(a) > cost(b); });
+    functions.resize(std::min(functions.size(), profiled_functions));
+    fmt::print("  {}:\n", by);
+    for (const FunctionCost& function : functions)
+        if (cost(function) > 0)
+            fmt::print("  {:6.2f} % {:>12.0f} cycles {:>8.0f} calls  {}\n",
+                       100 * cost(function) / all, cost(function), function.calls, function.name);
+}
+
+void print_profile(const Load& load, const Measured& measured) {
+    const double all = sum(measured_polls(measured));
+    fmt::print("profile of {} ({}): {:.0f} cycles; deepest in {}, {} bytes\n", load.name, load.what,
+               all, measured.replayed.deepest, measured.replayed.stack);
+    const auto& functions = measured.replayed.profile;
+    print_functions("own instructions", functions, all, [](const auto& f) { return f.self; });
+    print_functions("with what they call", functions, all, [](const auto& f) { return f.total; });
+}
+
+void add_load(const Load& load, const Measured& measured, std::vector<Metric>& metrics) {
+    const std::vector<double> polls = measured_polls(measured);
+    const auto add = [&](const char* what, double value, const char* unit,
+                         std::optional<double> goal = {}) {
+        metrics.push_back({fmt::format("firmware_{}_{}", load.name, what), value, unit, goal});
+    };
+    const auto goal_of = [&load](const char* name, double goal) {
+        return std::string(load.name) == name ? std::optional(goal) : std::nullopt;
+    };
+    add("poll_median", polls[polls.size() / 2], "cycles", goal_of("idle", idle_poll_goal));
+    add("poll_worst", polls.back(), "cycles");
+    if (!load.steady) return;
+    const double seconds = static_cast<double>(load.measured_for) * 1e-9;
+    add("poll_rate", static_cast<double>(polls.size()) / seconds, "1/s");
+    add("cpu", 100 * sum(polls) / (seconds * clock_hz), "%", goal_of("adis", cpu_goal_percent));
 }
 
 }  // namespace
 
-std::vector<Metric> bench_firmware() {
-    InstructionCounter counter(&work_at_full_load, address_of_poll());
-    std::vector<double> counts = counter.count_calls();
-    if (counts.empty()) throw std::runtime_error("no poll was counted");
-    std::sort(counts.begin(), counts.end());
-    // A port at 125 MHz has 125'000 cycles until what is committed a millisecond ahead is due.
-    return {
-        {"firmware_poll_median", counts[counts.size() / 2], "instr.", 5'000},
-        {"firmware_poll_worst", counts.back(), "instr.", 60'000},
-        {"firmware_static_memory", static_cast<double>(sizeof(firmware::Board)) / 1024, "KiB", 64}};
+std::vector<Metric> bench_firmware(bool with_profile) {
+    std::vector<Metric> metrics;
+    double imu_sample = 0;
+    double worst = 0;
+    double stack = 0;
+    Replayed last;
+    for (const Load& load : emulator::loads()) {
+        const auto lived = emulator::live(load, load.measured_for);
+        const Measured measured{*lived, emulator::replay(lived->recorder.words(), with_profile)};
+        last = measured.replayed;
+        if (with_profile) print_profile(load, measured);
+        add_load(load, measured, metrics);
+        if (std::string(load.name) == "adis_alone") imu_sample = imu_sample_cycles(measured);
+        worst = std::max<double>(worst, *std::max_element(last.polls.begin(), last.polls.end()));
+        stack = std::max<double>(stack, last.stack);
+    }
+    metrics.push_back({"firmware_imu_sample", imu_sample, "cycles", imu_sample_goal});
+    metrics.push_back({"firmware_poll_worst", worst, "cycles", worst_poll_goal});
+    metrics.push_back({"firmware_stack", stack, "bytes", stack_goal});
+    metrics.push_back({"firmware_image", last.core / kibibyte, "KiB", image_goal_kib});
+    metrics.push_back({"firmware_library", last.library / kibibyte, "KiB", {}});
+    metrics.push_back({"firmware_static_memory", last.board / kibibyte, "KiB", static_goal_kib});
+    return metrics;
 }
 
 }  // namespace versavis::bench

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// One measured figure and its goal.
+// One measured figure and its goal, if it has one.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,9 +12,9 @@ struct Metric {
     std::string name;
     double value;
     std::string unit;
-    double goal;  ///< met when the value is not above it
+    std::optional<double> goal;  ///< met when the value is not above it
 
-    bool met() const { return value <= goal; }
+    bool met() const { return !goal || value <= *goal; }
 };
 
 /// Publication and reading of rings, within this process.
@@ -39,7 +40,8 @@ std::vector<Metric> bench_link();
 /// How soon a camera delivers verified frames again after it, or the board, rebooted.
 std::vector<Metric> bench_recovery();
 
-/// Instructions and memory of the firmware's core.
-std::vector<Metric> bench_firmware();
+/// Cycles, stack and memory of the firmware's core on the chip; prints which functions take the
+/// cycles, if asked.
+std::vector<Metric> bench_firmware(bool with_profile);
 
 }  // namespace versavis::bench

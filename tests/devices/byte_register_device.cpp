@@ -17,10 +17,16 @@ std::uint8_t high(std::int16_t word) {
 }
 std::uint8_t low(std::int16_t word) { return static_cast<std::uint8_t>(word); }
 
+/// From the start of a transfer to its byte `index`.
+Nanoseconds byte_time(std::size_t index, unsigned bits, std::uint32_t clock_hz) {
+    return static_cast<Nanoseconds>(index * bits) * 1'000'000'000 / clock_hz;
+}
+
 }  // namespace
 
 void Icm42688pDevice::reset() {
     registers_.fill(0);
+    registers_[0x4C] = 0x30;  // both interfaces answer
     registers_[0x4F] = registers_[0x50] = 0x06;
     registers_[0x52] = 0x11;
     registers_[0x64] = registers_[0x65] = 0x10;
@@ -61,14 +67,9 @@ void Icm42688pDevice::write(unsigned address, std::uint8_t value, Nanoseconds at
 std::uint8_t Icm42688pDevice::read(unsigned address, Nanoseconds at) {
     if (address < 0x1D || address > 0x2D) return registers_[address];
     if (!running() || at < on_at_ + 30 * ms) return address % 2 == 1 ? 0x80 : 0x00;
+    if (address == 0x2D) return status(at);
     const UpdateTimes times = updates();
-    const std::int64_t index = times.index_at(at);
-    if (address == 0x2D) {
-        const bool fresh = index != read_index_;
-        read_index_ = index;
-        return fresh ? 0x08 : 0x00;
-    }
-    const Inertial felt = world_(times.time(index));
+    const Inertial felt = world_(times.time(times.index_at(std::min(at, frozen_at_))));
     const unsigned word = (address - 0x1D) / 2;
     std::int16_t value = 0;
     if (word == 0)
@@ -80,10 +81,18 @@ std::uint8_t Icm42688pDevice::read(unsigned address, Nanoseconds at) {
     return address % 2 == 1 ? high(value) : low(value);
 }
 
+/// Reading it clears it.
+std::uint8_t Icm42688pDevice::status(Nanoseconds at) {
+    const std::int64_t index = updates().index_at(std::min(at, frozen_at_));
+    const bool fresh = index != read_index_;
+    read_index_ = index;
+    return fresh ? 0x08 : 0x00;
+}
+
 void Icm42688pDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
                                std::span<std::uint8_t> received) {
     std::fill(received.begin(), received.end(), unplugged_ ? std::uint8_t{0xFF} : std::uint8_t{0});
-    if (unplugged_) return;
+    if (unplugged_ || address_ != 0) return;
     if (transfer.chip != 0 || transfer.clock_hz > 24'000'000 || at < ready_at_) ++breaches_;
     const unsigned address = transfer.bytes[0] & 0x7FU;
     if ((transfer.bytes[0] & 0x80U) == 0) {
@@ -91,7 +100,32 @@ void Icm42688pDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& tran
         return write(address, transfer.bytes[1], at);
     }
     for (std::size_t i = 1; i < received.size(); ++i)
-        received[i] = read(address + static_cast<unsigned>(i) - 1, at);
+        received[i] =
+            read(address + static_cast<unsigned>(i) - 1, at + byte_time(i, 8, transfer.clock_hz));
+}
+
+/// The register's address is kept and counts up; of bytes beyond the registers none is
+/// acknowledged. Each register shows what it holds when its byte is sent.
+bool Icm42688pDevice::i2c(Nanoseconds at, const firmware::ImuTransfer& transfer,
+                          std::span<std::uint8_t> received) {
+    std::fill(received.begin(), received.end(), std::uint8_t{0});
+    if (unplugged_ || address_ == 0 || transfer.chip != address_) return false;
+    if (transfer.clock_hz > 1'000'000 || at < ready_at_) ++breaches_;
+    const unsigned pointer = transfer.bytes[0];
+    if (pointer + transfer.size - 1U > registers_.size()) {
+        ++breaches_;  // bit 7 is of SPI
+        return false;
+    }
+    const bool reads = transfer.bus == firmware::ImuTransfer::Bus::i2c_read;
+    for (unsigned i = 1; i < transfer.size; ++i) {
+        // Behind both addresses and the register's, or behind one address.
+        const Nanoseconds then = at + byte_time(i + (reads ? 2 : 1), 9, transfer.clock_hz);
+        if (reads)
+            received[i] = read(pointer + i - 1, then);
+        else
+            write(pointer + i - 1, transfer.bytes[i], then);
+    }
+    return true;
 }
 
 void Bmi088Device::reset_gyro(Nanoseconds at) {
@@ -144,12 +178,21 @@ std::uint8_t Bmi088Device::read_gyro(unsigned address, Nanoseconds at) const {
     return address % 2 == 0 ? low(value) : high(value);
 }
 
+/// It samples with a clock of its own, 0.4 % off.
+UpdateTimes Bmi088Device::accel_updates() const {
+    constexpr double rates[] = {1, 1, 1, 1, 1, 12.5, 25, 50, 100, 200, 400, 800, 1600, 1, 1, 1};
+    return {accel_on_at_, 1.004e9 / rates[accel_[0x40] & 0xFU]};
+}
+
+bool Bmi088Device::accel_signals(Nanoseconds at) const {
+    const bool push_pull_high_output = (accel_[0x53] & 0x1EU) == 0x0A;
+    return accel_on() && at > accel_on_at_ && (accel_[0x58] & 0x4U) != 0 && push_pull_high_output;
+}
+
 std::uint8_t Bmi088Device::read_accel(unsigned address, Nanoseconds at) const {
     const bool data = (address >= 0x12 && address <= 0x17) || address == 0x22 || address == 0x23;
     if (!data || !accel_on()) return accel_[address];
-    // It samples with a clock of its own, 0.4 % off.
-    constexpr double rates[] = {1, 1, 1, 1, 1, 12.5, 25, 50, 100, 200, 400, 800, 1600, 1, 1, 1};
-    const UpdateTimes times{accel_on_at_, 1.004e9 / rates[accel_[0x40] & 0xFU]};
+    const UpdateTimes times = accel_updates();
     const Inertial felt = world_(times.time(times.index_at(at)));
     if (address >= 0x22) {
         const auto eleven_bits =
@@ -179,9 +222,15 @@ void Bmi088Device::transfer(Nanoseconds at, const firmware::ImuTransfer& transfe
     if ((transfer.bytes[0] & 0x80U) == 0) return write(chip, address, transfer.bytes[1], at);
     const std::size_t dummies = chip == 1 ? 1 : 0;
     if (chip == 1) received[1] = 0xA5;
+    // A burst shows the values of one instant: when it comes to the first of them.
+    const unsigned first = chip == 1 ? 0x12 : 0x02;
+    const Nanoseconds shown =
+        at + byte_time(first < address ? 0 : first - address + 1 + dummies, 8, transfer.clock_hz);
+    if (chip == 1 && accel_on() && address <= first && address + received.size() > first + 6)
+        accel_reads_.emplace_back(at, accel_updates().time(accel_updates().index_at(shown)));
     for (std::size_t i = 1 + dummies; i < received.size(); ++i) {
         const unsigned from = address + static_cast<unsigned>(i - 1 - dummies);
-        received[i] = chip == 1 ? read_accel(from, at) : read_gyro(from, at);
+        received[i] = chip == 1 ? read_accel(from, shown) : read_gyro(from, shown);
     }
 }
 

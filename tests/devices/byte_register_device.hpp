@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <utility>
+#include <vector>
 
 #include "inertial.hpp"
 
@@ -14,8 +16,15 @@ class Icm42688pDevice final : public SpiImuDevice {
 
     void transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
                   std::span<std::uint8_t> received) override;
+    bool i2c(Nanoseconds at, const firmware::ImuTransfer& transfer,
+             std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+
+    /// Its interface is wired for I2C, at this address.
+    void wire_i2c(std::uint8_t address) { address_ = address; }
+    /// It takes no new data after `at`, though its data-ready line goes on; never: it does again.
+    void freeze(Nanoseconds at) { frozen_at_ = at; }
 
     void brown_out(Nanoseconds at) override {
         reset();
@@ -28,6 +37,7 @@ class Icm42688pDevice final : public SpiImuDevice {
     void reset();
     void write(unsigned address, std::uint8_t value, Nanoseconds at);
     std::uint8_t read(unsigned address, Nanoseconds at);
+    std::uint8_t status(Nanoseconds at);
     bool running() const { return (registers_[0x4E] & 0x0FU) == 0x0F; }
 
     World world_;
@@ -36,6 +46,8 @@ class Icm42688pDevice final : public SpiImuDevice {
     Nanoseconds on_at_ = 0;
     std::int64_t read_index_ = -1;  ///< update whose data-ready flag was read
     bool unplugged_ = false;
+    std::uint8_t address_ = 0;  ///< on I2C; 0: it is wired for SPI
+    Nanoseconds frozen_at_ = firmware::never;
 };
 
 class Bmi088Device final : public SpiImuDevice {
@@ -49,6 +61,11 @@ class Bmi088Device final : public SpiImuDevice {
                   std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+    UpdateTimes accel_updates() const override;
+    bool accel_signals(Nanoseconds at) const override;
+    std::span<const std::pair<Nanoseconds, Nanoseconds>> accel_reads() const override {
+        return accel_reads_;
+    }
     /// Of the accelerometer alone: the gyro keeps running.
     void brown_out(Nanoseconds at) override {
         reset_accel(at);
@@ -71,6 +88,7 @@ class Bmi088Device final : public SpiImuDevice {
     Nanoseconds accel_on_at_ = 0;
     Nanoseconds last_write_[2] = {-1'000'000'000, -1'000'000'000};
     bool accel_spi_ = false;  ///< it wakes up on I2C
+    std::vector<std::pair<Nanoseconds, Nanoseconds>> accel_reads_;
 };
 
 }  // namespace versavis::devices

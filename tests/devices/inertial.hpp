@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <utility>
 
 #include "hal.hpp"
 
@@ -43,10 +44,22 @@ class SpiImuDevice {
     virtual void transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
                           std::span<std::uint8_t> received) = 0;
 
+    /// The same on I2C. False: nobody acknowledged.
+    virtual bool i2c(Nanoseconds /*at*/, const firmware::ImuTransfer& /*transfer*/,
+                     std::span<std::uint8_t> /*received*/) {
+        return false;
+    }
+
     /// When new data is taken with the present settings; a data-ready edge rises at each instant.
     virtual UpdateTimes updates() const = 0;
     /// False: the data-ready line does not pulse with the present settings.
     virtual bool signals(Nanoseconds at) const = 0;
+
+    /// The same of an accelerometer with a clock and a line of its own.
+    virtual UpdateTimes accel_updates() const { return {}; }
+    virtual bool accel_signals(Nanoseconds /*at*/) const { return false; }
+    /// The newest values that the accelerometer showed: when they were read, and when taken.
+    virtual std::span<const std::pair<Nanoseconds, Nanoseconds>> accel_reads() const { return {}; }
 
     /// The part loses its settings, as after a brown-out.
     virtual void brown_out(Nanoseconds at) = 0;

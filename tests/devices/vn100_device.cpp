@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <sstream>
 
@@ -116,7 +117,7 @@ bool Vn100Device::sends(Nanoseconds at) const {
 }
 
 Vn100Device::Burst Vn100Device::packet(Nanoseconds at) {
-    const Inertial felt = world_(at);
+    const Inertial felt = world_(std::min(at, frozen_at_));
     std::vector<std::uint8_t> bytes{0xFA, 0x01, 0x01, 0x06};
     const auto put = [&bytes](const void* data, std::size_t size) {
         const auto* first = static_cast<const std::uint8_t*>(data);

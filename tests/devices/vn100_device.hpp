@@ -40,6 +40,8 @@ class Vn100Device {
     /// From a sample to the first byte of its packet.
     void delay(Nanoseconds delay) { delay_ = delay; }
     void mute(bool muted) { muted_ = muted; }
+    /// It takes no new data after `at`, though it goes on sending; never: it does again.
+    void freeze(Nanoseconds at) { frozen_at_ = at; }
     void corrupt(unsigned packets) { corrupted_ = packets; }
 
  private:
@@ -56,6 +58,7 @@ class Vn100Device {
     unsigned sync_skip_ = 0;
     Nanoseconds delay_ = 400'000;
     bool muted_ = false;
+    Nanoseconds frozen_at_ = firmware::never;
     unsigned corrupted_ = 0;
 };
 

@@ -12,16 +12,27 @@ using namespace versavis;
 namespace {
 
 constexpr firmware::Nanoseconds step_ns = 200'000;
+constexpr std::uint8_t unacknowledged = 0xA5;
 
-/// An IMU that answers with its input bytes over and over.
+/// An IMU that answers with its input bytes over and over, and now and then not at all.
 firmware::Environment babbling(std::span<const std::uint8_t> bytes) {
     firmware::Environment environment;
     environment.imu_transfer = [bytes, next = std::size_t{0}](auto, const auto&,
                                                               auto received) mutable {
         for (std::uint8_t& byte : received)
             byte = bytes.empty() ? 0xFF : bytes[next++ % bytes.size()];
+        return received.empty() || received.back() != unacknowledged;
     };
     return environment;
+}
+
+/// What the part can have.
+std::uint8_t imu_options(wire::ImuKind kind, std::uint8_t choice) {
+    unsigned options = choice & wire::imu_data_ready;
+    if (kind == wire::ImuKind::bmi088 && options != 0) options |= wire::imu_accel_ready;
+    if (kind == wire::ImuKind::icm42688p && options != 0 && (choice & 2U) != 0)
+        options |= wire::imu_i2c | (choice & wire::imu_i2c_second);
+    return static_cast<std::uint8_t>(options);
 }
 
 /// Something of everything.
@@ -37,13 +48,25 @@ wire::Configuration full_configuration(std::uint8_t choice) {
                                     1'000'000,
                                     4'000'000,
                                     0,
+                                    choice,
                                     {}};
     configuration.cameras[3].flags |= wire::camera_slave;
-    configuration.imus[0] = {static_cast<wire::ImuKind>(1 + choice % 7), 0,
-                             static_cast<std::uint8_t>(choice & 1U), 0, 1'000'000};
+    const auto kind = static_cast<wire::ImuKind>(1 + choice % 7);
+    configuration.imus[0] = {kind, 0, imu_options(kind, choice), 0,
+                             kind < wire::ImuKind::adis16460 ? 800'000U : 1'000'000U};
     configuration.imus[1] = {wire::ImuKind::vn100, 0, 1, 0, 800'000};
     configuration.illumination = {15, 0, 0, 100'000, 2'000'000, 300'000};
-    configuration.ports = {15, 0, wire::port_imu_output, wire::test_camera0, 10'000'000, 10'000, 0};
+    const bool own_rate = (choice & 64U) != 0;
+    configuration.ports = {15,
+                           0,
+                           wire::port_imu_output,
+                           own_rate ? wire::test_rate : wire::test_camera0,
+                           10'000'000,
+                           10'000,
+                           0,
+                           own_rate ? 10'000'000U : 0U,
+                           wire::test_at_test,
+                           {}};
     return configuration;
 }
 
@@ -75,7 +98,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     wire::Decoder decoder;
     std::uint32_t packets = 0;
     decoder.feed(data, size, [&](const wire::Packet& packet) {
-        if (wire::payload_size(packet.header.type) != 0 &&
+        wire::HelloVersion version{};
+        const bool foreign = packet.read(version) && version.major != wire::protocol_major;
+        if (!foreign && wire::payload_size(packet.header.type) != 0 &&
             wire::payload_size(packet.header.type) != packet.payload_size)
             std::abort();
         ++packets;

@@ -23,7 +23,7 @@ const Victim any_exposure{
 const Victim any_sample{Type::imu_sample, {imu_sample::number, imu_sample::time, imu_sample::age}};
 const Victim any_answer{Type::clock_answer, answer_instants};
 const Victim any_follow_up{Type::clock_follow_up, {clock_follow_up::sent}};
-const Victim any_event{Type::event, {event::sequence, event::time, event::value}};
+const Victim any_event{Type::event, {event::detail, event::sequence, event::time, event::value}};
 const std::vector<Victim> all{any_exposure, any_sample, any_answer, any_follow_up, any_event};
 const std::vector<Victim> all_and_reports{any_exposure,   any_sample, any_answer,
                                           any_follow_up,  any_event,  {Type::health, {}},
@@ -76,6 +76,7 @@ const std::vector<Kind>& kinds() {
         {"exposure-flags", Way::flip_flag, {{Type::exposure, {exposure::flags}}}},
         {"imu-time", Way::shift, {{Type::imu_sample, {imu_sample::time}}}},
         {"imu-age", Way::shift, {{Type::imu_sample, {imu_sample::age}}}},
+        {"imu-accel-age", Way::jump, {{Type::imu_sample, {imu_sample::accel_age}}}},
         {"imu-number", Way::jump, {{Type::imu_sample, {imu_sample::number}}}},
         {"imu-flags", Way::flip_flag, {{Type::imu_sample, {imu_sample::flags}}}},
         {"answer-received", Way::shift, {{Type::clock_answer, {clock_answer::received}}}},
@@ -84,7 +85,9 @@ const std::vector<Kind>& kinds() {
         {"answer-id", Way::jump, {{Type::clock_answer, {clock_answer::id}}}},
         {"follow-up", Way::shift, {any_follow_up}},
         {"event-time", Way::shift, {{Type::event, {event::time}}}},
-        {"event-numbers", Way::jump, {{Type::event, {event::sequence, event::value}}}},
+        {"event-numbers",
+         Way::jump,
+         {{Type::event, {event::detail, event::sequence, event::value}}}},
         {"swap-messages", Way::swap_messages, all},
         {"swap-fields", Way::swap_fields, {any_exposure, any_sample, any_answer, any_event}},
         {"repeat", Way::repeat, all_and_reports},
@@ -318,7 +321,7 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
         }
         case Way::flip_flag: {
             constexpr unsigned exposure_flags = 12;
-            constexpr unsigned sample_flags = 5;
+            constexpr unsigned sample_flags = 6;
             const std::uint64_t bit =
                 below(packet.type == Type::exposure ? exposure_flags : sample_flags);
             const Field field = one_field();

@@ -56,10 +56,12 @@ inline constexpr Field number{"number", 4, 4};
 inline constexpr Field time{"time", 8, 8};
 inline constexpr Field magnetic_x{"magnetic x", 40, 2};
 inline constexpr Field magnetic_y{"magnetic y", 42, 2};
+inline constexpr Field accel_age{"accel age", 50, 2};
 inline constexpr Field age{"age", 52, 4};
 }  // namespace imu_sample
 
 namespace event {
+inline constexpr Field detail{"detail", 2, 2};
 inline constexpr Field sequence{"sequence", 4, 4};
 inline constexpr Field time{"time", 8, 8};
 inline constexpr Field value{"value", 16, 8};

@@ -119,6 +119,7 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
     environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
         imu_transfer(at, transfer, received);
+        return true;
     };
     environment.reboot = [this](bool) { reset(); };
     board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(environment), board_now());

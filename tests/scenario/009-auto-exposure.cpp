@@ -28,6 +28,7 @@ TEST_CASE(
     for (std::size_t i = 2; i < records.size(); ++i) {
         const Nanoseconds change = (records[i].end_ns - records[i].start_ns) -
                                    (records[i - 1].end_ns - records[i - 1].start_ns);
-        REQUIRE(std::abs(world.grid_error(records[i])) <= std::abs(change) / 2 + 1);
+        REQUIRE(std::abs(world.grid_error(records[i])) <=
+                std::abs(change) / 2 + 1 + 2 * world.rounding());
     }
 }

@@ -66,6 +66,10 @@ TEST_CASE(
     world.configuration.flags = wire::configuration_store;
     world.connect();
     REQUIRE(world.configure());
+    world.run(second);
+    const auto stored = world.inbox().events_of(wire::EventKind::stored);
+    REQUIRE(stored.size() == 1);
+    CHECK(stored[0].value == 1);
     world.reboot(wire::ResetCause::power_on);
     const std::uint64_t packets = world.inbox().packets;
     world.run(2 * second);
@@ -77,4 +81,24 @@ TEST_CASE(
     world.run(5 * ms);
     CHECK(std::abs(static_cast<std::int16_t>(burst(world)[2]) -
                    static_cast<std::int16_t>(before[2])) < 20);
+}
+
+TEST_CASE("027-power-fails: what was stored before is in force until the new one is safe") {
+    firmware::PortModel model;
+    model.store_ns = 400 * ms;
+    Scenario world(1, model);
+    world.add_imu(make_imu(wire::ImuKind::icm42688p), wire::ImuKind::icm42688p, 500, true);
+    world.configuration.flags = wire::configuration_store;
+    world.connect();
+    REQUIRE(world.configure());
+    world.run(500 * ms);
+    world.configuration.imus[0].rate_millihertz = 1'000'000;
+    REQUIRE(world.configure());
+    CHECK(world.inbox().events_of(wire::EventKind::stored).size() == 1);
+    const bool in_time = GENERATE(false, true);
+    world.run(in_time ? 500 * ms : 300 * ms);
+    world.reboot(wire::ResetCause::power_on);
+    world.run(500 * ms);
+    const std::size_t before = world.spi_imu().updates().period_ns > 1.5e6 ? 500 : 1000;
+    CHECK(before == (in_time ? 1000 : 500));
 }

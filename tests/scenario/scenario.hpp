@@ -3,6 +3,7 @@
 #pragma once
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 
@@ -14,7 +15,8 @@ namespace versavis::scenario {
 
 class Scenario : public World {
  public:
-    explicit Scenario(std::uint64_t seed = 1) : World(seed) {
+    explicit Scenario(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {})
+        : World(seed, model) {
         if (std::getenv("VERSAVIS_VCD") != nullptr) record_trace();
     }
     Scenario(const Scenario&) = delete;
@@ -34,10 +36,10 @@ inline std::size_t count(const std::vector<wire::Exposure>& records, wire::Expos
                       [flag](const auto& record) { return (record.flags & flag) != 0; }));
 }
 
-/// A part on the SPI bus, moved by World::motion().
-inline std::unique_ptr<devices::SpiImuDevice> make_imu(wire::ImuKind kind) {
+/// A part on the SPI bus.
+inline std::unique_ptr<devices::SpiImuDevice> make_imu(
+    wire::ImuKind kind, const devices::World& motion = &World::motion) {
     using Model = devices::AdisModel;
-    const devices::World motion = &World::motion;
     switch (kind) {
         case wire::ImuKind::adis16445:
             return std::make_unique<devices::AdisDevice>(Model::adis16445, motion);
@@ -52,6 +54,14 @@ inline std::unique_ptr<devices::SpiImuDevice> make_imu(wire::ImuKind kind) {
         case wire::ImuKind::icm42688p: return std::make_unique<devices::Icm42688pDevice>(motion);
         default: return std::make_unique<devices::Bmi088Device>(motion);
     }
+}
+
+/// World::motion() with a tremble, so that no two samples of a sensor are the same.
+inline devices::Inertial trembling(Nanoseconds at) {
+    devices::Inertial felt = World::motion(at);
+    felt.gyro_deg_s[0] += 5 * std::sin(static_cast<double>(at) * 1e-6);
+    felt.accel_g[0] += 0.1 * std::cos(static_cast<double>(at) * 1e-6);
+    return felt;
 }
 
 inline constexpr wire::ImuKind spi_imu_kinds[] = {

@@ -70,11 +70,24 @@ TEST_CASE("board_configuration: a refused name is told by name, and what would d
           "versavis.toml:19:8: 'test' of [ports] is \"left\": the board takes inertial");
 }
 
+TEST_CASE("board_configuration: refused options of an IMU are told by their keys") {
+    const auto options = [](unsigned value, unsigned possible) {
+        return told(refusal(Part::imu, 0, Field::imu_options, value, 0, possible));
+    };
+    const std::string why = ": the board does not take that of this part, as it is wired";
+    CHECK(options(wire::imu_data_ready | wire::imu_accel_ready, wire::imu_data_ready) ==
+          "versavis.toml:11:1: 'accel_ready' of [[imu]] \"inertial\" is true" + why);
+    CHECK_THAT(options(wire::imu_i2c | wire::imu_data_ready, wire::imu_data_ready),
+               Catch::Contains("'bus' of [[imu]] \"inertial\" is \"i2c\"" + why));
+    CHECK_THAT(options(wire::imu_i2c_second, 0), Catch::Contains("'i2c_address'"));
+    CHECK_THAT(options(wire::imu_data_ready, 0), Catch::Contains("'data_ready'"));
+}
+
 TEST_CASE("board_configuration: each field that a board can refuse has a key, in any file") {
     const auto key_of = [](int field) {
         return describe({}, refusal(Part::camera, 0, static_cast<Field>(field), 70, 10, 60));
     };
-    for (int field = 1; field <= 21; ++field)
+    for (int field = 1; field <= 25; ++field)
         CHECK_THAT(key_of(field), !Catch::Contains("unknown key"));
     CHECK_THAT(key_of(250), Catch::Contains("unknown key"));
 }

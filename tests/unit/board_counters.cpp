@@ -10,6 +10,7 @@ namespace {
 
 wire::Health report(std::uint32_t lost_edges, std::uint32_t imu_errors) {
     wire::Health health{};
+    health.glitches = lost_edges * 2;
     health.lost_edges = lost_edges;
     health.imu_errors[1] = imu_errors;
     health.loop_max_ns = 77;
@@ -24,6 +25,7 @@ TEST_CASE("board_counters: what was counted before the service looked is taken o
     CHECK(counters.since_start(report(1000, 5)).lost_edges == 0);
     const wire::Health later = counters.since_start(report(1003, 7));
     CHECK(later.lost_edges == 3);
+    CHECK(later.glitches == 6);
     CHECK(later.imu_errors[1] == 2);
     CHECK(later.loop_max_ns == 77);
 }
@@ -34,12 +36,15 @@ TEST_CASE("board_counters: a new life adds to the one before") {
     counters.since_start(report(1004, 0));
     counters.board_restarted();
     CHECK(counters.since_start(report(2, 0)).lost_edges == 6);
-    CHECK(counters.since_start(report(3, 0)).lost_edges == 7);
+    const wire::Health sum = counters.since_start(report(3, 0));
+    CHECK(sum.lost_edges == 7);
+    CHECK(sum.glitches == 14);
 }
 
 TEST_CASE("board_counters: a counter that goes back says nothing") {
     BoardCounters counters;
     counters.since_start(report(10, 0));
     CHECK(counters.since_start(report(4, 0)).lost_edges == 0);
+    CHECK(counters.since_start(report(4, 0)).glitches == 0);
     CHECK(counters.since_start(report(5, 0)).lost_edges == 1);
 }

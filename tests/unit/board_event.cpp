@@ -10,7 +10,7 @@ using namespace versavis::daemon;
 
 TEST_CASE("board_event: each kind of the wire has one of its own in the ring") {
     std::set<EventKind> kinds;
-    constexpr int kinds_on_the_wire = 13;
+    constexpr int kinds_on_the_wire = 17;
     for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {
         wire::Event event{};
         event.kind = static_cast<wire::EventKind>(kind);
@@ -30,7 +30,7 @@ TEST_CASE("board_event: each kind of the wire has one of its own in the ring") {
 }
 
 TEST_CASE("board_event: what only a newer board knows is nothing") {
-    for (const int kind : {0, 14, 255}) {
+    for (const int kind : {0, 18, 255}) {
         wire::Event event{};
         event.kind = static_cast<wire::EventKind>(kind);
         CHECK_FALSE(journal_entry(event));
@@ -51,4 +51,50 @@ TEST_CASE("board_event: a skipped trigger says why, and whose it is") {
     CHECK(source_of(wire::EventKind::trigger_skipped) == EventSource::camera);
     CHECK(source_of(wire::EventKind::imu_silent) == EventSource::imu);
     CHECK(source_of(wire::EventKind::pps) == EventSource::board);
+}
+
+TEST_CASE("board_event: a run of skipped triggers counts as that many") {
+    wire::Event event{};
+    event.kind = wire::EventKind::triggers_skipped;
+    event.source = 2;
+    event.detail = 65535;
+    event.value = 1000;
+    CHECK(skipped_triggers(event) == 65535);
+    const auto entry = journal_entry(event);
+    CHECK(entry->kind == EventKind::triggers_skipped);
+    CHECK(entry->reason == EventReason::too_late);
+    CHECK(entry->count == 65535);
+    CHECK(entry->value == 1000);
+    CHECK(source_of(event.kind) == EventSource::camera);
+    event.kind = wire::EventKind::trigger_skipped;
+    event.detail = static_cast<std::uint16_t>(wire::SkipReason::full);
+    CHECK(skipped_triggers(event) == 1);
+    CHECK(journal_entry(event)->count == 0);
+    event.kind = wire::EventKind::imu_failed;
+    CHECK(skipped_triggers(event) == 0);
+}
+
+TEST_CASE("board_event: sync and storage are told in the log, with what to do") {
+    wire::Event event{};
+    event.kind = wire::EventKind::sync_lost;
+    event.value = -1'234'567;
+    auto told = remark(event);
+    REQUIRE(told);
+    CHECK(told->level == LogLevel::warning);
+    CHECK_THAT(told->text, Catch::Contains("-1234.567 us off the grid") &&
+                               Catch::Contains("check its cable, and that 'sync_rate_hz'"));
+    event.kind = wire::EventKind::sync_taken;
+    told = remark(event);
+    REQUIRE(told);
+    CHECK(told->level == LogLevel::info);
+    CHECK_THAT(told->text, Catch::Contains("moves by -1234.567 us"));
+    event.kind = wire::EventKind::stored;
+    event.value = 1;
+    CHECK(remark(event)->level == LogLevel::info);
+    event.value = 0;
+    CHECK(remark(event)->level == LogLevel::warning);
+    CHECK_THAT(remark(event)->text, Catch::Contains("could not keep its configuration") &&
+                                        Catch::Contains("restart the service to try again"));
+    event.kind = wire::EventKind::pps;
+    CHECK_FALSE(remark(event));
 }

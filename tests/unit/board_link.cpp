@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The link against a board that is played: what it makes of answers, follow-ups and older boards.
+// The link against a board that is played: what it makes of answers, follow-ups and other versions.
 #include "board/board_link.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <catch2/catch.hpp>
 #include <condition_variable>
+#include <cstring>
 #include <deque>
 #include <future>
 
@@ -21,12 +25,20 @@ namespace {
 constexpr Duration on_the_way =
     milliseconds(100);  // an answer waits so long before it leaves the board
 
+/// What kind of board is played.
+struct Manner {
+    bool follows_up = true;
+    wire::HelloVersion version{wire::protocol_major, wire::protocol_minor};
+    std::size_t hello_size = sizeof(wire::BoardHello);
+    std::uint32_t present = wire::present_all;
+};
+
 /// Answers at once; time stands still on the way, but for what the stamps say.
 class PlayedBoard final : public ByteStream {
  public:
     std::string port() const override { return "played"; }
-    PlayedBoard(std::uint8_t minor, bool follows_up, std::vector<wire::Type>* heard = nullptr)
-        : minor_(minor), follows_up_(follows_up), heard_(heard) {}
+    explicit PlayedBoard(const Manner& manner = {}, std::vector<wire::Type>* heard = nullptr)
+        : manner_(manner), heard_(heard) {}
 
     Expected<Chunk> read(std::span<std::uint8_t> into, Duration timeout) override {
         std::unique_lock lock(mutex_);
@@ -97,15 +109,10 @@ class PlayedBoard final : public ByteStream {
         if (mute_ && packet.header.type != wire::Type::host_hello) return;
         mute_ = false;
         if (packet.read(hello)) {
-            wire::BoardHello message{};
-            message.major = wire::protocol_major;
-            message.minor = minor_;
-            message.capabilities = wire::capability_host_grid;
-            message.board_time_ns = now.ns;
-            send(message, now);
+            say_hello(now);
         } else if (packet.read(configuration)) {
             Judge judge(*this, configuration.id);
-            firmware::check(configuration, judge);
+            firmware::check(configuration, {wire::present_all, 8'000'000}, judge);
             wire::ConfigurationAnswer message{};
             message.id = configuration.id;
             if (judge.refused) message.status = wire::ConfigurationStatus::refused;
@@ -113,9 +120,38 @@ class PlayedBoard final : public ByteStream {
         } else if (packet.read(request)) {
             send(wire::ClockAnswer{request.id, 0, now.ns, now.ns}, now + on_the_way);
             const Duration until = on_the_way - microseconds(10);
-            if (follows_up_)
+            if (manner_.follows_up)
                 send(wire::ClockFollowUp{request.id, 0, (now + until).ns}, now + on_the_way);
         }
+    }
+
+    /// Of the size that it has in the board's version.
+    void say_hello(HostTime now) {
+        wire::BoardHello message{};
+        message.major = manner_.version.major;
+        message.minor = manner_.version.minor;
+        message.cameras = static_cast<std::uint8_t>(std::popcount(manner_.present & 0xFU));
+        message.capabilities = wire::capability_host_grid;
+        message.board_time_ns = now.ns;
+        message.present = manner_.present;
+        message.fastest_imu_millihertz = 8'000'000;
+        std::strcpy(message.serial, "PLAYED");
+        std::strcpy(message.firmware, "versavis 0.1");
+        if (manner_.hello_size == sizeof message) return send(message, now);
+        std::vector<std::uint8_t> raw(sizeof(wire::Header) + manner_.hello_size);
+        const wire::Header header{wire::Type::board_hello, {}, nonce_, sequence_++};
+        std::memcpy(raw.data(), &header, sizeof header);
+        std::memcpy(raw.data() + sizeof header, &message,
+                    std::min(manner_.hello_size, sizeof message));
+        const std::uint32_t crc = wire::crc32(raw.data(), raw.size());
+        raw.resize(raw.size() + wire::crc_size);
+        std::memcpy(raw.data() + raw.size() - wire::crc_size, &crc, wire::crc_size);
+        wire::Frame frame{};
+        frame.size = wire::cobs_encode(raw.data(), raw.size(), frame.bytes);
+        frame.bytes[frame.size++] = 0;
+        const std::lock_guard lock(mutex_);
+        packets_.push_back({now, frame});
+        came_.notify_one();
     }
 
     template <class T>
@@ -127,8 +163,7 @@ class PlayedBoard final : public ByteStream {
         came_.notify_one();
     }
 
-    std::uint8_t minor_;
-    bool follows_up_;
+    Manner manner_;
     std::vector<wire::Type>* heard_;
     wire::Decoder decoder_;
     std::atomic<std::uint32_t> nonce_{7};
@@ -198,17 +233,40 @@ struct Clock {
 };
 
 /// The clock as it stands when the cameras may be started.
-clock::ClockReport connect(std::uint8_t minor, bool follows_up) {
+clock::ClockReport connect(const Manner& manner) {
     Clock clock;
     Listener listener;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
-            return std::make_unique<PlayedBoard>(minor, follows_up);
+            return std::make_unique<PlayedBoard>(manner);
         },
         {}, 1, clock.translator, clock.recorder, listener);
     link.start();
     REQUIRE(listener.wait(&Listener::Counts::connected, 1));
     return clock.translator.report();
+}
+
+/// What is told of a board of which nothing can be made.
+BoardReport end_of_connection(const Configuration& configuration, const Manner& manner,
+                              std::vector<wire::Type>* heard = nullptr) {
+    Clock clock;
+    Listener listener;
+    std::promise<BoardReport> closed;
+    std::once_flag first;
+    BoardLink link(
+        [&]() -> Expected<std::unique_ptr<ByteStream>> {
+            auto board = std::make_unique<PlayedBoard>(manner, heard);
+            board->closed = [&] {
+                std::call_once(first, [&] { closed.set_value(link.report()); });
+            };
+            return board;
+        },
+        configuration, 1, clock.translator, clock.recorder, listener);
+    link.start();
+    auto end = closed.get_future();
+    REQUIRE(end.wait_for(std::chrono::seconds(10)) == std::future_status::ready);
+    link.stop();
+    return end.get();
 }
 
 /// A link to a board that the test plays, while it runs.
@@ -230,7 +288,7 @@ struct Running {
     Listener listener;
     std::atomic<PlayedBoard*> board{nullptr};
     BoardLink link{[&]() -> Expected<std::unique_ptr<ByteStream>> {
-                       auto made = std::make_unique<PlayedBoard>(std::uint8_t{2}, true);
+                       auto made = std::make_unique<PlayedBoard>();
                        board = made.get();
                        return made;
                    },
@@ -297,19 +355,15 @@ wire::ImuSample sample_at(std::int64_t ns) {
 }  // namespace
 
 TEST_CASE("board_link: an exchange ends when the answer truly left, if the board tells") {
-    const clock::ClockReport clock = connect(2, true);
+    const clock::ClockReport clock = connect({});
     CHECK(clock.exchanges == 4);
     CHECK(clock.round_trip < on_the_way / 2);
 }
 
-TEST_CASE(
-    "board_link: without a follow-up the answer's own stamp is used, whether one could come or "
-    "not") {
-    for (const std::uint8_t minor : {std::uint8_t{1}, std::uint8_t{2}}) {
-        const clock::ClockReport clock = connect(minor, false);
-        CHECK(clock.exchanges == 4);
-        CHECK(clock.round_trip >= on_the_way);
-    }
+TEST_CASE("board_link: without a follow-up the answer's own stamp is used") {
+    const clock::ClockReport clock = connect({false});
+    CHECK(clock.exchanges == 4);
+    CHECK(clock.round_trip >= on_the_way);
 }
 
 TEST_CASE("board_link: the grid is aligned before any camera can be started") {
@@ -318,7 +372,7 @@ TEST_CASE("board_link: the grid is aligned before any camera can be started") {
     std::vector<wire::Type> heard;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
-            return std::make_unique<PlayedBoard>(2, true, &heard);
+            return std::make_unique<PlayedBoard>(Manner{}, &heard);
         },
         {}, 1, clock.translator, clock.recorder, listener);
     listener.synchronised = [&] {
@@ -405,10 +459,22 @@ TEST_CASE("board_link: times that cannot be reach nobody") {
     record.trigger_ns = std::numeric_limits<std::int64_t>::min();
     board.send(record);
     wire::BoardHello hello{};
+    hello.major = wire::protocol_major;
     hello.board_time_ns = std::numeric_limits<std::int64_t>::max();
     board.send(hello);
+    wire::Health report{};
+    report.glitches = 1;
+    report.sync_state = wire::SyncState::lost;
+    board.send(report);  // counters begin with the first one
+    report.glitches = 4;
+    board.send(report);
+    report.glitches = 9;
+    report.sync_state = static_cast<wire::SyncState>(77);
+    board.send(report);
     running.settle();
-    CHECK(running.link.report().impossible == 4);
+    CHECK(running.link.report().impossible == 5);
+    CHECK(running.link.report().health.glitches == 3);
+    CHECK(running.link.report().health.sync_state == wire::SyncState::lost);
     CHECK(running.listener.counts().samples == 1);
     CHECK(running.listener.counts().exposures == 0);
     CHECK(running.listener.counts().connected == 1);
@@ -431,31 +497,54 @@ TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
 }
 
 TEST_CASE("board_link: what the board refuses is told in the words of the file") {
-    Clock clock;
-    Listener listener;
-    const std::string path = clock.directory.write(
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.write(
         "v.toml", "[[camera]]\nname = \"left\"\ndevice = \"x\"\nrate_hz = 50\nlatency_us = 60\n");
     Configuration configuration = *load_configuration(path);
     configuration.cameras[0].rate_hz = 2000;  // past the check of the file
-    std::promise<BoardReport> closed;
-    std::once_flag first;
-    BoardLink link(
-        [&]() -> Expected<std::unique_ptr<ByteStream>> {
-            auto board = std::make_unique<PlayedBoard>(2, true);
-            board->closed = [&] {
-                std::call_once(first, [&] { closed.set_value(link.report()); });
-            };
-            return board;
-        },
-        configuration, 1, clock.translator, clock.recorder, listener);
-    link.start();
-    auto end = closed.get_future();
-    REQUIRE(end.wait_for(std::chrono::seconds(10)) == std::future_status::ready);
-    const BoardReport report = end.get();
+    const BoardReport report = end_of_connection(configuration, {});
     CHECK(report.state == BoardState::refused);
     CHECK(report.hint ==
           path +
               ":4:11: 'rate_hz' of [[camera]] \"left\" is 2000 Hz: the board takes 0.1 to 1000 Hz; "
               "change the configuration");
-    link.stop();
+}
+
+TEST_CASE("board_link: what the board lacks is told with what it has, and it is not asked") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.write(
+        "v.toml",
+        "[[camera]]\nname = \"left\"\ndevice = \"x\"\noutput = 2\n[board]\nkeep_configuration = "
+        "true\n");
+    Manner manner;
+    manner.present = wire::present_camera0 * 3U | wire::present_memory;
+    std::vector<wire::Type> heard;
+    const BoardReport report = end_of_connection(*load_configuration(path), manner, &heard);
+    CHECK(report.state == BoardState::refused);
+    CHECK(report.hint ==
+          path +
+              ":4:10: 'output' of [[camera]] \"left\" is 2: the board (versavis 0.1, "
+              "serial PLAYED) has outputs 0 and 1; use one that it has, or another "
+              "board");
+    CHECK(report.present == manner.present);
+    CHECK(report.fastest_imu_millihertz == 8'000'000);
+    CHECK(std::count(heard.begin(), heard.end(), wire::Type::configuration) == 0);
+}
+
+TEST_CASE("board_link: a board of another major version is told by it, and what to do") {
+    const auto hint = [](std::uint8_t major, std::uint8_t minor, std::size_t size) {
+        Manner manner;
+        manner.version = {major, minor};
+        manner.hello_size = size;
+        const BoardReport report = end_of_connection({}, manner);
+        CHECK(report.state == BoardState::incompatible);
+        return report.hint;
+    };
+    const std::string own = fmt::format("{}.{}", wire::protocol_major, wire::protocol_minor);
+    for (const std::size_t size : {std::size_t{48}, sizeof(wire::BoardHello)})
+        CHECK(hint(2, 2, size) == "it speaks protocol 2.2, this service " + own +
+                                      ": flash the firmware of this release of the service");
+    CHECK(hint(9, 1, 80) == "it speaks protocol 9.1, this service " + own +
+                                ": install the service of its firmware's release, or flash the "
+                                "firmware of this one");
 }

@@ -11,7 +11,7 @@ using namespace versavis::daemon;
 namespace {
 
 struct Bench : test::Pipelines {
-    explicit Bench(std::uint8_t minor) { exchange.begin(minor); }
+    Bench() { exchange.begin(); }
 
     /// An answer to `request` that took `trip` there and back, of which nothing on the board.
     void answer(const wire::ClockRequest& request, Duration trip) {
@@ -27,7 +27,7 @@ struct Bench : test::Pipelines {
 }  // namespace
 
 TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the next request") {
-    Bench bench(2);
+    Bench bench;
     bench.answer(bench.exchange.request(), milliseconds(1));
     CHECK(bench.exchange.answers() == 1);
     CHECK(bench.exchange.expects_follow_up());
@@ -40,15 +40,8 @@ TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the
     CHECK(bench.exchanges() == 2);
 }
 
-TEST_CASE("clock_exchange: a board that cannot follow up is not waited for") {
-    Bench bench(1);
-    bench.answer(bench.exchange.request(), milliseconds(1));
-    CHECK_FALSE(bench.exchange.expects_follow_up());
-    CHECK(bench.exchanges() == 1);
-}
-
 TEST_CASE("clock_exchange: answers that are late, of another request or repeated are ignored") {
-    Bench bench(1);
+    Bench bench;
     const auto first = bench.exchange.request();
     const auto second = bench.exchange.request();
     bench.answer(first, milliseconds(1));
@@ -58,11 +51,12 @@ TEST_CASE("clock_exchange: answers that are late, of another request or repeated
     bench.answer(third, milliseconds(1));
     bench.answer(third, milliseconds(1));
     CHECK(bench.exchange.answers() == 1);
+    static_cast<void>(bench.exchange.request());
     CHECK(bench.exchanges() == 1);
 }
 
 TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
-    Bench bench(2);
+    Bench bench;
     const auto request = bench.exchange.request();
     bench.answer(request, milliseconds(1));
     bench.exchange.take(wire::ClockFollowUp{request.id, 0, 1});
@@ -71,7 +65,7 @@ TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
 }
 
 TEST_CASE("clock_exchange: a sample tells of the clock only if it says when it left") {
-    Bench bench(2);
+    Bench bench;
     wire::ImuSample sample{};
     sample.time_ns = Bench::to_board(host_now()).ns;
     bench.exchange.take(sample, host_now());
@@ -83,7 +77,7 @@ TEST_CASE("clock_exchange: a sample tells of the clock only if it says when it l
 }
 
 TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less") {
-    Bench bench(2);
+    Bench bench;
     for (int i = 0; i < 100; ++i) {
         const HostTime before = host_now();
         static_cast<void>(bench.exchange.request());
@@ -93,7 +87,7 @@ TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less
 }
 
 TEST_CASE("clock_exchange: what contradicts causality is doubted and not used") {
-    Bench bench(2);
+    Bench bench;
     const auto request = bench.exchange.request();
     const HostTime now = host_now();
     const auto times = GENERATE(std::pair<std::int64_t, std::int64_t>{1000, 999},  // left too early
@@ -107,7 +101,7 @@ TEST_CASE("clock_exchange: what contradicts causality is doubted and not used") 
 }
 
 TEST_CASE("clock_exchange: a follow-up that cannot be true leaves the answer as it was") {
-    Bench bench(2);
+    Bench bench;
     const auto request = bench.exchange.request();
     const HostTime now = host_now();
     CHECK_FALSE(

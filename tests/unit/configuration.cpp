@@ -147,6 +147,53 @@ TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is to
     CHECK(board.ports.pulse_ns == 20'000);
 }
 
+TEST_CASE("configuration: the filter of an exposure line, in the board's unit") {
+    const auto glitch = [](const std::string& key) {
+        return board_configuration(*load(camera + key)).cameras[0].glitch;
+    };
+    CHECK(glitch("") * wire::glitch_unit_ns == wire::default_glitch_ns);
+    CHECK(glitch("glitch_us = 0.1\n") == 1);
+    CHECK(glitch("glitch_us = 25.5\n") == 255);
+    CHECK(glitch("glitch_us = 7.26\n") == 73);
+    CHECK(glitch("glitch_us = 7.24\n") == 72);
+}
+
+TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the board is told") {
+    const auto first = [](const std::string& table) {
+        return board_configuration(*load("[[imu]]\n" + table)).imus[0].options;
+    };
+    const std::string icm = "model = \"icm42688p\"\ndata_ready = true\nbus = \"i2c\"\n";
+    const unsigned i2c = wire::imu_data_ready | wire::imu_i2c;
+    CHECK(first("model = \"icm42688p\"\nbus = \"spi\"\n") == 0);
+    CHECK(first(icm) == i2c);
+    CHECK(first(icm + "i2c_address = 0x68\n") == i2c);
+    CHECK(first(icm + "i2c_address = 0x69\n") == (i2c | wire::imu_i2c_second));
+    CHECK(first("model = \"bmi088\"\ndata_ready = true\naccel_ready = true\n") ==
+          (wire::imu_data_ready | wire::imu_accel_ready));
+}
+
+TEST_CASE("configuration: test pulses of their own, as the board is told") {
+    const auto ports = [](const std::string& keys) {
+        return board_configuration(*load(camera + "[ports]\n" + keys)).ports;
+    };
+    const wire::PortConfiguration none = ports("test_rate_hz = 0\n");
+    CHECK(none.test == wire::test_none);
+    CHECK(none.test_rate_millihertz == 0);
+    const wire::PortConfiguration leds = ports("test_rate_hz = 1000\n");
+    CHECK(leds.test == wire::test_rate);
+    CHECK(leds.test_rate_millihertz == 1'000'000);
+    CHECK(leds.test_output == wire::test_at_test);
+    CHECK(leds.pulse_ns == 100'000);
+    CHECK(ports("test_rate_hz = 10000\n").pulse_ns == 25'000);  // what fits
+    CHECK(ports("test_rate_hz = 10000\npulse_us = 50\n").pulse_ns == 50'000);
+    for (unsigned i = 1; i < wire::camera_count; ++i)
+        CHECK(ports("test_rate_hz = 0.1\ntest_output = \"trigger" + std::to_string(i) + "\"\n")
+                  .test_output == wire::test_at_camera0 + i);
+    const wire::PortConfiguration sync = ports("test_rate_hz = 0.1\ntest_output = \"sync\"\n");
+    CHECK(sync.test_rate_millihertz == 100);
+    CHECK(sync.test_output == wire::test_at_sync);
+}
+
 TEST_CASE("configuration: a GNSS receiver at the UART") {
     const auto configuration =
         load(camera + "[ports]\ninputs = [\"pps\"]\nnmea = true\nnmea_baud = 38400\n");
@@ -190,6 +237,20 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
     check(camera + "trigger = \"bord\"\n",
           "must be one of board, free, and is 'bord'; did you mean \"board\"?");
     check(camera + "strobe = 1\n", "must be one of active_high, active_low, none, and is 1");
+    check(camera + "glitch_us = 0\n", "'glitch_us' must be a number from 0.1 to 25.5 us, and is 0");
+    check(camera + "glitch_us = 26\n", "from 0.1 to 25.5 us, and is 26");
+    check(camera + "glitch = 5\n", "unknown key 'glitch'; did you mean 'glitch_us'?");
+    check("[[imu]]\nbus = \"usb\"\n", "must be one of spi, i2c, and is 'usb'");
+    check("[[imu]]\nbusses = \"spi\"\n", "unknown key 'busses'; did you mean 'bus'?");
+    check("[[imu]]\ni2c_adress = 0x69\n", "did you mean 'i2c_address'?");
+    check("[[imu]]\ni2c_address = \"0x68\"\n",
+          "'i2c_address' must be a whole number from 0 to 255");
+    check("[[imu]]\naccel_ready = 1\n", "'accel_ready' must be true or false, and is 1");
+    check("[ports]\ntest_rate_hz = 10001\n", "from 0 to 10000 Hz, and is 10001");
+    check("[ports]\ntest_rate = 10\n", "did you mean 'test_rate_hz'?");
+    check("[ports]\ntest_output = \"trigger4\"\n",
+          "must be one of test, sync, trigger0, trigger1, trigger2, trigger3, and is 'trigger4'; "
+          "did you mean");
     check(camera + "slots = 10\n", "'slots' must be a whole number from 14 to 1024, and is 10");
     check(camera + "[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
           "versavis.toml:6:16: 'largest_step' must be a number from 1.01 to 10, and is 1;");

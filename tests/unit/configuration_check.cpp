@@ -67,8 +67,9 @@ TEST_CASE("configuration_check: times must fit the period") {
     refused(camera("a", 0, "phase_us = 50000\n"),
             "c.toml:5:12: 'phase_us' is 50000 us, and must be at most 49999.999 us (less than the "
             "period); lower it, or 'rate_hz'");
-    refused(camera("a", 0, "rate_hz = 500\nlatency_us = 2000\nexposure_us = 0\n"), "'latency_us'");
-    refused(camera("a", 0, "gap_us = 50000\nexposure_us = 0\n"), "'gap_us' is 50000 us");
+    refused(camera("a", 0, "rate_hz = 500\nlatency_us = 2000\nstrobe = \"none\"\n"),
+            "'latency_us'");
+    refused(camera("a", 0, "gap_us = 50000\nstrobe = \"none\"\n"), "'gap_us' is 50000 us");
     refused(camera("a", 0, "rate_hz = 500\npulse_us = 1001\n"),
             "at most 1000 us (half the period)");
 }
@@ -171,7 +172,98 @@ TEST_CASE("configuration_check: rate and filter are those of the IMU's part") {
     refused("[[imu]]\nmodel = \"bmi088\"\nfilter = 3\n",
             "c.toml:3:10: 'filter' is 3, and must be at most 2 (the strongest of the bmi088)");
     refused("[[imu]]\n[[imu]]\nname = \"b\"\n",
-            "c.toml:2:1: the board has one SPI port for IMUs, taken by [[imu]] in line 1");
+            "c.toml:2:1: the board has one port for IMUs on SPI or I2C, taken by [[imu]] in line "
+            "1");
+}
+
+TEST_CASE("configuration_check: an IMU is on a bus that it has, at an address that it has") {
+    const std::string icm = "[[imu]]\nmodel = \"icm42688p\"\n";
+    refused("[[imu]]\nmodel = \"bmi088\"\nbus = \"i2c\"\n",
+            "c.toml:3:7: the bmi088 has no I2C; set bus = \"spi\"; of all parts only the icm42688p "
+            "can be on I2C");
+    refused("[[imu]]\nmodel = \"vn100\"\nbus = \"spi\"\n",
+            "c.toml:3:7: the vn100 is on the UART; remove the key");
+    refused("[[imu]]\nmodel = \"vn100\"\nbus = \"i2c\"\n", "the vn100 is on the UART");
+    refused(icm + "i2c_address = 0x69\n",
+            "c.toml:3:15: 'i2c_address' is of a part on I2C; set bus = \"i2c\", or remove the key");
+    refused("[[imu]]\ni2c_address = 0x68\n", "'i2c_address' is of a part on I2C; remove the key");
+    refused(icm + "bus = \"i2c\"\n",
+            "c.toml:3:7: a reading takes so long on I2C that the data-ready line must begin it; "
+            "wire that line and set data_ready = true, or put the part on the SPI");
+    const std::string i2c = icm + "data_ready = true\nbus = \"i2c\"\n";
+    refused(i2c + "i2c_address = 0x6A\n",
+            "c.toml:5:15: 'i2c_address' is 0x6A, and must be 0x68 or 0x69; see which of them its "
+            "address pin chooses");
+    refused(i2c + "rate_hz = 1001\n",
+            "c.toml:5:11: 'rate_hz' is 1001 Hz, and must be at most 1000 Hz (the fastest of the "
+            "icm42688p on I2C); lower it, or put the part on the SPI");
+    refused(i2c + "rate_hz = 8000\n", "at most 1000 Hz");
+    CHECK(errors_of(i2c + "rate_hz = 1000\n") == "no error");
+    CHECK(errors_of(icm + "bus = \"spi\"\nrate_hz = 8000\ndata_ready = true\n") == "no error");
+}
+
+TEST_CASE("configuration_check: only a BMI088 has a second data-ready line, beside the first") {
+    refused("[[imu]]\nmodel = \"icm42688p\"\ndata_ready = true\naccel_ready = true\n",
+            "c.toml:4:15: the icm42688p has no data-ready line of its accelerometer; remove the "
+            "key; of all parts only the bmi088 has one");
+    refused("[[imu]]\nmodel = \"bmi088\"\naccel_ready = true\n",
+            "c.toml:3:15: 'accel_ready' needs the data-ready line of the gyro, which paces the "
+            "samples; wire that line and set data_ready = true, or remove the key");
+    CHECK(errors_of("[[imu]]\nmodel = \"bmi088\"\ndata_ready = true\naccel_ready = true\n") ==
+          "no error");
+}
+
+TEST_CASE("configuration_check: no exposure is shorter than the filter of its line") {
+    const std::string why =
+        "('glitch_us'): the board takes what is shorter on the exposure line for a disturbance; "
+        "lower 'glitch_us', or expose for longer";
+    refused(camera("a", 0, "exposure_us = 4.9\n"),
+            "c.toml:5:15: 'exposure_us' is 4.9 us, and must be at least 5 us " + why);
+    refused(camera("a", 0, "glitch_us = 20\nmax_exposure_us = 15\n"),
+            "c.toml:6:19: 'max_exposure_us' is 15 us, and must be at least 20 us " + why);
+    refused(camera("a", 0, "exposure = \"pulse\"\npulse_us = 3\n"),
+            "c.toml:6:12: 'pulse_us' is 3 us");
+    refused(camera("a", 0, "[camera.auto_exposure]\nmin_us = 2\n"),
+            "c.toml:6:10: 'min_us' is 2 us");
+    refused(camera("a", 0, "[camera.auto_exposure]\nmax_us = 2\n"), "'max_us' is 2 us");
+    for (const char* feature : {"ExposureTime", "ExposureTimeAbs"})
+        refused(camera("a", 0, fmt::format("[camera.features]\n{} = 4.5\n", feature)),
+                fmt::format("'{}' is 4.5 us, and must be at least 5 us ", feature) + why);
+    for (const char* allowed :
+         {"exposure_us = 5\n", "exposure_us = 0.1\nglitch_us = 0.1\n",
+          "exposure_us = 1\nstrobe = \"none\"\n", "exposure_us = 1\ntrigger = \"free\"\n",
+          "pulse_us = 3\n", "[camera.features]\nExposureTime = 5\nGain = 1\n"})
+        CHECK(errors_of(camera("a", 0, allowed)) == "no error");
+}
+
+TEST_CASE("configuration_check: test pulses of their own leave where nothing else does") {
+    const std::string ports = cam0 + camera("cam1", 1) + "[ports]\n";
+    refused(ports + "test_rate_hz = 0.05\n",
+            "c.toml:10:16: 'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz");
+    refused(
+        ports + "test = \"cam1\"\ntest_rate_hz = 10\n",
+        "c.toml:11:16: the test pulses show 'cam1' already ('test'); remove one of the two keys");
+    refused(
+        ports + "test_output = \"trigger3\"\n",
+        "c.toml:10:15: 'test_output' is where the pulses of 'test_rate_hz' leave, and there are "
+        "none; set 'test_rate_hz', or remove the key");
+    refused(ports + "test_rate_hz = 10\ntest_output = \"trigger1\"\n",
+            "c.toml:11:15: output 1 triggers [[camera]] \"cam1\" in line 5; free: test, sync, "
+            "trigger2, trigger3");
+    refused(ports + "test_rate_hz = 10\ntest_output = \"sync\"\nsync_rate_hz = 1\n",
+            "c.toml:11:15: the sync output has the pulses of 'sync_rate_hz'; set sync_rate_hz = 0, "
+            "or choose another output");
+    refused(ports + "test_rate_hz = 10000\npulse_us = 51\n",
+            "c.toml:11:12: 'pulse_us' is 51 us, and must be at most 50 us (half the period of "
+            "'test_rate_hz'); lower it");
+    for (const char* allowed :
+         {"test_rate_hz = 0.1\n", "test_rate_hz = 10000\n", "test_rate_hz = 10000\npulse_us = 50\n",
+          "test_rate_hz = 10\ntest_output = \"trigger2\"\nsync_rate_hz = 1\n",
+          "test_rate_hz = 10\ntest_output = \"sync\"\n",
+          "test_output = \"test\"\ntest_rate_hz = 0\ntest = \"cam0\"\n"})
+        CHECK(errors_of(ports + allowed) == "no error");
+    CHECK(errors_of(camera("cam1", 1, "trigger = \"free\"\n") +
+                    "[ports]\ntest_rate_hz = 10\ntest_output = \"trigger1\"\n") == "no error");
 }
 
 TEST_CASE("configuration_check: a link has a path that fits a socket") {
@@ -207,7 +299,7 @@ TEST_CASE("configuration_check: light and ports name what is there") {
     refused(cam0 + "[ports]\ntest = \"nobody\"\n",
             "c.toml:6:8: 'nobody' is neither a triggered camera nor an IMU");
     refused("[[imu]]\nmodel = \"vn100\"\n[ports]\ntest = \"imu0\"\n", "data_ready = true");
-    refused(cam0 + "[ports]\nimu_output = true\n", "'imu_output' needs an IMU on the SPI");
+    refused(cam0 + "[ports]\nimu_output = true\n", "'imu_output' needs an IMU on SPI or I2C");
     refused(cam0 + "[ports]\nsync_rate_hz = 0.01\n", "must be 0 (no pulses), or 0.1 to 10 Hz");
     refused(camera("cam0", 0, "rate_hz = 1000\n") + "[ports]\ntest = \"cam0\"\npulse_us = 501\n",
             "'pulse_us' is 501 us, and must be at most 500 us (half the period of 'cam0'");
@@ -228,6 +320,9 @@ TEST_CASE("configuration_check: what a model of IMU can do is what its part does
         CHECK(std::llround(model.fastest_hz * 1e3) ==
               (serial ? firmware::vn100::fastest_millihertz : part->fastest_millihertz()));
         CHECK(model.strongest_filter == (serial ? 0 : part->strongest_filter()));
+        CHECK(std::llround(model.fastest_i2c_hz * 1e3) ==
+              (serial ? 0 : part->fastest_i2c_millihertz()));
+        CHECK(model.accel_ready == (!serial && part->accel_millihertz() != 0));
     }
 }
 
@@ -264,7 +359,7 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
                     line("phase_us", near(period)) + line("latency_us", near(period)) +
                     line("gap_us", near(period)) + line("pulse_us", near(period)) +
                     line("exposure_us", near(period)) + line("max_exposure_us", near(period)) +
-                    flag("strobe = \"none\"\n");
+                    line("glitch_us", near(25.5)) + flag("strobe = \"none\"\n");
         }
         if (any(4) == 0) text += camera("last", 3, "master = \"cam0\"\n");
         return text;
@@ -273,11 +368,20 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
         std::string text;
         for (const char* name : {"imu0", "imu1"})
             if (any(3) == 0)
-                text += fmt::format(
-                    "[[imu]]\nname = \"{}\"\nmodel = \"{}\"\n{}{}{}", name,
-                    imu::model_names()[any(8)], line("filter", static_cast<double>(any(9))),
-                    line("rate_hz", near(any(2) == 0 ? 2000 : 819.2)), flag("data_ready = true\n"));
+                text += fmt::format("[[imu]]\nname = \"{}\"\nmodel = \"{}\"\n{}{}{}", name,
+                                    imu::model_names()[any(8)],
+                                    line("filter", static_cast<double>(any(9))),
+                                    line("rate_hz", near(any(2) == 0 ? 2000 : 819.2)),
+                                    flag("data_ready = true\n") + flag("accel_ready = true\n"));
+        if (text.empty() && any(4) == 0)
+            text = "[[imu]]\nmodel = \"icm42688p\"\nbus = \"i2c\"\ndata_ready = true\n" +
+                   line("rate_hz", near(1000)) + flag("i2c_address = 0x69\n");
         return text;
+    };
+    const auto own_pulses = [&] {
+        const char* outputs[]{"test", "sync", "trigger0", "trigger2"};
+        return fmt::format("test_rate_hz = {:.17g}\ntest_output = \"{}\"\n", near(10'000),
+                           outputs[any(4)]);
     };
     const auto ports = [&] {
         const char* tests[]{"cam0", "cam1", "last", "imu0", "imu1", "", "", "", "", "", ""};
@@ -287,17 +391,18 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
                line("duty_percent", near(100)) + "[ports]\n" + flag("inputs = [\"pps\"]\n") +
                flag("nmea = true\n") + flag("imu_output = true\n") +
                line("pulse_us", near(1e6 / rate())) + line("sync_rate_hz", near(10)) +
-               fmt::format("test = \"{}\"\n", tests[any(11)]);
+               (any(4) == 0 ? own_pulses() : fmt::format("test = \"{}\"\n", tests[any(11)]));
     };
     unsigned accepted = 0;
-    for (int round = 0; round < 3000; ++round) {
+    for (int round = 0; round < 5000; ++round) {
         const std::string text = "preset_directory = \"" + directory.path().string() + "\"\n" +
                                  cameras() + imus() + ports();
         const auto configuration = load_configuration(directory.write("c", text));
         if (!configuration) continue;
         ++accepted;
         Refusals refusals;
-        firmware::check(board_configuration(*configuration), refusals);
+        firmware::check(board_configuration(*configuration), {wire::present_all, 8'000'000},
+                        refusals);
         INFO(text);
         for (const wire::Refusal& refusal : refusals.all) FAIL(describe(*configuration, refusal));
     }

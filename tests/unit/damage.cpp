@@ -16,7 +16,7 @@ constexpr Duration period = milliseconds(10);
 /// Payload sizes of the document.
 const std::map<Type, std::size_t> sizes{
     {Type::exposure, 48}, {Type::imu_sample, 56},      {Type::event, 24}, {Type::clock_answer, 24},
-    {Type::health, 88},   {Type::clock_follow_up, 16}, {Type::log, 96}};
+    {Type::health, 96},   {Type::clock_follow_up, 16}, {Type::log, 96}};
 
 /// The packets of a board: of each type in turn, each with instants and numbers of its own.
 class Board {
@@ -34,8 +34,10 @@ class Board {
         } else if (type == Type::imu_sample) {
             set(packet, imu_sample::number, n);
             set(packet, imu_sample::age, n + 1);
+            set(packet, imu_sample::accel_age, n + 2);
         } else if (type == Type::event) {
             set(packet, event::sequence, n);
+            set(packet, event::detail, n + 2);
             set(packet, event::value, n + 1);
         } else if (type == Type::clock_answer) {
             set(packet, clock_answer::id, n);

@@ -100,6 +100,23 @@ TEST_CASE("diagnosis: what delivers is well, and keeps the remarks of its camera
     CHECK(bench.camera().hint == "the camera is at 80 degrees");
 }
 
+TEST_CASE("diagnosis: a board that runs has remarks, and no fault, for sync and storage") {
+    Bench bench;
+    for (const auto state : {wire::SyncState::none, wire::SyncState::followed}) {
+        bench.status.board.health.sync_state = state;
+        CHECK(bench.board().hint.empty());
+    }
+    bench.status.board.health.sync_state = wire::SyncState::lost;
+    CHECK_THAT(bench.board().hint, Contains("do not fit the grid") && Contains("'sync_rate_hz'"));
+    CHECK(bench.board().health == Health::ok);
+    CHECK(bench.board().fault == Fault::none);
+    bench.status.board.unkept = true;
+    CHECK_THAT(bench.board().hint, Contains("keep_configuration = false"));
+    bench.status.board.hint = "what comes first";
+    CHECK(bench.board().hint == "what comes first");
+    CHECK(bench.board().health == Health::ok);
+}
+
 TEST_CASE("diagnosis: a camera that cannot be had says why, in its own words") {
     const std::pair<CameraState, Fault> states[] = {
         {CameraState::absent, Fault::camera_absent},
@@ -271,6 +288,9 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     Bench strobe;
     strobe.cam().recent.unmeasured = 20;
     check(strobe.camera(), Fault::strobe_missing, "measured");
+    strobe.cam().pipeline.told_exposure = nanoseconds(4'900);
+    check(strobe.camera(), Fault::strobe_missing,
+          "exposures of 4.9 us for a disturbance of the line: lower 'glitch_us', which is 5 us");
     Bench network;
     network.cam().delivery.full = false;
     network.cam().pipeline.last_sign = now - seconds(1);

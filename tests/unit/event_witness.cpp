@@ -29,3 +29,26 @@ TEST_CASE("event_witness: pulses of PPS are a second apart, and no event comes f
     CHECK(doubted(wire::EventKind::aux_pulse, 23, seconds(1000)));
     CHECK_FALSE(doubted(wire::EventKind::aux_pulse, 23, {}));
 }
+
+TEST_CASE("event_witness: of whatever kind, an event from the future or the far past is doubted") {
+    test::Pipelines bench;
+    const HostTime begin{40'000'000'000};
+    bench.synchronise(begin);
+    EventWitness witness(bench.translator);
+    const HostTime now = begin + seconds(20);
+    constexpr int kinds_on_the_wire = 17;
+    for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {
+        if (static_cast<wire::EventKind>(kind) == wire::EventKind::pps) continue;
+        INFO("kind " << kind);
+        wire::Event event{};
+        event.kind = static_cast<wire::EventKind>(kind);
+        const auto doubt = [&](Duration age) {
+            event.time_ns = test::Pipelines::to_board(now - age).ns;
+            return witness.judge(event, now);
+        };
+        CHECK_FALSE(doubt(milliseconds(2)));
+        CHECK_FALSE(doubt(seconds(9)));
+        CHECK(doubt(-milliseconds(20))->reason == EventReason::not_yet);
+        CHECK(doubt(seconds(11))->reason == EventReason::too_old);
+    }
+}

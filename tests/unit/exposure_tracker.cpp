@@ -78,7 +78,7 @@ TEST_CASE("exposure_tracker: without an exposure line the record follows from th
 
 TEST_CASE("exposure_tracker: a word that left late corrects the trigger's time, and says so") {
     Bench bench;
-    bench.tracker.left_late(98 * ms, 99 * ms);
+    bench.tracker.moved(98 * ms, 99 * ms, true);
     bench.tracker.edge(99 * ms, true);
     bench.tracker.edge(103 * ms, false);
     REQUIRE(bench.reports.exposures.size() == 1);

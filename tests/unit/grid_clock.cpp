@@ -15,12 +15,16 @@ constexpr Nanoseconds second = 1'000'000'000;
 Nanoseconds board_time(Nanoseconds host, std::int64_t ppb) {
     return host + host / 1'000'000 * ppb / 1'000;
 }
+/// False: the pulse is not followed.
+bool follows(GridClock& clock, Nanoseconds pulse) {
+    return clock.sync_pulse(pulse, true).what == GridClock::Sync::followed;
+}
 }  // namespace
 
 TEST_CASE("grid_clock: what lies before a board time is found, whatever the pace") {
     GridClock clock;
     clock.begin(5 * second, second);
-    REQUIRE(clock.sync_pulse(6 * second + 300'000));
+    REQUIRE(follows(clock, 6 * second + 300'000));
     for (const Nanoseconds at : {6 * second, 100 * second, 100'000 * second}) {
         CHECK(clock.board_time(clock.grid_time(at)) <= at);
         CHECK(clock.board_time(clock.grid_time(at)) >= at - at / 500'000 - 10);
@@ -32,18 +36,18 @@ TEST_CASE("grid_clock: without pulses grid time passes as board time does") {
     clock.begin(5 * second, 0);
     CHECK(clock.board_time(0) == 5 * second);
     CHECK(clock.board_time(100'000 * second) == 100'005 * second);
-    CHECK_FALSE(clock.sync_pulse(6 * second));
+    CHECK_FALSE(follows(clock, 6 * second));
 }
 
 TEST_CASE(
     "grid_clock: it takes the pace of the pulses, over gaps, and refuses what is none of them") {
     GridClock clock;
     clock.begin(5 * second, second);
-    CHECK(clock.sync_pulse(6 * second + 50'000));  // 50 ppm slower than here
+    CHECK(follows(clock, 6 * second + 50'000));  // 50 ppm slower than here
     CHECK(clock.board_time(second) == 6 * second + 50'000);
     CHECK(clock.board_time(second + second / 2) == 6 * second + second / 2 + 75'000);
-    CHECK_FALSE(clock.sync_pulse(6 * second + 700'000'000));
-    CHECK(clock.sync_pulse(9 * second + 200'000));
+    CHECK_FALSE(follows(clock, 6 * second + 700'000'000));
+    CHECK(follows(clock, 9 * second + 200'000));
     CHECK(clock.board_time(4 * second) == 9 * second + 200'000);
     CHECK(clock.board_time(5 * second) == 10 * second + 250'000);
 }
@@ -128,11 +132,51 @@ TEST_CASE("grid_clock: messages once a second from a true clock keep it there to
 TEST_CASE("grid_clock: the newer of host and sync pulses is followed") {
     GridClock clock;
     clock.begin(5 * second, second);
-    CHECK(clock.sync_pulse(6 * second + 50'000));
+    CHECK(follows(clock, 6 * second + 50'000));
     clock.align(7 * second, 0, 1'000'000, 6 * second + 100'000'000);
-    CHECK_FALSE(clock.sync_pulse(7 * second + 100'000));
+    CHECK_FALSE(follows(clock, 7 * second + 100'000));
     CHECK(clock.board_time(3 * second) == 8 * second);
     clock.begin(9 * second, second);
     CHECK(clock.board_time(second) == 10 * second);
-    CHECK(clock.sync_pulse(10 * second + 50'000));
+    CHECK(follows(clock, 10 * second + 50'000));
+}
+
+TEST_CASE("grid_clock: a sender that went on at another pace, or began anew, is followed again") {
+    using Sync = GridClock::Sync;
+    const Nanoseconds jump = GENERATE(150'000, 300'000'000, -250'000'000);
+    const bool running = GENERATE(true, false);
+    GridClock clock;
+    clock.begin(5 * second, second);
+    REQUIRE(follows(clock, 6 * second + 20'000));
+    REQUIRE(follows(clock, 7 * second + 40'000));
+    CHECK(clock.sync_state(8 * second) == versavis::wire::SyncState::followed);
+    CHECK(clock.sync_state(18 * second) == versavis::wire::SyncState::lost);
+    const auto pulse = [jump](int n) {
+        return 300 * second + 6'000'000 + jump + n * (second + 500);
+    };
+    const GridClock::SyncPulse first = clock.sync_pulse(pulse(0), running);
+    CHECK(first.what == Sync::lost);
+    CHECK(clock.sync_state(pulse(0)) == versavis::wire::SyncState::lost);
+    CHECK(clock.sync_pulse(pulse(1), running).what == Sync::ignored);
+    const Nanoseconds before = clock.board_time(clock.grid_time(pulse(2)));
+    const GridClock::SyncPulse taken = clock.sync_pulse(pulse(2), running);
+    CHECK(taken.what == Sync::taken);
+    const Nanoseconds there = (clock.grid_time(pulse(3)) + second / 2) / second * second;
+    if (!running) CHECK(std::abs(clock.board_time(there) - pulse(3)) < 10);
+    CHECK(clock.sync_state(pulse(2)) == versavis::wire::SyncState::followed);
+    if (running) CHECK(std::abs(clock.board_time(clock.grid_time(pulse(2))) - before) < 4'000);
+    for (int n = 3; n < 400; ++n) REQUIRE(follows(clock, pulse(n)));
+    // There, at last: its pulses lie on whole seconds.
+    const Nanoseconds whole = (clock.grid_time(pulse(400)) + second / 2) / second * second;
+    CHECK(std::abs(clock.board_time(whole) - pulse(400)) < 10);
+}
+
+TEST_CASE("grid_clock: noise between the pulses of a sender is no other sender") {
+    GridClock clock;
+    clock.begin(5 * second, second);
+    for (int n = 1; n < 100; ++n) {
+        REQUIRE(follows(clock, (5 + n) * second));
+        const Nanoseconds noise = (5 + n) * second + 100'000'000 + n * 7'000'000;
+        REQUIRE(clock.sync_pulse(noise, true).what != GridClock::Sync::taken);
+    }
 }

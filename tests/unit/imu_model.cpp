@@ -33,6 +33,21 @@ TEST_CASE("imu_model: a failed check is passed on, an unknown part is not invent
     CHECK(imu::find_model(wire::ImuKind::none) == nullptr);
 }
 
+TEST_CASE("imu_model: data that repeat, and how old the acceleration is, are passed on") {
+    const imu::ImuModel& model = *imu::find_model("bmi088");
+    wire::ImuSample sample{};
+    sample.accel_age = 100;  // without its flag it says nothing
+    CHECK(imu::to_si(model, sample).accel_age_ns == 0);
+    CHECK(imu::to_si(model, sample).flags == 0);
+    sample.flags = wire::imu_repeated;
+    CHECK(imu::to_si(model, sample).flags == flag_repeated);
+    sample.flags = wire::imu_accel_stamped;
+    CHECK(imu::to_si(model, sample).flags == flag_accel_age);
+    CHECK(imu::to_si(model, sample).accel_age_ns == 3'200);
+    sample.accel_age = -0x8000;  // it came after the angular rate
+    CHECK(imu::to_si(model, sample).accel_age_ns == -1'048'576);
+}
+
 namespace {
 
 double delay_ms(const char* name, unsigned filter, double rate_hz, bool data_ready) {

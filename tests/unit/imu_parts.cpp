@@ -70,3 +70,19 @@ TEST_CASE(
              {wire::ImuKind::adis16445, wire::ImuKind::adis16460, wire::ImuKind::adis16470})
             REQUIRE(rate(kind, rate(kind, wanted)) == rate(kind, wanted));
 }
+
+TEST_CASE("imu_parts: a BMI088 shows its accelerometer's data-ready only when that is wired") {
+    const ImuPart& part = *find_part(wire::ImuKind::bmi088);
+    const auto writes = [&part](bool accel_ready, std::uint8_t address) {
+        Setup setup;
+        part.setup({1'000'000, 0, accel_ready}, setup);
+        REQUIRE(setup.size() < Setup::capacity);  // nothing was left out
+        for (std::size_t i = 0; i < setup.size(); ++i)
+            if (setup[i].chip == 1 && setup[i].address == address) return int{setup[i].value};
+        return -1;
+    };
+    CHECK(writes(false, 0x53) == -1);
+    CHECK(writes(false, 0x58) == -1);
+    CHECK(writes(true, 0x53) == 0x0A);
+    CHECK(writes(true, 0x58) == 0x04);
+}

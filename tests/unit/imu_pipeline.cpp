@@ -259,3 +259,38 @@ TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it h
     }
     CHECK(told <= 11);
 }
+
+TEST_CASE("imu_pipeline: samples that repeat are counted, and only a wired line tells an age") {
+    test::Pipelines bench;
+    ImuConfiguration configuration;
+    configuration.model = imu::find_model("bmi088");
+    configuration.data_ready = true;
+    configuration.accel_ready = GENERATE(true, false);
+    ImuPipeline pipeline(configuration, bench.writer({"imu0", ring::StreamKind::imu, 64}),
+                         bench.translator, bench.events);
+    auto reader = bench.reader("imu0");
+    const HostTime begin{50'000'000'000};
+    bench.synchronise(begin);
+    const auto add = [&](std::uint32_t i, std::uint16_t flags, std::int16_t accel_age) {
+        const HostTime at = begin + milliseconds(30) + milliseconds(5) * i;
+        wire::ImuSample made = sample(i, test::Pipelines::to_board(at), flags);
+        made.accel_age = accel_age;
+        return pipeline.add(made, at + milliseconds(1));
+    };
+    for (std::uint32_t i = 0; i < neighbours; ++i) add(i, 0, 0);
+    CHECK(add(neighbours, wire::imu_repeated, 0));
+    CHECK(add(neighbours + 1, wire::imu_accel_stamped, 10) == configuration.accel_ready);
+    CHECK(add(neighbours + 2, 0, 0));
+    CHECK(pipeline.report().repeated == 1);
+    CHECK(pipeline.report().doubted == (configuration.accel_ready ? 0 : 1));
+    const auto first = unpack<ImuMetadata>(reader.next().metadata);
+    CHECK(first.flags == flag_repeated);
+    CHECK(first.accel_age_ns == 0);
+    const auto second = unpack<ImuMetadata>(reader.next().metadata);
+    CHECK(second.flags == (configuration.accel_ready ? flag_accel_age : 0U));
+    CHECK(second.accel_age_ns == (configuration.accel_ready ? 320 : 0));
+    if (configuration.accel_ready) return;
+    const auto event = unpack<EventMetadata>(bench.reader("events").next().metadata);
+    CHECK(event.kind == EventKind::message_doubted);
+    CHECK(event.reason == EventReason::implausible_flags);
+}

@@ -13,13 +13,38 @@ namespace {
 struct Hardware final : OutputSchedule {
     std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
     std::size_t capacity = 100;
+    Nanoseconds soonest = 0;  ///< that a word can leave
 
-    bool push(Nanoseconds at, std::uint32_t levels) override {
-        if (words.size() == capacity) return false;
-        words.emplace_back(at, levels);
-        return true;
+    Nanoseconds push(Nanoseconds at, std::uint32_t levels) override {
+        if (words.size() == capacity) return never;
+        words.emplace_back(std::max(at, soonest), levels);
+        return words.back().first;
     }
-    bool take_late(Late& /*late*/) override { return false; }
+};
+
+struct Move {
+    unsigned output;
+    bool level;
+    Nanoseconds asked;
+    Nanoseconds left;
+    bool operator==(const Move& other) const {
+        return output == other.output && level == other.level && asked == other.asked &&
+               left == other.left;
+    }
+};
+
+struct Moves final : OutputMoves {
+    std::vector<Move> all;
+    void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) override {
+        all.push_back({output, level, asked, left});
+    }
+};
+
+struct Bench {
+    explicit Bench(const PortFacts& facts = {}) : queue(hardware, moves, facts) {}
+    Hardware hardware;
+    Moves moves;
+    OutputQueue queue;
 };
 
 using Words = std::vector<std::pair<Nanoseconds, std::uint32_t>>;
@@ -27,23 +52,24 @@ using Words = std::vector<std::pair<Nanoseconds, std::uint32_t>>;
 }  // namespace
 
 TEST_CASE("output_queue: edges of all outputs leave in order, those of one instant in one word") {
-    Hardware hardware;
-    OutputQueue queue(hardware);
+    Bench bench;
+    Hardware& hardware = bench.hardware;
+    OutputQueue& queue = bench.queue;
     queue.set(200, 0, false);
     queue.set(100, 0, true);
     queue.set(100, 2, true);
     queue.set(150, 1, true);
     queue.commit(151 - OutputQueue::horizon);
     CHECK(hardware.words == Words{{100, 0b101}, {150, 0b111}});
-    CHECK(queue.next() == 200);
+    CHECK(queue.next_wake() == 200 - 500'000);
     CHECK(queue.commit(0));
     CHECK(hardware.words.back() == std::pair<Nanoseconds, std::uint32_t>{200, 0b110});
-    CHECK(queue.next() == never);
+    CHECK(queue.next_wake() == never);
 }
 
 TEST_CASE("output_queue: what comes too late is put behind what is committed, and says so") {
-    Hardware hardware;
-    OutputQueue queue(hardware);
+    Bench bench;
+    OutputQueue& queue = bench.queue;
     queue.set(100, 0, true);
     queue.commit(0);
     CHECK(queue.set(90, 1, true) == 101);
@@ -52,21 +78,23 @@ TEST_CASE("output_queue: what comes too late is put behind what is committed, an
 }
 
 TEST_CASE("output_queue: a full hardware queue delays nothing but the commit") {
-    Hardware hardware;
+    Bench bench;
+    Hardware& hardware = bench.hardware;
+    OutputQueue& queue = bench.queue;
     hardware.capacity = 1;
-    OutputQueue queue(hardware);
     queue.set(1, 0, true);
     queue.set(2, 0, false);
     CHECK_FALSE(queue.commit(0));
-    CHECK(queue.next() == 2);
+    CHECK_FALSE(queue.empty());
     hardware.capacity = 2;
     queue.commit(0);
     CHECK(hardware.words == Words{{1, 1}, {2, 0}});
 }
 
 TEST_CASE("output_queue: cancelling leaves the output idle and the others alone") {
-    Hardware hardware;
-    OutputQueue queue(hardware);
+    Bench bench;
+    Hardware& hardware = bench.hardware;
+    OutputQueue& queue = bench.queue;
     queue.set(10, 0, true);
     queue.commit(11 - OutputQueue::horizon);
     queue.set(50, 0, false);
@@ -78,15 +106,72 @@ TEST_CASE("output_queue: cancelling leaves the output idle and the others alone"
 }
 
 TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, and is told") {
-    Hardware hardware;
-    OutputQueue queue(hardware);
-    queue.pulse(100'000, 0, true, 50'000);
-    queue.pulse(180'000, 0, true, 50'000);
-    CHECK(queue.commit(1'000'000));
-    CHECK(hardware.words == Words{{1'000'000, 1}, {1'050'000, 0}, {1'060'000, 1}, {1'110'000, 0}});
-    OutputSchedule::Late late{};
-    std::vector<Nanoseconds> asked;
-    while (queue.take_late(late)) asked.push_back(late.asked);
-    std::sort(asked.begin(), asked.end());
-    CHECK(asked == std::vector<Nanoseconds>{100'000, 150'000, 180'000, 230'000});
+    Bench bench;
+    bench.queue.pulse(100'000, 0, true, 50'000);
+    bench.queue.pulse(180'000, 0, true, 50'000);
+    bench.hardware.soonest = 1'000'000;
+    CHECK(bench.queue.commit(1'000'000));
+    CHECK(bench.hardware.words ==
+          Words{{1'000'000, 1}, {1'050'000, 0}, {1'060'000, 1}, {1'110'000, 0}});
+    CHECK(bench.moves.all == std::vector<Move>{{0, true, 100'000, 1'000'000},
+                                               {0, false, 150'000, 1'050'000},
+                                               {0, true, 180'000, 1'060'000},
+                                               {0, false, 230'000, 1'110'000}});
+    CHECK(bench.queue.is_late(100'000, 1'000'000));
+}
+
+TEST_CASE("output_queue: a pulse whose rise left late is not cut by a word for another output") {
+    Bench bench;
+    bench.queue.pulse(100'000, 0, true, 10'000);
+    bench.queue.pulse(110'000, 1, true, 10'000);
+    bench.hardware.soonest = 105'000;
+    CHECK(bench.queue.commit(200'000));
+    // The fall of output 0 was due with the rise of output 1.
+    CHECK(bench.hardware.words ==
+          Words{{105'000, 0b01}, {110'000, 0b11}, {115'000, 0b10}, {120'000, 0b00}});
+    CHECK(bench.moves.all ==
+          std::vector<Move>{{0, true, 100'000, 105'000}, {0, false, 110'000, 115'000}});
+}
+
+TEST_CASE(
+    "output_queue: words leave at multiples of the grain, a step apart, and that is not late") {
+    PortFacts facts;
+    facts.output_grain_bits = 3;
+    facts.output_step = 24;
+    Bench bench(facts);
+    CHECK(bench.queue.set(1'003, 0, true) == 1'000);
+    CHECK(bench.queue.set(1'005, 1, true) == 1'008);
+    CHECK(bench.queue.set(1'021, 2, true) == 1'024);
+    CHECK(bench.queue.commit(0));
+    CHECK(bench.hardware.words == Words{{1'000, 0b001}, {1'024, 0b111}});
+    CHECK(bench.moves.all == std::vector<Move>{{1, true, 1'008, 1'024}});
+    CHECK_FALSE(bench.queue.is_late(1'008, 1'024));
+    CHECK(bench.queue.is_late(1'008, 1'040));
+    CHECK(bench.queue.set(1'030, 3, true) == 1'048);
+}
+
+TEST_CASE("output_queue: each output has room of its own, and one commit is bounded") {
+    Bench bench;
+    for (Nanoseconds at = 20'000; bench.queue.has_room(7); at += 20'000)
+        bench.queue.pulse(at, 7, true, 9'000);
+    CHECK_FALSE(bench.queue.has_room(7, 1));
+    CHECK(bench.queue.has_room(0));
+    bench.queue.set(1, 7, true);  // nothing: there is no room
+    CHECK(bench.queue.take_high_water() == 24);
+    CHECK(bench.queue.commit(0));
+    CHECK(bench.hardware.words.size() == 16);
+    CHECK(bench.queue.is_overdue(7, 1'000'000));
+    CHECK_FALSE(bench.queue.is_overdue(0, 1'000'000));
+    CHECK(bench.queue.commit(0));
+    CHECK(bench.hardware.words.size() == 24);
+    CHECK(bench.queue.empty());
+    CHECK_FALSE(bench.queue.is_overdue(7, 1'000'000));
+}
+
+TEST_CASE("output_queue: two edges of one output at one instant leave in two words") {
+    Bench bench;
+    bench.queue.pulse(20'000, 0, true, 10'000);
+    bench.queue.set(30'000, 0, true, 1);
+    CHECK(bench.queue.commit(0));
+    CHECK(bench.hardware.words == Words{{20'000, 1}, {30'000, 0}, {30'001, 1}});
 }

@@ -71,7 +71,7 @@ std::string documented(const std::string& name) {
 }  // namespace
 
 TEST_CASE("packet: the test vectors of the document") {
-    CHECK(hex(encoded(HostHello{2, 0, {}}, 0x11223344, 0)) == documented("host-hello"));
+    CHECK(hex(encoded(HostHello{3, 0, {}}, 0x11223344, 0)) == documented("host-hello"));
     CHECK(hex(encoded(example_exposure(), 0xA1B2C3D4, 5)) == documented("exposure"));
     CHECK(hex(encoded(ClockRequest{42, 0}, 0x11223344, 3)) == documented("clock-request"));
     CHECK(hex(encoded(ClockAnswer{42, 0, 123456789, 123459876}, 0xA1B2C3D4, 6)) ==
@@ -141,4 +141,38 @@ TEST_CASE("packet: an unknown type is passed on, a known one of the wrong size i
     CHECK(decoded(decoder, send(0x70)).size() == 1);
     CHECK(decoded(decoder, send(static_cast<std::uint8_t>(Type::exposure))).empty());
     CHECK(decoder.errors() == 1);
+}
+
+TEST_CASE("packet: a hello of another major version is passed on, whatever its size") {
+    const auto send = [](std::uint8_t major, std::size_t payload) {
+        Bytes raw(sizeof(Header) + payload + crc_size);
+        raw[0] = static_cast<std::uint8_t>(Type::board_hello);
+        if (payload > 0) raw[sizeof(Header)] = major;
+        if (payload > 1) raw[sizeof(Header) + 1] = 7;
+        const std::uint32_t crc = crc32(raw.data(), raw.size() - crc_size);
+        std::memcpy(raw.data() + raw.size() - crc_size, &crc, crc_size);
+        Bytes bytes(cobs_bound(raw.size()));
+        bytes.resize(cobs_encode(raw.data(), raw.size(), bytes.data()));
+        bytes.push_back(0);
+        return bytes;
+    };
+    const auto told = [&](std::uint8_t major, std::size_t payload) {
+        Decoder decoder;
+        const Bytes bytes = send(major, payload);
+        HelloVersion version{};
+        decoder.feed(bytes.data(), bytes.size(), [&](const Packet& packet) {
+            CHECK(packet.read(version));
+            BoardHello hello{};
+            CHECK(packet.read(hello) == (payload == sizeof hello));
+        });
+        CHECK(decoder.errors() == (version.major == 0 ? 1 : 0));
+        return version.major * 256 + version.minor;
+    };
+    for (const std::size_t payload : {std::size_t{2}, std::size_t{48}, sizeof(BoardHello)})
+        CHECK(told(2, payload) == 0x207);
+    CHECK(told(4, 100) == 0x407);
+    CHECK(told(protocol_major, sizeof(BoardHello)) == protocol_major * 256 + 7);
+    CHECK(told(protocol_major, 48) == 0);
+    CHECK(told(2, 1) == 0);
+    CHECK(told(2, 0) == 0);
 }

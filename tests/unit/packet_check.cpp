@@ -7,6 +7,17 @@
 using namespace versavis;
 using namespace versavis::daemon;
 
+namespace {
+
+wire::BoardHello board() {
+    wire::BoardHello hello{};
+    hello.cameras = wire::camera_count;
+    hello.present = wire::present_all;
+    return hello;
+}
+
+}  // namespace
+
 TEST_CASE("packet_check: gaps are losses, also where the number wraps") {
     SequenceWatch watch;
     watch.begin(0xFFFFFFFD);
@@ -51,13 +62,35 @@ TEST_CASE("packet_check: times before the boot or beyond any life cannot be") {
         wire::Event event{};
         event.time_ns = ns;
         CHECK_FALSE(possible(event));
-        wire::BoardHello hello{};
+        wire::BoardHello hello = board();
         hello.board_time_ns = ns;
         CHECK_FALSE(possible(hello));
         CHECK_FALSE(possible(wire::ClockAnswer{1, 0, ns, 0}));
         CHECK_FALSE(possible(wire::ClockAnswer{1, 0, 0, ns}));
         CHECK_FALSE(possible(wire::ClockFollowUp{1, 0, ns}));
+        wire::Health health{};
+        health.board_time_ns = ns;
+        CHECK_FALSE(possible(health));
     }
+}
+
+TEST_CASE("packet_check: a board has outputs, as many as it says") {
+    CHECK(possible(board()));
+    wire::BoardHello hello = board();
+    hello.present = wire::present_spi | wire::present_light;
+    hello.cameras = 0;
+    CHECK_FALSE(possible(hello));
+    hello.cameras = 1;
+    CHECK_FALSE(possible(hello));
+    hello.present |= wire::present_camera0 << 2U;  // outputs need not begin with the first
+    CHECK(possible(hello));
+    hello.present |= wire::present_camera0;
+    CHECK_FALSE(possible(hello));
+    hello.cameras = 2;
+    CHECK(possible(hello));
+    hello.present = ~0U;  // what a newer board has
+    hello.cameras = wire::camera_count;
+    CHECK(possible(hello));
 }
 
 TEST_CASE("packet_check: a sentence of the year 2300 labels nothing") {
@@ -71,4 +104,47 @@ TEST_CASE("packet_check: a sentence of the year 2300 labels nothing") {
     CHECK_FALSE(possible(event));
     event.kind = wire::EventKind::pps;  // its value is no time
     CHECK(possible(event));
+}
+
+TEST_CASE("packet_check: an accelerometer's age comes with its flag only") {
+    wire::ImuSample sample{};
+    sample.accel_age = 1;
+    CHECK_FALSE(possible(sample));
+    sample.flags = wire::imu_accel_stamped;
+    CHECK(possible(sample));
+    sample.accel_age = 0;
+    CHECK(possible(sample));
+}
+
+TEST_CASE("packet_check: a run of skipped triggers has some, and storage succeeds or fails") {
+    wire::Event event{};
+    event.kind = wire::EventKind::triggers_skipped;
+    CHECK_FALSE(possible(event));
+    event.detail = 1;
+    CHECK(possible(event));
+    event.kind = wire::EventKind::stored;
+    for (const std::int64_t value : {-1, 0, 1, 2}) {
+        event.value = value;
+        CHECK(possible(event) == (value == 0 || value == 1));
+    }
+    event.kind = wire::EventKind::sync_lost;  // its value is a difference
+    event.value = -5'000'000;
+    CHECK(possible(event));
+}
+
+TEST_CASE("packet_check: states of a report are those that there are") {
+    CHECK(possible(wire::Health{}));
+    wire::Health health{};
+    health.pps_state = wire::PpsState::good;
+    health.sync_state = wire::SyncState::followed;
+    health.reset_cause = wire::ResetCause::software;
+    CHECK(possible(health));
+    health.sync_state = static_cast<wire::SyncState>(3);
+    CHECK_FALSE(possible(health));
+    health = {};
+    health.pps_state = static_cast<wire::PpsState>(3);
+    CHECK_FALSE(possible(health));
+    health = {};
+    health.reset_cause = static_cast<wire::ResetCause>(5);
+    CHECK_FALSE(possible(health));
 }

@@ -117,6 +117,52 @@ TEST_CASE("status: the text for a person names what is wrong and what to do") {
     CHECK_THAT(text, Catch::Contains("check its cable"));
 }
 
+TEST_CASE("status: what a board has is named, and of one that was never met nothing is claimed") {
+    Status status = healthy();
+    auto document = nlohmann::json::parse(to_json(status));
+    CHECK(document["board"]["present"].is_null());
+    CHECK(document["board"]["fastest_imu_hz"].is_null());
+    CHECK_THAT(client::status_text(document), !Catch::Contains("it has"));
+    status.board.connections = 1;
+    status.board.present = wire::present_camera0 | wire::present_spi | wire::present_ready0 << 1U;
+    status.board.fastest_imu_millihertz = 2'048'500;
+    document = nlohmann::json::parse(to_json(status));
+    CHECK(document["board"]["present"] == nlohmann::json({"camera0", "spi", "imu1_ready"}));
+    CHECK(document["board"]["fastest_imu_hz"] == 2048.5);
+    CHECK_THAT(client::status_text(document),
+               Catch::Contains("it has camera0, spi, imu1_ready; IMUs up to 2048.5 Hz\n"));
+}
+
+TEST_CASE("status: the board's clock against PPS is known while PPS is good, and not else") {
+    Status status = healthy();
+    status.board.health.pps_error_ppb = -250;
+    for (const auto state : {wire::PpsState::none, wire::PpsState::acquiring}) {
+        status.board.health.pps_state = state;
+        const auto document = nlohmann::json::parse(to_json(status));
+        CHECK(document["board"]["pps_error_ppb"].is_null());
+        CHECK_THAT(client::clock_text(document), !Catch::Contains("ppb"));
+    }
+    status.board.health.pps_state = wire::PpsState::good;
+    const auto document = nlohmann::json::parse(to_json(status));
+    CHECK(document["board"]["pps_error_ppb"] == -250);
+    CHECK_THAT(client::clock_text(document), Catch::Contains("-250 ppb"));
+}
+
+TEST_CASE("status: pulses of the sync input, glitches and repeated samples") {
+    Status status = healthy();
+    status.board.health.glitches = 12;
+    status.imus[0].report.repeated = 3;
+    for (const auto& [state, word] : {std::pair(wire::SyncState::none, "none"),
+                                      {wire::SyncState::lost, "lost"},
+                                      {wire::SyncState::followed, "followed"}}) {
+        status.board.health.sync_state = state;
+        const auto document = nlohmann::json::parse(to_json(status));
+        CHECK(document["board"]["sync"] == word);
+        CHECK(document["board"]["glitches"] == 12);
+        CHECK(document["imus"][0]["repeated"] == 3);
+    }
+}
+
 TEST_CASE("status: sigma of a clock that is not known is no number, least of all zero") {
     Status status = healthy();
     status.clock.state = GENERATE(clock::ClockState::init, clock::ClockState::reset);

@@ -26,11 +26,23 @@ std::string hint(const json& part) {
     return fmt::format("\n         {}{}{}", fault, fault.empty() ? "" : ": ", text(part, "hint"));
 }
 
+/// What the board has, where it says so.
+std::string parts_line(const json& board) {
+    const json present = board.value("present", json());
+    const json fastest = board.value("fastest_imu_hz", json());
+    std::string names;
+    for (const json& name : present)
+        if (name.is_string()) names += (names.empty() ? "" : ", ") + name.get<std::string>();
+    if (names.empty() || !fastest.is_number()) return "";
+    return fmt::format("         it has {}; IMUs up to {:g} Hz\n", names, fastest.get<double>());
+}
+
 std::string board_line(const json& board) {
-    return fmt::format("board    {:<10} {} {}  lost packets {}, late outputs {}, IMU errors {}{}\n",
-                       text(board, "state"), text(board, "serial"), text(board, "firmware"),
-                       count(board, "lost_packets"), count(board, "late_outputs"),
-                       count(board, "imu_errors"), hint(board));
+    return fmt::format(
+        "board    {:<10} {} {}  lost packets {}, late outputs {}, IMU errors {}{}\n{}",
+        text(board, "state"), text(board, "serial"), text(board, "firmware"),
+        count(board, "lost_packets"), count(board, "late_outputs"), count(board, "imu_errors"),
+        hint(board), parts_line(board));
 }
 
 /// Of a time in ns, without the unit; what is not known is null, and no zero.

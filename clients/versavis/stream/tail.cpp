@@ -52,18 +52,20 @@ json describe(const Received<FrameMetadata>& item) {
 json describe(const Received<ImuMetadata>& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const ImuMetadata& d = item.data;
-    line.update({{"sample", d.number},
-                 {"sigma_ns", d.sigma_ns},
-                 {"filter_delay_ns", d.filter_delay.ns},
-                 {"gyro_rad_s", vector(d.gyro)},
-                 {"accel_m_s2", vector(d.accel)},
-                 {"magnetic_t", vector(d.magnetic)},
-                 {"temperature_c", d.temperature},
-                 {"pressure_pa", d.pressure},
-                 {"board_time_ns", d.board_time.ns},
-                 {"host_time_ns", d.host_time.ns},
-                 {"epoch", d.epoch},
-                 {"flags", d.flags}});
+    line.update(
+        {{"sample", d.number},
+         {"sigma_ns", d.sigma_ns},
+         {"filter_delay_ns", d.filter_delay.ns},
+         {"accel_age_ns", (d.flags & flag_accel_age) != 0 ? json(d.accel_age_ns) : json(nullptr)},
+         {"gyro_rad_s", vector(d.gyro)},
+         {"accel_m_s2", vector(d.accel)},
+         {"magnetic_t", vector(d.magnetic)},
+         {"temperature_c", d.temperature},
+         {"pressure_pa", d.pressure},
+         {"board_time_ns", d.board_time.ns},
+         {"host_time_ns", d.host_time.ns},
+         {"epoch", d.epoch},
+         {"flags", d.flags}});
     return line;
 }
 
@@ -74,6 +76,7 @@ json describe(const Received<EventMetadata>& item) {
                  {"source", d.source_name},
                  {"reason", to_string(d.reason)},
                  {"value", d.value},
+                 {"count", d.count},
                  {"board_time_ns", d.board_time.ns},
                  {"host_time_ns", d.host_time.ns},
                  {"epoch", d.epoch}});

@@ -12,18 +12,30 @@ constexpr std::uint16_t reset_command = 0x80;
 constexpr std::size_t max_words = 13;
 constexpr std::size_t crc_words = 11;
 
+/// What four bits leave in a register that shifts right.
+struct CrcTable {
+    constexpr CrcTable() {
+        for (std::uint16_t nibble = 0; nibble < 16; ++nibble) {
+            std::uint32_t crc = nibble;
+            for (int bit = 0; bit < 4; ++bit)
+                crc = (crc & 1U) != 0 ? (crc >> 1U) ^ 0x1021U : crc >> 1U;
+            remainders[nibble] = static_cast<std::uint16_t>(crc);
+        }
+    }
+    std::uint16_t remainders[16] = {};
+};
+constexpr CrcTable crc_table;
+
 }  // namespace
 
 std::uint16_t adis16448_crc(const std::uint16_t* words) {
-    std::uint16_t crc = 0xFFFF;
+    std::uint32_t crc = 0xFFFF;
     for (std::size_t i = 0; i < crc_words; ++i) {
-        std::uint16_t bits = words[i];  // low byte first, least significant bit first
-        for (int bit = 0; bit < 16; ++bit, bits = static_cast<std::uint16_t>(bits >> 1U)) {
-            const bool odd = ((crc ^ bits) & 1U) != 0;
-            crc = static_cast<std::uint16_t>(odd ? (crc >> 1U) ^ 0x1021U : crc >> 1U);
-        }
+        std::uint32_t bits = words[i];  // low byte first, least significant bit first
+        for (int nibble = 0; nibble < 4; ++nibble, bits >>= 4U)
+            crc = (crc >> 4U) ^ crc_table.remainders[(crc ^ bits) & 0xFU];
     }
-    crc = static_cast<std::uint16_t>(~crc);
+    crc = ~crc & 0xFFFFU;
     return static_cast<std::uint16_t>(crc << 8U | crc >> 8U);
 }
 
@@ -43,12 +55,12 @@ std::uint32_t Adis::rate(std::uint32_t wanted_millihertz) const {
                           : facts_.fastest_millihertz / (code + 1U);
 }
 
-void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
-    const std::uint16_t code = rate_code(rate_millihertz);
+void Adis::setup(const PartSettings& settings, Setup& setup) const {
+    const std::uint16_t code = rate_code(settings.rate_millihertz);
     // In octaves the rate is in the high byte, beside the bit that selects the internal clock.
     const auto rate =
         static_cast<std::uint16_t>(facts_.octaves ? std::uint32_t{code} << 8U | 1U : code);
-    const auto filters = static_cast<std::uint16_t>(facts_.filter_base | filter);
+    const auto filters = static_cast<std::uint16_t>(facts_.filter_base | settings.filter);
     constexpr std::uint32_t settle_us = 300;
     setup.write(0, facts_.command_register, reset_command, facts_.reset_us);
     setup.expect(0, facts_.product_register, facts_.product);
@@ -56,7 +68,7 @@ void Adis::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setu
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
     setup.write(0, facts_.filter_register, filters,
-                settle_us);  // changing the range may change the filter
+                settle_us);  // changing the range may change the settings.filter
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }

@@ -45,7 +45,7 @@ class Adis final : public ImuPart {
     std::uint32_t fastest_millihertz() const override { return facts_.fastest_millihertz; }
     std::uint8_t strongest_filter() const override { return 6; }
     std::uint32_t rate(std::uint32_t wanted_millihertz) const override;
-    void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
+    void setup(const PartSettings& settings, Setup& setup) const override;
     void access(const SetupStep& step, ImuTransfer& transfer) const override;
     std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const override;
     Nanoseconds pause() const override { return facts_.word_gap_ns; }

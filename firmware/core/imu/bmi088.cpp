@@ -31,6 +31,8 @@ enum AccelRegister : std::uint8_t {
     accel_temperature = 0x22,  // high byte first, unlike everything else
     accel_conf = 0x40,
     accel_range = 0x41,
+    accel_int1_io_conf = 0x53,
+    accel_int_map_data = 0x58,
     accel_pwr_conf = 0x7C,
     accel_pwr_ctrl = 0x7D,
     accel_soft_reset = 0x7E,
@@ -46,8 +48,8 @@ constexpr std::uint8_t on = 0x04;
 // The codes with the widest bandwidth at each rate.
 constexpr RateCode rates[] = {
     {2'000'000, 0}, {1'000'000, 2}, {400'000, 3}, {200'000, 6}, {100'000, 7}};
-// The accelerometer has a clock of its own: at its fastest rate its data is at most 625 us older
-// than the gyro's edge.
+// The accelerometer has a clock of its own: at its fastest rate, 1.6 kHz, its data is at most
+// 625 us older than the gyro's edge.
 constexpr std::uint8_t accel_rate = 0xC;
 
 }  // namespace
@@ -56,7 +58,7 @@ std::uint32_t Bmi088::rate(std::uint32_t wanted_millihertz) const {
     return slowest_not_below(rates, wanted_millihertz).millihertz;
 }
 
-void Bmi088::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
+void Bmi088::setup(const PartSettings& settings, Setup& setup) const {
     // The first reading switches the accelerometer from I2C to SPI, and means nothing.
     setup.write(accel, accel_chip_id, 0, write_pause_us);
     setup.write(accel, accel_soft_reset, soft_reset, 5'000);
@@ -65,15 +67,20 @@ void Bmi088::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& se
     setup.write(accel, accel_pwr_conf, active, 5'000);
     setup.write(accel, accel_pwr_ctrl, on, 50'000);
     const auto bandwidth =
-        static_cast<std::uint16_t>(0xA - filter);  // normal, 2 or 4 times oversampled
+        static_cast<std::uint16_t>(0xA - settings.filter);  // normal, 2 or 4 times oversampled
     setup.write(accel, accel_conf, static_cast<std::uint16_t>(bandwidth << 4U | accel_rate),
                 write_pause_us);
     setup.write(accel, accel_range, 0x03, write_pause_us);  // 24 g
+    if (settings.accel_ready) {
+        // INT1 is an output, push-pull, active high; the data-ready of the accelerometer is on it.
+        setup.write(accel, accel_int1_io_conf, 0x0A, write_pause_us);
+        setup.write(accel, accel_int_map_data, 0x04, write_pause_us);
+    }
 
     setup.write(gyro, gyro_soft_reset, soft_reset, 50'000);
     setup.expect(gyro, gyro_chip_id, gyro_id);
     setup.write(gyro, gyro_range, 0x00, write_pause_us);  // 2000 deg/s
-    const std::uint8_t code = slowest_not_below(rates, rate_millihertz).code;
+    const std::uint8_t code = slowest_not_below(rates, settings.rate_millihertz).code;
     setup.write(gyro, gyro_bandwidth, code, write_pause_us);
     setup.expect(gyro, gyro_bandwidth, static_cast<std::uint16_t>(code | 0x80U));
     setup.write(gyro, gyro_int_io_conf, 0x0D, write_pause_us);  // INT3 push-pull, active high
@@ -89,6 +96,11 @@ void Bmi088::reading(unsigned index, ImuTransfer& transfer) const {
         burst(accel, accel_chip_id, accel_burst, transfer);
     else
         burst(accel, accel_pwr_conf, 2, transfer);
+}
+
+AccelBytes Bmi088::accel_bytes() const {
+    constexpr std::uint8_t first = 2 + accel_data;  // after address and dummy
+    return {1, first, first + 6};
 }
 
 Verdict Bmi088::parse(const ImuReply* replies, unsigned /*count*/, wire::ImuSample& sample) const {

@@ -13,8 +13,10 @@ class Bmi088 final : public ByteRegisterPart {
     std::uint16_t identity() const override { return 0x0F1E; }
     std::uint32_t fastest_millihertz() const override { return 2'000'000; }
     std::uint8_t strongest_filter() const override { return 2; }
+    std::uint32_t accel_millihertz() const override { return 1'600'000; }
+    AccelBytes accel_bytes() const override;
     std::uint32_t rate(std::uint32_t wanted_millihertz) const override;
-    void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
+    void setup(const PartSettings& settings, Setup& setup) const override;
     unsigned readings() const override { return 3; }
     void reading(unsigned index, ImuTransfer& transfer) const override;
     Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const override;

@@ -36,15 +36,16 @@ std::uint32_t Icm42688p::rate(std::uint32_t wanted_millihertz) const {
     return slowest_not_below(rates, wanted_millihertz).millihertz;
 }
 
-void Icm42688p::setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const {
-    const std::uint8_t code = slowest_not_below(rates, rate_millihertz).code;
+void Icm42688p::setup(const PartSettings& settings, Setup& setup) const {
+    const std::uint8_t code = slowest_not_below(rates, settings.rate_millihertz).code;
     setup.write(0, device_config, 1, 2'000);  // reset; the sheet asks for 1 ms
     setup.expect(0, who_am_i, identity());
     setup.write(0, int_config, 0x03);  // INT1 pulsed, push-pull, active high
     // Short pulses where the rate requires them; the asynchronous reset bit must be cleared.
-    setup.write(0, int_config1, rate_millihertz >= fast_millihertz ? 0x60 : 0x00);
+    setup.write(0, int_config1, settings.rate_millihertz >= fast_millihertz ? 0x60 : 0x00);
     setup.write(0, int_source0, 0x08);  // data ready only
-    setup.write(0, gyro_accel_config0, static_cast<std::uint16_t>(filter << 4U | filter));
+    setup.write(0, gyro_accel_config0,
+                static_cast<std::uint16_t>(settings.filter << 4U | settings.filter));
     setup.write(0, gyro_config0, code);
     setup.write(0, accel_config0, code);
     setup.write(0, pwr_mgmt0, both_low_noise, 50'000);  // the gyro needs 45 ms

@@ -11,9 +11,10 @@ class Icm42688p final : public ByteRegisterPart {
     wire::ImuKind kind() const override { return wire::ImuKind::icm42688p; }
     std::uint16_t identity() const override { return 0x47; }
     std::uint32_t fastest_millihertz() const override { return 8'000'000; }
+    std::uint32_t fastest_i2c_millihertz() const override { return 1'000'000; }
     std::uint8_t strongest_filter() const override { return 7; }
     std::uint32_t rate(std::uint32_t wanted_millihertz) const override;
-    void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const override;
+    void setup(const PartSettings& settings, Setup& setup) const override;
     unsigned readings() const override { return 2; }
     void reading(unsigned index, ImuTransfer& transfer) const override;
     Verdict parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const override;

@@ -21,6 +21,7 @@ struct SetupStep {
 /// Steps from power-up to samples, in order.
 class Setup {
  public:
+    /// A BMI088 needs 18. At half, the end of its set-up is missing; at twice, memory is wasted.
     static constexpr std::size_t capacity = 20;
 
     void write(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
@@ -44,6 +45,20 @@ class Setup {
     std::size_t size_ = 0;
 };
 
+/// What a part is set up for.
+struct PartSettings {
+    std::uint32_t rate_millihertz = 0;  ///< one of its rates
+    std::uint8_t filter = 0;
+    bool accel_ready = false;  ///< the data-ready line of its accelerometer is wired
+};
+
+/// Where the accelerometer's values are among the bytes of a sample's readings.
+struct AccelBytes {
+    std::uint8_t reading = 0;
+    std::uint8_t first = 0;
+    std::uint8_t end = 0;
+};
+
 enum class Verdict : std::uint8_t {
     taken,   ///< the sample is filled, with flags for what is wrong
     unsure,  ///< one more reading is needed to tell
@@ -57,12 +72,16 @@ class ImuPart {
     /// What identifies the part, as reported by an `imu_ready` event.
     virtual std::uint16_t identity() const = 0;
     virtual std::uint32_t fastest_millihertz() const = 0;
+    /// On the I2C bus; 0: it is not made for that.
+    virtual std::uint32_t fastest_i2c_millihertz() const { return 0; }
+    /// Of its accelerometer, if that has a clock and a data-ready line of its own; else 0.
+    virtual std::uint32_t accel_millihertz() const { return 0; }
+    virtual AccelBytes accel_bytes() const { return {}; }
     virtual std::uint8_t strongest_filter() const = 0;
     /// Its slowest rate not below `wanted_millihertz`, or its fastest.
     virtual std::uint32_t rate(std::uint32_t wanted_millihertz) const = 0;
 
-    /// `rate_millihertz` is one of its rates.
-    virtual void setup(std::uint32_t rate_millihertz, std::uint8_t filter, Setup& setup) const = 0;
+    virtual void setup(const PartSettings& settings, Setup& setup) const = 0;
     virtual void access(const SetupStep& step, ImuTransfer& transfer) const = 0;
     /// The value of the register that `asked` read.
     virtual std::uint16_t answer(const ImuTransfer& asked, const ImuReply& reply) const = 0;

@@ -27,8 +27,11 @@ class ImuPort {
         overrun_ = overrun_ || samples > 0;
     }
 
-    /// A reading failed its check and gives no sample.
-    void count_error() { ++errors_; }
+    /// A reading failed its check and gives no sample. False: too many failed in a row.
+    bool count_error() {
+        ++errors_;
+        return ++failures_ < max_failures;
+    }
 
     /// Gives the sample its number and flags. False: too many failed in a row.
     bool finish(wire::ImuSample& sample) {
@@ -36,6 +39,7 @@ class ImuPort {
         sample.number = number_++;
         if (overrun_) sample.flags |= wire::imu_overrun;
         overrun_ = false;
+        if (repeats(sample)) sample.flags |= wire::imu_repeated;
         const bool failed = (sample.flags & wire::imu_check_failed) != 0;
         if (failed || (sample.flags & wire::imu_self_test_failed) != 0) ++errors_;
         failures_ = failed ? failures_ + 1 : 0;
@@ -57,7 +61,21 @@ class ImuPort {
     std::uint8_t port_;
 
  private:
+    /// The same words as in the sample before: it was not updated.
+    bool repeats(const wire::ImuSample& sample) {
+        bool same = true;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            same = same && gyro_before_[axis] == sample.gyro[axis] &&
+                   accel_before_[axis] == sample.accel[axis];
+            gyro_before_[axis] = sample.gyro[axis];
+            accel_before_[axis] = sample.accel[axis];
+        }
+        return same;
+    }
+
     ChannelReports& reports_;
+    std::int32_t gyro_before_[3] = {};
+    std::int32_t accel_before_[3] = {};
     std::uint32_t number_ = 0;
     std::uint32_t errors_ = 0;
     std::uint32_t restarts_ = 0;

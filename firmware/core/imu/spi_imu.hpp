@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The IMU on the SPI bus: sets it up, reads it at its data-ready edges or on a grid, and sets it up
-// again when it fails.
+// The IMU on the SPI or I2C bus: sets it up, reads it at its data-ready edges or on a grid, and
+// sets it up again when it fails.
 #pragma once
 
 #include "imu/imu_part.hpp"
 #include "imu/imu_port.hpp"
+#include "imu/ready_edges.hpp"
 
 namespace versavis::firmware {
 
@@ -16,45 +17,54 @@ class SpiImu final : public ImuPort {
     /// With a kind that is not on this bus, nothing is read.
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
 
-    /// The data-ready line rose. Pass on all edges before poll(): what is read belongs to the
-    /// newest.
+    /// The data-ready line rose, or that of the accelerometer.
     void ready_edge(Nanoseconds at, Nanoseconds now);
+    void accel_edge(Nanoseconds at) { accel_edges_.add(at); }
+    /// Some edges were not passed on: until the next one, nobody knows which sample is read.
+    void edges_lost();
 
-    /// Does what is due. True: `sample` holds a new sample.
-    bool poll(Nanoseconds now, wire::ImuSample& sample);
+    /// Collects what was read. Call it before the edges are passed on: those that came before the
+    /// reading are then known in poll().
+    void collect(Nanoseconds now);
 
-    Nanoseconds next_wake() const;
+    /// Does what is due; all edges before `settled` were passed on. True: `sample` holds a new
+    /// sample.
+    bool poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample);
+
+    /// When poll() has something to do next; it learns of edges `lag` after they came.
+    Nanoseconds next_wake(Nanoseconds lag) const;
 
     /// Instants of the samples without data-ready.
     const Grid& grid() const { return grid_; }
+    std::uint32_t take_glitches() {
+        return ready_edges_.take_echoes() + accel_edges_.take_echoes();
+    }
 
     /// The rate that a configuration leads to.
     static std::uint32_t true_rate(const wire::ImuConfiguration& configuration);
 
  private:
     enum class State : std::uint8_t { off, set_up, running };
+    enum class Job : std::uint8_t { none, armed, collected };
 
-    /// Data-ready edges known when a reading was requested, and the first ones seen later, which
-    /// may have come before it began.
-    struct Edges {
-        Nanoseconds newest = 0;
-        std::uint32_t count = 0;
-        Nanoseconds later[2] = {};
-        std::size_t later_count = 0;
-    };
-
-    bool paced_by_part() const { return (configuration_.options & wire::imu_data_ready) != 0; }
+    bool has(wire::ImuOption option) const { return (configuration_.options & option) != 0; }
+    bool paced_by_part() const { return has(wire::imu_data_ready); }
     void begin_setup(Nanoseconds at);
     void next_step(Nanoseconds now);
-    void check_step(const ImuReply& reply, Nanoseconds now);
+    void check_step(Nanoseconds now);
     void run(Nanoseconds now);
     void expect_edge(Nanoseconds now) { silent_at_ = now + patience_; }
     void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
-    void start_reading(Nanoseconds at, Nanoseconds now);
-    bool start(Nanoseconds at, Nanoseconds now);
-    bool take(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sample);
+    void adapt(ImuTransfer& transfer) const;
+    void arm(Nanoseconds now);
+    void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings, Nanoseconds now);
+    bool take(Nanoseconds now, wire::ImuSample& sample);
+    bool refused() const;
+    bool drop(wire::EventKind kind, Nanoseconds now);
+    bool mixes(const ImuReply& reply) const;
+    bool stamp(Nanoseconds started, wire::ImuSample& sample);
+    void stamp_accel(wire::ImuSample& sample) const;
     void pace(Nanoseconds now);
-    Nanoseconds stamp(unsigned reading);
 
     ImuBus& bus_;
     const ImuPart* part_ = nullptr;
@@ -65,19 +75,24 @@ class SpiImu final : public ImuPort {
     Nanoseconds resume_ = 0;    ///< when the next step may begin
     Grid grid_;                 ///< unless the part paces the samples
     Nanoseconds patience_ = 0;  ///< how long its data-ready edge may fail to come
-    ImuTransfer transfer_;
-    bool pending_ = false;           ///< a transfer is set or under way
-    Nanoseconds pending_until_ = 0;  ///< when it must have ended
-    unsigned reading_ = 0;           ///< of the sample that is being read
-    ImuReply replies_[max_readings];
-    Edges edges_[max_readings];  ///< as each reading of the sample began
-    Nanoseconds completed_ = 0;  ///< when the newest transfer was found complete
-    Nanoseconds period_ = 0;     ///< of the edges, as the part was told
-    unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
-    Nanoseconds newest_edge_ = 0;
-    std::uint32_t edge_count_ = 0;
+    ImuJob job_;
+    Job job_state_ = Job::none;
+    bool job_reads_ = false;          ///< its transfers are those that begin a sample
+    Nanoseconds job_until_ = 0;       ///< when it must have ended; never: it waits for an edge
+    unsigned readings_ = 0;           ///< of the sample that is being read
+    ImuReply fresh_[max_transfers];   ///< of the newest job
+    ImuReply replies_[max_readings];  ///< of the sample that is being read
+    Nanoseconds ended_ = 0;           ///< when the newest transfer did
+    Nanoseconds period_ = 0;          ///< of the edges, as the part was told
+    Nanoseconds accel_period_ = 0;
+    unsigned fast_edges_ = 0;  ///< edges in a row that came sooner
+    ReadyEdges ready_edges_;
+    ReadyEdges accel_edges_;
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed
+    Nanoseconds served_at_ = 0;  ///< the newest of them
+    bool edges_lost_ = false;    ///< since then
     Nanoseconds silent_at_ = 0;  ///< when the next edge must have come
+    Nanoseconds after_ = 0;      ///< the newest edge of the line, echoes included
 };
 
 }  // namespace versavis::firmware

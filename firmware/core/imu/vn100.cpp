@@ -28,6 +28,10 @@ constexpr std::size_t pressure_at = 52;
 constexpr Nanoseconds base_period = 1'250'000;  // of its own samples
 constexpr Nanoseconds power_up_time = 300'000'000;
 
+/// Edges closer to the one before are its echoes; the part's are a base period apart. At half, long
+/// reflections count double; at four times, two samples might be one.
+constexpr Nanoseconds longest_echo = 300'000;
+
 std::uint32_t word32(const std::uint8_t* bytes) {
     std::uint32_t word = 0;
     std::memcpy(&word, bytes, sizeof word);
@@ -52,12 +56,15 @@ bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowes
 
 }  // namespace
 
+/// The steps of eight bits at once, by the structure of the polynomial: x^12 + x^5 + 1.
 std::uint16_t vn100_crc(const std::uint8_t* data, std::size_t size) {
     std::uint32_t crc = 0;
     for (std::size_t i = 0; i < size; ++i) {
-        crc ^= std::uint32_t{data[i]} << 8U;
-        for (int bit = 0; bit < 8; ++bit)
-            crc = (crc & 0x8000U) != 0 ? crc << 1U ^ 0x1021U : crc << 1U;
+        crc = (crc >> 8U | crc << 8U) & 0xFFFFU;
+        crc ^= data[i];
+        crc ^= (crc & 0xFFU) >> 4U;
+        crc ^= crc << 12U & 0xFFFFU;
+        crc ^= (crc & 0xFFU) << 5U;
     }
     return static_cast<std::uint16_t>(crc);
 }
@@ -169,6 +176,7 @@ void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
 }
 
 void Vn100::ready_edge(Nanoseconds at) {
+    if (at - edges_[0] < longest_echo) return;
     for (std::size_t i = max_edges - 1; i > 0; --i) edges_[i] = edges_[i - 1];
     edges_[0] = at;
 }

@@ -17,6 +17,8 @@ struct ImuModel {
     wire::ImuKind kind = wire::ImuKind::none;
     double fastest_hz = 0;          ///< with the data-ready line
     unsigned strongest_filter = 0;  ///< as the configuration numbers them, from 0
+    double fastest_i2c_hz = 0;      ///< 0: it cannot be on I2C
+    bool accel_ready = false;       ///< its accelerometer has a data-ready line of its own
 };
 
 /// Names of all models, as the configuration has them.
@@ -41,7 +43,8 @@ struct FilterDelay {
 /// without the part's data-ready line.
 FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready);
 
-/// Fills the physical quantities of `sample`; times, number and epoch are the caller's.
+/// Fills the physical quantities of `sample` and the age of its acceleration; times, number and
+/// epoch are the caller's.
 ImuMetadata to_si(const ImuModel& model, const wire::ImuSample& sample);
 
 }  // namespace versavis::imu

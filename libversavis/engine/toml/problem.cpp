@@ -39,6 +39,11 @@ const TomlPlace& TomlEntry::place_of(const std::string& key) const {
     return found == keys.end() ? place : found->second;
 }
 
+std::string TomlEntry::reference(const std::string& key) const {
+    if (title.empty()) return fmt::format("'{}'", key);
+    return fmt::format("{}: '{}' of {}", place_of(key).text(), key, title);
+}
+
 TomlProblem TomlEntry::problem(const std::string& key, std::string what, std::string cure) const {
     return {place_of(key), title, key, std::move(what), std::move(cure)};
 }

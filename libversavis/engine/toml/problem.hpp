@@ -52,6 +52,8 @@ struct TomlEntry {
     bool has(const std::string& key) const { return keys.count(key) != 0; }
     /// Of the key; of the table if the key is not there.
     const TomlPlace& place_of(const std::string& key) const;
+    /// "file:line:column: 'key' of [[table]]"; the key alone when the file has no such table.
+    std::string reference(const std::string& key) const;
     TomlProblem problem(const std::string& key, std::string what, std::string cure) const;
 };
 

@@ -27,6 +27,8 @@ enum ItemFlag : std::uint32_t {
         1U << 3U,             ///< the clocks lost contact, or messages contradict them: sigma grows
     flag_clamped = 1U << 4U,  ///< the stamp was held so that it did not go backwards
     flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
+    flag_repeated = 1U << 6U,      ///< an IMU sample with the data of the one before
+    flag_accel_age = 1U << 7U,     ///< accel_age_ns is measured
 };
 
 /// A stamp of sigma `sigma_unknown` has no known accuracy.
@@ -67,9 +69,10 @@ struct ImuMetadata {
     float pressure;        ///< pascal; NaN where the part has none
     std::uint32_t sigma_ns;
     std::uint32_t epoch;
-    std::uint32_t flags;    ///< ItemFlag
-    Duration filter_delay;  ///< of the part's filter, already taken off host and output time
-    std::uint64_t reserved;
+    std::uint32_t flags;        ///< ItemFlag
+    Duration filter_delay;      ///< of the part's filter, already taken off host and output time
+    std::int32_t accel_age_ns;  ///< acceleration before angular rate, not taken off; 0: unknown
+    std::uint32_t reserved;
 };
 
 enum class EventKind : std::uint32_t {
@@ -97,6 +100,10 @@ enum class EventKind : std::uint32_t {
     message_doubted = 22,  ///< its witnesses contradict a message of the board: it was not used
     stream_stepped = 23,   ///< several messages agree against all before: a new epoch begins
     output_clock_stepped = 24,  ///< value: ns by which its offset to the host's clock changed
+    triggers_skipped = 25,  ///< grid points in a row that were too late; value: tick of the first
+    sync_lost = 26,         ///< pulses of the sync input do not fit the grid; value: ns off it
+    sync_taken = 27,        ///< the grid follows the sync pulses; value: ns that it moves for that
+    configuration_stored = 28,  ///< on the board; value: 1 when it is safe, 0 when that failed
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
@@ -139,7 +146,8 @@ struct EventMetadata {
     std::uint32_t epoch;
     char source_name[32];   ///< zero-terminated
     std::int64_t expected;  ///< of a message that was doubted: what its witnesses say
-    std::uint64_t reserved;
+    std::uint32_t count;    ///< of triggers_skipped: grid points
+    std::uint32_t reserved;
 };
 
 static_assert(sizeof(FrameMetadata) == ring::metadata_size, "96 bytes of inline metadata");

@@ -4,8 +4,13 @@
 namespace versavis::scenario {
 
 void CameraModel::emit(Edges& edges, Nanoseconds at, bool exposing) const {
-    if (settings_.strobe)
-        edges.push_back({at, settings_.input, exposing != settings_.strobe_inverted});
+    if (!settings_.strobe) return;
+    const bool level = exposing != settings_.strobe_inverted;
+    edges.push_back({at, settings_.input, level});
+    for (const Nanoseconds bounce : settings_.bounces) {
+        edges.push_back({at + bounce, settings_.input, !level});
+        edges.push_back({at + bounce + 100, settings_.input, level});
+    }
 }
 
 CameraModel::Edges CameraModel::trigger_line(Nanoseconds at, bool level) {

@@ -34,9 +34,10 @@ struct CameraSettings {
     Nanoseconds readout = 0;  ///< for this long after an exposure no trigger is accepted
     bool trigger_inverted = false;
     bool strobe_inverted = false;
-    bool strobe = true;          ///< the exposure line is wired
-    bool trigger_width = false;  ///< it exposes as long as the trigger is active
-    std::uint8_t input = 0;      ///< of the board, for the exposure line
+    bool strobe = true;                  ///< the exposure line is wired
+    std::vector<Nanoseconds> bounces{};  ///< after each of its edges the line toggles, twice each
+    bool trigger_width = false;          ///< it exposes as long as the trigger is active
+    std::uint8_t input = 0;              ///< of the board, for the exposure line
     /// Exposure of pulse 1, 2, ... at a time: constant, or an auto exposure.
     std::function<Nanoseconds(std::uint64_t pulse, Nanoseconds at)> exposure = [](auto, auto) {
         return 3 * ms;

@@ -99,9 +99,9 @@ void World::judge_record(const wire::Exposure& record, const TruePulse& pulse,
     const bool sees_end = sees_start && pulse.fault != Fault::end_lost && !overlong;
     if (has(record, wire::exposure_measured) != sees_end) wrong("measured or not");
     if (has(record, wire::exposure_no_start) == sees_start) wrong("start seen or not");
-    if (sees_start && record.start_ns != pulse.start) wrong("start");
+    if (sees_start && record.start_ns != stamped(pulse.start)) wrong("start");
     if (!sees_start && record.start_ns != wire::no_time) wrong("start invented");
-    if (sees_end && record.end_ns != pulse.end) wrong("end");
+    if (sees_end && record.end_ns != stamped(pulse.end)) wrong("end");
     if (!sees_end && record.end_ns != wire::no_time) wrong("end invented");
     if (overlong && !has(record, wire::exposure_overlong)) wrong("not overlong");
 }
@@ -115,6 +115,9 @@ void World::judge_ticks(unsigned camera, std::string& out) {
     for (const wire::Exposure& record : inbox().exposures[camera]) ticks.insert(record.tick);
     for (const wire::Event& event : inbox().events_of(wire::EventKind::trigger_skipped))
         if (event.source == camera) ticks.insert(static_cast<std::uint64_t>(event.value));
+    for (const wire::Event& event : inbox().events_of(wire::EventKind::triggers_skipped))
+        for (unsigned i = 0; i < event.detail && event.source == camera; ++i)
+            ticks.insert(static_cast<std::uint64_t>(event.value) + i);
     std::uint64_t expected = ticks.empty() ? 0 : *ticks.begin();
     for (const std::uint64_t tick : ticks)
         if (tick != expected++)
@@ -129,7 +132,8 @@ void World::judge_imu(unsigned port, std::string& out) {
         return;
     }
     const imu::ImuModel& model = *imu::find_model(samples[0].kind);
-    const std::vector<Nanoseconds>& ready = ready_times_[port];
+    std::vector<Nanoseconds> ready = ready_times_[port];
+    for (Nanoseconds& at : ready) at = stamped(at);
     const bool paced = (configuration.imus[port].options & wire::imu_data_ready) != 0;
     const auto index_of = [&ready](Nanoseconds at) {
         const auto found = std::lower_bound(ready.begin(), ready.end(), at);
@@ -170,6 +174,7 @@ void World::judge_imu(unsigned port, std::string& out) {
             taken = times.time(times.index_at(taken));
         }
         if ((sample.flags & wire::imu_check_failed) != 0) continue;
+        if ((sample.flags & wire::imu_accel_stamped) != 0) judge_accel_age(sample, out);
         const ImuMetadata si = imu::to_si(model, sample);
         const wire::ImuScale scale = wire::imu_scale(sample.kind);
         const devices::Inertial felt = motion(taken - filtered_for.ns);
@@ -189,6 +194,18 @@ void World::judge_imu(unsigned port, std::string& out) {
     }
 }
 
+/// The accelerometer's values were read soon after the stamp; their age is in 32 ns.
+void World::judge_accel_age(const wire::ImuSample& sample, std::string& out) const {
+    const auto reads = spi_imu_->accel_reads();
+    const auto read =
+        std::lower_bound(reads.begin(), reads.end(), std::pair(sample.time_ns, INT64_MIN));
+    if (read == reads.end()) return complain(out, "sample {} was not read", sample.number);
+    const Nanoseconds age = sample.time_ns - stamped(read->second);
+    if (!accel_ready_wired_ || std::abs(age - Nanoseconds{sample.accel_age} * 32) >= 32)
+        complain(out, "sample {}: its accelerometer's values are {} ns old, not {}", sample.number,
+                 age, sample.accel_age * 32);
+}
+
 void World::judge_pulses(std::string& out) {
     for (const PulseSource& source : pulses_) {
         const unsigned input = source.input - firmware::input_pulse;
@@ -203,7 +220,8 @@ void World::judge_pulses(std::string& out) {
             if (events[i].value != events[i - 1].value + 1 && !drops_allowed)
                 complain(out, "input {}: pulse {} after {}", input, events[i].value,
                          events[i - 1].value);
-        std::set<Nanoseconds> edges(source.fired.begin(), source.fired.end());
+        std::set<Nanoseconds> edges;
+        for (const Nanoseconds at : source.fired) edges.insert(stamped(at));
         for (const wire::Event& event : events)
             if (edges.erase(event.time_ns) == 0)
                 complain(out, "input {}: no edge at {}", input, event.time_ns);

@@ -5,16 +5,46 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <random>
+#include <string_view>
 
 namespace versavis::scenario {
 
 using firmware::never;
 
+namespace {
+
+/// What VERSAVIS_PORT names: a port without limits whose calls take no time, one whose calls take
+/// "2us", "4us" or a "random" time, or one that is as coarse as a "chip" as well.
+firmware::PortModel named_model(std::uint64_t seed) {
+    const char* variable = std::getenv("VERSAVIS_PORT");
+    const std::string_view name = variable == nullptr ? "" : variable;
+    if (name.empty()) return {};
+    if (name == "2us") return firmware::slow_model(2 * us, seed);
+    if (name == "4us") return firmware::slow_model(4 * us, seed);
+    if (name == "chip") return firmware::chip_model(2 * us, seed);
+    if (name != "random") throw std::runtime_error(fmt::format("no port is called '{}'", name));
+    std::mt19937_64 random(seed);
+    const auto draw = [&random](std::uint64_t below) {
+        return static_cast<Nanoseconds>(random() % below);
+    };
+    firmware::PortModel model = firmware::slow_model(1 + draw(5000), seed);
+    model.interrupt_ns = draw(20'000);
+    model.wake_ns = draw(20'000);
+    return model;
+}
+
+}  // namespace
+
 Nanoseconds PulseSource::next() const {
     return origin + std::llround(static_cast<double>(count) * period_ns);
 }
 
-World::World(std::uint64_t seed) : seed_(seed) { make_board(wire::ResetCause::power_on); }
+World::World(std::uint64_t seed, std::optional<firmware::PortModel> model, firmware::CoreTap* tap)
+    : seed_(seed), model_(model.value_or(named_model(seed))), tap_(tap) {
+    make_board(wire::ResetCause::power_on);
+}
 
 devices::Inertial World::motion(Nanoseconds at) {
     const double t = static_cast<double>(at) * 1e-9;
@@ -30,17 +60,26 @@ void World::make_board(wire::ResetCause cause) {
     firmware::Environment environment;
     environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
     environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
-        if (spi_imu_ && !dead_bus_) return spi_imu_->transfer(at, transfer, received);
+        const bool spi = transfer.bus == firmware::ImuTransfer::Bus::spi;
+        if (spi_imu_ && !dead_bus_ && !spi) return spi_imu_->i2c(at, transfer, received);
+        if (spi_imu_ && !dead_bus_) {
+            spi_imu_->transfer(at, transfer, received);
+            return true;
+        }
         std::fill(received.begin(), received.end(), dead_bus_.value_or(0xFF));
+        return false;
     };
     environment.uart_sent = [this](auto at, auto baud, auto bytes) { uart_sent(at, baud, bytes); };
     environment.reboot = [this](bool) { ++reboots_; };
+    environment.next_event = [this] { return next_event(); };
+    environment.fire = [this](auto at) { fire_events(at); };
     environment.flash = &flash_;
+    environment.tap = tap_;
     pins_ = 0;
     const auto nonce =
         static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);
     board_ = std::make_unique<firmware::NativeBoard>(firmware::Identity{nonce, cause, "TEST"},
-                                                     std::move(environment), now_);
+                                                     std::move(environment), now_, model_);
     board_->set_link_capacity(link_capacity_);
     for (const auto& [output, camera] : cameras_)
         if (camera->settings().strobe_inverted) board_->set_level(camera->settings().input, true);
@@ -73,6 +112,7 @@ void World::add_imu(std::unique_ptr<devices::SpiImuDevice> device, wire::ImuKind
                              data_ready ? std::uint8_t{wire::imu_data_ready} : std::uint8_t{0}, 0,
                              static_cast<std::uint32_t>(std::lround(rate_hz * 1e3))};
     if (data_ready) next_ready_ = now_ + ms;
+    next_accel_ready_ = now_ + ms;
 }
 
 devices::Vn100Device& World::add_vn100(double rate_hz, bool data_ready) {
@@ -127,7 +167,7 @@ void World::outputs_changed(Nanoseconds at, std::uint32_t pins) {
 
 void World::send_bytes(std::span<const std::uint8_t> bytes) {
     board_->receive(bytes, now_);
-    step(now_);
+    board_->run_until(now_);
 }
 
 void World::set_link(Nanoseconds interval, std::size_t bytes, std::size_t capacity) {
@@ -147,10 +187,14 @@ bool World::configure() {
     const std::size_t before = inbox().answers.size();
     const Nanoseconds sent = now_;
     send(configuration);
-    grid_origin_ = sent;
     run(20 * ms);
-    return inbox().answers.size() == before + 1 &&
-           inbox().answers.back().status == wire::ConfigurationStatus::taken;
+    if (inbox().answers.size() != before + 1 ||
+        inbox().answers.back().status != wire::ConfigurationStatus::taken)
+        return false;
+    grid_origin_ = inbox().answers.back().origin_ns;
+    if (grid_origin_ < sent || grid_origin_ > now_)
+        throw std::runtime_error("the grid did not begin when the configuration was taken");
+    return true;
 }
 
 void World::start(std::uint8_t cameras, std::uint8_t flags) {
@@ -174,7 +218,7 @@ void World::read_link() {
 }
 
 Nanoseconds World::next_event() const {
-    Nanoseconds next = std::min({next_read_, next_ready_, next_sample_});
+    Nanoseconds next = std::min({next_read_, next_ready_, next_accel_ready_, next_sample_});
     for (const PulseSource& source : pulses_) next = std::min(next, source.next());
     return next;
 }
@@ -183,9 +227,7 @@ void World::fire_spi_ready() {
     if (now_ < next_ready_) return;
     if (ready_fires_ && spi_imu_->signals(now_)) {
         const double period = spi_imu_->updates().period_ns;
-        board_->schedule_edge({now_, firmware::input_imu_ready, true});
-        board_->schedule_edge(
-            {now_ + std::llround(std::min(1e5, period / 4)), firmware::input_imu_ready, false});
+        pulse_ready(firmware::input_imu_ready, std::llround(std::min(1e5, period / 4)));
         ready_times_[0].push_back(now_);
         show("imu_ready", now_, true);
         show("imu_ready", now_ + std::llround(std::min(1e5, period / 4)), false);
@@ -193,6 +235,25 @@ void World::fire_spi_ready() {
     ready_fires_ = spi_imu_->signals(now_);
     const devices::UpdateTimes times = spi_imu_->updates();
     next_ready_ = ready_fires_ ? times.time(times.index_at(now_) + 1) : now_ + ms;
+}
+
+/// A pulse of a data-ready line, with its echo.
+void World::pulse_ready(std::uint8_t input, Nanoseconds width) {
+    board_->schedule_edge({now_, input, true});
+    if (ready_echo_ != 0) {
+        board_->schedule_edge({now_ + ready_echo_ / 2, input, false});
+        board_->schedule_edge({now_ + ready_echo_, input, true});
+    }
+    board_->schedule_edge({now_ + std::max(width, 2 * ready_echo_), input, false});
+}
+
+void World::fire_accel_ready() {
+    if (now_ < next_accel_ready_) return;
+    if (accel_ready_fires_ && spi_imu_->accel_signals(now_) && accel_ready_wired_)
+        pulse_ready(firmware::input_accel_ready, 50 * us);
+    accel_ready_fires_ = spi_imu_->accel_signals(now_);
+    const devices::UpdateTimes times = spi_imu_->accel_updates();
+    next_accel_ready_ = accel_ready_fires_ ? times.time(times.index_at(now_) + 1) : now_ + ms;
 }
 
 void World::fire_uart_sample() {
@@ -217,38 +278,32 @@ void World::uart_sent(Nanoseconds at, std::uint32_t baud, std::span<const std::u
     next_sample_ = uart_imu_->next_sample(at).value_or(never);
 }
 
-void World::fire_events() {
+void World::fire_events(Nanoseconds at) {
+    now_ = std::max(now_, at);
     if (now_ >= next_read_) {
         read_link();
         next_read_ += read_interval_;
     }
     fire_spi_ready();
+    fire_accel_ready();
     fire_uart_sample();
     for (PulseSource& source : pulses_) {
-        const Nanoseconds at = source.next();
-        if (at > now_) continue;
+        const Nanoseconds pulse = source.next();
+        if (pulse > now_) continue;
         static constexpr const char* names[] = {"pps", "aux0", "aux1", "sync_in"};
-        show(names[source.input - firmware::input_pulse], at, !source.falling);
-        show(names[source.input - firmware::input_pulse], at + source.width, source.falling);
-        board_->schedule_edge({at, source.input, !source.falling});
-        board_->schedule_edge({at + source.width, source.input, source.falling});
-        source.fired.push_back(at);
+        show(names[source.input - firmware::input_pulse], pulse, !source.falling);
+        show(names[source.input - firmware::input_pulse], pulse + source.width, source.falling);
+        board_->schedule_edge({pulse, source.input, !source.falling});
+        board_->schedule_edge({pulse + source.width, source.input, source.falling});
+        source.fired.push_back(pulse);
         ++source.count;
     }
 }
 
-void World::step(Nanoseconds until) {
-    board_->run_until(until);
-    now_ = until;
-}
-
 void World::run(Nanoseconds duration) {
     const Nanoseconds end = now_ + duration;
-    for (Nanoseconds next = next_event(); next <= end; next = next_event()) {
-        step(std::max(now_, next));
-        fire_events();
-    }
-    step(end);
+    board_->run_until(end);
+    now_ = std::max(now_, end);
 }
 
 void World::stall_board(Nanoseconds duration) {
@@ -272,9 +327,19 @@ Nanoseconds World::grid_time(unsigned camera, std::uint64_t tick) const {
            static_cast<Nanoseconds>(static_cast<__int128>(tick) * 1'000'000'000'000'000 / rate);
 }
 
+Nanoseconds World::rounding() const {
+    if (model_.edge_grain_ns == 1) return 0;
+    return (Nanoseconds{1} << model_.output_grain_bits) / 2 + model_.output_step_ns +
+           model_.edge_grain_ns;
+}
+
 Nanoseconds World::grid_error(const wire::Exposure& record) const {
-    return record.start_ns + (record.end_ns - record.start_ns) / 2 -
-           grid_time(record.camera, record.tick);
+    if (is_slow() && (record.flags & wire::exposure_late) != 0) return 0;
+    const Nanoseconds error = record.start_ns + (record.end_ns - record.start_ns) / 2 -
+                              grid_time(record.camera, record.tick);
+    if (rounding() == 0) return error;
+    const Nanoseconds whole = (error + (error < 0 ? -us : us) / 2) / us * us;
+    return std::abs(error - whole) <= rounding() ? whole : error;
 }
 
 const wire::Exposure& World::record(unsigned camera, std::uint64_t trigger) {

@@ -38,7 +38,10 @@ struct Interval {
 
 class World {
  public:
-    explicit World(std::uint64_t seed = 1);
+    /// The board runs on `model`; without one, on what the variable VERSAVIS_PORT names. `tap` sees
+    /// what its core does.
+    explicit World(std::uint64_t seed = 1, std::optional<firmware::PortModel> model = {},
+                   firmware::CoreTap* tap = nullptr);
 
     /// A motion that is easy to recognise, and slow compared with every IMU.
     static devices::Inertial motion(Nanoseconds at);
@@ -51,6 +54,8 @@ class World {
     devices::Vn100Device& add_vn100(double rate_hz, bool data_ready);
     void add_pulses(wire::PulseInput input, Nanoseconds origin, double period_ns,
                     Nanoseconds width = 100 * us);
+    /// No more pulses from any source.
+    void stop_pulses() { pulses_.clear(); }
     /// Endless edges at an input, `period` apart.
     void add_noise(std::uint8_t input, Nanoseconds period, Nanoseconds from, Nanoseconds to);
 
@@ -93,12 +98,26 @@ class World {
     const std::vector<Nanoseconds>& rises(unsigned pin) const { return rises_[pin]; }
     int reboots() const { return reboots_; }
     devices::SpiImuDevice& spi_imu() { return *spi_imu_; }
-    /// The SPI bus reads only this byte, or what the part sends.
+    /// Every data-ready edge of IMU 0 is followed by another one after so long; 0: none is.
+    void set_ready_echo(Nanoseconds after) { ready_echo_ = after; }
+    /// The accelerometer's data-ready line is cut, or whole.
+    void set_accel_ready_wired(bool wired) { accel_ready_wired_ = wired; }
+    /// The SPI bus reads only this byte, or what the part sends; on I2C nobody acknowledges.
     void set_dead_bus(std::optional<std::uint8_t> level) { dead_bus_ = level; }
 
     /// True time of a grid point.
     Nanoseconds grid_time(unsigned camera, std::uint64_t tick) const;
-    /// Middle of a measured exposure relative to its grid point.
+    /// The calls of the port take time: what does not fit may come late, and says so.
+    bool is_slow() const { return model_.call_ns > 0; }
+    /// How far what the port does may be from what was asked, as coarse as it is: half a grain of
+    /// an output, a step between two words, and a grain of the stamps.
+    Nanoseconds rounding() const;
+    /// As the port stamps it.
+    Nanoseconds stamped(Nanoseconds at) const {
+        return at / model_.edge_grain_ns * model_.edge_grain_ns;
+    }
+    /// Middle of a measured exposure relative to its grid point, as exact as the port allows; 0 for
+    /// one that says it was late on a slow port.
     Nanoseconds grid_error(const wire::Exposure& record) const;
     const wire::Exposure& record(unsigned camera, std::uint64_t trigger);
 
@@ -116,12 +135,13 @@ class World {
  private:
     void outputs_changed(Nanoseconds at, std::uint32_t pins);
     void make_board(wire::ResetCause cause);
-    void step(Nanoseconds until);
     void show(const std::string& line, Nanoseconds at, bool level);
     void read_link();
     Nanoseconds next_event() const;
-    void fire_events();
+    void fire_events(Nanoseconds at);
     void fire_spi_ready();
+    void fire_accel_ready();
+    void pulse_ready(std::uint8_t input, Nanoseconds width);
     void fire_uart_sample();
     void uart_sent(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes);
 
@@ -129,10 +149,13 @@ class World {
     void judge_record(const wire::Exposure& record, const TruePulse& pulse, std::string& out) const;
     void judge_ticks(unsigned camera, std::string& out);
     void judge_imu(unsigned port, std::string& out);
+    void judge_accel_age(const wire::ImuSample& sample, std::string& out) const;
     void judge_pulses(std::string& out);
     void judge_light(std::string& out);
 
     std::uint64_t seed_;
+    firmware::PortModel model_;
+    firmware::CoreTap* tap_;
     Nanoseconds now_ = 0;
     std::vector<std::uint8_t> flash_;
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
@@ -142,6 +165,10 @@ class World {
     std::vector<PulseSource> pulses_;
     Nanoseconds next_ready_ = firmware::never;
     bool ready_fires_ = false;
+    Nanoseconds next_accel_ready_ = firmware::never;
+    bool accel_ready_fires_ = false;
+    bool accel_ready_wired_ = true;
+    Nanoseconds ready_echo_ = 0;
     Nanoseconds next_sample_ = firmware::never;
     std::vector<Nanoseconds> ready_times_[2];
     HostModel host_;
