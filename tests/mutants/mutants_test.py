@@ -6,6 +6,7 @@ import io
 import json
 import os
 import pathlib
+import select
 import signal
 import subprocess
 import sys
@@ -337,6 +338,12 @@ class Project(unittest.TestCase):
         self.assertNotEqual(mutants.in_order(some, 1), mutants.in_order(some, 2))
         self.assertEqual(set(mutants.in_order(some, 1)), set(some))
 
+    def test_what_only_waits_is_ended_too(self):
+        begin = time.monotonic()
+        code = mutants.Processes().run(["sleep", "60"], subprocess.DEVNULL, limit_s=0.1)
+        self.assertEqual(code, -signal.SIGXCPU)
+        self.assertLess(time.monotonic() - begin, 30)
+
     def test_memory_is_limited(self):
         for size, fails in ((1 << 20, False), (2 * mutants.MEMORY_LIMIT, True)):
             code = mutants.Processes().run([sys.executable, "-c", f"bytearray({size})"],
@@ -362,16 +369,21 @@ class Project(unittest.TestCase):
         output, _ = tool.communicate(timeout=60)
         self.assertEqual(tool.returncode, mutants.INTERRUPTED, output)
         self.assertIn("were not run.", output)
-        time.sleep(0.1)
-        left = [path for path in pathlib.Path("/proc").glob("[0-9]*/cmdline")
-                if self.names_root(path)]
-        self.assertEqual(left, [])
+        for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+            self.assertTrue(self.ends(path), path)
 
-    def names_root(self, path):
+    def ends(self, path):
+        """What is about to end may do so."""
         try:
-            return path.parent.name != str(os.getpid()) and str(self.root) in path.read_text()
+            if path.parent.name == str(os.getpid()) or str(self.root) not in path.read_text():
+                return True
+            file = os.pidfd_open(int(path.parent.name))
         except OSError:
-            return False
+            return True
+        try:
+            return bool(select.select([file], [], [], 10)[0])
+        finally:
+            os.close(file)
 
 
 if __name__ == "__main__":
