@@ -22,7 +22,7 @@ void Board::poll_edges(Nanoseconds now) {
     // Of the edges still to be read, some came before the lost ones and some after.
     const std::uint32_t lost = hal_.edges.take_lost();
     if (lost != 0) edges_lost();
-    Edge edge{};
+    Edge edge;
     unsigned count = 0;
     while (count < edges_a_poll && hal_.edges.pop(edge)) {
         ++count;

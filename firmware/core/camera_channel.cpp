@@ -43,7 +43,7 @@ void CameraChannel::configure(const wire::CameraConfiguration& configuration, Na
         tracked.flags &= ~std::uint32_t{wire::camera_no_strobe};
         tracked.latency_ns = 0;
     }
-    tracker_.configure(tracked, min(max(period(), start_timeout_floor), start_timeout_limit));
+    tracker().configure(tracked, min(max(period(), start_timeout_floor), start_timeout_limit));
 }
 
 void CameraChannel::start(Nanoseconds now, std::uint8_t flags) {
@@ -64,7 +64,10 @@ void CameraChannel::start(Nanoseconds now, std::uint8_t flags) {
     plan();
 }
 
-void CameraChannel::stop() { running_ = false; }
+void CameraChannel::stop() {
+    running_ = false;
+    plan();
+}
 
 void CameraChannel::route(Nanoseconds at, bool clean) {
     running_ = true;
@@ -92,9 +95,11 @@ Nanoseconds CameraChannel::expected_exposure() const {
 
 /// Whatever the time of the next trigger depends on may have changed.
 void CameraChannel::plan() {
-    if (running_ && !is_slave())
-        trigger_at_ =
-            clock_.board_time(grid_.next()) - expected_exposure() / 2 - configuration_.latency_ns;
+    decide_at_ = never;
+    if (!running_ || is_slave()) return;
+    trigger_at_ =
+        clock_.board_time(grid_.next()) - expected_exposure() / 2 - configuration_.latency_ns;
+    decide_at_ = trigger_at_ - OutputQueue::horizon - lead_;
 }
 
 void CameraChannel::advance(std::int64_t ticks) {
@@ -200,13 +205,13 @@ void CameraChannel::send_trigger(Nanoseconds now) {
         expected_since_ = trigger_;
         announcements_.used(trigger_);
     }
-    tracker_.add(record, exposure);
+    tracker().add(record, exposure);
     reports_.exposure_planned(camera_, sent + configuration_.latency_ns, exposure);
 }
 
 void CameraChannel::exposure_edge(Nanoseconds at, bool exposing) {
     if (!has_strobe()) return;  // no exposure line is wired
-    const ExposureTracker::Completed completed = tracker_.edge(at, exposing);
+    const ExposureTracker::Completed completed = tracker().edge(at, exposing);
     // An exposure from before an announcement says nothing about those after it.
     if (completed.trigger == 0 || completed.trigger < expected_since_) return;
     expected_ = min(completed.duration, configuration_.max_exposure_ns);
@@ -216,32 +221,34 @@ void CameraChannel::exposure_edge(Nanoseconds at, bool exposing) {
 void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tick) {
     const bool own_strobe = has_strobe();
     if (exposing && at >= routed_from_ && at < routed_until_) {
-        if (tracker_.full()) tracker_.give_up();
+        if (tracker_.full()) tracker().give_up();
         wire::Exposure record = new_record(at, tick);
         if (!own_strobe) record.flags |= wire::exposure_from_master;
         if (uncounted_) record.flags |= wire::exposure_uncounted;
-        tracker_.add(record, expected_);
+        tracker().add(record, expected_);
     }
-    if (!own_strobe && !tracker_.empty()) tracker_.edge(at, exposing);
+    if (!own_strobe && !tracker_.empty()) tracker().edge(at, exposing);
 }
 
 void CameraChannel::edges_lost() {
     filter_.edges_lost();
-    tracker_.edges_lost();
+    tracker().edges_lost();
     if (is_slave() && running_) uncounted_ = true;
 }
 
 void CameraChannel::poll(Nanoseconds now, Nanoseconds settled) {
+    if (!stirred_ && settled < expiry_ && now < decide_at_) return;
     // A pulse that has not left yet causes no exposure.
     if (!outputs_.is_overdue(camera_, settled)) tracker_.expire(settled);
-    for (unsigned i = 0; i < decisions_a_poll; ++i)
-        if (running_ && !is_slave() && decision_time() <= now) decide(now, settled);
+    for (unsigned i = 0; i < decisions_a_poll && decide_at_ <= now; ++i) decide(now, settled);
+    expiry_ = tracker_.next_deadline();
+    stirred_ = false;
 }
 
 Nanoseconds CameraChannel::next_wake(Nanoseconds lag) const {
-    Nanoseconds wake = min(tracker_.next_deadline(), filter_.next_wake());
-    if (wake != never) wake += lag;
-    return running_ && !is_slave() ? min(decision_time(), wake) : wake;
+    const Nanoseconds expiry = stirred_ ? tracker_.next_deadline() : expiry_;
+    const Nanoseconds wake = min(expiry, filter_.next_wake());
+    return min(decide_at_, wake == never ? never : wake + lag);
 }
 
 }  // namespace versavis::firmware

@@ -44,7 +44,7 @@ class CameraChannel {
     /// True: not waiting for any exposure.
     bool idle() const { return tracker_.empty(); }
     /// Stops waiting for exposures.
-    void give_up() { tracker_.give_up(); }
+    void give_up() { tracker().give_up(); }
 
     /// Restarts the grid, its ticks from 0; only while the camera is not running.
     void grid_began() { next_tick_ = 0; }
@@ -72,7 +72,7 @@ class CameraChannel {
     void edges_lost();
     /// The trigger due at `asked` left at `left`.
     void moved(Nanoseconds asked, Nanoseconds left, bool late) {
-        tracker_.moved(asked, left, late);
+        tracker().moved(asked, left, late);
     }
 
     /// Decides the triggers that are due and gives up on exposures that did not happen. The edges
@@ -98,7 +98,11 @@ class CameraChannel {
     static constexpr unsigned decisions_a_poll = 2;
 
     Nanoseconds period() const { return grid_.period(); }
-    Nanoseconds decision_time() const { return trigger_at_ - OutputQueue::horizon - lead_; }
+    /// To change it.
+    ExposureTracker& tracker() {
+        stirred_ = true;
+        return tracker_;
+    }
     Nanoseconds expected_exposure() const;
     void plan();
     void advance(std::int64_t ticks);
@@ -117,10 +121,13 @@ class CameraChannel {
     OutputQueue& outputs_;
     ChannelReports& reports_;
     ExposureTracker tracker_;
+    bool stirred_ = true;     ///< it changed since `expiry_` was asked for
+    Nanoseconds expiry_ = 0;  ///< its next deadline
     GlitchFilter filter_;
     wire::CameraConfiguration configuration_{};
-    Grid grid_;                   ///< in grid time
-    Nanoseconds trigger_at_ = 0;  ///< of the next grid point, as things are
+    Grid grid_;                      ///< in grid time
+    Nanoseconds trigger_at_ = 0;     ///< of the next grid point, as things are
+    Nanoseconds decide_at_ = never;  ///< and when it is decided
     bool running_ = false;
     bool uncounted_ = false;  ///< pulses of this slave may have been missed
     std::uint8_t start_flags_ = 0;

@@ -150,19 +150,20 @@ struct ImuJob {
     /// have come already. not_routed: it starts at `after`.
     std::uint8_t input = not_routed;
     Nanoseconds after = 0;
-    Nanoseconds pause = 0;  ///< at least, after a transfer
+    /// At least, between two transfers, be they of this job or of the one before.
+    Nanoseconds pause = 0;
     std::uint8_t count = 0;
     ImuTransfer transfers[max_transfers];
 };
 
-/// Buses of the IMU. Board::poll() is called when a job has completed.
+/// Buses of the IMU. Board::poll() is called when a job has ended.
 struct ImuBus {
     /// Starts no sooner than the job asks for, and within 2 us when that is not in the past. False:
-    /// the job before has not been collected.
+    /// not all replies of the job before were taken.
     virtual bool arm(const ImuJob& job) = 0;
-    /// True, once for each job: `replies` has those of its transfers. An I2C transfer that hangs
-    /// ends by itself within 10 ms, an SPI transfer always does.
-    virtual bool complete(ImuReply (&replies)[max_transfers]) = 0;
+    /// Once a job has ended, the replies to its transfers, one with each call that returns true. An
+    /// I2C transfer that hangs ends by itself within 10 ms, an SPI transfer always does.
+    virtual bool take_reply(ImuReply& reply) = 0;
     /// Cancels what is armed or under way, and forgets what is complete.
     virtual void disarm() = 0;
 

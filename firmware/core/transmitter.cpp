@@ -14,70 +14,76 @@ std::uint32_t age(Nanoseconds of, Nanoseconds now) {
 }  // namespace
 
 void Transmitter::begin() {
-    hellos_.clear();
-    refusals_.clear();
-    answers_.clear();
-    follow_ups_.clear();
-    clock_answers_.clear();
-    exposures_.clear();
-    events_.clear();
-    healths_.clear();
-    samples_.clear();
-    logs_.clear();
+    for (Waiting& waiting : waiting_) waiting.count = 0;
+    total_ = 0;
     frame_.bytes[0] = 0;  // ends the packet that was being written
     frame_.size = 1;
     written_ = 0;
     answering_ = watching_ = false;
 }
 
-std::size_t Transmitter::waiting_packets() const {
-    return hellos_.size() + refusals_.size() + answers_.size() + follow_ups_.size() +
-           clock_answers_.size() + exposures_.size() + events_.size() + healths_.size() +
-           samples_.size() + logs_.size();
+std::uint8_t* Transmitter::place(unsigned queue, unsigned index) {
+    const MessageQueue& kind = message_queues[queue];
+    if (index >= kind.capacity) index -= kind.capacity;
+    return messages_ + kind.offset + index * kind.message_size;
 }
 
-template <class Queue>
-bool Transmitter::stage_first_of(Queue& queue) {
-    if (queue.empty()) return false;
-    wire::encode(queue.front(), nonce_, sequence_++, frame_);
-    written_ = 0;
-    queue.pop();
-    return true;
+void Transmitter::push(unsigned queue, const void* message) {
+    const MessageQueue& kind = message_queues[queue];
+    Waiting& waiting = waiting_[queue];
+    if (waiting.count == kind.capacity) {
+        pop(queue);
+        ++waiting.dropped;
+    }
+    std::memcpy(place(queue, waiting.first + waiting.count), message, kind.message_size);
+    ++waiting.count;
+    ++total_;
+    if (total_ > high_water_) high_water_ = total_;
 }
 
-/// The packet that matters most.
+void Transmitter::pop(unsigned queue) {
+    Waiting& waiting = waiting_[queue];
+    if (++waiting.first == message_queues[queue].capacity) waiting.first = 0;
+    --waiting.count;
+    --total_;
+}
+
+/// The packet that matters most of those that wait.
 void Transmitter::stage() {
-    stamp();
-    if (stage_first_of(hellos_) || stage_first_of(follow_ups_)) return;
-    answering_ = !clock_answers_.empty();
-    if (answering_) answer_id_ = clock_answers_.front().id;
-    if (stage_first_of(clock_answers_) || stage_first_of(refusals_) || stage_first_of(answers_) ||
-        stage_first_of(exposures_) || stage_first_of(events_) || stage_first_of(healths_) ||
-        stage_first_of(samples_))
-        return;
-    stage_first_of(logs_);
+    unsigned queue = 0;
+    while (waiting_[queue].count == 0) ++queue;
+    const MessageQueue& kind = message_queues[queue];
+    std::uint8_t* const message = place(queue, waiting_[queue].first);
+    stamp(queue, message);
+    wire::encode(kind.type, message, kind.message_size, nonce_, sequence_++, frame_);
+    written_ = 0;
+    pop(queue);
 }
 
-/// The packet staged next carries the current time.
-void Transmitter::stamp() {
-    const Nanoseconds now = clock_.now();
-    if (!clock_answers_.empty()) clock_answers_.front().sent_ns = now;
-    if (!samples_.empty()) samples_.front().departure_ns = age(samples_.front().time_ns, now);
+/// With the current time.
+void Transmitter::stamp(unsigned queue, std::uint8_t* message) {
+    if (queue == queue_of(wire::Type::clock_answer)) {
+        auto& answer = *reinterpret_cast<wire::ClockAnswer*>(message);
+        answer.sent_ns = clock_.now();
+        answer_id_ = answer.id;
+        answering_ = true;
+    } else if (queue == queue_of(wire::Type::imu_sample)) {
+        auto& sample = *reinterpret_cast<wire::ImuSample*>(message);
+        sample.departure_ns = age(sample.time_ns, clock_.now());
+    }
 }
 
 void Transmitter::follow_up() {
     Nanoseconds left = 0;
     if (!watching_ || !link_.take_departure(left)) return;
     watching_ = false;
-    follow_ups_.push(wire::ClockFollowUp{watched_id_, 0, left});
+    send(wire::ClockFollowUp{watched_id_, 0, left});
 }
 
 bool Transmitter::pump() {
     follow_up();
-    const std::size_t waiting = waiting_packets();
-    if (waiting > high_water_) high_water_ = waiting;
     std::size_t budget = bytes_a_pump;
-    while (written_ < frame_.size || waiting_packets() != 0) {
+    while (written_ < frame_.size || total_ != 0) {
         const std::size_t free = link_.free_space();
         const std::size_t space = free < budget ? free : budget;
         if (space == 0) return budget == 0;
@@ -97,17 +103,18 @@ bool Transmitter::pump() {
 }
 
 void Transmitter::count_drops(wire::Health& health) const {
-    health.dropped_exposures = exposures_.dropped();
-    health.dropped_clock_answers = clock_answers_.dropped();
-    health.dropped_events = events_.dropped();
-    health.dropped_imu_samples = samples_.dropped();
-    health.dropped_logs = logs_.dropped();
+    const auto dropped = [this](wire::Type type) { return waiting_[queue_of(type)].dropped; };
+    health.dropped_exposures = dropped(wire::Type::exposure);
+    health.dropped_clock_answers = dropped(wire::Type::clock_answer);
+    health.dropped_events = dropped(wire::Type::event);
+    health.dropped_imu_samples = dropped(wire::Type::imu_sample);
+    health.dropped_logs = dropped(wire::Type::log);
 }
 
 std::uint32_t Transmitter::take_high_water() {
-    const std::size_t most = high_water_;
+    const std::uint32_t most = high_water_;
     high_water_ = 0;
-    return static_cast<std::uint32_t>(most);
+    return most;
 }
 
 }  // namespace versavis::firmware

@@ -3,39 +3,50 @@
 // kept, and the missing ones are counted.
 #pragma once
 
+#include <array>
+
 #include "hal.hpp"
 #include "wire/packet.hpp"
 
 namespace versavis::firmware {
 
-/// First in, first out; when full, the oldest is dropped.
-template <class Message, std::size_t Capacity>
-class MessageQueue {
- public:
-    void push(const Message& message) {
-        if (size_ == Capacity) {
-            pop();
-            ++dropped_;
-        }
-        messages_[(first_ + size_) % Capacity] = message;
-        ++size_;
-    }
-    bool empty() const { return size_ == 0; }
-    std::size_t size() const { return size_; }
-    Message& front() { return messages_[first_]; }
-    void pop() {
-        first_ = (first_ + 1) % Capacity;
-        --size_;
-    }
-    void clear() { size_ = 0; }
-    std::uint32_t dropped() const { return dropped_; }
-
- private:
-    Message messages_[Capacity] = {};
-    std::size_t first_ = 0;
-    std::size_t size_ = 0;
-    std::uint32_t dropped_ = 0;
+/// Messages of one type that wait, first in, first out; when they are too many, the oldest is
+/// dropped.
+struct MessageQueue {
+    wire::Type type;
+    std::uint16_t capacity;
+    std::uint16_t message_size;
+    std::uint32_t offset;  ///< of its place among all that wait
 };
+
+constexpr auto make_message_queues() {
+    // What matters most leaves first.
+    std::array<MessageQueue, 10> queues{{{wire::Type::board_hello, 1, 0, 0},
+                                         {wire::Type::clock_follow_up, 1, 0, 0},
+                                         {wire::Type::clock_answer, 8, 0, 0},
+                                         {wire::Type::refusal, 48, 0, 0},
+                                         {wire::Type::configuration_answer, 1, 0, 0},
+                                         {wire::Type::exposure, 256, 0, 0},
+                                         {wire::Type::event, 128, 0, 0},
+                                         {wire::Type::health, 1, 0, 0},
+                                         {wire::Type::imu_sample, 256, 0, 0},
+                                         {wire::Type::log, 8, 0, 0}}};
+    std::uint32_t offset = 0;
+    for (MessageQueue& queue : queues) {
+        queue.message_size = static_cast<std::uint16_t>(wire::payload_size(queue.type));
+        queue.offset = offset;
+        offset += std::uint32_t{queue.capacity} * queue.message_size;
+    }
+    return queues;
+}
+
+inline constexpr auto message_queues = make_message_queues();
+
+constexpr unsigned queue_of(wire::Type type) {
+    unsigned queue = 0;
+    while (message_queues[queue].type != type) ++queue;
+    return queue;
+}
 
 /// Sends what matters most first: answers, exposures, events, health, samples, text. Packets are
 /// numbered as they leave, so that a gap is a loss on the line.
@@ -47,18 +58,13 @@ class Transmitter {
     /// A new connection: what is waiting was meant for the previous one.
     void begin();
 
-    void send(const wire::BoardHello& message) { hellos_.push(message); }
-    void send(const wire::Refusal& message) { refusals_.push(message); }
-    void send(const wire::ConfigurationAnswer& message) { answers_.push(message); }
-    /// Its time of sending is filled in when it is handed to the link; a second message says when
-    /// it really left.
-    void send(const wire::ClockAnswer& message) { clock_answers_.push(message); }
-    void send(const wire::Exposure& message) { exposures_.push(message); }
-    void send(const wire::Event& message) { events_.push(message); }
-    void send(const wire::Health& message) { healths_.push(message); }
-    /// Its age is filled in when it leaves.
-    void send(const wire::ImuSample& message) { samples_.push(message); }
-    void send(const wire::Log& message) { logs_.push(message); }
+    /// Of a clock answer, the time of sending is filled in when it is handed to the link, and a
+    /// second message says when it really left; of a sample, its age when it leaves.
+    template <class Message>
+    void send(const Message& message) {
+        constexpr unsigned queue = queue_of(Message::type);
+        push(queue, &message);
+    }
 
     /// Writes as much as the link accepts, and at most `bytes_a_pump`. True: it would accept more.
     bool pump();
@@ -72,18 +78,24 @@ class Transmitter {
     /// burst; at twice, a poll takes longer.
     static constexpr std::size_t bytes_a_pump = 256;
 
-    std::size_t waiting_packets() const;
+    struct Waiting {
+        std::uint16_t first = 0;
+        std::uint16_t count = 0;
+        std::uint32_t dropped = 0;
+    };
+
+    void push(unsigned queue, const void* message);
+    void pop(unsigned queue);
+    std::uint8_t* place(unsigned queue, unsigned index);
     void follow_up();
-    void stamp();
+    void stamp(unsigned queue, std::uint8_t* message);
     void stage();
-    template <class Queue>
-    bool stage_first_of(Queue& queue);
 
     ByteLink& link_;
     Clock64& clock_;
     std::uint32_t nonce_;
     std::uint32_t sequence_ = 0;
-    std::size_t high_water_ = 0;
+    std::uint32_t high_water_ = 0;
     wire::Frame frame_{};      ///< the packet that is being written
     std::size_t written_ = 0;  ///< of its bytes
     bool answering_ = false;   ///< it is a clock answer
@@ -91,16 +103,11 @@ class Transmitter {
     std::uint32_t answer_id_ = 0;
     std::uint32_t watched_id_ = 0;
 
-    MessageQueue<wire::BoardHello, 1> hellos_;
-    MessageQueue<wire::Refusal, 48> refusals_;
-    MessageQueue<wire::ConfigurationAnswer, 1> answers_;
-    MessageQueue<wire::ClockFollowUp, 1> follow_ups_;
-    MessageQueue<wire::ClockAnswer, 8> clock_answers_;
-    MessageQueue<wire::Exposure, 256> exposures_;
-    MessageQueue<wire::Event, 128> events_;
-    MessageQueue<wire::Health, 1> healths_;
-    MessageQueue<wire::ImuSample, 256> samples_;
-    MessageQueue<wire::Log, 8> logs_;
+    std::uint32_t total_ = 0;  ///< packets that wait
+    Waiting waiting_[message_queues.size()];
+    alignas(8)
+        std::uint8_t messages_[message_queues.back().offset +
+                               message_queues.back().capacity * message_queues.back().message_size];
 };
 
 }  // namespace versavis::firmware

@@ -78,8 +78,10 @@ Nanoseconds NativeBoard::transfer_end(Nanoseconds at, const ImuTransfer& transfe
 Nanoseconds NativeBoard::job_end() const {
     if (!armed_ || armed_->at == never || imu_bus_stuck_) return never;
     Nanoseconds at = armed_->at;
-    for (unsigned i = 0; i < armed_->job.count; ++i)
-        at = transfer_end(i == 0 ? at : at + armed_->job.pause, armed_->job.transfers[i]);
+    for (unsigned i = armed_->taken; i < armed_->job.count; ++i) {
+        if (i > armed_->taken) at += armed_->job.pause;
+        at = transfer_end(at, armed_->job.transfers[i]);
+    }
     return at;
 }
 
@@ -167,7 +169,7 @@ void NativeBoard::apply(const Edge& edge) {
         ready_at_[edge.input] = stamp;
         if (armed_ && armed_->at == never && armed_->job.input == edge.input &&
             stamp > armed_->job.after)
-            armed_->at = edge.at + model_.imu_start_ns;
+            begin_job(edge.at + model_.imu_start_ns);
     }
     if ((listened_ >> edge.input & 1U) == 0) return;
     if (stamped_.size() == model_.edges)
@@ -273,35 +275,38 @@ bool NativeBoard::arm(const ImuJob& job) {
     if (armed_) return false;
     armed_ = ArmedJob{never, job};
     if (job.input == not_routed)
-        armed_->at = std::max(job.after, now_);
+        begin_job(std::max(job.after, now_));
     else if (ready_at_[job.input] > job.after)
-        armed_->at = std::max(ready_at_[job.input] + model_.imu_start_ns, now_);
+        begin_job(std::max(ready_at_[job.input] + model_.imu_start_ns, now_));
     return true;
 }
 
-bool NativeBoard::complete(ImuReply (&replies)[max_transfers]) {
+void NativeBoard::begin_job(Nanoseconds at) {
+    armed_->at = std::max(at, imu_free_at_ + armed_->job.pause);
+}
+
+bool NativeBoard::take_reply(ImuReply& reply) {
     spend();
     if (job_end() > now_) return false;
-    const ArmedJob done = *std::exchange(armed_, std::nullopt);
-    Nanoseconds at = done.at;
-    for (unsigned i = 0; i < done.job.count; ++i) {
-        const ImuTransfer& transfer = done.job.transfers[i];
-        replies[i] = {};
-        replies[i].started = at;
-        replies[i].ended = transfer_end(at, transfer);
-        const bool spi = transfer.bus == ImuTransfer::Bus::spi;
-        bool acknowledged = !i2c_held_;
-        if (environment_.imu_transfer && (spi || !i2c_held_))
-            acknowledged =
-                environment_.imu_transfer(at, transfer, std::span(replies[i].bytes, transfer.size));
-        replies[i].refused = !spi && !acknowledged;
-        at = replies[i].ended + done.job.pause;
-    }
+    const ImuTransfer& transfer = armed_->job.transfers[armed_->taken];
+    reply = {};
+    reply.started = armed_->at;
+    reply.ended = transfer_end(reply.started, transfer);
+    const bool spi = transfer.bus == ImuTransfer::Bus::spi;
+    bool acknowledged = !i2c_held_;
+    if (environment_.imu_transfer && (spi || !i2c_held_))
+        acknowledged = environment_.imu_transfer(reply.started, transfer,
+                                                 std::span(reply.bytes, transfer.size));
+    reply.refused = !spi && !acknowledged;
+    imu_free_at_ = reply.ended;
+    armed_->at = reply.ended + armed_->job.pause;
+    if (++armed_->taken == armed_->job.count) armed_.reset();
     return true;
 }
 
 void NativeBoard::disarm() {
     spend();
+    if (armed_ && armed_->at <= now_) imu_free_at_ = now_;
     armed_.reset();
 }
 

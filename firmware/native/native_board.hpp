@@ -129,8 +129,9 @@ class NativeBoard final : Clock64,
     };
     /// A job of the IMU's bus; `at`: when it starts; never: it waits for its edge.
     struct ArmedJob {
-        Nanoseconds at;
+        Nanoseconds at;  ///< when its first transfer without a taken reply starts; never: unknown
         ImuJob job;
+        unsigned taken = 0;
     };
     struct Packet {
         Nanoseconds at;
@@ -148,7 +149,7 @@ class NativeBoard final : Clock64,
     std::uint32_t take_lost() override;
     Switched route(const Routes& routes, bool force) override;
     bool arm(const ImuJob& job) override;
-    bool complete(ImuReply (&replies)[max_transfers]) override;
+    bool take_reply(ImuReply& reply) override;
     void disarm() override;
     std::size_t read(std::uint8_t* data, Nanoseconds& received) override;
     void write(const std::uint8_t* data, std::size_t size) override;
@@ -179,6 +180,7 @@ class NativeBoard final : Clock64,
     void advance_to(Nanoseconds until);
     void poll_core();
     Nanoseconds transfer_end(Nanoseconds at, const ImuTransfer& transfer) const;
+    void begin_job(Nanoseconds at);
     Nanoseconds job_end() const;
     bool visible(const Edge& edge) const { return edge.at + model_.edge_lag_ns <= now_; }
     void set_input(std::uint8_t input, bool level);
@@ -209,6 +211,7 @@ class NativeBoard final : Clock64,
     std::deque<Edge> stamped_;
     std::uint32_t lost_edges_ = 0;
     std::optional<ArmedJob> armed_;
+    Nanoseconds imu_free_at_ = 0;             ///< when the newest transfer ended
     Nanoseconds ready_at_[input_count] = {};  ///< newest edges of data-ready inputs
     bool imu_bus_stuck_ = false;
     bool i2c_held_ = false;

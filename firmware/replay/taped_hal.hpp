@@ -90,8 +90,8 @@ template <class Tape>
 struct TapedImuBus final : Taped<ImuBus, Tape> {
     using Taped<ImuBus, Tape>::Taped;
     bool arm(const ImuJob& job) override { return this->call("imu_bus.arm", &ImuBus::arm, job); }
-    bool complete(ImuReply (&replies)[max_transfers]) override {
-        return this->call("imu_bus.complete", &ImuBus::complete, replies);
+    bool take_reply(ImuReply& reply) override {
+        return this->call("imu_bus.take_reply", &ImuBus::take_reply, reply);
     }
     void disarm() override { this->call("imu_bus.disarm", &ImuBus::disarm); }
 };

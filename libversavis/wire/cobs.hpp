@@ -13,21 +13,30 @@ namespace versavis::wire {
 constexpr std::size_t cobs_bound(std::size_t size) { return size + size / 254 + 1; }
 
 /// Encodes `size` bytes of `data` to `out`, which has room for cobs_bound(size); returns the
-/// encoded size.
+/// encoded size. `data` may be in that room, behind what it takes to stuff size bytes.
 constexpr std::size_t cobs_encode(const std::uint8_t* data, std::size_t size, std::uint8_t* out) {
+    constexpr std::ptrdiff_t full_run = 0xFF;  // its code included
     std::uint8_t* code_at = out;
     std::uint8_t* next = out + 1;
     const std::uint8_t* const end = data + size;
     while (data != end) {
-        // The place of a zero is that of the next code.
-        const std::uint8_t byte = *next++ = *data++;
-        if (byte == 0) {
-            *code_at = static_cast<std::uint8_t>(next - 1 - code_at);
-            code_at = next - 1;
-        } else if (next - code_at == 0xFF && data != end) {
-            *code_at = 0xFF;
+        if (next - code_at == full_run) {
+            *code_at = full_run;
             code_at = next++;
         }
+        // So many bytes fit the run, whatever they are.
+        const std::ptrdiff_t room = full_run - (next - code_at);
+        const std::uint8_t* const stop = end - data > room ? data + room : end;
+        do {
+            const std::uint8_t byte = *data++;
+            *next = byte;
+            if (byte == 0) {
+                // The place of a zero is that of the next code.
+                *code_at = static_cast<std::uint8_t>(next - code_at);
+                code_at = next;
+            }
+            ++next;
+        } while (data != stop);
     }
     *code_at = static_cast<std::uint8_t>(next - code_at);
     return static_cast<std::size_t>(next - out);

@@ -24,9 +24,11 @@ inline constexpr auto crc32_table = make_crc32_table();
 
 /// CRC-32 with reflected polynomial 0xEDB88320, initial value and final exclusive-or 0xFFFFFFFF.
 constexpr std::uint32_t crc32(const std::uint8_t* data, std::size_t size) {
+    const std::uint8_t* const end = data + size;
     std::uint32_t crc = 0xFFFFFFFFU;
-    for (std::size_t i = 0; i < size; ++i)
-        crc = detail::crc32_table[(crc ^ data[i]) & 0xFFU] ^ (crc >> 8U);
+    if (size != 0) do
+            crc = detail::crc32_table[(crc ^ *data++) & 0xFFU] ^ (crc >> 8U);
+        while (data != end);
     return ~crc;
 }
 

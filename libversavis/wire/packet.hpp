@@ -14,11 +14,10 @@ namespace versavis::wire {
 inline constexpr std::size_t crc_size = sizeof(std::uint32_t);
 /// Most bytes that one packet takes in the stream, with its delimiter.
 inline constexpr std::size_t max_frame_size = cobs_bound(max_packet_size) + 1;
-static_assert(sizeof(Header) + sizeof(ConfigurationAnswer) + crc_size <= max_packet_size);
 
 /// Bytes of one encoded packet, with its delimiter.
 struct Frame {
-    std::uint8_t bytes[max_frame_size];
+    alignas(4) std::uint8_t bytes[max_frame_size];
     std::size_t size;
 };
 
@@ -46,20 +45,33 @@ struct Packet {
     }
 };
 
-/// Encodes `message` with the sender's nonce and sequence number.
+/// Encodes a message of `type`, the `size` bytes at `message`, with the sender's nonce and sequence
+/// number. All in all at most max_packet_size.
+inline void encode(Type type, const void* message, std::size_t size, std::uint32_t nonce,
+                   std::uint32_t sequence, Frame& frame) {
+    const std::size_t body = sizeof(Header) + size;
+    const std::size_t whole = body + crc_size;
+    // Where words are copied as such, and from where it is stuffed in place.
+    constexpr std::size_t ahead = 4;
+    static_assert(ahead >= cobs_bound(max_packet_size) - max_packet_size &&
+                      ahead + max_packet_size <= max_frame_size,
+                  "has room");
+    std::uint8_t* const raw = frame.bytes + ahead;
+    const Header header{type, {}, nonce, sequence};
+    std::memcpy(raw, &header, sizeof header);
+    std::memcpy(raw + sizeof header, message, size);
+    const std::uint32_t crc = crc32(raw, body);
+    std::memcpy(raw + body, &crc, crc_size);
+    frame.size = cobs_encode(raw, whole, frame.bytes);
+    frame.bytes[frame.size++] = 0;
+}
+
 template <class T>
 void encode(const T& message, std::uint32_t nonce, std::uint32_t sequence, Frame& frame) {
     static_assert(std::is_trivially_copyable<T>::value && sizeof(T) == payload_size(T::type),
                   "a wire struct");
-    constexpr std::size_t body = sizeof(Header) + sizeof(T);
-    std::uint8_t raw[body + crc_size];
-    const Header header{T::type, {}, nonce, sequence};
-    std::memcpy(raw, &header, sizeof header);
-    std::memcpy(raw + sizeof header, &message, sizeof message);
-    const std::uint32_t crc = crc32(raw, body);
-    std::memcpy(raw + body, &crc, crc_size);
-    frame.size = cobs_encode(raw, sizeof raw, frame.bytes);
-    frame.bytes[frame.size++] = 0;
+    static_assert(sizeof(Header) + sizeof(T) + crc_size <= max_packet_size, "fits");
+    encode(T::type, &message, sizeof message, nonce, sequence, frame);
 }
 
 /// Cuts a byte stream into packets. Malformed input is counted and skipped up to the next

@@ -33,6 +33,7 @@ struct UpdateTimes {
 
     std::int64_t index_at(Nanoseconds at) const;
     Nanoseconds time(std::int64_t index) const;
+    bool operator==(const UpdateTimes&) const = default;
 };
 
 /// A part on the SPI bus, at register level.

@@ -16,6 +16,11 @@ namespace {
 Bytes encode(const Bytes& data) {
     Bytes out(cobs_bound(data.size()));
     out.resize(cobs_encode(data.data(), data.size(), out.data()));
+    Bytes in_place(cobs_bound(data.size()));
+    std::copy(data.rbegin(), data.rend(), in_place.rbegin());
+    const std::uint8_t* const from = in_place.data() + in_place.size() - data.size();
+    in_place.resize(cobs_encode(from, data.size(), in_place.data()));
+    CHECK(in_place == out);
     return out;
 }
 

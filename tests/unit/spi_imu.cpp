@@ -31,13 +31,14 @@ struct Reports final : ChannelReports {
 struct Bus final : ImuBus {
     bool arm(const ImuJob& wanted) override {
         job = wanted;
+        taken = 0;
         armed = true;
         return true;
     }
-    bool complete(ImuReply (&replies)[max_transfers]) override {
+    bool take_reply(ImuReply& reply) override {
         if (!armed || !done) return false;
-        armed = done = false;
-        for (unsigned i = 0; i < job.count; ++i) replies[i] = answers[i];
+        reply = answers[taken++];
+        if (taken == job.count) armed = done = false;
         return true;
     }
     void disarm() override { armed = false; }
@@ -63,6 +64,7 @@ struct Bus final : ImuBus {
 
     ImuJob job;
     ImuReply answers[max_transfers];
+    unsigned taken = 0;
     std::uint8_t counter = 0;
     bool fresh = true;
     bool armed = false;

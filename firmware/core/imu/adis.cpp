@@ -31,9 +31,9 @@ constexpr CrcTable crc_table;
 std::uint16_t adis16448_crc(const std::uint16_t* words) {
     std::uint32_t crc = 0xFFFF;
     for (std::size_t i = 0; i < crc_words; ++i) {
-        std::uint32_t bits = words[i];  // low byte first, least significant bit first
-        for (int nibble = 0; nibble < 4; ++nibble, bits >>= 4U)
-            crc = (crc >> 4U) ^ crc_table.remainders[(crc ^ bits) & 0xFU];
+        crc ^= words[i];  // low byte first, least significant bit first
+        for (int nibble = 0; nibble < 4; ++nibble)
+            crc = (crc >> 4U) ^ crc_table.remainders[crc & 0xFU];
     }
     crc = ~crc & 0xFFFFU;
     return static_cast<std::uint16_t>(crc << 8U | crc >> 8U);
@@ -123,7 +123,7 @@ void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
 Verdict Adis::parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const {
     // What arrives while the command goes out means nothing.
     const std::uint8_t* newest = replies[count - 1].bytes + 2;
-    std::uint16_t words[max_words] = {};
+    std::uint16_t words[max_words];
     for (std::size_t i = 0; i < facts_.words; ++i) words[i] = big_endian(newest, i);
     if (facts_.check != AdisFacts::Check::twice) {
         fill(words, sample);

@@ -46,6 +46,12 @@ class ReadyEdges {
         return false;
     }
 
+    /// The edge after one that was found. False: none has come.
+    bool next(std::uint32_t number, Nanoseconds& stamp) const {
+        stamp = stamps_[number % kept];
+        return number != count_;
+    }
+
     std::uint32_t take_echoes() {
         const std::uint32_t echoes = echoes_;
         echoes_ = 0;

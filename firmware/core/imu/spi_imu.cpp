@@ -101,7 +101,6 @@ void SpiImu::adapt(ImuTransfer& transfer) const {
 void SpiImu::arm(Nanoseconds now) {
     job_.pause = part_->pause();
     const bool at_edge = job_.input != not_routed;
-    if (!at_edge) job_.after = max(job_.after, ended_ + job_.pause);
     job_until_ = at_edge ? never : max(job_.after, now) + transfer_limit;
     job_state_ = bus_.arm(job_) ? Job::armed : Job::none;
 }
@@ -193,22 +192,16 @@ void SpiImu::edges_lost() {
     edges_lost_ = true;
 }
 
-/// The part took new data while it was read.
-bool SpiImu::mixes(const ImuReply& reply) const {
-    Nanoseconds stamp = 0;
-    std::uint32_t before = 0;
-    std::uint32_t newest = 0;
-    return ready_edges_.find(reply.started, stamp, before) &&
-           ready_edges_.find(reply.ended, stamp, newest) && newest != before;
-}
-
 /// The data is that of the newest edge before the reading; samples of earlier edges were never
-/// read. False: that edge is not known any more, or its sample was read already.
-bool SpiImu::stamp(Nanoseconds started, wire::ImuSample& sample) {
+/// read. False: that edge is not known any more, or its sample was read already, or the part took
+/// new data in the meantime.
+bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sample) {
     std::uint32_t edge = 0;
-    if (!ready_edges_.find(started, sample.time_ns, edge) ||
-        static_cast<std::int32_t>(edge - served_) <= 0)
-        return false;
+    if (!ready_edges_.find(reply.started, sample.time_ns, edge)) return false;
+    Nanoseconds next = 0;
+    if (ready_edges_.next(edge, next) && next <= reply.ended)
+        return drop(wire::EventKind::imu_failed, now);
+    if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
     if (edges_lost_) {
         // How many there were is told by the period of the part.
@@ -252,10 +245,10 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
 }
 
 void SpiImu::collect(Nanoseconds now) {
-    if (job_state_ != Job::armed || !bus_.complete(fresh_)) return;
+    if (job_state_ != Job::armed || !bus_.take_reply(replies_[readings_])) return;
     job_state_ = Job::collected;
-    for (unsigned i = 0; i < job_.count; ++i) replies_[readings_++] = fresh_[i];
-    ended_ = replies_[readings_ - 1].ended;
+    for (unsigned i = 1; i < job_.count; ++i) bus_.take_reply(replies_[readings_ + i]);
+    readings_ += job_.count;
     if (state_ == State::set_up) {
         job_state_ = Job::none;
         check_step(now);
@@ -288,8 +281,7 @@ bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     readings_ = 0;
     sample.kind = part_->kind();
     sample.time_ns = reply.started;
-    if (paced_by_part() && mixes(reply)) return drop(wire::EventKind::imu_failed, now);
-    if (paced_by_part() && !stamp(reply.started, sample)) return false;
+    if (paced_by_part() && !stamp(reply, now, sample)) return false;
     stamp_accel(sample);
     if (!finish(sample)) fail(wire::EventKind::imu_failed, now, 0, while_running);
     return true;
@@ -327,9 +319,8 @@ bool SpiImu::poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample)
     } else if (fast_edges_ >= max_fast_edges) {
         // A part that has reset itself continues at another rate.
         fail(wire::EventKind::imu_failed, now, 0, while_running);
-    } else if (job_state_ == Job::none && now >= ended_ + part_->pause()) {
-        // An edge that came already starts it at once: the part must have had its pause. Neither
-        // the newest edge nor its echoes, whether they have come or not, start a reading.
+    } else if (job_state_ == Job::none) {
+        // Neither the newest edge nor its echoes, whether they have come or not, start a reading.
         arm_reading(input_imu_ready, max(after_, ready_edges_.quiet_until()), part_->readings(),
                     now);
     }
@@ -343,8 +334,6 @@ Nanoseconds SpiImu::next_wake(Nanoseconds lag) const {
     if (job_state_ == Job::collected) sooner(replies_[readings_ - 1].started + 1 + lag);
     if (state_ == State::set_up && job_state_ == Job::none) sooner(resume_);
     if (state_ == State::running) sooner(paced_by_part() ? silent_at_ : grid_.next() - set_ahead);
-    if (state_ == State::running && paced_by_part() && job_state_ == Job::none)
-        sooner(ended_ + part_->pause());
     return wake;
 }
 

@@ -61,8 +61,7 @@ class SpiImu final : public ImuPort {
     bool take(Nanoseconds now, wire::ImuSample& sample);
     bool refused() const;
     bool drop(wire::EventKind kind, Nanoseconds now);
-    bool mixes(const ImuReply& reply) const;
-    bool stamp(Nanoseconds started, wire::ImuSample& sample);
+    bool stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sample);
     void stamp_accel(wire::ImuSample& sample) const;
     void pace(Nanoseconds now);
 
@@ -80,9 +79,7 @@ class SpiImu final : public ImuPort {
     bool job_reads_ = false;          ///< its transfers are those that begin a sample
     Nanoseconds job_until_ = 0;       ///< when it must have ended; never: it waits for an edge
     unsigned readings_ = 0;           ///< of the sample that is being read
-    ImuReply fresh_[max_transfers];   ///< of the newest job
     ImuReply replies_[max_readings];  ///< of the sample that is being read
-    Nanoseconds ended_ = 0;           ///< when the newest transfer did
     Nanoseconds period_ = 0;          ///< of the edges, as the part was told
     Nanoseconds accel_period_ = 0;
     unsigned fast_edges_ = 0;  ///< edges in a row that came sooner

@@ -15,6 +15,9 @@ namespace versavis::scenario {
 namespace {
 
 constexpr std::size_t longest_report = 2000;
+constexpr double radians = 3.14159265358979 / 180;
+constexpr double gravity = 9.80665;
+constexpr Nanoseconds longest_reading = 20'000;  ///< of registers that change in between
 
 template <class... Args>
 void complain(std::string& out, fmt::format_string<Args...> text, Args&&... args) {
@@ -23,6 +26,11 @@ void complain(std::string& out, fmt::format_string<Args...> text, Args&&... args
 
 bool has(const wire::Exposure& record, wire::ExposureFlag flag) {
     return (record.flags & flag) != 0;
+}
+
+/// Neither one, nor the other, nor between them.
+bool beyond(double value, double one, double other, double tolerance) {
+    return value < std::min(one, other) - tolerance || value > std::max(one, other) + tolerance;
 }
 
 }  // namespace
@@ -157,6 +165,7 @@ void World::judge_imu(unsigned port, std::string& out) {
             continue;
         }
         Nanoseconds taken = sample.time_ns;
+        Nanoseconds newest = taken;
         if (paced) {
             const std::ptrdiff_t index = index_of(sample.time_ns);
             if (index < 0)
@@ -170,21 +179,28 @@ void World::judge_imu(unsigned port, std::string& out) {
                          sample.number, index - last_index);
             last_index = index;
         } else if (spi_imu_ && port == 0) {
-            const devices::UpdateTimes times = spi_imu_->updates();
-            taken = times.time(times.index_at(taken));
+            const devices::UpdateTimes times =
+                imu_updates_.empty() ? spi_imu_->updates()
+                                     : std::prev(imu_updates_.upper_bound(taken))->second;
+            taken = times.time(times.index_at(sample.time_ns));
+            // New data may come between the bytes that are read.
+            newest = times.time(times.index_at(sample.time_ns + longest_reading));
         }
         if ((sample.flags & wire::imu_check_failed) != 0) continue;
         if ((sample.flags & wire::imu_accel_stamped) != 0) judge_accel_age(sample, out);
         const ImuMetadata si = imu::to_si(model, sample);
         const wire::ImuScale scale = wire::imu_scale(sample.kind);
         const devices::Inertial felt = motion(taken - filtered_for.ns);
+        const devices::Inertial later = motion((paced ? taken : newest) - filtered_for.ns);
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double rate = felt.gyro_deg_s[axis] * 3.14159265358979 / 180;
-            const double acceleration = felt.accel_g[axis] * 9.80665;
-            if (std::abs(si.gyro[axis] - rate) > gyro_lsb * scale.gyro_rad_s + 1e-6)
+            const double rate = felt.gyro_deg_s[axis] * radians;
+            const double acceleration = felt.accel_g[axis] * gravity;
+            if (beyond(si.gyro[axis], rate, later.gyro_deg_s[axis] * radians,
+                       gyro_lsb * scale.gyro_rad_s + 1e-6))
                 complain(out, "IMU {} sample {}: gyro {} is {}, not {}", port, sample.number, axis,
                          si.gyro[axis], rate);
-            if (std::abs(si.accel[axis] - acceleration) > 0.7 * scale.accel_m_s2 + 1e-5)
+            if (beyond(si.accel[axis], acceleration, later.accel_g[axis] * gravity,
+                       0.7 * scale.accel_m_s2 + 1e-5))
                 complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port,
                          sample.number, axis, si.accel[axis], acceleration);
         }

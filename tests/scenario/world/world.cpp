@@ -64,6 +64,9 @@ void World::make_board(wire::ResetCause cause) {
         if (spi_imu_ && !dead_bus_ && !spi) return spi_imu_->i2c(at, transfer, received);
         if (spi_imu_ && !dead_bus_) {
             spi_imu_->transfer(at, transfer, received);
+            const devices::UpdateTimes times = spi_imu_->updates();
+            if (imu_updates_.empty() || imu_updates_.rbegin()->second != times)
+                imu_updates_[at] = times;
             return true;
         }
         std::fill(received.begin(), received.end(), dead_bus_.value_or(0xFF));

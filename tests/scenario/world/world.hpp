@@ -160,6 +160,8 @@ class World {
     std::vector<std::uint8_t> flash_;
     std::map<unsigned, std::unique_ptr<CameraModel>> cameras_;
     std::unique_ptr<devices::SpiImuDevice> spi_imu_;
+    /// When it takes new data on the SPI bus, since the instant that is the key.
+    std::map<Nanoseconds, devices::UpdateTimes> imu_updates_;
     std::optional<devices::Vn100Device> uart_imu_;
     std::optional<std::uint8_t> dead_bus_;
     std::vector<PulseSource> pulses_;
