@@ -60,19 +60,19 @@ constexpr EchoFilter aux_echo(10'000);
 Board::Board(const Hal& hal, const Identity& identity)
     : hal_(hal),
       identity_(identity),
-      transmitter_(hal_.link, hal_.clock, identity.nonce),
+      echoes_{pps_echo, aux_echo, aux_echo, pps_echo},
+      sync_(outputs_),
+      test_(outputs_),
       noise_(hal_.edges),
-      outputs_(hal_.outputs, *this, hal_.facts),
+      light_(outputs_, *this),
+      uart_imu_(1, hal_.imu_uart, *this),
+      spi_imu_(0, hal_.imu_bus, *this),
       cameras_{{0, grid_clock_, outputs_, *this},
                {1, grid_clock_, outputs_, *this},
                {2, grid_clock_, outputs_, *this},
                {3, grid_clock_, outputs_, *this}},
-      light_(outputs_, *this),
-      spi_imu_(0, hal_.imu_bus, *this),
-      uart_imu_(1, hal_.imu_uart, *this),
-      sync_(outputs_),
-      test_(outputs_),
-      echoes_{pps_echo, aux_echo, aux_echo, pps_echo} {
+      outputs_(hal_.outputs, *this, hal_.facts),
+      transmitter_(hal_.link, hal_.clock, identity.nonce) {
     health_.reset_cause = identity.reset_cause;
     noise_.listen(0);
     restore();

@@ -83,50 +83,51 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     template <class T>
     void send(const T& message);
 
-    Hal hal_;
-    Identity identity_;
-    Transmitter transmitter_;
-    NoiseGuard noise_;
-    OutputQueue outputs_;
-    GridClock grid_clock_;
-    GridClock board_clock_;  ///< runs as board time does
-    CameraChannel cameras_[camera_count];
-    Illumination light_;
-    SpiImu spi_imu_;
-    Vn100 uart_imu_;
-    PulseTrain sync_;
-    PulseTrain test_;
-    PpsMonitor pps_;
-    EchoFilter echoes_[wire::pulse_input_count];
-    NmeaReader nmea_;
-    wire::Decoder decoder_;
-    wire::Configuration configuration_{};  ///< in force
-    wire::Configuration wanted_{};         ///< waits for the last pulses and exposures to end
+    // Sorted by size: the processor reaches what is near the beginning with the shortest code.
     bool configuring_ = false;
-    Nanoseconds configure_at_ = 0;  ///< at the latest
-    wire::Start on_sync_{};         ///< waits for a sync pulse
-    Nanoseconds last_sync_ = INT64_MIN / 2;
-    std::uint32_t checked_id_ = 0;
-    std::uint8_t refused_ = 0;
-    std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
-    std::uint8_t slaves_ = 0;    ///< slaves that are to run
-    std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
     bool greeted_ = false;
     bool storing_ = false;
     bool outputs_blocked_ = false;
     bool more_ = false;          ///< to do at once
     bool stirred_ = true;        ///< cameras, light and outputs may have something to do
     std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled
-    Nanoseconds timers_ = 0;     ///< when they have something to do in any case
-    Nanoseconds settled_ = 0;    ///< all edges before are known
+    std::uint8_t refused_ = 0;
+    std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
+    std::uint8_t slaves_ = 0;    ///< slaves that are to run
+    std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
+    wire::Start on_sync_{};      ///< waits for a sync pulse
+    std::uint32_t checked_id_ = 0;
+    std::uint32_t event_sequence_ = 0;
+    Nanoseconds timers_ = 0;   ///< when cameras, light and outputs have something to do in any case
+    Nanoseconds settled_ = 0;  ///< all edges before are known
     Nanoseconds output_progress_ = 0;
     Nanoseconds next_health_ = 0;
     Nanoseconds due_ = 0;  ///< when poll() has something to do next
     Nanoseconds polled_ = 0;
-    Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be reported
-    std::uint32_t event_sequence_ = 0;
+    Nanoseconds next_stray_ = 0;    ///< when the next stray edge may be reported
+    Nanoseconds configure_at_ = 0;  ///< at the latest
+    Nanoseconds last_sync_ = INT64_MIN / 2;
+    Hal hal_;
+    Identity identity_;
     std::uint32_t pulses_[wire::pulse_input_count] = {};
+    EchoFilter echoes_[wire::pulse_input_count];
     wire::Health health_{};
+    PulseTrain sync_;
+    PulseTrain test_;
+    GridClock grid_clock_;
+    GridClock board_clock_;  ///< runs as board time does
+    NoiseGuard noise_;
+    NmeaReader nmea_;
+    wire::Configuration configuration_{};  ///< in force
+    wire::Configuration wanted_{};         ///< waits for the last pulses and exposures to end
+    PpsMonitor pps_;
+    Illumination light_;
+    Vn100 uart_imu_;
+    SpiImu spi_imu_;
+    wire::Decoder decoder_;
+    CameraChannel cameras_[camera_count];
+    OutputQueue outputs_;
+    Transmitter transmitter_;
 };
 
 }  // namespace versavis::firmware

@@ -120,11 +120,11 @@ class Decoder {
         return known == 0 || known == packet.payload_size;
     }
 
+    bool overflow_ = false;
+    std::size_t filled_ = 0;
+    std::uint32_t errors_ = 0;
     std::uint8_t encoded_[max_frame_size - 1] = {};
     std::uint8_t decoded_[max_packet_size] = {};
-    std::size_t filled_ = 0;
-    bool overflow_ = false;
-    std::uint32_t errors_ = 0;
 };
 
 }  // namespace versavis::wire
