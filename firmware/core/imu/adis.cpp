@@ -41,11 +41,11 @@ std::uint16_t adis16448_crc(const std::uint16_t* words) {
 
 /// 819.2 Hz / 2^D, or base / (D + 1).
 std::uint16_t Adis::rate_code(std::uint32_t millihertz) const {
-    const std::uint32_t parts = facts_.fastest_millihertz / (millihertz == 0 ? 1 : millihertz);
+    const std::uint32_t parts = facts_.fastest_millihertz / millihertz;
     if (!facts_.octaves)
-        return static_cast<std::uint16_t>(parts <= 1 ? 0 : parts > 2000 ? 1999 : parts - 1);
+        return static_cast<std::uint16_t>(parts == 0 ? 0 : parts > 2000 ? 1999 : parts - 1);
     std::uint16_t octaves = 0;
-    while (octaves < 10 && parts >= 2U << octaves) ++octaves;
+    while (parts >= 2U << octaves) ++octaves;
     return octaves;
 }
 
@@ -67,8 +67,8 @@ void Adis::setup(const PartSettings& settings, Setup& setup) const {
     setup.write(0, facts_.control_register, facts_.control, settle_us);
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
-    setup.write(0, facts_.filter_register, filters,
-                settle_us);  // changing the range may change the settings.filter
+    // Changing the range may change the filter.
+    setup.write(0, facts_.filter_register, filters, settle_us);
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }

@@ -92,9 +92,7 @@ std::uint32_t Vn100::true_rate(std::uint32_t wanted_millihertz) {
 }
 
 std::uint32_t Vn100::divider() const {
-    const std::uint32_t parts =
-        vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
-    return parts == 0 ? 1 : parts;
+    return vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
 }
 
 void Vn100::configure(const wire::ImuConfiguration& configuration, Nanoseconds now) {
