@@ -460,11 +460,12 @@ TEST_CASE("vn100: an answer comes in pieces, or among packets, and has 64 charac
     world.reach(1);
     const auto waits = [&world] { return world.uart.sent.size() == 2; };
     SECTION("byte by byte") {
-        for (const char c : framed("VNWRG,06,0")) {
-            REQUIRE(waits());
-            world.receive({static_cast<std::uint8_t>(c)}, world.now + ms / 10);
-        }
-        CHECK_FALSE(waits());
+        for (std::size_t step = 1; step < 5; ++step)
+            for (const char c : framed(answer_to(world.uart.sent.back()))) {
+                REQUIRE(world.uart.sent.size() == step + 1);
+                world.receive({static_cast<std::uint8_t>(c)}, world.now + ms / 10);
+            }
+        CHECK(world.uart.sent.size() == 6);
     }
     SECTION("between packets") {
         world.receive(packet() + bytes_of(framed("VNWRG,06,0")) + packet(), world.now + ms);

@@ -182,7 +182,7 @@ void Vn100::ready_edge(Nanoseconds at) {
 }
 
 void Vn100::drop(std::size_t size) {
-    for (std::size_t i = size; i < filled_; ++i) bytes_[i - size] = bytes_[i];
+    for (std::size_t i = size; i != filled_; ++i) bytes_[i - size] = bytes_[i];
     filled_ -= size;
 }
 
@@ -199,7 +199,7 @@ bool Vn100::take_line(Nanoseconds now) {
     const std::size_t end = line_length() - 1;
     const char* line = reinterpret_cast<const char*>(bytes_);
     std::size_t star = 0;
-    while (star < end && line[star] != '*') ++star;
+    while (star != end && line[star] != '*') ++star;
     TextLine sum;
     sum.hex(text_checksum(line + 1, star - 1));
     if (star == end || std::memcmp(line + star + 1, sum.data(), 2) != 0) return false;
@@ -267,7 +267,7 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     sample.time_ns = first_byte;
     if ((configuration_.options & wire::imu_data_ready) == 0) return;
     std::size_t newest = 0;
-    while (newest < max_edges && edges_[newest] >= first_byte) ++newest;
+    while (newest != max_edges && edges_[newest] >= first_byte) ++newest;
     if (newest == max_edges || first_byte - edges_[newest] >= base_period) return;
     const Nanoseconds off = edges_[newest] - stamp_ - since_last;
     const bool agrees = off < base_period / 2 && -off < base_period / 2;
@@ -279,7 +279,7 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
 
 /// Takes the first item from the bytes. True: it was a sample.
 bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
-    while (filled_ > 0) {
+    while (filled_ != 0) {
         if (bytes_[0] == sync) {
             const std::size_t head = filled_ < sizeof header ? filled_ : sizeof header;
             if (std::memcmp(bytes_, header, head) == 0) {
