@@ -28,9 +28,8 @@ class Setup {
                std::uint32_t pause_us = 0) {
         add({SetupStep::Action::write, chip, address, value, pause_us});
     }
-    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
-                std::uint32_t pause_us = 0) {
-        add({SetupStep::Action::expect, chip, address, value, pause_us});
+    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value) {
+        add({SetupStep::Action::expect, chip, address, value, 0});
     }
 
     std::size_t size() const { return size_; }
