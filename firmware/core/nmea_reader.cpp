@@ -7,55 +7,54 @@ namespace {
 
 constexpr Nanoseconds oldest_pulse = 900'000'000;
 constexpr std::int64_t day_s = 86'400;
-constexpr unsigned first_year_of_century =
-    80;  // two digits from 80 on are of the 20th: GPS began then
-constexpr std::size_t most_fields = 24;
+/// Two digits from here on are of the 20th century: GPS began then.
+constexpr unsigned first_year_of_century = 80;
+/// The last one that is read is the date of RMC.
+constexpr std::size_t most_fields = 10;
 
 struct Text {
-    const char* begin = nullptr;
-    std::size_t size = 0;
+    const char* begin;
+    std::size_t size;
 };
 
-/// Digits from `from` on as a number. False: they are not all digits.
-bool number(const Text& text, std::size_t from, std::size_t count, unsigned& out) {
-    if (from + count > text.size) return false;
+/// False: they are not all digits.
+bool number(const char* digits, std::size_t count, unsigned& out) {
     out = 0;
-    for (std::size_t i = from; i < from + count; ++i) {
-        if (text.begin[i] < '0' || text.begin[i] > '9') return false;
-        out = out * 10 + static_cast<unsigned>(text.begin[i] - '0');
+    for (std::size_t i = 0; i < count; ++i) {
+        if (digits[i] < '0' || digits[i] > '9') return false;
+        out = out * 10 + static_cast<unsigned>(digits[i] - '0');
     }
     return true;
 }
 
-int hex_digit(char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return -1;
+bool is_hex_digit(char c, unsigned value) {
+    return c == "0123456789ABCDEF"[value] || c == "0123456789abcdef"[value];
 }
 
-/// Exclusive-or of what lies between '$' and '*'.
-bool checksum_right(const char* sentence, std::size_t size) {
-    if (size < 4 || sentence[0] != '$' || sentence[size - 3] != '*') return false;
-    unsigned sum = 0;
-    for (std::size_t i = 1; i < size - 3; ++i) sum ^= static_cast<unsigned char>(sentence[i]);
-    const int high = hex_digit(sentence[size - 2]);
-    const int low = hex_digit(sentence[size - 1]);
-    return high >= 0 && low >= 0 && static_cast<unsigned>(high * 16 + low) == sum;
+/// Where the '*' is, if it is followed by the exclusive-or of what lies between it and '$'; else 0.
+std::size_t checked_size(const char* sentence, std::size_t size) {
+    std::size_t star = 0;
+    unsigned sum = '$';  // of which nothing is left when it comes first
+    while (star != size && sentence[star] != '*')
+        sum ^= static_cast<unsigned char>(sentence[star++]);
+    const bool right = star + 3 == size && sentence[0] == '$' &&
+                       is_hex_digit(sentence[size - 2], sum >> 4U) &&
+                       is_hex_digit(sentence[size - 1], sum & 0xFU);
+    return right ? star : 0;
 }
 
-std::size_t split(const char* sentence, std::size_t size, Text* fields) {
+/// Fields that a sentence does not have are empty.
+void split(const char* sentence, std::size_t size, Text (&fields)[most_fields]) {
     std::size_t count = 0;
-    fields[0] = {sentence + 1, 0};
-    for (std::size_t i = 1; i < size - 3; ++i) {
+    fields[0].begin = sentence + 1;
+    for (std::size_t i = 1; i < size; ++i) {
         if (sentence[i] != ',') {
             ++fields[count].size;
         } else {
-            if (++count == most_fields) return most_fields;
-            fields[count] = {sentence + i + 1, 0};
+            if (++count == most_fields) return;
+            fields[count].begin = sentence + i + 1;
         }
     }
-    return count + 1;
 }
 
 /// The last three letters of "GPRMC" and the like.
@@ -68,10 +67,11 @@ bool is(const Text& name, const char* kind) {
 
 /// "hhmmss" or "hhmmss.00".
 bool time_of_day(const Text& text, std::int64_t& seconds) {
-    unsigned hours = 0;
-    unsigned minutes = 0;
-    unsigned whole = 0;
-    if (!number(text, 0, 2, hours) || !number(text, 2, 2, minutes) || !number(text, 4, 2, whole))
+    unsigned hours;
+    unsigned minutes;
+    unsigned whole;
+    if (text.size < 6 || !number(text.begin, 2, hours) || !number(text.begin + 2, 2, minutes) ||
+        !number(text.begin + 4, 2, whole))
         return false;
     for (std::size_t i = 6; i < text.size; ++i)
         if (text.begin[i] != (i == 6 ? '.' : '0')) return false;
@@ -99,45 +99,47 @@ bool days(unsigned year, unsigned month, unsigned day, std::int64_t& out) {
     return true;
 }
 
-bool rmc(const Text* fields, std::size_t count, std::int64_t& day, std::int64_t& seconds) {
-    unsigned parts[3] = {};
-    if (count < 10 || fields[2].size != 1 || fields[2].begin[0] != 'A' || fields[9].size != 6)
-        return false;
-    for (std::size_t i = 0; i < 3; ++i)
-        if (!number(fields[9], 2 * i, 2, parts[i])) return false;
-    const unsigned year = parts[2] + (parts[2] < first_year_of_century ? 2000 : 1900);
-    return time_of_day(fields[1], seconds) && days(year, parts[1], parts[0], day);
+bool utc(const Text& time, unsigned year, unsigned month, unsigned day, std::int64_t& utc_s) {
+    std::int64_t past_days;
+    std::int64_t seconds;
+    if (!days(year, month, day, past_days) || !time_of_day(time, seconds)) return false;
+    utc_s = past_days * day_s + seconds;
+    return true;
 }
 
-bool zda(const Text* fields, std::size_t count, std::int64_t& day, std::int64_t& seconds) {
-    unsigned day_of_month = 0;
-    unsigned month = 0;
-    unsigned year = 0;
-    if (count < 5 || fields[2].size != 2 || fields[3].size != 2 || fields[4].size != 4)
+bool rmc(const Text* fields, std::int64_t& utc_s) {
+    unsigned day;
+    unsigned month;
+    unsigned year;
+    const char* date = fields[9].begin;
+    if (fields[2].size != 1 || fields[2].begin[0] != 'A' || fields[9].size != 6 ||
+        !number(date, 2, day) || !number(date + 2, 2, month) || !number(date + 4, 2, year))
         return false;
-    return number(fields[2], 0, 2, day_of_month) && number(fields[3], 0, 2, month) &&
-           number(fields[4], 0, 4, year) && time_of_day(fields[1], seconds) &&
-           days(year, month, day_of_month, day);
+    return utc(fields[1], year + (year < first_year_of_century ? 2000 : 1900), month, day, utc_s);
+}
+
+bool zda(const Text* fields, std::int64_t& utc_s) {
+    unsigned day;
+    unsigned month;
+    unsigned year;
+    if (fields[2].size != 2 || fields[3].size != 2 || fields[4].size != 4 ||
+        !number(fields[2].begin, 2, day) || !number(fields[3].begin, 2, month) ||
+        !number(fields[4].begin, 4, year))
+        return false;
+    return utc(fields[1], year, month, day, utc_s);
 }
 
 }  // namespace
 
 bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s) {
-    if (!checksum_right(sentence, size)) return false;
-    Text fields[most_fields];
-    const std::size_t count = split(sentence, size, fields);
-    std::int64_t day = 0;
-    std::int64_t seconds = 0;
-    const bool read = is(fields[0], "RMC")
-                          ? rmc(fields, count, day, seconds)
-                          : is(fields[0], "ZDA") && zda(fields, count, day, seconds);
-    utc_s = day * day_s + seconds;
-    return read;
+    Text fields[most_fields] = {};
+    split(sentence, checked_size(sentence, size), fields);
+    return is(fields[0], "RMC") ? rmc(fields, utc_s) : is(fields[0], "ZDA") && zda(fields, utc_s);
 }
 
 void NmeaReader::begin(std::uint32_t baud) {
     *this = {};
-    byte_duration_ = 10'000'000'000 / static_cast<Nanoseconds>(baud == 0 ? 1 : baud);
+    byte_duration_ = 10'000'000'000 / static_cast<Nanoseconds>(baud);
 }
 
 bool NmeaReader::take(std::uint8_t byte, Nanoseconds at, UtcLabel& label) {
@@ -159,7 +161,7 @@ bool NmeaReader::take(std::uint8_t byte, Nanoseconds at, UtcLabel& label) {
 bool NmeaReader::finish(UtcLabel& label) {
     const std::size_t size = size_;
     size_ = 0;
-    std::int64_t utc_s = 0;
+    std::int64_t utc_s;
     if (!nmea_utc(line_, size, utc_s)) return false;
     const Nanoseconds pulse = newest_ <= began_ ? newest_ : before_;
     if (pulse > began_ || began_ - pulse >= oldest_pulse) return false;

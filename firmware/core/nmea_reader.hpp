@@ -16,8 +16,8 @@ bool nmea_utc(const char* sentence, std::size_t size, std::int64_t& utc_s);
 
 /// A pulse and the second it marks.
 struct UtcLabel {
-    Nanoseconds pulse = 0;
-    std::int64_t utc_s = 0;
+    Nanoseconds pulse;
+    std::int64_t utc_s;
 };
 
 /// A sentence labels the last pulse before the sentence began, if that is less than 0.9 s old.
@@ -48,7 +48,7 @@ class NmeaReader {
     Nanoseconds byte_duration_ = 0;
     Nanoseconds newest_ = long_ago;
     Nanoseconds before_ = long_ago;  ///< the bytes of a sentence may be read after the next pulse
-    UtcLabel told_{long_ago, 0};
+    UtcLabel told_{};
 };
 
 }  // namespace versavis::firmware

@@ -4,6 +4,8 @@
 #include <rapidcheck.h>
 
 #include <catch2/catch.hpp>
+#include <cctype>
+#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +35,16 @@ std::string rmc(const std::string& time, const std::string& date, const std::str
                     ",,,A");
 }
 
+std::string zda(const std::string& time, const std::string& date) {
+    return sentence("GPZDA," + time + "," + date + ",,");
+}
+
+/// As many digits as asked for.
+std::string digits(unsigned number, std::size_t count) {
+    const std::string all = std::to_string(number);
+    return std::string(count > all.size() ? count - all.size() : 0, '0') + all;
+}
+
 /// Sends the text so that its first byte begins at `begin`.
 std::vector<UtcLabel> feed(NmeaReader& reader, const std::string& text, Nanoseconds begin) {
     std::vector<UtcLabel> labels;
@@ -59,38 +71,148 @@ TEST_CASE("nmea_reader: seconds since 1970 of sentences as receivers send them")
     CHECK(utc(rmc("120000", "010179")) == 3'439'800'000);
 }
 
-TEST_CASE("nmea_reader: leap days are those of the calendar") {
-    CHECK(utc(rmc("000000", "290200")) == 951'782'400);
-    CHECK(utc(rmc("000000", "010300")) == 951'868'800);
-    CHECK(utc(rmc("235959", "290224")) == 1'709'251'199);
-    CHECK(utc(rmc("000000", "010324")) == 1'709'251'200);
-    CHECK_FALSE(utc(rmc("000000", "290223")));
-    CHECK_FALSE(utc(sentence("GPZDA,000000,29,02,2100,,")));
-    CHECK(utc(sentence("GPZDA,000000,01,03,2100,,")) == 4'107'542'400);
+TEST_CASE("nmea_reader: every day of the calendar, and no other one") {
+    using namespace std::chrono;
+    const unsigned year_number = GENERATE(1970U, 1971U, 1972U, 1973U, 1999U, 2000U, 2001U, 2024U,
+                                          2079U, 2099U, 2100U, 2101U, 2400U, 2401U, 9999U);
+    for (unsigned m = 0; m <= 13; ++m)
+        for (unsigned d = 0; d <= 32; ++d) {
+            const year_month_day date{year(static_cast<int>(year_number)), month(m), day(d)};
+            std::optional<std::int64_t> expected;
+            if (date.ok()) expected = sys_seconds(sys_days(date)).time_since_epoch().count();
+            const std::string written = digits(d, 2) + "," + digits(m, 2) + ",";
+            CAPTURE(written, year_number);
+            REQUIRE(utc(zda("000000", written + digits(year_number, 4))) == expected);
+            if (year_number < 1980 || year_number > 2079) continue;
+            REQUIRE(utc(rmc("000000", digits(d, 2) + digits(m, 2) +
+                                          digits(year_number % 100, 2))) == expected);
+        }
+}
+
+TEST_CASE("nmea_reader: every year since 1970, and the century of two digits") {
+    using namespace std::chrono;
+    CHECK_FALSE(utc(zda("000000", "31,12,1969")));
+    CHECK_FALSE(utc(zda("000000", "01,01,0000")));
+    for (int y = 1970; y < 2600; ++y) {
+        const auto seconds = [y](unsigned m) {
+            return sys_seconds(sys_days(year(y) / month(m) / 1)).time_since_epoch().count();
+        };
+        const std::string text = std::to_string(y);
+        REQUIRE(utc(zda("000000", "01,01," + text)) == seconds(1));
+        REQUIRE(utc(zda("000000", "01,03," + text)) == seconds(3));
+        if (y < 1980 || y > 2079) continue;
+        REQUIRE(utc(rmc("000000", "0101" + text.substr(2))) == seconds(1));
+        REQUIRE(utc(rmc("000000", "0103" + text.substr(2))) == seconds(3));
+    }
+}
+
+TEST_CASE("nmea_reader: every second of a day, and no other one") {
+    for (unsigned part = 0; part < 100; ++part) {
+        const auto time = [](unsigned hours, unsigned minutes, unsigned seconds) {
+            return utc(
+                zda(digits(hours, 2) + digits(minutes, 2) + digits(seconds, 2), "01,01,1970"));
+        };
+        CAPTURE(part);
+        CHECK(time(part, 0, 0) == (part < 24 ? std::optional(part * 3600) : std::nullopt));
+        CHECK(time(1, part, 2) == (part < 60 ? std::optional(3602 + part * 60) : std::nullopt));
+        CHECK(time(0, 1, part) == (part < 60 ? std::optional(60 + part) : std::nullopt));
+    }
 }
 
 TEST_CASE("nmea_reader: what is no time, or no good one, gives none") {
-    CHECK_FALSE(utc(rmc("120000", "010120", "V")));
-    CHECK_FALSE(utc(rmc("235960", "311216")));     // the leap second
-    CHECK_FALSE(utc(rmc("120000.20", "010120")));  // between pulses
-    CHECK_FALSE(utc(rmc("120000x00", "010120")));
-    CHECK_FALSE(utc(rmc("240000", "010120")));
-    CHECK_FALSE(utc(rmc("126000", "010120")));
-    CHECK_FALSE(utc(rmc("12000", "010120")));
+    CHECK_FALSE(utc(rmc("235960", "311216")));  // the leap second
     CHECK_FALSE(utc(rmc("", "")));
-    CHECK_FALSE(utc(rmc("120000", "000120")));
-    CHECK_FALSE(utc(rmc("120000", "010020")));
-    CHECK_FALSE(utc(rmc("120000", "011320")));
-    CHECK_FALSE(utc(rmc("120000", "310420")));
-    CHECK_FALSE(utc(sentence("GPGGA,120000,A,4723.1,N,00832.4,E,0.02,31.6,010120")));
-    CHECK_FALSE(utc(sentence("GPRMC,120000,A")));
-    CHECK_FALSE(utc(sentence("RMC,120000,A,4723.1,N,00832.4,E,0.02,31.6,010120")));
-    CHECK_FALSE(utc(sentence("GPZDA,120000,01,01,69,,")));
-    CHECK_FALSE(utc(sentence("GPZDA,120000,01,01,1969,,")));
     CHECK_FALSE(utc(sentence("GPRMC,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,")));
-    CHECK_FALSE(utc(""));
-    CHECK_FALSE(utc("$*"));
-    CHECK_FALSE(utc("$*00"));
+    CHECK_FALSE(utc(sentence("GPZDA,120000")));
+    CHECK_FALSE(utc(sentence("GPZDA,120000,01,01")));
+    for (const char* status : {"V", "", "AA", "a"})
+        CHECK_FALSE(utc(rmc("120000", "010120", status)));
+    for (const char* date : {"01012", "0101200", "", "010120 "})
+        CHECK_FALSE(utc(rmc("120000", date)));
+    for (const char* date : {"1,01,2020", "001,01,2020", "01,1,2020", "01,001,2020", "01,01,20",
+                             "01,01,202", "01,01,20200", ",,", "01,01", "01"})
+        CHECK_FALSE(utc(zda("120000", date)));
+}
+
+TEST_CASE("nmea_reader: only whole seconds, with as many zeros as a receiver likes") {
+    for (const char* time : {"120001", "120001.", "120001.0", "120001.00", "120001.0000"})
+        CHECK(utc(zda(time, "01,01,1970")) == 43'201);
+    for (const char* time : {"12000", "1200", "120000.1", "120000.01", "120000.20", "120000x00",
+                             "1200000", "120000,", "120000.0.", " 120000", "-12000", ""})
+        CHECK_FALSE(utc(zda(time, "01,01,1970")));
+}
+
+TEST_CASE("nmea_reader: of a date and a time, each character is a digit") {
+    const std::string time = "120000";
+    const std::string date = "01,01,2020";
+    for (const char bad : {'/', ':', ' ', 'A'}) {
+        for (std::size_t i = 0; i < time.size(); ++i) {
+            std::string damaged = time;
+            damaged[i] = bad;
+            CHECK_FALSE(utc(zda(damaged, date)));
+            CHECK_FALSE(utc(rmc(damaged, "010120")));
+        }
+        for (std::size_t i = 0; i < date.size(); ++i) {
+            if (date[i] == ',') continue;
+            std::string damaged = date;
+            damaged[i] = bad;
+            CHECK_FALSE(utc(zda(time, damaged)));
+        }
+        for (std::size_t i = 0; i < 6; ++i) {
+            std::string damaged = "010120";
+            damaged[i] = bad;
+            CHECK_FALSE(utc(rmc(time, damaged)));
+        }
+    }
+}
+
+TEST_CASE("nmea_reader: sentences of any talker, and of no other kind") {
+    for (const char* name : {"GPZDA", "GNZDA", "XXZDA"})
+        CHECK(utc(sentence(std::string(name) + ",000001,01,01,1970,,")) == 1);
+    for (const char* name :
+         {"GPZDX", "GPZXA", "GPXDA", "ZDA", "PZDA", "GGPZDA", "GPZDAA", "GP", ""})
+        CHECK_FALSE(utc(sentence(std::string(name) + ",000001,01,01,1970,,")));
+    for (const char* name : {"GPRMX", "GPRXC", "GPXMC", "RMC", "PRMC", "GPGGA"})
+        CHECK_FALSE(utc(sentence(std::string(name) + ",000001,A,47,N,8,E,0,0,010120,,,A")));
+    // The date is the last field that counts, however many follow.
+    CHECK(utc(sentence("GPRMC,000001,A,47,N,8,E,0,0,010180")) == 315'532'801);
+    CHECK(utc(sentence("GPRMC,000001,A,47,N,8,E,0,0,010180,,")) == 315'532'801);
+    CHECK(utc(sentence("GPRMC,000001,A,47,N,8,E,0,0,010180" + std::string(40, ','))) ==
+          315'532'801);
+    CHECK_FALSE(utc(sentence("GPRMC,000001,A,47,N,8,E,0,0")));
+}
+
+TEST_CASE("nmea_reader: a checksum has two hexadecimal digits, and all must be right") {
+    const std::string hex = "0123456789ABCDEFabcdef";
+    for (const char first : {'A', 'a', 'p', 'Q'})  // between them, all digits are right ones
+        for (char second = 'A'; second <= 'P'; ++second) {
+            const std::string good =
+                sentence(std::string{first, second} + "ZDA,000001,01,01,1970,,");
+            for (const std::size_t at : {good.size() - 2, good.size() - 1})
+                for (int c = 0; c < 256; ++c) {
+                    std::string other = good;
+                    other[at] = static_cast<char>(c);
+                    const bool same = std::toupper(c) == good[at] && hex.find(other[at]) < 22;
+                    REQUIRE(utc(other).has_value() == same);
+                }
+        }
+    const std::string good = zda("000001", "01,01,1970");
+    REQUIRE(utc(good));
+    for (std::size_t i = 0; i + 3 < good.size(); ++i) {
+        std::string damaged = good;
+        damaged[i] = static_cast<char>(damaged[i] ^ 1);
+        CHECK_FALSE(utc(damaged));
+        CHECK_FALSE(utc(good.substr(0, i)));
+        CHECK_FALSE(utc(good.substr(i + 1)));
+    }
+    CHECK_FALSE(utc(good + "0"));
+    CHECK_FALSE(utc(good.substr(0, good.size() - 1)));
+    CHECK_FALSE(utc(good.substr(0, good.size() - 2)));
+    std::string other = good;
+    other[good.size() - 3] = '#';  // in place of the star
+    CHECK_FALSE(utc(other));
+    for (const char* nothing : {"", "$", "*", "$*", "*$", "$*0", "$*00", "*00", "**0", "$$*00"})
+        CHECK_FALSE(utc(nothing));
 }
 
 TEST_CASE("nmea_reader: any bytes at all do no harm, and a sentence after them is read") {
@@ -108,6 +230,92 @@ TEST_CASE("nmea_reader: any bytes at all do no harm, and a sentence after them i
     reader.pulse(0);
     CHECK(feed(reader, "$" + std::string(5000, 'A') + "\r\n", 0).empty());
     CHECK(feed(reader, rmc("120000", "010120") + "\r\n", 100 * ms).size() == 1);
+}
+
+TEST_CASE("nmea_reader: a line may end in either way, and begins with its sign") {
+    const std::string line = rmc("120000", "010120");
+    for (const std::string& text :
+         {line + "\r\n", line + "\n", line + "\r", "A,*00\r\n" + line + "\r", "$GP" + line + "\n",
+          "\n\r\n" + line + "\n\r\n"}) {
+        NmeaReader reader;
+        reader.begin(115'200);
+        reader.pulse(0);
+        CHECK(feed(reader, text, 100 * ms).size() == 1);
+    }
+    for (const std::string& text : {line, line.substr(1) + "\r\n", line + " \r\n",
+                                    line.substr(0, 20) + "\r\n" + line.substr(20) + "\r\n"}) {
+        NmeaReader reader;
+        reader.begin(115'200);
+        reader.pulse(0);
+        CHECK(feed(reader, text, 100 * ms).empty());
+    }
+}
+
+TEST_CASE("nmea_reader: a sentence has at most 100 characters") {
+    const std::string start = "GPZDA,120000,01,01,2020";
+    for (const std::size_t size : {99U, 100U, 101U, 102U, 200U}) {
+        const std::string line = sentence(start + std::string(size - start.size() - 4, ','));
+        REQUIRE(line.size() == size);
+        NmeaReader reader;
+        reader.begin(115'200);
+        reader.pulse(0);
+        CHECK(feed(reader, line + "\r\n", 100 * ms).size() == (size <= 100 ? 1 : 0));
+        // The next one is read again.
+        CHECK(feed(reader, rmc("120001", "010120") + "\r\n", 200 * ms).size() == 1);
+    }
+}
+
+TEST_CASE("nmea_reader: it begins anew with what it knows of pulses and bytes") {
+    const std::string line = rmc("120000", "010120") + "\r\n";
+    NmeaReader reader;
+    CHECK(reader.byte_duration() == 0);
+    reader.begin(1'200);
+    CHECK(reader.byte_duration() == 8'333'333);
+    reader.begin(9'600);
+    CHECK(reader.byte_duration() == 1'041'666);
+    reader.pulse(0);
+    CHECK(feed(reader, line, 100 * ms).size() == 1);
+    CHECK(feed(reader, line.substr(0, 10), 300 * ms).empty());
+    reader.begin(921'600);
+    CHECK(feed(reader, line.substr(10), 400 * ms).empty());
+    CHECK(feed(reader, line, 500 * ms).empty());
+    reader.pulse(0);
+    CHECK(feed(reader, line, 500 * ms).size() == 1);  // told once more
+}
+
+TEST_CASE("nmea_reader: which pulse a sentence names, to the nanosecond") {
+    const std::string line = rmc("120000", "010120") + "\r\n";
+    const auto named = [&line](const std::vector<Nanoseconds>& pulses, Nanoseconds begin) {
+        NmeaReader reader;
+        reader.begin(9'600);
+        for (const Nanoseconds pulse : pulses) reader.pulse(pulse);
+        const auto labels = feed(reader, line, begin);
+        return labels.empty() ? std::nullopt : std::optional(labels[0].pulse);
+    };
+    CHECK(named({}, 0) == std::nullopt);
+    CHECK(named({}, second / 2) == std::nullopt);
+    CHECK(named({}, 5 * second) == std::nullopt);
+    CHECK(named({second}, second) == second);
+    CHECK(named({second}, second - 1) == std::nullopt);
+    CHECK(named({second}, second + 900 * ms - 1) == second);
+    CHECK(named({second}, second + 900 * ms) == std::nullopt);
+    CHECK(named({second, 2 * second}, 2 * second) == 2 * second);
+    CHECK(named({second, 2 * second}, 2 * second - 200 * ms) == second);
+    CHECK(named({second, 2 * second}, 2 * second - 100 * ms) == std::nullopt);
+    CHECK(named({second, 2 * second}, second - 1) == std::nullopt);
+    CHECK(named({0, second, 2 * second}, second - 200 * ms) == std::nullopt);  // too long ago
+}
+
+TEST_CASE("nmea_reader: another name for the same pulse is told, and the same name for another") {
+    NmeaReader reader;
+    reader.begin(115'200);
+    reader.pulse(second);
+    CHECK(feed(reader, rmc("120000", "010120") + "\r\n", second + 10 * ms).size() == 1);
+    CHECK(feed(reader, rmc("120000", "010120") + "\r\n", second + 50 * ms).empty());
+    CHECK(feed(reader, rmc("120001", "010120") + "\r\n", second + 100 * ms).size() == 1);
+    CHECK(feed(reader, rmc("120001", "010120") + "\r\n", second + 150 * ms).empty());
+    reader.pulse(2 * second);
+    CHECK(feed(reader, rmc("120001", "010120") + "\r\n", 2 * second + 10 * ms).size() == 1);
 }
 
 TEST_CASE(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "imu/ready_edges.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 using namespace versavis::firmware;
@@ -40,6 +41,17 @@ TEST_CASE("ready_edges: echoes are left out, by the part's period and at most 10
     CHECK(edges.add(1));
     CHECK_FALSE(edges.add(100'000));
     CHECK(edges.add(100'001));
+}
+
+TEST_CASE("ready_edges: how far echoes reach, for any period") {
+    for (const Nanoseconds period : {8, 720'000, 799'992, 800'000, 880'000, 100'000'000}) {
+        const Nanoseconds width = std::min<Nanoseconds>(period / 8, 100'000);
+        ReadyEdges edges;
+        edges.configure(period);
+        REQUIRE(edges.add(1'000'000));
+        CHECK_FALSE(edges.add(1'000'000 + width - 1));
+        CHECK(edges.add(1'000'000 + width));
+    }
 }
 
 TEST_CASE("ready_edges: edges from before lost ones are not found, and count all the same") {

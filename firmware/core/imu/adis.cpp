@@ -9,7 +9,6 @@ namespace {
 
 constexpr std::uint32_t clock_hz = 1'000'000;  // the limit of bursts
 constexpr std::uint16_t reset_command = 0x80;
-constexpr std::size_t max_words = 13;
 constexpr std::size_t crc_words = 11;
 
 /// What four bits leave in a register that shifts right.
@@ -41,11 +40,11 @@ std::uint16_t adis16448_crc(const std::uint16_t* words) {
 
 /// 819.2 Hz / 2^D, or base / (D + 1).
 std::uint16_t Adis::rate_code(std::uint32_t millihertz) const {
-    const std::uint32_t parts = facts_.fastest_millihertz / (millihertz == 0 ? 1 : millihertz);
+    const std::uint32_t parts = facts_.fastest_millihertz / millihertz;
     if (!facts_.octaves)
-        return static_cast<std::uint16_t>(parts <= 1 ? 0 : parts > 2000 ? 1999 : parts - 1);
+        return static_cast<std::uint16_t>(parts == 0 ? 0 : parts > 2000 ? 1999 : parts - 1);
     std::uint16_t octaves = 0;
-    while (octaves < 10 && parts >= 2U << octaves) ++octaves;
+    while (parts >= 2U << octaves) ++octaves;
     return octaves;
 }
 
@@ -67,8 +66,8 @@ void Adis::setup(const PartSettings& settings, Setup& setup) const {
     setup.write(0, facts_.control_register, facts_.control, settle_us);
     setup.write(0, facts_.rate_register, rate, settle_us);
     setup.write(0, facts_.filter_register, filters, settle_us);
-    setup.write(0, facts_.filter_register, filters,
-                settle_us);  // changing the range may change the settings.filter
+    // Changing the range may change the filter.
+    setup.write(0, facts_.filter_register, filters, settle_us);
     setup.expect(0, facts_.rate_register, rate);
     setup.expect(0, facts_.filter_register, filters);
 }
@@ -83,7 +82,7 @@ void Adis::access(const SetupStep& step, ImuTransfer& transfer) const {
     }
     transfer.bytes[0] = static_cast<std::uint8_t>(0x80U | step.address);
     transfer.bytes[1] = static_cast<std::uint8_t>(step.value);
-    transfer.bytes[2] = static_cast<std::uint8_t>(0x80U | (step.address + 1U));
+    transfer.bytes[2] = static_cast<std::uint8_t>(transfer.bytes[0] + 1U);
     transfer.bytes[3] = static_cast<std::uint8_t>(step.value >> 8U);
 }
 
@@ -123,19 +122,19 @@ void Adis::fill(const std::uint16_t* words, wire::ImuSample& sample) const {
 Verdict Adis::parse(const ImuReply* replies, unsigned count, wire::ImuSample& sample) const {
     // What arrives while the command goes out means nothing.
     const std::uint8_t* newest = replies[count - 1].bytes + 2;
-    std::uint16_t words[max_words];
-    for (std::size_t i = 0; i < facts_.words; ++i) words[i] = big_endian(newest, i);
+    decltype(ImuImage::burst) words;  // no part has a longer one
+    for (std::size_t i = 0; i != facts_.words; ++i) words[i] = big_endian(newest, i);
     if (facts_.check != AdisFacts::Check::twice) {
         fill(words, sample);
         if (!check(words, newest)) sample.flags |= wire::imu_check_failed;
         return Verdict::taken;
     }
     const std::uint8_t* before = replies[count - 2].bytes + 2;
-    for (unsigned i = 0; i + 1 < count; ++i)  // reading clears its flags
+    for (unsigned i = 0; i != count; ++i)  // reading clears its flags
         words[0] = static_cast<std::uint16_t>(words[0] | big_endian(replies[i].bytes + 2, 0));
     bool equal = true;
     bool alive = false;
-    for (std::size_t i = 1; i < facts_.words; ++i) {
+    for (std::size_t i = 1; i != facts_.words; ++i) {
         equal = equal && words[i] == big_endian(before, i);
         alive = alive || (words[i] != 0 && words[i] != 0xFFFF);
     }

@@ -47,11 +47,15 @@ constexpr Scale same(adis16448);
 
 constexpr std::uint16_t self_test_failed = 1U << 5U;
 
-std::uint16_t scaled(std::int64_t raw, std::int64_t ratio, std::int64_t lowest,
-                     std::int64_t highest) {
-    const std::int64_t value = (raw * ratio + (std::int64_t{1} << 31U)) >> 32U;
+std::int64_t scaled(std::int64_t raw, std::int64_t ratio) {
+    return (raw * ratio + (std::int64_t{1} << 31U)) >> 32U;
+}
+
+std::uint16_t limited(std::int64_t value, std::int64_t lowest, std::int64_t highest) {
     return static_cast<std::uint16_t>(value < lowest ? lowest : value > highest ? highest : value);
 }
+
+std::uint16_t as_word(std::int64_t value) { return limited(value, INT16_MIN, INT16_MAX); }
 
 const Scale& scale_of(wire::ImuKind kind) {
     for (const Scale& scale : scales)
@@ -68,19 +72,14 @@ bool adis16448_image(const wire::ImuSample& sample, ImuImage& image) {
     image.burst[0] =
         (sample.flags & wire::imu_self_test_failed) != 0 ? self_test_failed : std::uint16_t{0};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        image.burst[1 + axis] = scaled(sample.gyro[axis], scale.gyro, INT16_MIN, INT16_MAX);
-        image.burst[4 + axis] = scaled(sample.accel[axis], scale.accel, INT16_MIN, INT16_MAX);
-        image.burst[7 + axis] = scaled(sample.magnetic[axis], scale.magnetic, INT16_MIN, INT16_MAX);
+        image.burst[1 + axis] = as_word(scaled(sample.gyro[axis], scale.gyro));
+        image.burst[4 + axis] = as_word(scaled(sample.accel[axis], scale.accel));
+        image.burst[7 + axis] = as_word(scaled(sample.magnetic[axis], scale.magnetic));
     }
-    image.burst[10] = scaled(sample.pressure, scale.pressure, 0, UINT16_MAX);
-    const auto warmth = static_cast<std::int16_t>(
-        scaled(sample.temperature, scale.temperature, INT16_MIN, INT16_MAX));
-    const std::int32_t temperature = warmth + scale.temperature_offset;
-    image.burst[11] =
-        static_cast<std::uint16_t>(static_cast<std::uint32_t>(temperature < -2048  ? -2048
-                                                              : temperature > 2047 ? 2047
-                                                                                   : temperature) &
-                                   0xFFFU);
+    image.burst[10] = limited(scaled(sample.pressure, scale.pressure), 0, UINT16_MAX);
+    const std::int64_t temperature =
+        scaled(sample.temperature, scale.temperature) + scale.temperature_offset;
+    image.burst[11] = static_cast<std::uint16_t>(limited(temperature, -2048, 2047) & 0xFFFU);
     image.burst[12] = adis16448_crc(image.burst + 1);
     return true;
 }

@@ -11,11 +11,11 @@ namespace versavis::firmware {
 /// One register access while the part is set up.
 struct SetupStep {
     enum class Action : std::uint8_t { write, expect };
-    Action action = Action::write;
-    std::uint8_t chip = 0;
-    std::uint8_t address = 0;
-    std::uint16_t value = 0;     ///< to write, or that a read must return
-    std::uint32_t pause_us = 0;  ///< before the next step
+    Action action;
+    std::uint8_t chip;
+    std::uint8_t address;
+    std::uint16_t value;     ///< to write, or that a read must return
+    std::uint32_t pause_us;  ///< before the next step
 };
 
 /// Steps from power-up to samples, in order.
@@ -28,9 +28,8 @@ class Setup {
                std::uint32_t pause_us = 0) {
         add({SetupStep::Action::write, chip, address, value, pause_us});
     }
-    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
-                std::uint32_t pause_us = 0) {
-        add({SetupStep::Action::expect, chip, address, value, pause_us});
+    void expect(std::uint8_t chip, std::uint8_t address, std::uint16_t value) {
+        add({SetupStep::Action::expect, chip, address, value, 0});
     }
 
     std::size_t size() const { return size_; }
@@ -47,16 +46,16 @@ class Setup {
 
 /// What a part is set up for.
 struct PartSettings {
-    std::uint32_t rate_millihertz = 0;  ///< one of its rates
-    std::uint8_t filter = 0;
-    bool accel_ready = false;  ///< the data-ready line of its accelerometer is wired
+    std::uint32_t rate_millihertz;  ///< one of its rates
+    std::uint8_t filter;
+    bool accel_ready;  ///< the data-ready line of its accelerometer is wired
 };
 
 /// Where the accelerometer's values are among the bytes of a sample's readings.
 struct AccelBytes {
-    std::uint8_t reading = 0;
-    std::uint8_t first = 0;
-    std::uint8_t end = 0;
+    std::uint8_t reading;
+    std::uint8_t first;
+    std::uint8_t end;
 };
 
 enum class Verdict : std::uint8_t {
@@ -78,7 +77,7 @@ class ImuPart {
     virtual std::uint32_t accel_millihertz() const { return 0; }
     virtual AccelBytes accel_bytes() const { return {}; }
     virtual std::uint8_t strongest_filter() const = 0;
-    /// Its slowest rate not below `wanted_millihertz`, or its fastest.
+    /// Its slowest rate not below `wanted_millihertz`, which is at least 1000, or its fastest.
     virtual std::uint32_t rate(std::uint32_t wanted_millihertz) const = 0;
 
     virtual void setup(const PartSettings& settings, Setup& setup) const = 0;

@@ -25,10 +25,10 @@ struct RateCode {
 /// The slowest entry not below `wanted_millihertz`, or the first; entries from fast to slow.
 template <std::size_t N>
 const RateCode& slowest_not_below(const RateCode (&rates)[N], std::uint32_t wanted_millihertz) {
-    std::size_t found = 0;
-    for (std::size_t i = 1; i < N; ++i)
-        if (rates[i].millihertz >= wanted_millihertz) found = i;
-    return rates[found];
+    const RateCode* found = rates;
+    for (const RateCode& rate : rates)
+        if (rate.millihertz >= wanted_millihertz) found = &rate;
+    return *found;
 }
 
 }  // namespace versavis::firmware

@@ -22,7 +22,7 @@ class ReadyEdges {
             return false;
         }
         stamps_[count_++ % kept] = at;
-        if (known_ < kept) ++known_;
+        if (known_ != kept) ++known_;
         return true;
     }
 

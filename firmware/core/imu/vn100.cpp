@@ -33,7 +33,7 @@ constexpr Nanoseconds power_up_time = 300'000'000;
 constexpr Nanoseconds longest_echo = 300'000;
 
 std::uint32_t word32(const std::uint8_t* bytes) {
-    std::uint32_t word = 0;
+    std::uint32_t word;
     std::memcpy(&word, bytes, sizeof word);
     return word;
 }
@@ -48,7 +48,7 @@ std::uint8_t text_checksum(const char* text, std::size_t size) {
 template <class Narrow>
 bool narrow(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t lowest,
             std::int32_t highest, Narrow& out) {
-    std::int32_t wide = 0;
+    std::int32_t wide;
     if (!fixed_point(float_bits, fraction_bits, wide)) return false;
     out = static_cast<Narrow>(wide < lowest ? lowest : wide > highest ? highest : wide);
     return true;
@@ -73,15 +73,16 @@ bool fixed_point(std::uint32_t float_bits, unsigned fraction_bits, std::int32_t&
     const bool negative = (float_bits >> 31U) != 0;
     const int exponent = static_cast<int>(float_bits >> 23U & 0xFFU);
     if (exponent == 0xFF) return false;
-    const std::int64_t mantissa = (float_bits & 0x7FFFFFU) | (exponent == 0 ? 0U : 0x800000U);
+    const auto mantissa = static_cast<std::int32_t>((float_bits & 0x7FFFFFU) | 0x800000U);
     const int shift = exponent - 127 - 23 + static_cast<int>(fraction_bits);
-    std::int64_t value = 0;
-    if (shift >= 0)
-        value = shift > 8 ? (mantissa == 0 ? 0 : INT32_MAX) : mantissa << shift;
-    else if (shift > -32)
-        value = (mantissa + (std::int64_t{1} << (-shift - 1))) >> -shift;
-    if (value > INT32_MAX) value = INT32_MAX;
-    out = static_cast<std::int32_t>(negative ? -value : value);
+    std::int32_t value = 0;  // also of what is less than half of a unit: zero is so small
+    if (shift > 7)
+        value = INT32_MAX;
+    else if (shift >= 0)
+        value = mantissa << shift;
+    else if (shift > -25)
+        value = (mantissa + (1 << (-shift - 1))) >> -shift;
+    out = negative ? -value : value;
     return true;
 }
 
@@ -92,9 +93,7 @@ std::uint32_t Vn100::true_rate(std::uint32_t wanted_millihertz) {
 }
 
 std::uint32_t Vn100::divider() const {
-    const std::uint32_t parts =
-        vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
-    return parts == 0 ? 1 : parts;
+    return vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
 }
 
 void Vn100::configure(const wire::ImuConfiguration& configuration, Nanoseconds now) {
@@ -133,7 +132,6 @@ void Vn100::send_step(Nanoseconds now) {
         case Step::pulses: text << "VNWRG,32,3,0,0,0,1,1,0,100000,0"; break;
         case Step::packets: text << "VNWRG,75,1," << divider() << ",01,0601"; break;
         case Step::go: text << "VNASY,1"; break;
-        case Step::end: return;
     }
     TextLine line;
     line << "$" << text << "*";
@@ -159,8 +157,10 @@ void Vn100::next_step(Nanoseconds now) {
         set_baud(wanted_baud());
         wake_ = now + settle;
     }
-    step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
-    if (step_ != Step::end) return;
+    if (step_ != Step::go) {
+        step_ = static_cast<Step>(static_cast<std::uint8_t>(step_) + 1);
+        return;
+    }
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
@@ -182,7 +182,7 @@ void Vn100::ready_edge(Nanoseconds at) {
 }
 
 void Vn100::drop(std::size_t size) {
-    for (std::size_t i = size; i < filled_; ++i) bytes_[i - size] = bytes_[i];
+    for (std::size_t i = size; i != filled_; ++i) bytes_[i - size] = bytes_[i];
     filled_ -= size;
 }
 
@@ -199,16 +199,16 @@ bool Vn100::take_line(Nanoseconds now) {
     const std::size_t end = line_length() - 1;
     const char* line = reinterpret_cast<const char*>(bytes_);
     std::size_t star = 0;
-    while (star < end && line[star] != '*') ++star;
+    while (star != end && line[star] != '*') ++star;
     TextLine sum;
-    sum.hex(text_checksum(line + 1, star == 0 ? 0 : star - 1));
-    if (star + 2 >= end || std::memcmp(line + star + 1, sum.data(), 2) != 0) return false;
-    const bool error = end > 8 && std::memcmp(line, "$VNERR,", 7) == 0;
+    sum.hex(text_checksum(line + 1, star - 1));
+    if (star == end || std::memcmp(line + star + 1, sum.data(), 2) != 0) return false;
+    const bool error = std::memcmp(line, "$VNERR,", 7) == 0;
     const std::int64_t code = line[7] * 256 + line[8];
     const bool command = step_ == Step::quiet || step_ == Step::go;
-    const bool answer = end > 6 && std::memcmp(line, command ? "$VNASY" : "$VNWRG", 6) == 0;
+    const bool answer = std::memcmp(line, command ? "$VNASY" : "$VNWRG", 6) == 0;
     drop(end + 1);
-    if (state_ != State::set_up || !waiting_) return true;
+    if (!waiting_) return true;
     if (error)
         fail(wire::EventKind::imu_failed, now, code);
     else if (answer)
@@ -222,7 +222,7 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
     const Nanoseconds first_byte = received_ - static_cast<Nanoseconds>(filled_) * 10'000'000'000 /
                                                    static_cast<Nanoseconds>(baud_);
     const std::uint8_t* packet = bytes_;
-    std::uint64_t startup = 0;
+    std::uint64_t startup;
     std::memcpy(&startup, packet + time_at, sizeof startup);
     sample = {};
     sample.kind = wire::ImuKind::vn100;
@@ -253,10 +253,9 @@ bool Vn100::take_packet(Nanoseconds now, wire::ImuSample& sample) {
 /// The part's own clock shows how many samples were lost on the way. Returns the time since the
 /// previous sample; 0: there was none.
 Nanoseconds Vn100::count(std::uint64_t startup_ns) {
+    if (startup_ns_ == 0) startup_ns_ = startup_ns;
     const auto since = static_cast<Nanoseconds>(startup_ns - startup_ns_);
-    const bool first = startup_ns_ == 0 || since <= 0;
     startup_ns_ = startup_ns;
-    if (first) return 0;
     const Nanoseconds periods = (since + period_ / 2) / period_;
     if (periods > 1) miss(static_cast<std::uint32_t>(periods - 1));
     return since;
@@ -268,19 +267,19 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     sample.time_ns = first_byte;
     if ((configuration_.options & wire::imu_data_ready) == 0) return;
     std::size_t newest = 0;
-    while (newest < max_edges && edges_[newest] >= first_byte) ++newest;
+    while (newest != max_edges && edges_[newest] >= first_byte) ++newest;
     if (newest == max_edges || first_byte - edges_[newest] >= base_period) return;
     const Nanoseconds off = edges_[newest] - stamp_ - since_last;
     const bool agrees = off < base_period / 2 && -off < base_period / 2;
     stamp_ = edges_[newest];
-    if (since_last == 0 || !agrees) return;
+    if (!agrees) return;
     sample.time_ns = stamp_;
     sample.flags |= wire::imu_stamped;
 }
 
 /// Takes the first item from the bytes. True: it was a sample.
 bool Vn100::parse(Nanoseconds now, wire::ImuSample& sample) {
-    while (filled_ > 0) {
+    while (filled_ != 0) {
         if (bytes_[0] == sync) {
             const std::size_t head = filled_ < sizeof header ? filled_ : sizeof header;
             if (std::memcmp(bytes_, header, head) == 0) {
@@ -311,14 +310,14 @@ bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
         if (parse(now, sample)) return true;
     }
     if (now < wake_) return false;
-    if (state_ == State::set_up && waiting_ && step_ == Step::baud && baud_ != wanted_baud())
+    if (waiting_ && step_ == Step::baud && baud_ != wanted_baud()) {
         set_baud(wanted_baud());  // it may have changed before it answered: ask again
-    else if (state_ == State::running || waiting_)
+    } else if (state_ == State::running || waiting_) {
         fail(wire::EventKind::imu_silent, now, 0);
-    if (state_ == State::set_up && now >= wake_) send_step(now);
+        return false;
+    }
+    send_step(now);
     return false;
 }
-
-Nanoseconds Vn100::next_wake() const { return state_ == State::off ? never : wake_; }
 
 }  // namespace versavis::firmware

@@ -38,7 +38,7 @@ class Vn100 final : public ImuPort {
     /// Does what is due. True: `sample` holds a new sample; call again for more.
     bool poll(Nanoseconds now, wire::ImuSample& sample);
 
-    Nanoseconds next_wake() const;
+    Nanoseconds next_wake() const { return wake_; }
 
     static std::uint32_t true_rate(std::uint32_t wanted_millihertz);
 
@@ -53,8 +53,7 @@ class Vn100 final : public ImuPort {
         baud,
         pulses,
         packets,
-        go,
-        end
+        go
     };
     static constexpr std::size_t max_line = 64;
     static constexpr std::size_t max_edges = 16;
@@ -78,15 +77,15 @@ class Vn100 final : public ImuPort {
     wire::ImuConfiguration configuration_{};
     State state_ = State::off;
     std::uint32_t baud_ = 0;
-    bool fast_first_ = false;  ///< the part may still use the faster baud rate set earlier
-    Step step_ = Step::quiet;
-    bool waiting_ = false;      ///< for the answer to the step
+    bool fast_first_;  ///< the part may still use the faster baud rate set earlier
+    Step step_;
+    bool waiting_;              ///< for the answer to the step
     Nanoseconds wake_ = never;  ///< the next attempt, or the end of patience
-    Nanoseconds period_ = 0;
+    Nanoseconds period_;
     Nanoseconds edges_[max_edges] = {};  ///< of the sync output, the newest first
     Nanoseconds stamp_ = 0;              ///< edge of the newest sample
-    std::uint64_t startup_ns_ = 0;       ///< the part's clock at the newest sample; 0: none yet
-    Nanoseconds received_ = 0;           ///< when the last of the bytes had arrived
+    std::uint64_t startup_ns_;           ///< the part's clock at the newest sample; 0: none yet
+    Nanoseconds received_;               ///< when the last of the bytes had arrived
     std::uint8_t bytes_[2 * vn100::packet_size] = {};
     std::size_t filled_ = 0;
 };
