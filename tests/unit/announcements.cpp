@@ -47,9 +47,9 @@ TEST_CASE("announcements: a new one replaces those of its trigger and of later o
 }
 
 TEST_CASE("announcements: one that is repeated takes the room of one") {
-    Announcements some = announced({1, 2, 3, 4, 5, 6, 7, 7, 7, 8});
+    const Announcements some = announced({1, 1, 2, 2, 3, 4, 5, 6, 7});
+    CHECK(exposure(some, 6) == 6);
     CHECK(exposure(some, 7) == 7);
-    CHECK(exposure(some, 8) == 8);
 }
 
 TEST_CASE("announcements: a used one is gone, with those before it, and later ones remain") {
