@@ -152,11 +152,13 @@ TEST_CASE(
     CHECK(Bench(facts).queue.set(1'004, 0, true) == 1'008);
     CHECK(bench.queue.set(1'005, 1, true) == 1'008);
     CHECK(bench.queue.set(1'021, 2, true) == 1'024);
-    CHECK(bench.queue.commit(0));
+    bench.queue.set(2'000, 2, false);
+    CHECK(bench.queue.commit(1'500 - OutputQueue::horizon));
     CHECK(bench.hardware.words == Words{{1'000, 0b001}, {1'024, 0b111}});
     CHECK(bench.moves.all == std::vector<Move>{{1, true, 1'008, 1'024}});
     CHECK_FALSE(bench.queue.is_late(1'008, 1'024));
-    CHECK(bench.queue.is_late(1'008, 1'040));
+    CHECK_FALSE(bench.queue.is_late(1'000, 1'024));
+    CHECK(bench.queue.is_late(1'000, 1'025));
     CHECK(bench.queue.set(1'030, 3, true) == 1'048);
 }
 
@@ -164,6 +166,7 @@ TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words
     Bench bench;
     bench.queue.set(OutputQueue::horizon, 0, true);
     bench.queue.set(OutputQueue::horizon + 1, 0, false);
+    CHECK(bench.queue.next_wake() == 500'000);
     CHECK(bench.queue.commit(0));
     CHECK(bench.hardware.words.size() == 1);
     CHECK(bench.queue.next_wake() == 500'001);
@@ -175,6 +178,7 @@ TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words
     for (Nanoseconds at = 1; at <= 20; ++at) busy.queue.set(at, 7, at % 2 == 1);
     CHECK(busy.queue.commit(0));
     CHECK(busy.hardware.words.size() == 16);
+    CHECK(busy.hardware.words.front() == std::pair<Nanoseconds, std::uint32_t>{1, 0b1000'0000});
     CHECK(busy.queue.commit(0));
     CHECK(busy.hardware.words.size() == 20);
     CHECK(busy.queue.next_wake() == never);
