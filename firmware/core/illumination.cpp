@@ -40,8 +40,6 @@ void Illumination::stop(Nanoseconds now) {
 
 /// On-time that a span of time earns.
 Nanoseconds Illumination::earned(Nanoseconds span) const {
-    span = min(span,
-               configuration_.max_on_ns * million);  // earns the full store, and does not overflow
     return span / million * configuration_.duty_ppm +
            span % million * configuration_.duty_ppm / million;
 }

@@ -38,6 +38,7 @@ TEST_CASE("grid_clock: a line is as exact as 128 bits would be") {
     }
     const GridLine none;
     CHECK((none.board() == 0 && none.grid() == 0 && none.pace_ppb() == 0));
+    CHECK(none.board_time(100'000 * second) == 100'000 * second);
 }
 
 TEST_CASE("grid_clock: what lies before a board time is found, whatever the pace") {
@@ -284,6 +285,22 @@ TEST_CASE("grid_clock: while it goes to a new sender it runs 1000 ppm off its pa
     for (; n < 220; ++n) REQUIRE(follows(clock, pulse(n)));
     REQUIRE(follows(clock, pulse(n) + 30'000));
     CHECK(clock.board_time((95 + n) * second) == pulse(n) + 30'000);
+    CHECK(std::abs(clock.board_time(clock.grid_time(pulse(n))) - pulse(n)) < 100);
+}
+
+TEST_CASE("grid_clock: pulses that come a little later on the way to them make no step") {
+    GridClock clock;
+    clock.begin(5 * second, second);
+    Nanoseconds grid = 0;
+    Nanoseconds before = clock.board_time(grid);
+    for (int n = 0; n < 250; ++n) {
+        const Nanoseconds pulse = (6 + n) * second + 200'000'000 + (n < 10 ? 0 : 30'000);
+        for (; clock.board_time(grid + 10'000'000) < pulse; before = clock.board_time(grid)) {
+            grid += 10'000'000;
+            REQUIRE(std::abs(clock.board_time(grid) - before - 10'000'000) <= 10'310);
+        }
+        clock.sync_pulse(pulse, true);
+    }
 }
 
 TEST_CASE("grid_clock: a sender that was just taken must be kept, like any other") {

@@ -15,8 +15,10 @@ constexpr Nanoseconds ms = 1'000'000;
 
 struct Hardware final : OutputSchedule {
     std::uint32_t levels = 0;
+    unsigned words = 0;
     std::vector<Nanoseconds> changes[output_count];
     Nanoseconds push(Nanoseconds at, std::uint32_t wanted) override {
+        ++words;
         for (unsigned output = 0; output < output_count; ++output)
             if (((levels ^ wanted) >> output & 1U) != 0) changes[output].push_back(at);
         levels = wanted;
@@ -122,6 +124,7 @@ TEST_CASE("illumination: the gate is open from one lead before the exposure unti
     bench.run(40 * ms);
     CHECK(bench.gate() == Times{9'900 * us, 14 * ms});
     CHECK(bench.lead() == Times{9'900 * us, 10'050 * us});
+    CHECK(bench.hardware.words == 3);
     CHECK(bench.light.next_wake(7) == never);
     CHECK(bench.reports.all.empty());
 }
@@ -213,6 +216,8 @@ TEST_CASE("illumination: light that was not wanted any longer was not limited") 
     // With a budget of 1 ms the gate closes at 10.9 ms.
     for (const Nanoseconds longer : {0, 1}) {
         Bench bench(ms);
+        for (int i = 0; i < 2; ++i) bench.light.plan(0, 10 * ms, 5 * ms, false, 0);
+        bench.light.stop(ms);
         bench.light.plan(0, 10 * ms, 900 * us + longer, false, ms);
         bench.run(11 * ms);
         CHECK(bench.reports.all.size() == (longer == 0 ? 0 : 1));
@@ -296,7 +301,7 @@ TEST_CASE("illumination: what leaves late is paid for") {
     };
     for (const Case& one :
          {Case{false, 14 * ms, 14'500 * us, 500 * us}, Case{false, 14 * ms, 1'000 * ms, 10 * ms},
-          Case{false, 13 * ms, 14 * ms, 0}, Case{true, 14 * ms, 15 * ms, 0}}) {
+          Case{false, 13 * ms, 17 * ms, 0}, Case{true, 14 * ms, 18 * ms, 0}}) {
         Bench bench;
         bench.expose(0, 10 * ms, 14 * ms);
         bench.light.moved(one.open, one.asked, one.left);
@@ -346,6 +351,43 @@ TEST_CASE("illumination: it stays on for an exposure whose lead is on its way") 
     }
 }
 
+TEST_CASE("illumination: exposures without a pause share one longest light") {
+    Bench bench;
+    bench.light.plan(0, 10 * ms, ms, true, ms);
+    bench.edge(10 * ms, 0, true);
+    bench.run(11 * ms);
+    bench.light.plan(1, 11'100 * us, ms, true, 11 * ms);
+    bench.edge(11 * ms, 0, false);
+    bench.edge(11'100 * us, 1, true);
+    bench.run(25 * ms);
+    CHECK(bench.gate() == Times{9'900 * us, 19'900 * us});
+}
+
+TEST_CASE(
+    "illumination: after an exposure that ended, it ends with the lead of one that is missing") {
+    Bench bench;
+    bench.light.plan(0, 10 * ms, ms, true, ms);
+    bench.light.plan(1, 10'600 * us, ms, true, ms);
+    bench.edge(10 * ms, 0, true);
+    bench.edge(10'500 * us, 0, false);
+    bench.run(20 * ms);
+    CHECK(bench.gate() == Times{9'900 * us, 10'700 * us});
+}
+
+TEST_CASE("illumination: one that is refused leaves the others that wait as they are") {
+    Bench bench(ms, 10'000);
+    bench.light.plan(0, 10 * ms, ms, true, ms);
+    bench.edge(10 * ms, 0, true);
+    for (const Nanoseconds start : {12 * ms, 40 * ms, 60 * ms})
+        bench.light.plan(0, start, ms, true, 10 * ms);
+    bench.edge(15 * ms, 0, false);
+    bench.run(70 * ms);
+    CHECK(bench.reports.all == std::vector<Limited>{{output_light_gate, 10'900 * us, ms},
+                                                    {output_light_gate, 11'900 * us, 0}});
+    CHECK(bench.gate() ==
+          Times{9'900 * us, 10'900 * us, 39'900 * us, 40'200 * us, 59'900 * us, 60'100 * us});
+}
+
 TEST_CASE("illumination: eight exposures are planned, one more gets no light and is told") {
     Bench bench;
     for (Nanoseconds n = 1; n <= 8; ++n) bench.light.plan(0, 20 * n * ms, ms, true, 0);
@@ -360,7 +402,7 @@ TEST_CASE("illumination: eight exposures are planned, one more gets no light and
 TEST_CASE("illumination: stopped, it is dark, and what was planned is forgotten") {
     Bench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
-    bench.light.plan(1, 10'080 * us, 9 * ms, false, ms);
+    bench.light.plan(1, 10'080 * us, 19 * ms, false, ms);
     bench.edge(10 * ms, 0, true);
     bench.light.stop(10'020 * us);
     bench.run(11 * ms);
@@ -392,4 +434,17 @@ TEST_CASE("illumination: a new configuration earns no light") {
     bench.configuration.duty_ppm = 0;
     bench.light.configure(bench.configuration, 14 * ms);
     CHECK(bench.budget(24 * ms) == std::min(longest, 6'310 * us));
+}
+
+TEST_CASE("illumination: configured anew, it is dark at once") {
+    const bool lit = GENERATE(true, false);
+    Bench bench;
+    bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
+    bench.edge(10 * ms, 0, true);
+    bench.light.configure(lit ? bench.configuration : wire::IlluminationConfiguration{},
+                          10'100 * us);
+    bench.light.plan(0, 20 * ms, 4 * ms, true, 10'100 * us);
+    bench.run(30 * ms);
+    CHECK(bench.gate() == (lit ? Times{9'900 * us, 10'100 * us, 19'900 * us, 21'900 * us}
+                               : Times{9'900 * us, 10'100 * us}));
 }

@@ -103,12 +103,14 @@ TEST_CASE("output_queue: cancelling leaves the output idle and the others alone"
     queue.commit(11 - OutputQueue::horizon);
     queue.set(50, 0, false);
     queue.set(60, 0, true);
-    queue.set(55, 1, true);
+    queue.set(45, 1, true);
     CHECK(queue.rest(0, false, 20) == 20);
     CHECK(queue.has_room(0, 23));
     CHECK_FALSE(queue.has_room(0, 24));
+    CHECK_FALSE(queue.cancel(3));
     CHECK(queue.commit(0));
-    CHECK(hardware.words == Words{{10, 1}, {20, 0}, {55, 0b10}});
+    CHECK(hardware.words == Words{{10, 1}, {20, 0}, {45, 0b10}});
+    CHECK(queue.cancel(1));
 }
 
 TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, and is told") {
