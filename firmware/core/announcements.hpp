@@ -10,9 +10,9 @@
 namespace versavis::firmware {
 
 struct Announcement {
-    std::uint64_t trigger = 0;  ///< applies from this one on
-    Nanoseconds exposure = 0;
-    bool clipped = false;
+    std::uint64_t trigger;  ///< applies from this one on
+    Nanoseconds exposure;
+    bool clipped;
 };
 
 /// In the order of their triggers; at most eight, beyond that the furthest is dropped.

@@ -14,7 +14,7 @@ void ExposureTracker::configure(const wire::CameraConfiguration& configuration,
     configuration_ = configuration;
     patience_ = patience;
     period_ = configuration.rate_uhz == 0 ? never : 1'000'000'000'000'000 / configuration.rate_uhz;
-    last_end_ = INT64_MIN / 2;
+    last_end_ = -never;
 }
 
 void ExposureTracker::add(const wire::Exposure& record, Nanoseconds expected) {
@@ -70,14 +70,14 @@ ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
 }
 
 void ExposureTracker::edges_lost() {
-    while (count_ > 0 && started(flights_[0])) finish_first(wire::exposure_no_end);
+    if (count_ > 0 && started(flights_[0])) finish_first(wire::exposure_no_end);
 }
 
 Nanoseconds ExposureTracker::busy_until(Nanoseconds settled) const {
     if (count_ == 0) return last_end_;
-    for (std::size_t i = 0; i < count_; ++i)  // overdue: it may last any length of time
-        if (started(flights_[i]) && flights_[i].record.start_ns + flights_[i].expected < settled)
-            return never / 2;
+    const Flight& first = flights_[0];
+    if (started(first) && first.record.start_ns + first.expected < settled)
+        return never / 2;  // overdue: it may last any length of time
     const Flight& newest = flights_[count_ - 1];
     const Nanoseconds start = started(newest)
                                   ? newest.record.start_ns

@@ -43,8 +43,8 @@ class ExposureTracker {
     /// Takes an edge of the exposure line; edges come in order. Returns the trigger of an exposure
     /// that it completed, with its duration; trigger 0: it completed none.
     struct Completed {
-        std::uint64_t trigger = 0;
-        Nanoseconds duration = 0;
+        std::uint64_t trigger;
+        Nanoseconds duration;
     };
     Completed edge(Nanoseconds at, bool exposing);
 
@@ -89,10 +89,9 @@ class ExposureTracker {
     wire::CameraConfiguration configuration_{};
     Nanoseconds patience_ = 0;
     Nanoseconds period_ = 0;
-    Nanoseconds last_end_ =
-        INT64_MIN / 2;             ///< when the newest finished exposure ended, or was given up
-    std::uint64_t last_tick_ = 0;  ///< of the newest finished record
-    Flight flights_[max_flights] = {};
+    Nanoseconds last_end_ = -never;  ///< when the newest finished exposure ended, or was given up
+    std::uint64_t last_tick_ = 0;    ///< of the newest finished record
+    Flight flights_[max_flights] = {};  ///< only the first can have started
     std::size_t count_ = 0;
 };
 

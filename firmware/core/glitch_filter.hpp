@@ -17,15 +17,14 @@ class GlitchFilter {
 
     /// An edge of the line; edges come in order, each after take() for its instant.
     void edge(Nanoseconds at, bool level) {
-        // The same level twice: the edge in between was missed, and this one counts anew.
-        if (!pending() && (!known_ || level == line_)) level_ = !level;
-        known_ = true;
+        if (pending()) {
+            ++left_out_;
+        } else {
+            first_ = at;
+            level_ = !level;  // also if it was so before: then the edge in between was missed
+        }
         line_ = level;
         newest_ = at;
-        if (pending())
-            ++left_out_;
-        else
-            first_ = at;
     }
 
     /// True, once, when all edges before `settled` are known and a level has lasted: it counts from
@@ -43,10 +42,7 @@ class GlitchFilter {
     }
 
     /// The levels from before say nothing about those from here on.
-    void edges_lost() {
-        first_ = never;
-        known_ = false;
-    }
+    void edges_lost() { first_ = never; }
 
     /// Before this instant nothing more will count.
     Nanoseconds settled(Nanoseconds settled) const { return first_ < settled ? first_ : settled; }
@@ -65,7 +61,6 @@ class GlitchFilter {
     bool pending() const { return first_ != never; }
 
     Nanoseconds width_ = 0;
-    bool known_ = false;         ///< the levels are
     bool level_ = false;         ///< that counts
     bool line_ = false;          ///< of the newest edge
     Nanoseconds first_ = never;  ///< edge towards a level that does not count yet

@@ -8,7 +8,7 @@ namespace {
 constexpr Nanoseconds lead_overlap =
     50'000;  // the lead lasts into the exposure, so that there is no gap when it begins
 constexpr Nanoseconds start_patience =
-    2'000'000;  // a camera that starts this late still gets light
+    2'000'000;  // a camera that starts this long after the gate opened still gets light
 constexpr Nanoseconds shortest_light = 10'000;
 constexpr std::int64_t million = 1'000'000;
 
@@ -20,26 +20,26 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 void Illumination::configure(const wire::IlluminationConfiguration& configuration,
                              Nanoseconds now) {
     stop(now);
-    // A new configuration does not earn more light; the very first finds a full store.
-    saved_ = configuration_.max_on_ns == 0 ? configuration.max_on_ns
-                                           : min(budget(now), configuration.max_on_ns);
-    saved_at_ = now;
-    if (configuration.cameras != 0) configuration_ = configuration;
-    configuration_.cameras = configuration.cameras;
+    if (configuration.cameras != 0) {
+        // A new configuration earns no light; the very first finds a full store.
+        saved_ = configuration_.max_on_ns == 0 ? configuration.max_on_ns
+                                               : min(budget(now), configuration.max_on_ns);
+        saved_at_ = now;
+        configuration_ = configuration;
+    } else {
+        configuration_.cameras = 0;
+    }
 }
 
 void Illumination::stop(Nanoseconds now) {
     plan_count_ = 0;
     exposing_ = 0;
-    over_ = false;
     outputs_.rest(output_light_lead, false, now);
     close_gate(now);
 }
 
 /// On-time that a span of time earns.
 Nanoseconds Illumination::earned(Nanoseconds span) const {
-    span = min(span,
-               configuration_.max_on_ns * million);  // earns the full store, and does not overflow
     return span / million * configuration_.duty_ppm +
            span % million * configuration_.duty_ppm / million;
 }
@@ -119,7 +119,7 @@ void Illumination::close_gate(Nanoseconds now) {
     const Nanoseconds closed =
         min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
     last_off_ = closed;
-    saved_ = gate_off_ - closed + earned(max(0, closed - gate_on_));
+    saved_ = gate_off_ - closed + earned(closed - gate_on_);
     saved_at_ = closed;
     gate_off_ = never;
 }
@@ -144,13 +144,12 @@ void Illumination::poll(Nanoseconds now, Nanoseconds settled) {
             dark_until_ = gate_off_ + configuration_.max_on_ns / 10;
         }
         gate_off_ = never;
-        over_ = false;
     } else if (open() && exposing_ == 0 &&
                (next_end() <= settled ||
                 (over_ && gate_on_ <= settled && !exposes_before(outputs_.soonest(now))))) {
         close_gate(now);
-        over_ = false;
     }
+    if (!open() || gate_on_ > settled) over_ = false;  // an exposure without this light ended
     forget_past(settled);
     open_next(now);
 }
@@ -159,9 +158,9 @@ Nanoseconds Illumination::next_end() const {
     if (!open()) return never;
     if (exposing_ != 0) return gate_off_;
     // No exposure came: the gate need not stay open.
-    Nanoseconds last = gate_on_;
+    Nanoseconds last = gate_on_ + start_patience;
     for (std::size_t i = 0; i < plan_count_; ++i) last = max(last, plans_[i].lead_off);
-    return min(gate_off_, last + start_patience);
+    return min(gate_off_, last);
 }
 
 }  // namespace versavis::firmware

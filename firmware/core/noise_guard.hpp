@@ -27,7 +27,7 @@ class NoiseGuard {
             for (std::uint16_t& count : counts_) count = 0;
         }
         const std::uint16_t most = is_data_ready(edge.input) ? most_ready : most_changes;
-        if (++counts_[edge.input] < most) return true;
+        if (++counts_[edge.input] <= most) return true;
         if ((muted_ >> edge.input & 1U) != 0)
             return true;  // stamped before the input was switched off
         muted_ |= 1U << edge.input;

@@ -30,7 +30,7 @@ void OutputQueue::remove_first(std::size_t count) {
 /// with those behind it.
 bool OutputQueue::held_back(const PendingEdge& edge, Nanoseconds at) {
     const std::uint8_t output = edge.output;
-    if (edge.hold == 0 || changed_[output] + edge.hold <= at) return false;
+    if (changed_[output] + edge.hold <= at) return false;
     Nanoseconds before = changed_[output];
     for (std::size_t i = 0; i < size_; ++i) {
         PendingEdge& later = edges_[i];

@@ -127,7 +127,7 @@ class OutputQueue {
     std::size_t size_ = 0;
     std::uint8_t counts_[output_count] = {};
     std::size_t high_water_ = 0;
-    Nanoseconds committed_until_ = INT64_MIN / 2;
+    Nanoseconds committed_until_ = -never;
     std::uint32_t levels_ = 0;
     Nanoseconds changed_[output_count] = {};  ///< when its level changed last
 };

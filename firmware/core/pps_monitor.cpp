@@ -18,31 +18,29 @@ constexpr Nanoseconds tolerance = 5'000;
 /// At half, the slope of a single second is believed; at twice, the state is late.
 constexpr std::size_t pulses_to_trust = 4;
 
+/// To the nearest. All pulses lie within 64 ms of whole seconds from the oldest.
+Nanoseconds whole_seconds(Nanoseconds span) { return (span + second / 2) / second; }
+
 }  // namespace
 
 void PpsMonitor::begin(Nanoseconds at) {
     count_ = 0;
-    add(at, 0);
+    add(at);
 }
 
-void PpsMonitor::add(Nanoseconds at, Nanoseconds seconds) {
+void PpsMonitor::add(Nanoseconds at) {
     if (count_ == capacity) {
-        for (std::size_t i = 1; i < capacity; ++i) {
-            pulses_[i - 1] = pulses_[i];
-            seconds_[i - 1] = seconds_[i];
-        }
         --count_;
+        for (std::size_t i = 0; i < count_; ++i) pulses_[i] = pulses_[i + 1];
     }
-    pulses_[count_] = at;
-    seconds_[count_] = static_cast<std::uint16_t>(seconds);
-    ++count_;
+    pulses_[count_++] = at;
     rival_.clear();
 }
 
 void PpsMonitor::pulse(Nanoseconds at) {
     const Nanoseconds gap = count_ == 0 ? never : at - pulses_[count_ - 1];
     if (gap > longest_gap) return begin(at);
-    const Nanoseconds seconds = (gap + second / 2) / second;
+    const Nanoseconds seconds = whole_seconds(gap);
     const Nanoseconds off = gap - seconds * second;
     const Nanoseconds allowed = seconds * (second / tolerance);
     if (seconds == 0 || off > allowed || -off > allowed) {
@@ -50,15 +48,19 @@ void PpsMonitor::pulse(Nanoseconds at) {
         if (rival_.add(at, second, tolerance)) begin(at);
         return;
     }
-    add(at, seconds);
-    Nanoseconds span = 0;
-    for (std::size_t i = 1; i < count_; ++i) span += seconds_[i];
-    error_ppb_ = static_cast<std::int32_t>((at - pulses_[0] - span * second) / span);
+    add(at);
 }
 
 wire::PpsState PpsMonitor::state(Nanoseconds now) const {
     if (count_ == 0 || now - pulses_[count_ - 1] > longest_gap) return wire::PpsState::none;
     return count_ >= pulses_to_trust ? wire::PpsState::good : wire::PpsState::acquiring;
+}
+
+std::int32_t PpsMonitor::error_ppb(Nanoseconds now) const {
+    if (state(now) != wire::PpsState::good) return 0;
+    const Nanoseconds span = pulses_[count_ - 1] - pulses_[0];
+    const Nanoseconds seconds = whole_seconds(span);
+    return static_cast<std::int32_t>((span - seconds * second) / seconds);
 }
 
 }  // namespace versavis::firmware

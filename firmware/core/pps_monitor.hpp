@@ -16,20 +16,16 @@ class PpsMonitor {
     /// none: no good pulse within the last seconds before `now`.
     wire::PpsState state(Nanoseconds now) const;
     /// 0 unless the state is good.
-    std::int32_t error_ppb(Nanoseconds now) const {
-        return state(now) == wire::PpsState::good ? error_ppb_ : 0;
-    }
+    std::int32_t error_ppb(Nanoseconds now) const;
 
  private:
     static constexpr std::size_t capacity = 33;
 
     void begin(Nanoseconds at);
-    void add(Nanoseconds at, Nanoseconds seconds);
+    void add(Nanoseconds at);
 
-    Nanoseconds pulses_[capacity] = {};     ///< oldest first; whole seconds apart
-    std::uint16_t seconds_[capacity] = {};  ///< since the previous pulse
+    Nanoseconds pulses_[capacity] = {};  ///< oldest first; whole seconds apart
     std::size_t count_ = 0;
-    std::int32_t error_ppb_ = 0;
     PulseRival rival_;
 };
 

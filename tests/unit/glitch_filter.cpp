@@ -97,3 +97,31 @@ TEST_CASE("glitch_filter: after a missed edge the next one counts, whatever its 
     line.settle(75'000);
     CHECK(line.edges.back() == std::pair<Nanoseconds, bool>{70'000, true});
 }
+
+TEST_CASE("glitch_filter: configured anew, it forgets what was pending") {
+    Line line;
+    line.edge(1'000, true);
+    line.edge(2'000, false);
+    line.filter.configure(7'000);
+    CHECK(line.filter.next_wake() == never);
+    CHECK(line.filter.settled(10'000) == 10'000);
+    CHECK(line.filter.take_left_out() == 0);
+    line.edge(20'000, false);
+    CHECK(line.filter.next_wake() == 27'000);
+    line.settle(27'000);
+    CHECK(line.edges == Edges{{20'000, false}});
+}
+
+TEST_CASE("glitch_filter: what is left out is counted, an edge from rest always may count") {
+    Line line;
+    line.edge(0, true);
+    line.edge(1'000, true);  // the fall in between was missed
+    line.settle(6'000);
+    CHECK(line.edges == Edges{{0, true}});
+    CHECK(line.filter.take_left_out() == 1);
+    line.edge(20'000, true);
+    line.edge(21'000, false);
+    line.settle(30'000);
+    CHECK(line.edges.size() == 1);
+    CHECK(line.filter.take_left_out() == 2);
+}

@@ -11,32 +11,46 @@ constexpr Nanoseconds second = 1'000'000'000;
 
 TEST_CASE("pulse_rival: three pulses whole periods apart agree, over short gaps") {
     PulseRival rival;
-    CHECK_FALSE(rival.add(100, second, 5'000));
-    CHECK_FALSE(rival.add(100 + second + 200'000, second, 5'000));
-    CHECK(rival.add(100 + 5 * second, second, 5'000));
-    CHECK(rival.first() == 100);
-    CHECK(rival.newest() == 100 + 5 * second);
+    CHECK_FALSE(rival.add(second, second, 5'000));
+    CHECK_FALSE(rival.add(2 * second, second, 5'000));
+    CHECK(rival.add(6 * second, second, 5'000));
+    CHECK(rival.first() == second);
+    CHECK(rival.newest() == 6 * second);
     CHECK(rival.periods() == 5);
+    CHECK(rival.add(7 * second, second, 5'000));
     rival.clear();
-    CHECK_FALSE(rival.add(100 + 6 * second, second, 5'000));
+    CHECK_FALSE(rival.add(8 * second, second, 5'000));
+    CHECK_FALSE(rival.add(9 * second, second, 5'000));
+    CHECK(rival.add(10 * second, second, 5'000));
+    CHECK(rival.first() == 8 * second);
+}
+
+TEST_CASE("pulse_rival: pulses agree up to the tolerance of the time between them") {
+    const Nanoseconds sign = GENERATE(1, -1);
+    const Nanoseconds periods = GENERATE(1, 4);
+    CAPTURE(sign, periods);
+    const Nanoseconds furthest = periods * (second + sign * 200'000);
+    for (const Nanoseconds beyond : {0, 1}) {
+        PulseRival rival;
+        CHECK_FALSE(rival.add(0, second, 5'000));
+        CHECK_FALSE(rival.add(furthest, second, 5'000));
+        CHECK(rival.add(2 * furthest + sign * beyond, second, 5'000) == (beyond == 0));
+    }
 }
 
 TEST_CASE("pulse_rival: one that does not agree begins anew") {
-    for (const Nanoseconds off : {200'001, -200'001}) {
-        PulseRival rival;
-        CHECK_FALSE(rival.add(0, second, 5'000));
-        CHECK_FALSE(rival.add(second, second, 5'000));
-        CHECK_FALSE(rival.add(2 * second + off, second, 5'000));
-        CHECK(rival.first() == 2 * second + off);
-        CHECK_FALSE(rival.add(3 * second + off, second, 5'000));
-        CHECK(rival.add(4 * second + off, second, 5'000));
-    }
+    const Nanoseconds odd = GENERATE(as<Nanoseconds>{}, 2 * second + 200'001,  // off
+                                     second + 300'000'000,  // less than half a period
+                                     second,                // the same again
+                                     6 * second);           // too long ago
+    CAPTURE(odd);
     PulseRival rival;
-    rival.add(0, second, 5'000);
-    rival.add(second, second, 5'000);
-    CHECK_FALSE(rival.add(second + 300'000'000, second, 5'000));  // less than half a period
-    rival.clear();
-    rival.add(0, second, 5'000);
-    rival.add(second, second, 5'000);
-    CHECK_FALSE(rival.add(6 * second, second, 5'000));  // too long ago
+    CHECK_FALSE(rival.add(0, second, 5'000));
+    CHECK_FALSE(rival.add(second, second, 5'000));
+    CHECK_FALSE(rival.add(odd, second, 5'000));
+    CHECK(rival.first() == odd);
+    CHECK(rival.periods() == 0);
+    CHECK_FALSE(rival.add(odd + second, second, 5'000));
+    CHECK(rival.add(odd + 2 * second, second, 5'000));
+    CHECK(rival.periods() == 2);
 }
