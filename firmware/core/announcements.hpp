@@ -46,8 +46,8 @@ class Announcements {
  private:
     static constexpr std::size_t capacity = 8;
 
-    Announcement entries_[capacity] = {};
     std::size_t count_ = 0;
+    Announcement entries_[capacity];
 };
 
 }  // namespace versavis::firmware

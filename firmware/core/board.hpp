@@ -119,7 +119,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     NoiseGuard noise_;
     NmeaReader nmea_;
     wire::Configuration configuration_{};  ///< in force
-    wire::Configuration wanted_{};         ///< waits for the last pulses and exposures to end
+    wire::Configuration wanted_;           ///< waits for the last pulses and exposures to end
     PpsMonitor pps_;
     Illumination light_;
     Vn100 uart_imu_;

@@ -117,20 +117,17 @@ class CameraChannel {
     bool has(wire::CameraFlag flag) const { return (configuration_.flags & flag) != 0; }
 
     std::uint8_t camera_;
+    std::uint8_t start_flags_ = 0;
+    bool running_ = false;
+    bool uncounted_ = false;  ///< pulses of this slave may have been missed
+    bool stirred_ = true;     ///< the tracker changed since `expiry_` was asked for
     const GridClock& clock_;
     OutputQueue& outputs_;
     ChannelReports& reports_;
-    ExposureTracker tracker_;
-    bool stirred_ = true;     ///< it changed since `expiry_` was asked for
-    Nanoseconds expiry_ = 0;  ///< its next deadline
-    GlitchFilter filter_;
-    wire::CameraConfiguration configuration_{};
-    Grid grid_;                      ///< in grid time
-    Nanoseconds trigger_at_ = 0;     ///< of the next grid point, as things are
-    Nanoseconds decide_at_ = never;  ///< and when it is decided
-    bool running_ = false;
-    bool uncounted_ = false;  ///< pulses of this slave may have been missed
-    std::uint8_t start_flags_ = 0;
+    std::uint32_t skipped_ = 0;
+    Nanoseconds trigger_at_ = 0;             ///< of the next grid point, as things are
+    Nanoseconds decide_at_ = never;          ///< and when it is decided
+    Nanoseconds expiry_ = 0;                 ///< next deadline of the tracker
     std::uint64_t trigger_ = 0;              ///< pulses sent since boot
     std::uint64_t first_tick_ = 0;           ///< of this run, where the pattern begins
     std::uint64_t next_tick_ = 0;            ///< the first not decided yet
@@ -140,8 +137,11 @@ class CameraChannel {
     Nanoseconds lead_ = 0;
     Nanoseconds expected_ = 0;
     std::uint64_t expected_since_ = 0;  ///< trigger that set `expected_`
+    Grid grid_;                         ///< in grid time
+    wire::CameraConfiguration configuration_{};
+    GlitchFilter filter_;
     Announcements announcements_;
-    std::uint32_t skipped_ = 0;
+    ExposureTracker tracker_;
 };
 
 }  // namespace versavis::firmware

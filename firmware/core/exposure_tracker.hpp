@@ -91,8 +91,8 @@ class ExposureTracker {
     Nanoseconds period_ = 0;
     Nanoseconds last_end_ = -never;  ///< when the newest finished exposure ended, or was given up
     std::uint64_t last_tick_ = 0;    ///< of the newest finished record
-    Flight flights_[max_flights] = {};  ///< only the first can have started
     std::size_t count_ = 0;
+    Flight flights_[max_flights];  ///< only the first can have started
 };
 
 }  // namespace versavis::firmware

@@ -42,6 +42,42 @@ GridLine::GridLine(Nanoseconds board, Nanoseconds grid, std::int64_t pace_ppb)
     pace_ = (scaled + (scaled < 0 ? -billion : billion) / 2) / billion;
 }
 
+Nanoseconds GridLine::board_time(Nanoseconds grid_time) const {
+    const Nanoseconds since = grid_time - grid_;
+    return board_ + since + gained(since);
+}
+
+Nanoseconds GridLine::grid_time(Nanoseconds board_time) const {
+    const Nanoseconds since = board_time - board_;
+    if (pace_ == 0) return grid_ + since;
+    const Nanoseconds margin =
+        ((since < 0 ? -since : since) >> 27) + 4;  // more than the cube of the pace
+    return grid_ + since - gained(since - gained(since)) - margin;
+}
+
+Nanoseconds GridLine::gained(Nanoseconds since) const {
+    if (pace_ == 0) return 0;
+    const Nanoseconds low = (since & 0xFFFFFFFF) * pace_;
+    const Nanoseconds high = (since >> 32) * pace_;
+    return (high + (low >> 32) + 128) >> 8;
+}
+
+void GridClock::begin(Nanoseconds origin, Nanoseconds sync_period) {
+    *this = {};
+    line_ = GridLine(origin, 0, 0);
+    period_ = sync_period;
+    newest_pulse_ = origin;
+}
+
+Nanoseconds GridClock::board_time(Nanoseconds grid_time) const {
+    return (grid_time < bend_ ? approach_ : line_).board_time(grid_time);
+}
+
+Nanoseconds GridClock::grid_time(Nanoseconds board_time) const {
+    const bool approaches = bend_ != no_bend && board_time < line_.board_time(bend_);
+    return (approaches ? approach_ : line_).grid_time(board_time);
+}
+
 GridClock::SyncPulse GridClock::sync_pulse(Nanoseconds at, bool running) {
     if (period_ == 0) return {};
     const Nanoseconds since = at - line_.board();

@@ -22,28 +22,14 @@ class GridLine {
     Nanoseconds board() const { return board_; }
     Nanoseconds grid() const { return grid_; }
 
-    Nanoseconds board_time(Nanoseconds grid_time) const {
-        const Nanoseconds since = grid_time - grid_;
-        return board_ + since + gained(since);
-    }
+    Nanoseconds board_time(Nanoseconds grid_time) const;
 
     /// Not after the true one, and close before it: a place to begin a search with.
-    Nanoseconds grid_time(Nanoseconds board_time) const {
-        const Nanoseconds since = board_time - board_;
-        if (pace_ == 0) return grid_ + since;
-        const Nanoseconds margin =
-            ((since < 0 ? -since : since) >> 27) + 4;  // more than the cube of the pace
-        return grid_ + since - gained(since - gained(since)) - margin;
-    }
+    Nanoseconds grid_time(Nanoseconds board_time) const;
 
  private:
     /// since * pace_ / 2^40, rounded, in two halves that do not overflow.
-    Nanoseconds gained(Nanoseconds since) const {
-        if (pace_ == 0) return 0;
-        const Nanoseconds low = (since & 0xFFFFFFFF) * pace_;
-        const Nanoseconds high = (since >> 32) * pace_;
-        return (high + (low >> 32) + 128) >> 8;
-    }
+    Nanoseconds gained(Nanoseconds since) const;
 
     Nanoseconds board_ = 0;
     Nanoseconds grid_ = 0;
@@ -60,22 +46,12 @@ class GridClock {
  public:
     /// Grid time 0 is at `origin`; `sync_period` by the sender's clock; 0: unknown, pulses are not
     /// followed.
-    void begin(Nanoseconds origin, Nanoseconds sync_period) {
-        *this = {};
-        line_ = GridLine(origin, 0, 0);
-        period_ = sync_period;
-        newest_pulse_ = origin;
-    }
+    void begin(Nanoseconds origin, Nanoseconds sync_period);
 
-    Nanoseconds board_time(Nanoseconds grid_time) const {
-        return (grid_time < bend_ ? approach_ : line_).board_time(grid_time);
-    }
+    Nanoseconds board_time(Nanoseconds grid_time) const;
 
     /// Not after the true one, and close before it: a place to begin a search with.
-    Nanoseconds grid_time(Nanoseconds board_time) const {
-        const bool approaches = bend_ != no_bend && board_time < line_.board_time(bend_);
-        return (approaches ? approach_ : line_).grid_time(board_time);
-    }
+    Nanoseconds grid_time(Nanoseconds board_time) const;
 
     enum class Sync : std::uint8_t {
         ignored,   ///< no sender is followed, or the pulse is one more that does not fit

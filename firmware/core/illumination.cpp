@@ -17,6 +17,9 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 }  // namespace
 
+Illumination::Illumination(OutputQueue& outputs, ChannelReports& reports)
+    : outputs_(outputs), reports_(reports) {}
+
 void Illumination::configure(const wire::IlluminationConfiguration& configuration,
                              Nanoseconds now) {
     stop(now);

@@ -10,8 +10,7 @@ namespace versavis::firmware {
 
 class Illumination {
  public:
-    Illumination(OutputQueue& outputs, ChannelReports& reports)
-        : outputs_(outputs), reports_(reports) {}
+    Illumination(OutputQueue& outputs, ChannelReports& reports);
 
     void configure(const wire::IlluminationConfiguration& configuration, Nanoseconds now);
 
@@ -61,7 +60,6 @@ class Illumination {
     OutputQueue& outputs_;
     ChannelReports& reports_;
     wire::IlluminationConfiguration configuration_{};
-    Plan plans_[max_plans] = {};
     std::size_t plan_count_ = 0;
     std::uint8_t exposing_ = 0;  ///< cameras whose line is active
     bool over_ = false;          ///< the last exposure of this light has ended
@@ -71,6 +69,7 @@ class Illumination {
     Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last told to close
     Nanoseconds saved_ = 0;               ///< on-time that may be spent, as of saved_at_
     Nanoseconds saved_at_ = 0;
+    Plan plans_[max_plans];
 };
 
 }  // namespace versavis::firmware

@@ -42,13 +42,13 @@ class NmeaReader {
 
     bool finish(UtcLabel& label);
 
-    char line_[longest] = {};
     std::size_t size_ = 0;  ///< 0: waits for the beginning of a sentence
     Nanoseconds began_ = 0;
     Nanoseconds byte_duration_ = 0;
     Nanoseconds newest_ = long_ago;
     Nanoseconds before_ = long_ago;  ///< the bytes of a sentence may be read after the next pulse
     UtcLabel told_{};
+    char line_[longest];
 };
 
 }  // namespace versavis::firmware

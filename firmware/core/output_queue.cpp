@@ -3,6 +3,9 @@
 
 namespace versavis::firmware {
 
+OutputQueue::OutputQueue(OutputSchedule& hardware, OutputMoves& moves, const PortFacts& facts)
+    : hardware_(hardware), moves_(moves), grain_(facts.output_grain()), step_(facts.output_step) {}
+
 Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold) {
     at = (at + grain_ / 2) & ~(grain_ - 1);
     if (at < committed_until_ + step_) at = committed_until_ + step_;

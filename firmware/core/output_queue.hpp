@@ -25,11 +25,7 @@ class OutputQueue {
     /// are expected from older measurements.
     static constexpr Nanoseconds horizon = 1'000'000;
 
-    OutputQueue(OutputSchedule& hardware, OutputMoves& moves, const PortFacts& facts)
-        : hardware_(hardware),
-          moves_(moves),
-          grain_(facts.output_grain()),
-          step_(facts.output_step) {}
+    OutputQueue(OutputSchedule& hardware, OutputMoves& moves, const PortFacts& facts);
 
     /// True while `edges` more can be set of an output. The rooms of all outputs fit together.
     bool has_room(unsigned output, unsigned edges = 2) const {
@@ -123,13 +119,13 @@ class OutputQueue {
     OutputMoves& moves_;
     Nanoseconds grain_;
     Nanoseconds step_;
-    PendingEdge edges_[capacity] = {};
     std::size_t size_ = 0;
     std::uint8_t counts_[output_count] = {};
     std::size_t high_water_ = 0;
     Nanoseconds committed_until_ = -never;
     std::uint32_t levels_ = 0;
     Nanoseconds changed_[output_count] = {};  ///< when its level changed last
+    PendingEdge edges_[capacity];
 };
 
 }  // namespace versavis::firmware

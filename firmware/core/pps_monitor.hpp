@@ -24,9 +24,9 @@ class PpsMonitor {
     void begin(Nanoseconds at);
     void add(Nanoseconds at);
 
-    Nanoseconds pulses_[capacity] = {};  ///< oldest first; whole seconds apart
     std::size_t count_ = 0;
     PulseRival rival_;
+    Nanoseconds pulses_[capacity];  ///< oldest first; whole seconds apart
 };
 
 }  // namespace versavis::firmware

@@ -14,13 +14,7 @@ class PulseTrain {
 
     /// A pulse at each point of `grid`, which is in the time of `clock`, at `output`.
     void begin(unsigned output, const Grid& grid, const GridClock& clock, Nanoseconds width,
-               Nanoseconds now) {
-        output_ = output;
-        grid_ = grid;
-        clock_ = &clock;
-        width_ = width;
-        skip(now);
-    }
+               Nanoseconds now);
     void stop() { clock_ = nullptr; }
     /// The clock changed.
     void moved() {
@@ -29,39 +23,12 @@ class PulseTrain {
 
     /// Before each commit of the outputs: pulses are decided further ahead than words are
     /// committed.
-    void poll(Nanoseconds now) {
-        if (clock_ == nullptr || at_ > now + furthest) return;
-        // A late pulse would be taken for one on time: it is left out.
-        if (at_ < now + soonest) skip(now);
-        while (at_ <= now + furthest && outputs_.has_room(output_)) {
-            outputs_.pulse(at_, output_, true, width_);
-            grid_.advance();
-            moved();
-        }
-    }
+    void poll(Nanoseconds now);
 
-    Nanoseconds next_wake() const { return clock_ == nullptr ? never : at_ - wake_ahead; }
+    Nanoseconds next_wake() const;
 
  private:
-    /// A pulse is decided this long before it leaves, at most: many at once where they are fast. At
-    /// half, words for other outputs overtake it; at twice, the room of the output does not hold
-    /// it.
-    static constexpr Nanoseconds furthest = 1'200'000;
-    static_assert(furthest > OutputQueue::horizon);
-    /// At half, a slow poll leaves pulses out; at twice, fast trains take more polls.
-    static constexpr Nanoseconds wake_ahead = 700'000;
-    /// What is decided later than that may leave late. At half, a port with a horizon of its own
-    /// makes it late; at twice, pulses are left out that would be on time.
-    static constexpr Nanoseconds soonest = 300'000;
-
-    void skip(Nanoseconds now) {
-        grid_.skip_before(clock_->grid_time(now + soonest));
-        moved();
-        while (at_ < now + soonest) {
-            grid_.advance();
-            moved();
-        }
-    }
+    void skip(Nanoseconds now);
 
     OutputQueue& outputs_;
     unsigned output_ = 0;

@@ -13,6 +13,9 @@ std::uint32_t age(Nanoseconds of, Nanoseconds now) {
 
 }  // namespace
 
+Transmitter::Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce)
+    : link_(link), clock_(clock), nonce_(nonce) {}
+
 void Transmitter::begin() {
     for (Waiting& waiting : waiting_) waiting.count = 0;
     total_ = 0;

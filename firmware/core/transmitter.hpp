@@ -33,7 +33,7 @@ constexpr auto make_message_queues() {
                                          {wire::Type::log, 8, 0, 0}}};
     std::uint32_t offset = 0;
     for (MessageQueue& queue : queues) {
-        queue.message_size = static_cast<std::uint16_t>(wire::payload_size(queue.type));
+        queue.message_size = wire::payload_size(queue.type);
         queue.offset = offset;
         offset += std::uint32_t{queue.capacity} * queue.message_size;
     }
@@ -52,8 +52,7 @@ constexpr unsigned queue_of(wire::Type type) {
 /// numbered as they leave, so that a gap is a loss on the line.
 class Transmitter {
  public:
-    Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce)
-        : link_(link), clock_(clock), nonce_(nonce) {}
+    Transmitter(ByteLink& link, Clock64& clock, std::uint32_t nonce);
 
     /// A new connection: what is waiting was meant for the previous one.
     void begin();

@@ -327,28 +327,35 @@ static_assert(sizeof(ClockRequest) == 8 && sizeof(ClockAnswer) == 24 &&
 static_assert(sizeof(Start) == 4 && sizeof(Stop) == 4 && sizeof(ExpectedExposure) == 24 &&
               sizeof(Reboot) == 8 && sizeof(AlignGrid) == 16);
 
+struct PayloadSize {
+    Type type;
+    std::uint16_t bytes;
+};
+inline constexpr PayloadSize payload_sizes[] = {
+    {BoardHello::type, sizeof(BoardHello)},
+    {Exposure::type, sizeof(Exposure)},
+    {ImuSample::type, sizeof(ImuSample)},
+    {Event::type, sizeof(Event)},
+    {ClockAnswer::type, sizeof(ClockAnswer)},
+    {ClockFollowUp::type, sizeof(ClockFollowUp)},
+    {Health::type, sizeof(Health)},
+    {Log::type, sizeof(Log)},
+    {ConfigurationAnswer::type, sizeof(ConfigurationAnswer)},
+    {Refusal::type, sizeof(Refusal)},
+    {HostHello::type, sizeof(HostHello)},
+    {Configuration::type, sizeof(Configuration)},
+    {Start::type, sizeof(Start)},
+    {Stop::type, sizeof(Stop)},
+    {ClockRequest::type, sizeof(ClockRequest)},
+    {ExpectedExposure::type, sizeof(ExpectedExposure)},
+    {Reboot::type, sizeof(Reboot)},
+    {AlignGrid::type, sizeof(AlignGrid)},
+};
+
 /// Size of the payload of `type`, or 0 when the type is unknown.
-constexpr std::size_t payload_size(Type type) {
-    switch (type) {
-        case Type::board_hello: return sizeof(BoardHello);
-        case Type::exposure: return sizeof(Exposure);
-        case Type::imu_sample: return sizeof(ImuSample);
-        case Type::event: return sizeof(Event);
-        case Type::clock_answer: return sizeof(ClockAnswer);
-        case Type::clock_follow_up: return sizeof(ClockFollowUp);
-        case Type::health: return sizeof(Health);
-        case Type::log: return sizeof(Log);
-        case Type::configuration_answer: return sizeof(ConfigurationAnswer);
-        case Type::refusal: return sizeof(Refusal);
-        case Type::host_hello: return sizeof(HostHello);
-        case Type::configuration: return sizeof(Configuration);
-        case Type::start: return sizeof(Start);
-        case Type::stop: return sizeof(Stop);
-        case Type::clock_request: return sizeof(ClockRequest);
-        case Type::expected_exposure: return sizeof(ExpectedExposure);
-        case Type::reboot: return sizeof(Reboot);
-        case Type::align_grid: return sizeof(AlignGrid);
-    }
+constexpr std::uint16_t payload_size(Type type) {
+    for (const PayloadSize& size : payload_sizes)
+        if (size.type == type) return size.bytes;
     return 0;
 }
 

@@ -16,21 +16,21 @@ constexpr wire::ImuScale adis16448 = wire::imu_scale(wire::ImuKind::adis16448b);
 struct Scale {
     constexpr explicit Scale(const wire::ImuScale& of)
         : kind(of.kind),
-          gyro(q32(of.gyro_rad_s / adis16448.gyro_rad_s)),
-          accel(q32(of.accel_m_s2 / adis16448.accel_m_s2)),
-          temperature(q32(of.temperature_c / adis16448.temperature_c)),
           temperature_offset(static_cast<std::int32_t>(
               (of.temperature_at_zero_c - adis16448.temperature_at_zero_c) /
                   adis16448.temperature_c -
               0.5)),
+          gyro(q32(of.gyro_rad_s / adis16448.gyro_rad_s)),
+          accel(q32(of.accel_m_s2 / adis16448.accel_m_s2)),
+          temperature(q32(of.temperature_c / adis16448.temperature_c)),
           magnetic(q32(of.magnetic_t / adis16448.magnetic_t)),
           pressure(q32(of.pressure_pa / adis16448.pressure_pa)) {}
 
     wire::ImuKind kind;
+    std::int32_t temperature_offset;
     std::int64_t gyro;
     std::int64_t accel;
     std::int64_t temperature;
-    std::int32_t temperature_offset;
     std::int64_t magnetic;
     std::int64_t pressure;
 };

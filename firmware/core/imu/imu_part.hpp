@@ -40,8 +40,8 @@ class Setup {
         if (size_ < capacity) steps_[size_++] = step;
     }
 
-    SetupStep steps_[capacity] = {};
     std::size_t size_ = 0;
+    SetupStep steps_[capacity];
 };
 
 /// What a part is set up for.

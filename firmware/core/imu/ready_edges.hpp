@@ -11,7 +11,7 @@ class ReadyEdges {
     /// Edges closer than an eighth of the part's period to the one before are echoes of it, but at
     /// most 100 us: a part that reset itself and runs faster is to be noticed.
     void configure(Nanoseconds period) {
-        *this = {};
+        count_ = known_ = echoes_ = 0;
         width_ = period / 8 < longest_echo ? period / 8 : longest_echo;
     }
 
@@ -66,10 +66,10 @@ class ReadyEdges {
     static constexpr Nanoseconds longest_echo = 100'000;
 
     Nanoseconds width_ = 0;
-    Nanoseconds stamps_[kept] = {};
     std::uint32_t count_ = 0;
     std::uint32_t known_ = 0;  ///< of the newest of them
     std::uint32_t echoes_ = 0;
+    Nanoseconds stamps_[kept];
 };
 
 }  // namespace versavis::firmware

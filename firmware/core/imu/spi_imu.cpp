@@ -54,6 +54,9 @@ std::uint32_t part_rate(const ImuPart& part, const wire::ImuConfiguration& confi
 
 }  // namespace
 
+SpiImu::SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports)
+    : ImuPort(port, reports), bus_(bus) {}
+
 std::uint32_t SpiImu::true_rate(const wire::ImuConfiguration& configuration) {
     const ImuPart* part = find_part(configuration.kind);
     const bool paced_by_part = (configuration.options & wire::imu_data_ready) != 0;
@@ -223,16 +226,17 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     if (!has(wire::imu_accel_ready)) return;
     const AccelBytes bytes = part_->accel_bytes();
     const ImuReply& reply = replies_[bytes.reading];
-    const Nanoseconds size = job_.transfers[bytes.reading].size;
-    const Nanoseconds length = reply.ended - reply.started;
+    const std::uint32_t size = job_.transfers[bytes.reading].size;
+    const auto length = static_cast<std::uint32_t>(reply.ended - reply.started);
     const Nanoseconds first = reply.started + length * bytes.first / size - accel_margin;
     const Nanoseconds end = reply.started + length * bytes.end / size + accel_margin;
     Nanoseconds taken = 0;
     Nanoseconds before = 0;
-    Nanoseconds newest = 0;
+    Nanoseconds newer = 0;
     std::uint32_t edge = 0;
-    if (!accel_edges_.find(first, taken, edge) || !accel_edges_.find(taken - 1, before, edge) ||
-        !accel_edges_.find(end, newest, edge) || newest != taken)
+    if (!accel_edges_.find(first, taken, edge) ||
+        (accel_edges_.next(edge, newer) && newer <= end) ||
+        !accel_edges_.find(taken - 1, before, edge))
         return;
     const Nanoseconds period = taken - before;
     const Nanoseconds off = period - accel_period_;

@@ -11,8 +11,7 @@ namespace versavis::firmware {
 
 class SpiImu final : public ImuPort {
  public:
-    SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports)
-        : ImuPort(port, reports), bus_(bus) {}
+    SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports);
 
     /// With a kind that is not on this bus, nothing is read.
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
@@ -69,27 +68,27 @@ class SpiImu final : public ImuPort {
     const ImuPart* part_ = nullptr;
     wire::ImuConfiguration configuration_{};
     State state_ = State::off;
-    Setup setup_;
     std::size_t step_ = 0;
     Nanoseconds resume_ = 0;    ///< when the next step may begin
     Grid grid_;                 ///< unless the part paces the samples
     Nanoseconds patience_ = 0;  ///< how long its data-ready edge may fail to come
-    ImuJob job_;
     Job job_state_ = Job::none;
-    bool job_reads_ = false;          ///< its transfers are those that begin a sample
-    Nanoseconds job_until_ = 0;       ///< when it must have ended; never: it waits for an edge
-    unsigned readings_ = 0;           ///< of the sample that is being read
-    ImuReply replies_[max_readings];  ///< of the sample that is being read
-    Nanoseconds period_ = 0;          ///< of the edges, as the part was told
+    bool job_reads_ = false;     ///< its transfers are those that begin a sample
+    Nanoseconds job_until_ = 0;  ///< when it must have ended; never: it waits for an edge
+    unsigned readings_ = 0;      ///< of the sample that is being read
+    Nanoseconds period_ = 0;     ///< of the edges, as the part was told
     Nanoseconds accel_period_ = 0;
-    unsigned fast_edges_ = 0;  ///< edges in a row that came sooner
-    ReadyEdges ready_edges_;
-    ReadyEdges accel_edges_;
+    unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed
     Nanoseconds served_at_ = 0;  ///< the newest of them
     bool edges_lost_ = false;    ///< since then
     Nanoseconds silent_at_ = 0;  ///< when the next edge must have come
     Nanoseconds after_ = 0;      ///< the newest edge of the line, echoes included
+    Setup setup_;
+    ReadyEdges ready_edges_;
+    ReadyEdges accel_edges_;
+    ImuJob job_;
+    ImuReply replies_[max_readings];  ///< of the sample that is being read
 };
 
 }  // namespace versavis::firmware

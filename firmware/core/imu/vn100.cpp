@@ -96,6 +96,9 @@ std::uint32_t Vn100::divider() const {
     return vn100::fastest_millihertz / true_rate(configuration_.rate_millihertz);
 }
 
+Vn100::Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports)
+    : ImuPort(port, reports), uart_(uart) {}
+
 void Vn100::configure(const wire::ImuConfiguration& configuration, Nanoseconds now) {
     configuration_ = configuration;
     state_ = State::off;

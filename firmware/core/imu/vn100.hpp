@@ -27,8 +27,7 @@ inline constexpr std::size_t packet_size = 58;  ///< with time, IMU, magnetic an
 
 class Vn100 final : public ImuPort {
  public:
-    Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports)
-        : ImuPort(port, reports), uart_(uart) {}
+    Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports);
 
     void configure(const wire::ImuConfiguration& configuration, Nanoseconds now);
 
@@ -86,7 +85,7 @@ class Vn100 final : public ImuPort {
     Nanoseconds stamp_ = 0;              ///< edge of the newest sample
     std::uint64_t startup_ns_;           ///< the part's clock at the newest sample; 0: none yet
     Nanoseconds received_;               ///< when the last of the bytes had arrived
-    std::uint8_t bytes_[2 * vn100::packet_size] = {};
+    std::uint8_t bytes_[2 * vn100::packet_size];
     std::size_t filled_ = 0;
 };
 
