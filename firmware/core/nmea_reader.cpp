@@ -70,7 +70,8 @@ bool time_of_day(const Text& text, std::int64_t& seconds) {
     unsigned hours;
     unsigned minutes;
     unsigned whole;
-    if (text.size < 6 || !number(text.begin, 2, hours) || !number(text.begin + 2, 2, minutes) ||
+    // A shorter one ends before what is no digit.
+    if (!number(text.begin, 2, hours) || !number(text.begin + 2, 2, minutes) ||
         !number(text.begin + 4, 2, whole))
         return false;
     for (std::size_t i = 6; i < text.size; ++i)
@@ -122,11 +123,9 @@ bool zda(const Text* fields, std::int64_t& utc_s) {
     unsigned day;
     unsigned month;
     unsigned year;
-    if (fields[2].size != 2 || fields[3].size != 2 || fields[4].size != 4 ||
-        !number(fields[2].begin, 2, day) || !number(fields[3].begin, 2, month) ||
-        !number(fields[4].begin, 4, year))
-        return false;
-    return utc(fields[1], year, month, day, utc_s);
+    return fields[2].size == 2 && fields[3].size == 2 && fields[4].size == 4 &&
+           number(fields[2].begin, 2, day) && number(fields[3].begin, 2, month) &&
+           number(fields[4].begin, 4, year) && utc(fields[1], year, month, day, utc_s);
 }
 
 }  // namespace
@@ -146,14 +145,9 @@ bool NmeaReader::take(std::uint8_t byte, Nanoseconds at, UtcLabel& label) {
     if (byte == '$') {
         began_ = at - byte_duration_;
         size_ = 0;
-    } else if (size_ == 0) {
-        return false;
     }
     if (byte == '\r' || byte == '\n') return finish(label);
-    if (size_ == longest) {
-        size_ = 0;  // no sentence is that long
-        return false;
-    }
+    if (size_ == longest) size_ = 0;  // no sentence is that long
     line_[size_++] = static_cast<char>(byte);
     return false;
 }

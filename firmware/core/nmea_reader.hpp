@@ -42,7 +42,7 @@ class NmeaReader {
 
     bool finish(UtcLabel& label);
 
-    std::size_t size_ = 0;  ///< 0: waits for the beginning of a sentence
+    std::size_t size_ = 0;
     Nanoseconds began_ = 0;
     Nanoseconds byte_duration_ = 0;
     Nanoseconds newest_ = long_ago;

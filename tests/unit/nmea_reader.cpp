@@ -129,8 +129,9 @@ TEST_CASE("nmea_reader: what is no time, or no good one, gives none") {
         CHECK_FALSE(utc(rmc("120000", "010120", status)));
     for (const char* date : {"01012", "0101200", "", "010120 "})
         CHECK_FALSE(utc(rmc("120000", date)));
-    for (const char* date : {"1,01,2020", "001,01,2020", "01,1,2020", "01,001,2020", "01,01,20",
-                             "01,01,202", "01,01,20200", ",,", "01,01", "01"})
+    for (const char* date :
+         {"1,01,2020", "010,01,2020", "01,010,2020", "001,01,2020", "01,1,2020", "01,001,2020",
+          "01,01,20", "01,01,202", "01,01,20200", ",,", "01,01", "01"})
         CHECK_FALSE(utc(zda("120000", date)));
 }
 
@@ -260,9 +261,21 @@ TEST_CASE("nmea_reader: a sentence has at most 100 characters") {
         reader.begin(115'200);
         reader.pulse(0);
         CHECK(feed(reader, line + "\r\n", 100 * ms).size() == (size <= 100 ? 1 : 0));
+        CHECK(feed(reader, line + std::string(size, 'x') + "\r\n", 150 * ms).empty());
+        CHECK(feed(reader, line.substr(1) + "\r\n", 160 * ms).empty());
         // The next one is read again.
         CHECK(feed(reader, rmc("120001", "010120") + "\r\n", 200 * ms).size() == 1);
     }
+}
+
+TEST_CASE("nmea_reader: the end of a long line is no sentence") {
+    NmeaReader reader;
+    reader.begin(115'200);
+    reader.pulse(0);
+    const std::string line = rmc("120000", "010120") + "\r\n";
+    for (std::size_t size = 98; size < 104; ++size)
+        CHECK(feed(reader, "$" + std::string(size, 'A') + line.substr(1), 100 * ms).empty());
+    CHECK(feed(reader, line, 200 * ms).size() == 1);
 }
 
 TEST_CASE("nmea_reader: it begins anew with what it knows of pulses and bytes") {

@@ -428,6 +428,7 @@ TEST_CASE("vn100: only an intact answer to the command ends a step") {
     std::vector<std::string> wrong{framed(other),
                                    framed("VNYMR,+100.949,-006.786"),
                                    framed("VNER,0C"),
+                                   framed("VNERRS,0"),
                                    framed("VNASX,0"),
                                    framed("VNWRX,06,0"),
                                    framed(""),
@@ -695,9 +696,21 @@ TEST_CASE("vn100: a packet that begins with an edge, or long after one, is not s
     CHECK(sample(1, 400 * us));
     CHECK(sample(2, base - 1));
     CHECK_FALSE(sample(3, base));
-    CHECK_FALSE(sample(4, 3 * base));
-    CHECK_FALSE(sample(5, 0));
-    CHECK(world.samples.back().time_ns == 2 * second + 40 * base);
+    CHECK_FALSE(sample(4, 400 * us));  // it is not compared with the one before
+    CHECK(sample(5, 400 * us));
+    CHECK_FALSE(sample(6, 0));
+    CHECK(world.samples.back().time_ns == 2 * second + 48 * base);
+    CHECK_FALSE(sample(7, 3 * base));
+}
+
+TEST_CASE("vn100: more bytes wait than there is room for") {
+    Running world;
+    Bytes many;
+    for (int i = 0; i < 8; ++i) many = many + packet(second + static_cast<std::uint64_t>(i * base));
+    const Nanoseconds end = world.send({many.begin(), many.begin() + 50}, world.now);
+    world.send({many.begin() + 50, many.end()}, end);
+    CHECK(world.samples.size() == 8);
+    CHECK(world.imu.errors() == 0);
 }
 
 TEST_CASE("vn100: an edge that the part's own clock does not confirm stamps nothing") {

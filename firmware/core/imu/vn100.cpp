@@ -117,10 +117,7 @@ void Vn100::begin_setup(Nanoseconds at) {
 }
 
 void Vn100::send_step(Nanoseconds now) {
-    if (step_ == Step::quiet) {
-        set_baud(fast_first_ ? fast_baud : slow_baud);
-        filled_ = 0;
-    }
+    if (step_ == Step::quiet) set_baud(fast_first_ ? fast_baud : slow_baud);
     TextLine text;
     switch (step_) {
         case Step::quiet: text << "VNASY,0"; break;
@@ -210,7 +207,7 @@ bool Vn100::take_line(Nanoseconds now) {
     const std::int64_t code = line[7] * 256 + line[8];
     const bool command = step_ == Step::quiet || step_ == Step::go;
     const bool answer = std::memcmp(line, command ? "$VNASY" : "$VNWRG", 6) == 0;
-    drop(end + 1);
+    drop(end);
     if (!waiting_) return true;
     if (error)
         fail(wire::EventKind::imu_failed, now, code);
