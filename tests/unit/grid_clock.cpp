@@ -340,6 +340,7 @@ TEST_CASE("grid_clock: placed while it slews, it is there at once, and follows n
     clock.begin(5 * second, second);
     clock.align(10'400'000'000, 0, 1'000'000, 9 * second);
     CHECK(std::abs(clock.board_time(6 * second) - 11 * second) < 3'000'000);
+    CHECK(clock.sync_state(9 * second) == versavis::wire::SyncState::none);
     clock.begin(5 * second, second);
     clock.align(10'400'000'000, 0, 1'000'000, 9 * second);
     clock.place(10'300'000'000, 0);
