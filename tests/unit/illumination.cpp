@@ -410,6 +410,7 @@ TEST_CASE("illumination: stopped, it is dark, and what was planned is forgotten"
     CHECK(bench.gate() == Times{9'900 * us, 10'020 * us});
     CHECK(bench.lead() == Times{9'900 * us, 10'020 * us});
     bench.light.plan(0, 20 * ms, 4 * ms, true, 11 * ms);
+    CHECK(bench.light.next_wake(0) == 21'900 * us);
     bench.run(30 * ms);
     CHECK(bench.gate() == Times{9'900 * us, 10'020 * us, 19'900 * us, 21'900 * us});
     CHECK(bench.lead() == Times{9'900 * us, 10'020 * us, 19'900 * us, 20'050 * us});
