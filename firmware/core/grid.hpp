@@ -43,7 +43,8 @@ class Grid {
         carry_ = carried - whole * rate_uhz_;
     }
 
-    /// Moves to a tick at most one period before `at` in a few steps, however long ago the origin was.
+    /// Moves to a tick within one period before `at`, in few steps, however long ago the origin
+    /// was.
     void skip_before(Nanoseconds at) {
         while (at - next_ > whole_) advance_by((at - next_) / (whole_ + 1));
     }
