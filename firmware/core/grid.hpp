@@ -32,7 +32,7 @@ class Grid {
     /// advance(), `ticks` times.
     void advance_by(std::int64_t ticks);
 
-    /// Moves to a tick at most one period before `at` in a few steps, however long ago the origin
+    /// Moves to a tick within one period before `at`, in few steps, however long ago the origin
     /// was.
     void skip_before(Nanoseconds at);
 

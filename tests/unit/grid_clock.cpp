@@ -312,6 +312,18 @@ TEST_CASE("grid_clock: a sender that was just taken must be kept, like any other
     CHECK(follows(clock, 10 * second + 300'000'000));
 }
 
+TEST_CASE("grid_clock: it goes to the pulses of a new sender by the shortest way") {
+    for (const Nanoseconds phase : {100, 400, 499, 500, 501, 600, 900}) {
+        GridClock clock;
+        clock.begin(5 * second, second);
+        GridClock::SyncPulse pulse;
+        for (int n = 0; n < 3; ++n)
+            pulse = clock.sync_pulse((8 + n) * second + phase * 1'000'000, false);
+        CHECK(pulse.what == GridClock::Sync::taken);
+        CHECK(pulse.off == (phase < 500 ? phase : phase - 1000) * 1'000'000);
+    }
+}
+
 TEST_CASE("grid_clock: taken while no camera runs, it is there at once, whatever went before") {
     GridClock clock;
     clock.begin(5 * second, second);
@@ -328,6 +340,7 @@ TEST_CASE("grid_clock: placed while it slews, it is there at once, and follows n
     clock.begin(5 * second, second);
     clock.align(10'400'000'000, 0, 1'000'000, 9 * second);
     CHECK(std::abs(clock.board_time(6 * second) - 11 * second) < 3'000'000);
+    CHECK(clock.sync_state(9 * second) == versavis::wire::SyncState::none);
     clock.begin(5 * second, second);
     clock.align(10'400'000'000, 0, 1'000'000, 9 * second);
     clock.place(10'300'000'000, 0);

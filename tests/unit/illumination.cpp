@@ -356,8 +356,9 @@ TEST_CASE("illumination: exposures without a pause share one longest light") {
     bench.light.plan(0, 10 * ms, ms, true, ms);
     bench.edge(10 * ms, 0, true);
     bench.run(11 * ms);
+    bench.light.edge(0, false);
     bench.light.plan(1, 11'100 * us, ms, true, 11 * ms);
-    bench.edge(11 * ms, 0, false);
+    bench.light.plan(1, 60 * ms, ms, true, 11 * ms);
     bench.edge(11'100 * us, 1, true);
     bench.run(25 * ms);
     CHECK(bench.gate() == Times{9'900 * us, 19'900 * us});
@@ -409,6 +410,7 @@ TEST_CASE("illumination: stopped, it is dark, and what was planned is forgotten"
     CHECK(bench.gate() == Times{9'900 * us, 10'020 * us});
     CHECK(bench.lead() == Times{9'900 * us, 10'020 * us});
     bench.light.plan(0, 20 * ms, 4 * ms, true, 11 * ms);
+    CHECK(bench.light.next_wake(0) == 21'900 * us);
     bench.run(30 * ms);
     CHECK(bench.gate() == Times{9'900 * us, 10'020 * us, 19'900 * us, 21'900 * us});
     CHECK(bench.lead() == Times{9'900 * us, 10'020 * us, 19'900 * us, 20'050 * us});
@@ -428,12 +430,13 @@ TEST_CASE("illumination: a new configuration earns no light") {
     const Nanoseconds longest = GENERATE(10 * ms, 3 * ms);
     Bench bench;
     bench.expose(0, 10 * ms, 14 * ms);
-    if (paused) bench.light.configure({}, 14 * ms);
+    if (paused) bench.light.configure({}, 24 * ms);
     bench.configuration.max_on_ns = static_cast<std::uint32_t>(longest);
-    bench.light.configure(bench.configuration, 14 * ms);
-    bench.configuration.duty_ppm = 0;
-    bench.light.configure(bench.configuration, 14 * ms);
-    CHECK(bench.budget(24 * ms) == std::min(longest, 6'310 * us));
+    bench.light.configure(bench.configuration, 24 * ms);
+    bench.configuration.duty_ppm = 50'000;
+    bench.light.configure(bench.configuration, 24 * ms);
+    // There were 7.31 ms.
+    CHECK(bench.budget(34 * ms) == std::min(longest, 7'810 * us));
 }
 
 TEST_CASE("illumination: configured anew, it is dark at once") {

@@ -24,10 +24,10 @@ struct Bench {
     Bench() { guard.listen(all); }
 
     /// Returns how many edges of an input are taken, from `at` on, before one is too many.
-    int taken(std::uint8_t input, Nanoseconds at, Nanoseconds spacing, int edges) {
-        for (int i = 0; i < edges; ++i)
+    int taken(std::uint8_t input, Nanoseconds at, Nanoseconds spacing, int count) {
+        for (int i = 0; i < count; ++i)
             if (!guard.take({at + i * spacing, input, true})) return i;
-        return edges;
+        return count;
     }
 
     Edges edges;

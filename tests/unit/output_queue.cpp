@@ -162,6 +162,11 @@ TEST_CASE(
     CHECK_FALSE(bench.queue.is_late(1'000, 1'024));
     CHECK(bench.queue.is_late(1'000, 1'025));
     CHECK(bench.queue.set(1'030, 3, true) == 1'048);
+
+    Bench far(facts);
+    for (const Nanoseconds at : {1'000, 1'008, 2'000}) far.queue.set(at, 0, at != 1'008);
+    CHECK(far.queue.commit(1'500 - OutputQueue::horizon));
+    CHECK(far.hardware.words == Words{{1'000, 1}, {1'024, 0}});
 }
 
 TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words at a time") {
