@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <catch2/catch.hpp>
+#include <functional>
 #include <random>
 
 #include "../support/temporary_directory.hpp"
@@ -47,6 +48,39 @@ class Refusals : public firmware::RefusalSink {
     void refuse(const wire::Refusal& refusal) override { all.push_back(refusal); }
     std::vector<wire::Refusal> all;
 };
+
+using Change = std::function<void(wire::Configuration&)>;
+using Setter = std::function<void(wire::Configuration&, std::int64_t)>;
+
+constexpr std::uint32_t fastest_here = 4'000'000;
+
+/// What goes together of all that there is.
+wire::Configuration valid() {
+    wire::Configuration all{};
+    wire::CameraConfiguration camera{};
+    camera.flags = wire::camera_enabled;
+    camera.rate_uhz = 50'000'000;
+    camera.pulse_ns = 1'000;
+    camera.exposure_ns = 1'000'000;
+    camera.max_exposure_ns = 2'000'000;
+    for (std::size_t i = 0; i < 3; ++i) all.cameras[i] = camera;
+    all.imus[0] = {wire::ImuKind::icm42688p, 0, wire::imu_data_ready, 0, 1'000'000};
+    all.imus[1] = {wire::ImuKind::vn100, 0, wire::imu_data_ready, 0, 200'000};
+    all.illumination = {3, 0, 0, 1'000, 5'000'000, 500'000};
+    all.ports.inputs = 0xF;
+    all.ports.options = wire::port_imu_output;
+    all.ports.test = wire::test_rate;
+    all.ports.test_rate_millihertz = 1'000'000;
+    all.ports.pulse_ns = 1'000;
+    return all;
+}
+
+std::vector<wire::Refusal> refusals_of(const wire::Configuration& configuration,
+                                       std::uint32_t present = wire::present_all) {
+    Refusals refusals;
+    firmware::check(configuration, {present, fastest_here}, refusals);
+    return refusals.all;
+}
 
 }  // namespace
 
@@ -323,6 +357,151 @@ TEST_CASE("configuration_check: what a model of IMU can do is what its part does
         CHECK(std::llround(model.fastest_i2c_hz * 1e3) ==
               (serial ? 0 : part->fastest_i2c_millihertz()));
         CHECK(model.accel_ready == (!serial && part->accel_millihertz() != 0));
+    }
+}
+
+TEST_CASE("configuration_check: the board takes what is at a limit, and tells what is beyond it") {
+    using Part = wire::ConfigurationPart;
+    using Field = wire::ConfigurationField;
+    struct Limit {
+        Part part;
+        Field field;
+        std::int64_t minimum, maximum;
+        Setter set;
+        Change before = [](wire::Configuration&) {};
+    };
+    const auto camera = [](auto member) {
+        return [member](auto& all, auto value) {
+            all.cameras[2].*member =
+                static_cast<std::decay_t<decltype(all.cameras[2].*member)>>(value);
+        };
+    };
+    const auto imu = [](std::size_t port, auto member) {
+        return [=](auto& all, auto value) {
+            all.imus[port].*member =
+                static_cast<std::decay_t<decltype(all.imus[port].*member)>>(value);
+        };
+    };
+    const auto light = [](auto member) {
+        return [member](auto& all, auto value) {
+            all.illumination.*member =
+                static_cast<std::decay_t<decltype(all.illumination.*member)>>(value);
+        };
+    };
+    const auto ports = [](auto member) {
+        return [member](auto& all, auto value) {
+            all.ports.*member = static_cast<std::decay_t<decltype(all.ports.*member)>>(value);
+        };
+    };
+    using Camera = wire::CameraConfiguration;
+    using Imu = wire::ImuConfiguration;
+    using Light = wire::IlluminationConfiguration;
+    using Ports = wire::PortConfiguration;
+    const Change slow = [](auto& all) { all.cameras[2].rate_uhz = 5'000'000; };
+    const Change on_grid = [](auto& all) { all.imus[0].options = 0; };
+    const Change by_i2c = [](auto& all) { all.imus[0].options |= wire::imu_i2c; };
+    const Change with_sync = [](auto& all) { all.ports.sync_rate_uhz = 1'000'000; };
+    const Change with_receiver = [](auto& all) {
+        all.imus[1] = {};
+        all.ports.options = wire::port_nmea;
+    };
+    const auto test_of = [](std::uint8_t source) {
+        return [source](wire::Configuration& all) { all.ports.test = source; };
+    };
+    const Change no_test = test_of(wire::test_none);
+    const Limit limits[] = {
+        {Part::camera, Field::rate, 100'000, 1'000'000'000, camera(&Camera::rate_uhz)},
+        {Part::camera, Field::phase, 0, 19'999'999, camera(&Camera::phase_ns)},
+        {Part::camera, Field::pulse, 1'000, 10'000'000, camera(&Camera::pulse_ns)},
+        {Part::camera, Field::pulse, 1'000, 10'000'000, camera(&Camera::pulse_ns), slow},
+        {Part::camera, Field::latency, 0, 19'999'999, camera(&Camera::latency_ns)},
+        {Part::camera, Field::latency, 0, 100'000'000, camera(&Camera::latency_ns), slow},
+        {Part::camera, Field::gap, 0, 19'999'999, camera(&Camera::gap_ns)},
+        {Part::camera, Field::exposure, 0, 10'000'000'000, camera(&Camera::exposure_ns)},
+        {Part::camera, Field::max_exposure, 1'000, 10'000'000'000,
+         camera(&Camera::max_exposure_ns)},
+        {Part::imu, Field::imu_rate, 1'000, fastest_here, imu(0, &Imu::rate_millihertz)},
+        {Part::imu, Field::imu_rate, 1'000, 1'000'000, imu(0, &Imu::rate_millihertz), on_grid},
+        {Part::imu, Field::imu_rate, 1'000, 1'000'000, imu(0, &Imu::rate_millihertz), by_i2c},
+        {Part::imu, Field::imu_rate, 1'000, 800'000, imu(1, &Imu::rate_millihertz)},
+        {Part::imu, Field::imu_filter, 0, 0, imu(1, &Imu::filter)},
+        {Part::imu, Field::imu_options, 0, 1, imu(1, &Imu::options)},
+        {Part::imu, Field::imu_kind, 8, 8, imu(1, &Imu::kind)},
+        {Part::imu, Field::imu_kind, 1, 7, imu(0, &Imu::kind), on_grid},
+        {Part::illumination, Field::cameras, 1, 15, light(&Light::cameras)},
+        {Part::illumination, Field::lead, 0, 1'000'000, light(&Light::lead_ns)},
+        {Part::illumination, Field::max_on, 11'000, 1'000'000'000, light(&Light::max_on_ns)},
+        {Part::illumination, Field::duty, 1, 1'000'000, light(&Light::duty_ppm)},
+        {Part::ports, Field::inputs, 0, 15, ports(&Ports::inputs)},
+        {Part::ports, Field::test_rate, 100, 10'000'000, ports(&Ports::test_rate_millihertz)},
+        {Part::ports, Field::pulse, 1'000, 500'000, ports(&Ports::pulse_ns)},
+        {Part::ports, Field::pulse, 1'000, 10'000'000, ports(&Ports::pulse_ns),
+         test_of(wire::test_camera0 + 1)},
+        {Part::ports, Field::pulse, 1'000, 500'000, ports(&Ports::pulse_ns),
+         test_of(wire::test_imu0)},
+        {Part::ports, Field::pulse, 1'000, 2'500'000, ports(&Ports::pulse_ns),
+         test_of(wire::test_imu0 + 1)},
+        {Part::ports, Field::pulse, 1'000, 10'000'000, ports(&Ports::pulse_ns),
+         [&](auto& all) { no_test(all), with_sync(all); }},
+        {Part::ports, Field::sync_rate, 100'000, 10'000'000, ports(&Ports::sync_rate_uhz)},
+        {Part::ports, Field::nmea_baud, 1'200, 921'600, ports(&Ports::nmea_baud), with_receiver},
+    };
+    REQUIRE(refusals_of(valid()).empty());
+    for (const Limit& limit : limits) {
+        INFO("part " << int(limit.part) << ", field " << int(limit.field) << ", up to "
+                     << limit.maximum);
+        const auto with = [&](std::int64_t value) {
+            wire::Configuration all = valid();
+            limit.before(all);
+            limit.set(all, value);
+            std::vector<wire::Refusal> refusals = refusals_of(all);
+            // A period that changes takes other limits along.
+            std::erase_if(refusals, [&](const auto& one) { return one.field != limit.field; });
+            return refusals;
+        };
+        CHECK(with(limit.minimum).empty());
+        CHECK(with(limit.maximum).empty());
+        const auto beyond = [&](std::int64_t value) {
+            const auto refusals = with(value);
+            REQUIRE(refusals.size() == 1);
+            CHECK(refusals[0].part == limit.part);
+            CHECK(refusals[0].value == value);
+            CHECK(refusals[0].minimum == limit.minimum);
+            CHECK(refusals[0].maximum == limit.maximum);
+        };
+        // Without a kind there is no IMU, without cameras no light, and without a rate no sync.
+        if (limit.minimum > 1) beyond(limit.minimum - 1);
+        beyond(limit.maximum + 1);
+    }
+}
+
+TEST_CASE("configuration_check: the board tells each thing that it does not have") {
+    const auto only = [](std::uint32_t bit) -> Change {
+        return [bit](wire::Configuration& all) {
+            switch (bit) {
+                case wire::present_camera0 << 3U: all.cameras[3] = all.cameras[2]; break;
+                case wire::present_sync_output: all.ports.sync_rate_uhz = 1'000'000; break;
+                case wire::present_i2c: all.imus[0].options |= wire::imu_i2c; break;
+                case wire::present_accel_ready:
+                    all.imus[0].kind = wire::ImuKind::bmi088;
+                    all.imus[0].options |= wire::imu_accel_ready;
+                    break;
+                case wire::present_memory: all.flags = wire::configuration_store; break;
+                default: break;
+            }
+        };
+    };
+    for (unsigned bit = 0; bit < 19; ++bit) {
+        INFO("bit " << bit);
+        wire::Configuration all = valid();
+        only(1U << bit)(all);
+        CHECK(refusals_of(all).empty());
+        const auto refusals = refusals_of(all, wire::present_all & ~(1U << bit));
+        REQUIRE(refusals.size() == 1);
+        CHECK(refusals[0].field == wire::ConfigurationField::present);
+        CHECK(refusals[0].value == bit);
+        CHECK(refusals[0].minimum == 0);
+        CHECK(refusals[0].maximum == -1);
     }
 }
 
