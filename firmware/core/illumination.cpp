@@ -8,7 +8,7 @@ namespace {
 constexpr Nanoseconds lead_overlap =
     50'000;  // the lead lasts into the exposure, so that there is no gap when it begins
 constexpr Nanoseconds start_patience =
-    2'000'000;  // a camera that starts this long after the gate opened still gets light
+    2'000'000;  // a camera that starts this late still gets light
 constexpr Nanoseconds shortest_light = 10'000;
 constexpr std::int64_t million = 1'000'000;
 
@@ -86,11 +86,20 @@ void Illumination::edge(std::uint8_t camera, bool exposing) {
     over_ = exposing_ == 0;
 }
 
+/// Without an exposure line, its light is the lead.
+Nanoseconds Illumination::awaited_until(const Plan& plan) {
+    return max(plan.lead_off, plan.on + start_patience);
+}
+
 /// Plans whose exposures may still come: an edge that is not known yet may begin one.
 void Illumination::forget_past(Nanoseconds settled) {
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < plan_count_; ++i)
-        if (plans_[i].lead_off > settled) plans_[kept++] = plans_[i];
+    for (std::size_t i = 0; i < plan_count_; ++i) {
+        if (plans_[i].lead_off > settled)
+            plans_[kept++] = plans_[i];
+        else
+            awaited_until_ = max(awaited_until_, awaited_until(plans_[i]));
+    }
     plan_count_ = kept;
 }
 
@@ -113,6 +122,7 @@ void Illumination::open_gate(Nanoseconds on) {
     gate_on_ = outputs_.set(on, output_light_gate, true);
     gate_off_ = outputs_.set(gate_on_ + allowed, output_light_gate, false);
     last_off_ = gate_off_;
+    awaited_until_ = gate_on_ + start_patience;
     saved_ = earned(allowed);  // all counts as spent, until it is known how much really was
     saved_at_ = gate_off_;
 }
@@ -161,8 +171,8 @@ Nanoseconds Illumination::next_end() const {
     if (!open()) return never;
     if (exposing_ != 0) return gate_off_;
     // No exposure came: the gate need not stay open.
-    Nanoseconds last = gate_on_ + start_patience;
-    for (std::size_t i = 0; i < plan_count_; ++i) last = max(last, plans_[i].lead_off);
+    Nanoseconds last = awaited_until_;
+    for (std::size_t i = 0; i < plan_count_; ++i) last = max(last, awaited_until(plans_[i]));
     return min(gate_off_, last);
 }
 

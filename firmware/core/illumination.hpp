@@ -55,6 +55,7 @@ class Illumination {
     void open_next(Nanoseconds now);
     void open_gate(Nanoseconds on);
     void close_gate(Nanoseconds now);
+    static Nanoseconds awaited_until(const Plan& plan);
     void forget_past(Nanoseconds settled);
 
     OutputQueue& outputs_;
@@ -64,6 +65,7 @@ class Illumination {
     std::uint8_t exposing_ = 0;  ///< cameras whose line is active
     bool over_ = false;          ///< the last exposure of this light has ended
     Nanoseconds gate_on_ = 0;
+    Nanoseconds awaited_until_ = 0;       ///< exposures of this light that should have begun
     Nanoseconds gate_off_ = never;        ///< never: the gate is closed
     Nanoseconds dark_until_ = INT64_MIN;  ///< after the limit was reached
     Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last told to close

@@ -26,7 +26,7 @@ TEST_CASE("byte_register_part: a write is an address and a value") {
     CHECK(write.bytes[1] == 0xB6);
 }
 
-TEST_CASE("byte_register_part: a read is an address with bit 7; its last byte is the answer") {
+TEST_CASE("byte_register_part: a read is an address with bit 7, and its last byte is the answer") {
     struct Chip {
         wire::ImuKind kind;
         std::uint8_t chip, size;

@@ -172,6 +172,16 @@ TEST_CASE("illumination: when no exposure comes, it ends after 2 ms, and not bef
     CHECK(bench.lead() == Times{9'900 * us, lead_off});
 }
 
+TEST_CASE("illumination: a second camera that is late gets light, too, whenever it is looked at") {
+    Bench bench;
+    bench.light.plan(0, 10 * ms, 4 * ms, true, ms);  // it ignores its trigger
+    bench.light.plan(1, 11'500 * us, 4 * ms, true, ms);
+    if (GENERATE(true, false)) bench.run(12 * ms);
+    bench.edge(13'200 * us, 1, true);
+    bench.edge(17 * ms, 1, false);
+    CHECK(bench.gate() == Times{9'900 * us, 17 * ms});
+}
+
 TEST_CASE("illumination: an end before the light is not the end of the light") {
     Bench bench;
     const bool planned = GENERATE(true, false);

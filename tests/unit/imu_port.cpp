@@ -65,7 +65,7 @@ using Told = std::pair<unsigned, unsigned>;
 
 }  // namespace
 
-TEST_CASE("imu_port: numbers count from zero; those that were missed are left out, and told once") {
+TEST_CASE("imu_port: numbers count from zero, without those that were missed, which is told once") {
     World world;
     CHECK(world.next() == Told{0, 0});
     CHECK(world.next(wire::imu_stamped) == Told{1, wire::imu_stamped});
@@ -119,7 +119,7 @@ TEST_CASE("imu_port: what a part says is repeated stays so") {
     CHECK(world.next() == Told{1, 0});
 }
 
-TEST_CASE("imu_port: failed samples are counted; twenty in a row are too many") {
+TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too many") {
     World world;
     wire::ImuSample sample{};
     for (int round = 0; round < 2; ++round) {
@@ -158,7 +158,7 @@ TEST_CASE("imu_port: a part's own diagnosis is an error of each sample, and no f
     CHECK(world.port.errors() == 31);
 }
 
-TEST_CASE("imu_port: events tell the port; after a failure at least one sample is missing") {
+TEST_CASE("imu_port: events tell the port, and after a failure at least one sample is missing") {
     World world;
     world.port.report_event(wire::EventKind::imu_ready, 7, 100);
     CHECK(world.reports.events == std::vector<Event>{{wire::EventKind::imu_ready, 1, 7, 100, 0}});
