@@ -150,6 +150,14 @@ TEST_CASE(
     CHECK(health.dropped_clock_answers == 2 * 8);
 }
 
+TEST_CASE("transmitter: what is stamped as it leaves lies where its words are aligned") {
+    for (const wire::Type type : {wire::Type::clock_answer, wire::Type::imu_sample}) {
+        const MessageQueue& queue = message_queues[queue_of(type)];
+        CHECK(queue.offset % alignof(std::int64_t) == 0);
+        CHECK(queue.message_size % alignof(std::int64_t) == 0);
+    }
+}
+
 TEST_CASE("transmitter: the most that waited is told since it was asked for last") {
     Bench bench;
     CHECK(bench.transmitter.take_high_water() == 0);
@@ -180,11 +188,13 @@ TEST_CASE(
     bench.transmitter.pump();
     bench.transmitter.begin();
     bench.transmitter.send(wire::BoardHello{});
+    bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
     bench.link.space = 1'000;
     bench.transmitter.pump();
     const auto headers = bench.headers();
-    REQUIRE(headers.size() == 1);
+    REQUIRE(headers.size() == 2);
     CHECK(headers[0].type == wire::Type::board_hello);
+    CHECK(headers[1].type == wire::Type::log);
     CHECK(headers[0].nonce == 7);
     CHECK(headers[0].sequence == 1);  // the first is lost on the line
 }
@@ -192,6 +202,7 @@ TEST_CASE(
 TEST_CASE("transmitter: nothing to send is nothing written") {
     Bench bench;
     bench.link.space = 1'000;
+    bench.link.left = 12'345;  // nobody asked
     CHECK_FALSE(bench.transmitter.pump());
     CHECK(bench.link.bytes.empty());
     bench.transmitter.begin();  // ends what the host may have got of a packet
@@ -257,6 +268,7 @@ TEST_CASE("transmitter: of two answers, each is told of by its own number, and o
     const auto told = bench.received<wire::ClockFollowUp>();
     REQUIRE(told.size() == 2);
     CHECK(told[0].id == 42);
+    CHECK(told[0].reserved == 0);
     CHECK(told[0].sent_ns == 12'345);
     CHECK(told[1].id == 43);
     CHECK(told[1].sent_ns == 23'456);
