@@ -88,6 +88,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     bool greeted_ = false;
     bool storing_ = false;
     bool outputs_blocked_ = false;
+    bool losing_ = false;        ///< edges were lost, and some from before are still to be read
     bool more_ = false;          ///< to do at once
     bool stirred_ = true;        ///< cameras, light and outputs may have something to do
     std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled

@@ -19,9 +19,12 @@ constexpr unsigned edges_a_poll = 24;
 
 void Board::poll_edges(Nanoseconds now) {
     noise_.poll(now);
-    // Of the edges still to be read, some came before the lost ones and some after.
-    const std::uint32_t lost = hal_.edges.take_lost();
-    if (lost != 0) edges_lost();
+    if (const std::uint32_t lost = hal_.edges.take_lost()) {
+        edges_lost();
+        losing_ = true;
+        health_.lost_edges += lost;
+        event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+    }
     Edge edge;
     unsigned count = 0;
     while (count < edges_a_poll && hal_.edges.pop(edge)) {
@@ -47,10 +50,10 @@ void Board::poll_edges(Nanoseconds now) {
         settled = cameras_[i].settled(settled);
     }
     if (settled > settled_) settled_ = settled;
-    if (lost == 0) return;
+    if (!losing_) return;
+    // Of the edges that waited, some came before the lost ones and some after.
     edges_lost();
-    health_.lost_edges += lost;
-    event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+    losing_ = count == edges_a_poll;
 }
 
 void Board::edges_lost() {

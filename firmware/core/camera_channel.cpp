@@ -28,10 +28,9 @@ Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
 
 void CameraChannel::configure(const wire::CameraConfiguration& configuration, Nanoseconds lead) {
     configuration_ = configuration;
-    lead_ = lead > configuration.latency_ns ? lead - configuration.latency_ns : 0;
+    lead_ = max(lead - configuration.latency_ns, 0);
     next_tick_ = 0;
     expected_ = min(configuration.exposure_ns, configuration.max_exposure_ns);
-    expected_since_ = 0;
     announcements_.clear();
     routed_from_ = routed_until_ = never;
     filter_.configure(configuration.glitch == 0 ? wire::default_glitch_ns
@@ -213,8 +212,8 @@ void CameraChannel::exposure_edge(Nanoseconds at, bool exposing) {
     if (!has_strobe()) return;  // no exposure line is wired
     const ExposureTracker::Completed completed = tracker().edge(at, exposing);
     // An exposure from before an announcement says nothing about those after it.
-    if (completed.trigger == 0 || completed.trigger < expected_since_) return;
-    expected_ = min(completed.duration, configuration_.max_exposure_ns);
+    if (completed.trigger < expected_since_) return;
+    expected_ = completed.duration;
     plan();
 }
 
@@ -233,7 +232,7 @@ void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tic
 void CameraChannel::edges_lost() {
     filter_.edges_lost();
     tracker().edges_lost();
-    if (is_slave() && running_) uncounted_ = true;
+    uncounted_ = true;
 }
 
 void CameraChannel::poll(Nanoseconds now, Nanoseconds settled) {

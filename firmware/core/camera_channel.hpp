@@ -136,7 +136,7 @@ class CameraChannel {
     Nanoseconds routed_until_ = never;
     Nanoseconds lead_ = 0;
     Nanoseconds expected_ = 0;
-    std::uint64_t expected_since_ = 0;  ///< trigger that set `expected_`
+    std::uint64_t expected_since_ = 1;  ///< trigger that set `expected_`
     Grid grid_;                         ///< in grid time
     wire::CameraConfiguration configuration_{};
     GlitchFilter filter_;

@@ -7,8 +7,8 @@ namespace {
 
 /// 0, for unknown, when the age is negative or does not fit the field.
 std::uint32_t age(Nanoseconds of, Nanoseconds now) {
-    const Nanoseconds passed = now - of;
-    return passed < 0 || passed > UINT32_MAX ? 0 : static_cast<std::uint32_t>(passed);
+    const auto passed = static_cast<std::uint64_t>(now - of);
+    return passed > UINT32_MAX ? 0 : static_cast<std::uint32_t>(passed);
 }
 
 }  // namespace
@@ -89,7 +89,7 @@ bool Transmitter::pump() {
     while (written_ < frame_.size || total_ != 0) {
         const std::size_t free = link_.free_space();
         const std::size_t space = free < budget ? free : budget;
-        if (space == 0) return budget == 0;
+        if (space == 0) return free != 0;
         if (written_ == frame_.size) stage();
         const std::size_t left = frame_.size - written_;
         const std::size_t size = left < space ? left : space;
@@ -116,7 +116,7 @@ void Transmitter::count_drops(wire::Health& health) const {
 
 std::uint32_t Transmitter::take_high_water() {
     const std::uint32_t most = high_water_;
-    high_water_ = 0;
+    high_water_ = total_;
     return most;
 }
 

@@ -2,6 +2,7 @@
 #include "transmitter.hpp"
 
 #include <catch2/catch.hpp>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -65,6 +66,22 @@ wire::Exposure exposure(std::uint64_t trigger) {
     return record;
 }
 
+using Numbers = std::vector<std::pair<wire::Type, std::uint32_t>>;
+
+/// Sends `count` messages that carry their numbers. The newest `kept` of them are expected to leave
+/// before all that was sent by earlier calls.
+template <class T>
+void fill(Transmitter& transmitter, std::uint32_t count, std::uint32_t kept, Numbers& expected) {
+    Numbers numbers;
+    for (std::uint32_t number = 1; number <= count; ++number) {
+        T message{};
+        std::memcpy(static_cast<void*>(&message), &number, sizeof number);
+        transmitter.send(message);
+        if (number + kept > count) numbers.emplace_back(T::type, number);
+    }
+    expected.insert(expected.begin(), numbers.begin(), numbers.end());
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -91,25 +108,74 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("transmitter: of a class that is full the newest stay, and the others are counted") {
+TEST_CASE(
+    "transmitter: of each class the newest stay, whatever else waits, and the others are counted") {
     Bench bench;
-    for (std::uint64_t trigger = 1; trigger <= 300; ++trigger)
-        bench.transmitter.send(exposure(trigger));
-    bench.link.space = 1'000'000;
-    while (bench.transmitter.pump()) continue;
-    std::vector<std::uint64_t> triggers;
-    wire::Decoder decoder;
-    decoder.feed(bench.link.bytes.data(), bench.link.bytes.size(), [&](const wire::Packet& packet) {
-        wire::Exposure record{};
-        if (packet.read(record)) triggers.push_back(record.trigger);
-    });
-    REQUIRE(triggers.size() == 256);
-    CHECK(triggers.front() == 45);
-    CHECK(triggers.back() == 300);
+    Transmitter& transmitter = bench.transmitter;
+    Numbers expected;
+    for (int round = 0; round < 2; ++round) {
+        expected.clear();
+        fill<wire::Log>(transmitter, 9, 8, expected);
+        fill<wire::ImuSample>(transmitter, 258, 256, expected);
+        fill<wire::Health>(transmitter, 4, 1, expected);
+        fill<wire::Event>(transmitter, 132, 128, expected);
+        fill<wire::Exposure>(transmitter, 261, 256, expected);
+        fill<wire::ConfigurationAnswer>(transmitter, 7, 1, expected);
+        fill<wire::Refusal>(transmitter, 55, 48, expected);
+        fill<wire::ClockAnswer>(transmitter, 16, 8, expected);
+        fill<wire::ClockFollowUp>(transmitter, 10, 1, expected);
+        fill<wire::BoardHello>(transmitter, 11, 1, expected);
+        CHECK(transmitter.take_high_water() == 708);
+
+        bench.link.bytes.clear();
+        bench.link.space = 1'000'000;
+        while (transmitter.pump()) continue;
+        Numbers received;
+        wire::Decoder decoder;
+        decoder.feed(bench.link.bytes.data(), bench.link.bytes.size(),
+                     [&](const wire::Packet& packet) {
+                         std::uint32_t number = 0;
+                         std::memcpy(&number, packet.payload, sizeof number);
+                         received.emplace_back(packet.header.type, number);
+                     });
+        CHECK(received == expected);
+        CHECK(decoder.errors() == 0);
+    }
     wire::Health health{};
-    bench.transmitter.count_drops(health);
-    CHECK(health.dropped_exposures == 44);
-    CHECK(health.dropped_imu_samples == 0);
+    transmitter.count_drops(health);
+    CHECK(health.dropped_logs == 2 * 1);
+    CHECK(health.dropped_imu_samples == 2 * 2);
+    CHECK(health.dropped_events == 2 * 4);
+    CHECK(health.dropped_exposures == 2 * 5);
+    CHECK(health.dropped_clock_answers == 2 * 8);
+}
+
+TEST_CASE("transmitter: what is stamped as it leaves lies where its words are aligned") {
+    for (const wire::Type type : {wire::Type::clock_answer, wire::Type::imu_sample}) {
+        const MessageQueue& queue = message_queues[queue_of(type)];
+        CHECK(queue.offset % alignof(std::int64_t) == 0);
+        CHECK(queue.message_size % alignof(std::int64_t) == 0);
+    }
+}
+
+TEST_CASE("transmitter: the most that waited is told since it was asked for last") {
+    Bench bench;
+    CHECK(bench.transmitter.take_high_water() == 0);
+    for (unsigned i = 1; i <= 3; ++i) bench.transmitter.send(exposure(i));
+    bench.link.space = 100;  // one packet, and a part of the next
+    bench.transmitter.pump();
+    CHECK(bench.transmitter.take_high_water() == 3);
+    CHECK(bench.transmitter.take_high_water() == 1);
+    bench.transmitter.send(exposure(4));
+    CHECK(bench.transmitter.take_high_water() == 2);
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    CHECK(bench.transmitter.take_high_water() == 2);
+    CHECK(bench.transmitter.take_high_water() == 0);
+    bench.transmitter.send(exposure(5));
+    bench.transmitter.begin();
+    CHECK(bench.transmitter.take_high_water() == 1);
+    CHECK(bench.transmitter.take_high_water() == 0);
 }
 
 TEST_CASE(
@@ -122,11 +188,27 @@ TEST_CASE(
     bench.transmitter.pump();
     bench.transmitter.begin();
     bench.transmitter.send(wire::BoardHello{});
+    bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
     bench.link.space = 1'000;
     bench.transmitter.pump();
     const auto headers = bench.headers();
-    REQUIRE(headers.size() == 1);
+    REQUIRE(headers.size() == 2);
     CHECK(headers[0].type == wire::Type::board_hello);
+    CHECK(headers[1].type == wire::Type::log);
+    CHECK(headers[0].nonce == 7);
+    CHECK(headers[0].sequence == 1);  // the first is lost on the line
+}
+
+TEST_CASE("transmitter: nothing to send is nothing written") {
+    Bench bench;
+    bench.link.space = 1'000;
+    bench.link.left = 12'345;  // nobody asked
+    CHECK_FALSE(bench.transmitter.pump());
+    CHECK(bench.link.bytes.empty());
+    bench.transmitter.begin();  // ends what the host may have got of a packet
+    CHECK_FALSE(bench.transmitter.pump());
+    CHECK_FALSE(bench.transmitter.pump());
+    CHECK(bench.link.bytes == std::vector<std::uint8_t>{0});
 }
 
 TEST_CASE("transmitter: the time of sending is that at which the answer leaves") {
@@ -168,6 +250,42 @@ TEST_CASE(
     CHECK(bench.received<wire::ClockFollowUp>()[0].sent_ns == 12'345);
 }
 
+TEST_CASE("transmitter: of two answers, each is told of by its own number, and once") {
+    Bench bench;
+    bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    bench.transmitter.send(wire::ClockAnswer{43, 0, 600, 0});
+    bench.link.space = 20;  // less than the answer
+    bench.transmitter.pump();
+    bench.link.left = 12'345;  // the first left while the second is written
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    bench.link.left = 23'456;
+    bench.transmitter.pump();
+    bench.link.left = 34'567;  // nobody asked
+    bench.transmitter.pump();
+    const auto told = bench.received<wire::ClockFollowUp>();
+    REQUIRE(told.size() == 2);
+    CHECK(told[0].id == 42);
+    CHECK(told[0].reserved == 0);
+    CHECK(told[0].sent_ns == 12'345);
+    CHECK(told[1].id == 43);
+    CHECK(told[1].sent_ns == 23'456);
+}
+
+TEST_CASE("transmitter: the departure of an answer that a new connection cuts is not asked for") {
+    Bench bench;
+    bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
+    bench.link.space = 20;  // less than the answer
+    bench.transmitter.pump();
+    bench.transmitter.begin();
+    bench.transmitter.send(wire::BoardHello{});
+    bench.link.space = 1'000;
+    bench.transmitter.pump();
+    CHECK(bench.link.watched == 0);
+}
+
 TEST_CASE("transmitter: a new connection hears nothing of the departures of the one before") {
     Bench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
@@ -183,32 +301,39 @@ TEST_CASE("transmitter: a new connection hears nothing of the departures of the 
 
 TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody knows") {
     Bench bench;
-    for (const Nanoseconds taken :
-         {Nanoseconds{90'000}, Nanoseconds{40'000}, Nanoseconds{-5'000'000'000}}) {
-        wire::ImuSample sample{};
-        sample.time_ns = taken;
-        bench.transmitter.send(sample);
-    }
     bench.clock.time = 100'000;
+    wire::ImuSample sample{};
+    sample.time_ns = 90'000;
+    bench.transmitter.send(sample);
+    sample.time_ns = 40'000;
+    bench.transmitter.send(sample);
     bench.link.space = 60;  // for the first, which is staged now
     bench.transmitter.pump();
     bench.clock.time = 190'000;
     bench.link.space = 1'000;
     bench.transmitter.pump();
-    const auto samples = bench.received<wire::ImuSample>();
-    REQUIRE(samples.size() == 3);
-    CHECK(samples[0].departure_ns == 10'000);
-    CHECK(samples[1].departure_ns == 150'000);
-    CHECK(samples[2].departure_ns == 0);
+    const Nanoseconds ages[] = {1, 0, -1, 0xFFFFFFFF, 0x100000000, 0x100000001, -0xFFFFFFFFLL};
+    for (const Nanoseconds age : ages) {
+        sample.time_ns = bench.clock.time - age;
+        bench.transmitter.send(sample);
+    }
+    while (bench.transmitter.pump()) continue;
+    std::vector<std::uint32_t> told;
+    for (const wire::ImuSample& received : bench.received<wire::ImuSample>())
+        told.push_back(received.departure_ns);
+    CHECK(told == std::vector<std::uint32_t>{10'000, 150'000, 1, 0, 0, 0xFFFFFFFF, 0, 0, 0});
 }
 
-TEST_CASE("transmitter: one pump writes a bounded part, and says that there is more") {
-    Bench bench;
-    for (unsigned i = 1; i <= 10; ++i) bench.transmitter.send(exposure(i));
-    bench.link.space = 100'000;
-    CHECK(bench.transmitter.pump());
-    CHECK(bench.link.bytes.size() == 256);
-    CHECK(bench.transmitter.pump());
-    while (bench.transmitter.pump()) continue;
-    CHECK(bench.received<wire::Exposure>().size() == 10);
+TEST_CASE("transmitter: one pump writes a bounded part, and says whether the link takes more") {
+    for (const std::size_t space : {std::size_t{255}, std::size_t{256}, std::size_t{257}}) {
+        Bench bench;
+        for (unsigned i = 1; i <= 10; ++i) bench.transmitter.send(exposure(i));
+        bench.link.space = space;
+        CHECK(bench.transmitter.pump() == (space > 256));
+        CHECK(bench.link.bytes.size() == (space < 256 ? space : 256));
+        bench.link.space = 100'000;
+        CHECK(bench.transmitter.pump());
+        while (bench.transmitter.pump()) continue;
+        CHECK(bench.received<wire::Exposure>().size() == 10);
+    }
 }

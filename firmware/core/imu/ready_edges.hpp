@@ -69,7 +69,7 @@ class ReadyEdges {
     std::uint32_t count_ = 0;
     std::uint32_t known_ = 0;  ///< of the newest of them
     std::uint32_t echoes_ = 0;
-    Nanoseconds stamps_[kept];
+    Nanoseconds stamps_[kept] = {};
 };
 
 }  // namespace versavis::firmware

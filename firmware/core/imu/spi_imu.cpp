@@ -81,7 +81,6 @@ void SpiImu::configure(const wire::ImuConfiguration& configuration, Nanoseconds 
     ready_edges_.configure(period_);
     accel_period_ = part_->accel_millihertz() == 0 ? 0 : mhz_ns / part_->accel_millihertz();
     accel_edges_.configure(accel_period_);
-    served_ = 0;
     begin_setup(max(now, power_up_time));
 }
 
@@ -101,10 +100,9 @@ void SpiImu::adapt(ImuTransfer& transfer) const {
     transfer.bytes[0] = static_cast<std::uint8_t>(transfer.bytes[0] & ~reads);
 }
 
-void SpiImu::arm(Nanoseconds now) {
+void SpiImu::arm() {
     job_.pause = part_->pause();
-    const bool at_edge = job_.input != not_routed;
-    job_until_ = at_edge ? never : max(job_.after, now) + transfer_limit;
+    job_until_ = job_.input == not_routed ? job_.after + transfer_limit : never;
     job_state_ = bus_.arm(job_) ? Job::armed : Job::none;
 }
 
@@ -118,7 +116,7 @@ void SpiImu::next_step(Nanoseconds now) {
     adapt(job_.transfers[0]);
     job_reads_ = false;
     readings_ = 0;
-    arm(now);
+    arm();
     if (job_state_ == Job::none)
         fail(wire::EventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
 }
@@ -144,7 +142,7 @@ void SpiImu::run(Nanoseconds now) {
         while (grid_.next() < now + set_ahead) grid_.advance();
     }
     expect_edge(now);
-    after_ = now;
+    began_ = now;
     served_ = ready_edges_.count();
     served_at_ = now;
     edges_lost_ = false;
@@ -160,8 +158,7 @@ void SpiImu::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std
 }
 
 /// Arms the next `readings` of a sample.
-void SpiImu::arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings,
-                         Nanoseconds now) {
+void SpiImu::arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings) {
     job_.input = input;
     job_.after = after;
     job_.count = static_cast<std::uint8_t>(readings);
@@ -172,17 +169,14 @@ void SpiImu::arm_reading(std::uint8_t input, Nanoseconds after, unsigned reading
         adapt(job_.transfers[i]);
     }
     job_reads_ = begins;
-    arm(now);
+    arm();
     if (job_state_ != Job::none) return;
     readings_ = 0;
     miss();
 }
 
 void SpiImu::ready_edge(Nanoseconds at, Nanoseconds now) {
-    if (!paced_by_part()) return;
-    after_ = at;
-    const bool first = ready_edges_.count() == 0;
-    const Nanoseconds since = first ? period_ : at - ready_edges_.newest();
+    const Nanoseconds since = at - ready_edges_.newest();
     if (!ready_edges_.add(at)) return;
     expect_edge(now);
     fast_edges_ = since < period_ * 3 / 4 ? fast_edges_ + 1 : 0;
@@ -243,8 +237,9 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     const Nanoseconds tolerance = accel_period_ / accel_tolerance;
     if (off > tolerance || -off > tolerance || end >= taken + period) return;
     const Nanoseconds age = (sample.time_ns - taken) / accel_age_step;
-    if (age < INT16_MIN || age > INT16_MAX) return;
-    sample.accel_age = static_cast<std::int16_t>(age);
+    const auto told = static_cast<std::int16_t>(age);
+    if (told != age) return;
+    sample.accel_age = told;
     sample.flags |= wire::imu_accel_stamped;
 }
 
@@ -277,7 +272,7 @@ bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     sample = {};
     if (refused()) return drop(wire::EventKind::imu_silent, now);
     if (part_->parse(replies_, readings_, sample) == Verdict::unsure) {
-        arm_reading(not_routed, now, 1, now);
+        arm_reading(not_routed, now, 1);
         return false;
     }
     // Of the readings that were compared, the first: an update may precede it.
@@ -293,7 +288,6 @@ bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
 
 /// Sets the reading for the next grid point when it is time.
 void SpiImu::pace(Nanoseconds now) {
-    if (grid_.next() - set_ahead > now) return;
     if (grid_.next() < now) {
         const std::int64_t passed = (now - grid_.next()) / grid_.period() + 1;
         miss(static_cast<std::uint32_t>(passed));
@@ -301,7 +295,7 @@ void SpiImu::pace(Nanoseconds now) {
     }
     if (grid_.next() - set_ahead > now) return;
     if (job_state_ == Job::none)
-        arm_reading(not_routed, grid_.next(), part_->readings(), now);
+        arm_reading(not_routed, grid_.next(), part_->readings());
     else
         miss();
     grid_.advance();
@@ -325,8 +319,7 @@ bool SpiImu::poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample)
         fail(wire::EventKind::imu_failed, now, 0, while_running);
     } else if (job_state_ == Job::none) {
         // Neither the newest edge nor its echoes, whether they have come or not, start a reading.
-        arm_reading(input_imu_ready, max(after_, ready_edges_.quiet_until()), part_->readings(),
-                    now);
+        arm_reading(input_imu_ready, max(began_, ready_edges_.quiet_until()), part_->readings());
     }
     return taken;
 }

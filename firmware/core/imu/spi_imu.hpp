@@ -55,8 +55,8 @@ class SpiImu final : public ImuPort {
     void expect_edge(Nanoseconds now) { silent_at_ = now + patience_; }
     void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
     void adapt(ImuTransfer& transfer) const;
-    void arm(Nanoseconds now);
-    void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings, Nanoseconds now);
+    void arm();
+    void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings);
     bool take(Nanoseconds now, wire::ImuSample& sample);
     bool refused() const;
     bool drop(wire::EventKind kind, Nanoseconds now);
@@ -83,7 +83,7 @@ class SpiImu final : public ImuPort {
     Nanoseconds served_at_ = 0;  ///< the newest of them
     bool edges_lost_ = false;    ///< since then
     Nanoseconds silent_at_ = 0;  ///< when the next edge must have come
-    Nanoseconds after_ = 0;      ///< the newest edge of the line, echoes included
+    Nanoseconds began_ = 0;      ///< when it was set up
     Setup setup_;
     ReadyEdges ready_edges_;
     ReadyEdges accel_edges_;

@@ -1,0 +1,539 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "board.hpp"
+
+using namespace versavis;
+using namespace versavis::firmware;
+
+namespace {
+
+constexpr Nanoseconds us = 1'000;
+constexpr Nanoseconds ms = 1'000'000;
+constexpr Nanoseconds second = 1'000'000'000;
+constexpr std::uint8_t pps = input_pulse + unsigned{wire::pulse_pps};
+constexpr std::uint8_t aux0 = input_pulse + unsigned{wire::pulse_aux0};
+constexpr std::uint8_t aux1 = input_pulse + unsigned{wire::pulse_aux1};
+constexpr std::uint8_t sync_in = input_pulse + unsigned{wire::pulse_sync};
+
+/// A port whose time and edges are those of the test, and which does the rest at once.
+struct Port final : Clock64,
+                    OutputSchedule,
+                    EdgeStream,
+                    Routing,
+                    ImuBus,
+                    ImuUart,
+                    ImuOutput,
+                    ByteLink,
+                    Persist,
+                    Rebooter,
+                    Watchdog {
+    Nanoseconds now() override { return time; }
+    Nanoseconds push(Nanoseconds at, std::uint32_t levels) override {
+        words.emplace_back(at, levels);
+        return at;
+    }
+    void listen(std::uint32_t mask) override { inputs = mask; }
+    bool pop(Edge& edge) override {
+        if (edges.empty()) return false;
+        edge = edges.front();
+        edges.pop_front();
+        return true;
+    }
+    Nanoseconds settled() override { return time; }
+    std::uint32_t take_lost() override { return std::exchange(lost, 0); }
+    Switched route(const Routes& wanted, bool /*force*/) override {
+        routes = wanted;
+        return {time, true};
+    }
+    bool arm(const ImuJob& /*job*/) override { return true; }
+    bool take_reply(ImuReply& /*reply*/) override { return false; }
+    void disarm() override {}
+    void set_baud(std::uint32_t wanted) override { baud = wanted; }
+    void write(const std::uint8_t* data, std::size_t size) override {
+        sent.insert(sent.end(), data, data + size);
+    }
+    std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override {
+        const std::size_t size = std::min(capacity, serial.size());
+        std::copy_n(serial.begin(), size, data);
+        serial.erase(serial.begin(), serial.begin() + static_cast<std::ptrdiff_t>(size));
+        received = serial_until - static_cast<Nanoseconds>(serial.size()) * serial_byte;
+        return size;
+    }
+    void publish(const ImuImage& /*image*/) override {}
+    std::size_t free_space() override { return 100'000; }
+    std::size_t read(std::uint8_t* data, Nanoseconds& received) override {
+        if (packets.empty()) return 0;
+        const std::vector<std::uint8_t> packet = packets.front();
+        packets.pop_front();
+        std::copy(packet.begin(), packet.end(), data);
+        received = time;
+        return packet.size();
+    }
+    std::size_t load(std::uint8_t* /*data*/, std::size_t /*capacity*/) override { return 0; }
+    bool store(const std::uint8_t* /*data*/, std::size_t /*size*/) override { return true; }
+    Outcome take_outcome() override { return Outcome::stored; }
+    void reboot(bool /*to_boot_loader*/) override {}
+    void feed() override {}
+
+    Nanoseconds time = 0;
+    std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
+    std::deque<Edge> edges;
+    std::uint32_t lost = 0;
+    std::uint32_t inputs = 0;
+    Routes routes;
+    std::uint32_t baud = 0;
+    std::vector<std::uint8_t> serial;
+    Nanoseconds serial_until = 0;  ///< when the last byte has arrived
+    Nanoseconds serial_byte = 0;
+    std::vector<std::uint8_t> sent;
+    std::deque<std::vector<std::uint8_t>> packets;
+};
+
+PortFacts facts() {
+    PortFacts facts;
+    facts.present = wire::present_all;
+    facts.fastest_imu_millihertz = 8'000'000;
+    return facts;
+}
+
+/// A board that a host has greeted, at a port that does what the test says.
+struct Bench {
+    Bench() {
+        configuration.ports.inputs = 0xF;
+        configuration.ports.pulse_ns = 1'000'000;
+        send(wire::HostHello{wire::protocol_major, 0, {}});
+    }
+    template <class T>
+    void send(const T& message) {
+        wire::Frame frame{};
+        wire::encode(message, 1, sequence++, frame);
+        for (std::size_t at = 0; at < frame.size; at += link_packet_size)
+            port.packets.emplace_back(frame.bytes + at,
+                                      frame.bytes + std::min(frame.size, at + link_packet_size));
+        while (!port.packets.empty()) poll();
+    }
+    void configure() {
+        send(configuration);
+        while (board.next_wake() <= port.time) poll();
+        const auto answers = all<wire::ConfigurationAnswer>();
+        REQUIRE(answers.size() == 1);
+        REQUIRE(answers[0].status == wire::ConfigurationStatus::taken);
+    }
+    void add_camera(unsigned camera, std::uint32_t flags = 0) {
+        wire::CameraConfiguration& wanted = configuration.cameras[camera];
+        wanted.flags = wire::camera_enabled | flags;
+        wanted.rate_uhz = 20'000'000;
+        wanted.pulse_ns = 100'000;
+        wanted.exposure_ns = 4 * ms;
+        wanted.max_exposure_ns = 30 * ms;
+    }
+    void poll() { board.poll(); }
+    void poll(Nanoseconds at) {
+        port.time = at;
+        poll();
+    }
+    /// Polls when the board asks for it.
+    void run(Nanoseconds until) {
+        while (board.next_wake() <= until) poll(std::max(port.time, board.next_wake()));
+        do poll(until);
+        while (board.next_wake() <= until);
+    }
+    void edge(std::uint8_t input, Nanoseconds at, bool level = true) {
+        port.edges.push_back({at, input, level});
+    }
+    /// When the newest pulse of camera 0 began.
+    Nanoseconds trigger() {
+        Nanoseconds at = 0;
+        for (const auto& [left, levels] : port.words)
+            if ((levels & 1U) != 0) at = left;
+        return at;
+    }
+    /// All messages of a type that the board has sent.
+    template <class T>
+    std::vector<T> all() {
+        std::vector<T> out;
+        wire::Decoder decoder;
+        decoder.feed(port.sent.data(), port.sent.size(), [&](const wire::Packet& packet) {
+            T message{};
+            if (packet.read(message)) out.push_back(message);
+        });
+        return out;
+    }
+    std::vector<wire::Event> events(wire::EventKind kind) {
+        std::vector<wire::Event> out = all<wire::Event>();
+        out.erase(std::remove_if(out.begin(), out.end(),
+                                 [kind](const wire::Event& event) { return event.kind != kind; }),
+                  out.end());
+        return out;
+    }
+    wire::Health health() {
+        const std::size_t before = all<wire::Health>().size();
+        while (all<wire::Health>().size() == before) run(board.next_wake());
+        return all<wire::Health>().back();
+    }
+
+    wire::Configuration configuration{};
+    std::uint32_t sequence = 0;
+    Port port;
+    Board board{Hal{port, port, port, port, port, port, port, port, port, port, port, facts()}, {}};
+};
+
+/// Camera 0 runs, and a pulse of it has begun.
+struct Running : Bench {
+    Running() {
+        add_camera(0);
+        add_camera(1, wire::camera_slave | wire::camera_no_strobe);
+        configuration.cameras[1].master = 0;
+        configure();
+        send(wire::Start{1, 0, {}});
+        while (trigger() == 0) poll(board.next_wake());
+        began = trigger();
+        run(began + us);
+    }
+    wire::Exposure first_record() {
+        run(began + 200 * ms);
+        const auto records = all<wire::Exposure>();
+        REQUIRE_FALSE(records.empty());
+        return records[0];
+    }
+    Nanoseconds began = 0;
+};
+
+}  // namespace
+
+TEST_CASE("board_inputs: each pulse is an event, with the number of its input") {
+    Bench bench;
+    bench.configuration.ports.falling = 1U << wire::pulse_aux1;
+    bench.configure();
+    CHECK(bench.port.inputs == 0xFU << input_pulse);
+    for (const std::uint8_t input : {pps, aux0, aux1, sync_in, pps, aux1, aux1}) {
+        const Nanoseconds at = bench.port.time + 2 * ms;
+        bench.edge(input, at);
+        bench.edge(input, at + 100 * us, false);
+        bench.poll(at + ms);
+    }
+    struct Told {
+        wire::EventKind kind;
+        std::uint8_t source;
+        std::int64_t number;
+        Nanoseconds at;
+    };
+    const Told expected[] = {{wire::EventKind::pps, 0, 1, 2 * ms},
+                             {wire::EventKind::aux_pulse, 0, 1, 5 * ms},
+                             {wire::EventKind::aux_pulse, 1, 1, 8 * ms + 100 * us},
+                             {wire::EventKind::sync_pulse, 0, 1, 11 * ms},
+                             {wire::EventKind::pps, 0, 2, 14 * ms},
+                             {wire::EventKind::aux_pulse, 1, 2, 17 * ms + 100 * us},
+                             {wire::EventKind::aux_pulse, 1, 3, 20 * ms + 100 * us}};
+    const auto events = bench.all<wire::Event>();
+    REQUIRE(events.size() == std::size(expected));
+    for (std::size_t i = 0; i < events.size(); ++i) {
+        CHECK(events[i].kind == expected[i].kind);
+        CHECK(events[i].source == expected[i].source);
+        CHECK(events[i].value == expected[i].number);
+        CHECK(events[i].time_ns == expected[i].at);
+    }
+}
+
+TEST_CASE("board_inputs: echoes of pulses are no events, but counted") {
+    Bench bench;
+    bench.configure();
+    for (const auto& [input, width] : {std::pair{pps, ms}, std::pair{aux0, 10 * us},
+                                       std::pair{aux1, 10 * us}, std::pair{sync_in, ms}}) {
+        const Nanoseconds at = bench.port.time + ms;
+        for (const Nanoseconds after : {Nanoseconds{0}, width - 1, width, 2 * width - 1})
+            bench.edge(input, at + after);
+        bench.poll(at + 3 * ms);
+    }
+    CHECK(bench.all<wire::Event>().size() == 8);
+    CHECK(bench.health().glitches == 8);
+}
+
+TEST_CASE("board_inputs: one poll takes a bounded number of edges, and the rest is due at once") {
+    Bench bench;
+    bench.configure();
+    for (int i = 0; i < 30; ++i) bench.edge(aux0, 10 * ms + i * 20 * us);
+    bench.poll(11 * ms);
+    CHECK(bench.port.edges.size() == 6);
+    CHECK(bench.board.next_wake() <= bench.port.time);
+    bench.run(11 * ms);
+    CHECK(bench.all<wire::Event>().size() == 30);
+}
+
+TEST_CASE("board_inputs: what waits behind the edges of one poll is not given up") {
+    Running world;
+    // Its start is among the edges that are still to be read when it should have come.
+    for (int i = 0; i < 24; ++i) world.edge(aux0, world.began + 10 * us + i * 10 * us);
+    world.edge(0, world.began + 400 * us);
+    world.edge(0, world.began + 4 * ms, false);
+    world.poll(world.began + 80 * ms);
+    CHECK(world.all<wire::Exposure>().empty());
+    world.poll();
+    const auto records = world.all<wire::Exposure>();
+    REQUIRE_FALSE(records.empty());
+    CHECK(records[0].flags == wire::exposure_measured);
+}
+
+TEST_CASE("board_inputs: an exposure counts once its edges have settled") {
+    Running world;
+    world.edge(0, world.began);
+    world.poll(world.began + 3 * us);
+    world.edge(0, world.began + 4 * ms, false);
+    world.edge(0, world.began + 4 * ms + us);
+    world.edge(0, world.began + 4 * ms + 2 * us, false);
+    world.poll(world.began + 4 * ms + 6 * us);
+    CHECK(world.all<wire::Exposure>().empty());
+    CHECK(world.board.next_wake() <= world.began + 4 * ms + 20 * us);
+    world.poll(world.began + 4 * ms + 7 * us);
+    const auto records = world.all<wire::Exposure>();
+    REQUIRE(records.size() == 1);
+    CHECK(records[0].start_ns == world.began);
+    CHECK(records[0].end_ns == world.began + 4 * ms);
+    CHECK(records[0].flags == wire::exposure_measured);
+}
+
+TEST_CASE("board_inputs: where edges were lost, no start is paired with an end") {
+    for (const bool ended : {false, true}) {
+        Running world;
+        world.edge(0, world.began);
+        world.poll(world.began + 50 * us);
+        world.edge(0, world.began + 4 * ms, false);
+        if (ended) world.poll(world.began + 4 * ms + 50 * us);
+        world.port.lost = 3;
+        world.poll(world.began + 5 * ms);
+        const auto events = world.events(wire::EventKind::edge_overflow);
+        REQUIRE(events.size() == 1);
+        CHECK(events[0].value == 3);
+        CHECK(events[0].time_ns == world.began + 5 * ms);
+        CHECK(world.first_record().flags ==
+              (ended ? wire::exposure_measured : wire::exposure_no_end));
+        CHECK(world.health().lost_edges == 3);
+    }
+}
+
+TEST_CASE("board_inputs: no start that waited while edges were lost is paired with a later end") {
+    for (const int others : {0, 22, 23, 24, 60}) {
+        Running world;
+        for (int i = 0; i < others; ++i) world.edge(aux0, world.began - 10 * us);
+        world.edge(0, world.began);
+        world.edge(aux0, world.began + 10 * us);  // it has settled
+        world.port.lost = 1;
+        world.run(world.began + 50 * us);
+        world.edge(0, world.began + 4 * ms, false);
+        world.run(world.began + 5 * ms);
+        CHECK((world.first_record().flags & wire::exposure_measured) == 0);
+        // That is over with what waited.
+        const Nanoseconds next = world.trigger();
+        const std::size_t before = world.all<wire::Exposure>().size();
+        world.edge(0, next);
+        world.poll(next + 50 * us);
+        world.edge(0, next + 4 * ms, false);
+        world.run(next + 5 * ms);
+        REQUIRE(world.all<wire::Exposure>().size() > before);
+        CHECK(world.all<wire::Exposure>().back().flags == wire::exposure_measured);
+    }
+}
+
+TEST_CASE("board_inputs: a slave is switched when its master does not expose, as far as is known") {
+    for (const bool lost : {false, true}) {
+        Running world;
+        const auto switched = [&world] { return world.port.routes.master[1] == 0; };
+        world.edge(0, world.began);
+        world.poll(world.began + ms);
+        world.send(wire::Start{2, 0, {}});
+        CHECK_FALSE(switched());
+        if (lost) {
+            // Its end may be among them: the port knows, and is asked at the next occasion.
+            world.port.lost = 1;
+            world.poll(world.began + 2 * ms);
+            world.send(wire::Start{2, 0, {}});
+        } else {
+            world.edge(0, world.began + 4 * ms, false);
+            world.poll(world.began + 5 * ms);
+        }
+        CHECK(switched());
+    }
+}
+
+TEST_CASE("board_inputs: a slave is switched at an edge of its master, not of another camera") {
+    Bench bench;
+    bench.add_camera(0);
+    bench.add_camera(1, wire::camera_slave | wire::camera_no_strobe);
+    bench.configuration.cameras[1].master = 0;
+    bench.add_camera(2);
+    bench.configure();
+    bench.edge(0, ms);
+    bench.edge(2, ms + 10 * us);
+    bench.poll(2 * ms);
+    bench.send(wire::Start{2, 0, {}});
+    bench.edge(2, 3 * ms, false);
+    bench.poll(4 * ms);
+    CHECK(bench.port.routes.master[1] == not_routed);
+    bench.edge(0, 5 * ms, false);
+    bench.poll(6 * ms);
+    CHECK(bench.port.routes.master[1] == 0);
+}
+
+TEST_CASE("board_inputs: a slave has the master's edges, and its grid point") {
+    Running world;
+    world.send(wire::Start{2, 0, {}});
+    world.edge(0, world.began);
+    world.edge(0, world.began + 4 * ms, false);
+    world.poll(world.began + 10 * ms);
+    const auto records = world.all<wire::Exposure>();
+    // The slave was switched on after this pulse had begun.
+    REQUIRE(records.size() == 1);
+    world.run(world.began + 50 * ms + us);
+    const Nanoseconds next = world.trigger();
+    REQUIRE(next > world.began);
+    world.edge(0, next);
+    world.edge(0, next + 4 * ms, false);
+    world.poll(next + 10 * ms);
+    const auto both = world.all<wire::Exposure>();
+    REQUIRE(both.size() == 3);
+    CHECK(both[1].camera == 0);
+    CHECK(both[2].camera == 1);
+    CHECK(both[2].trigger == 1);
+    CHECK(both[2].tick == both[1].tick);
+    CHECK(both[2].tick == both[0].tick + 1);
+    CHECK(both[2].start_ns == next);
+    CHECK(both[2].end_ns == next + 4 * ms);
+}
+
+TEST_CASE("board_inputs: a noisy input is told, and spoils the exposures only of the cameras") {
+    for (const std::uint8_t input : {std::uint8_t{0}, aux0}) {
+        Running world;
+        world.edge(0, world.began);
+        world.edge(aux1, world.began + 10 * us);
+        for (int i = 0; i < 130; ++i)
+            world.edge(input, world.began + 20 * us + i * 2 * us, i % 2 != 0);
+        world.run(world.began + 3 * ms);
+        const auto events = world.events(wire::EventKind::input_noisy);
+        REQUIRE(events.size() == 1);
+        CHECK(events[0].source == input);
+        CHECK((world.port.inputs >> input & 1U) == 0);
+        if (input != 0) {
+            world.edge(0, world.began + 4 * ms, false);
+            world.poll(world.began + 5 * ms);
+        }
+        CHECK((world.first_record().flags == wire::exposure_measured) == (input != 0));
+        CHECK(world.health().noisy_inputs == 1);
+    }
+}
+
+TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the second of a pair") {
+    for (const std::uint32_t rate_uhz : {0U, 10'000'000U})
+        for (const Nanoseconds off : {-1, 0, 1}) {
+            Bench bench;
+            bench.add_camera(0);
+            bench.configuration.ports.sync_rate_uhz = rate_uhz;
+            bench.configure();
+            bench.send(wire::Start{1, wire::start_on_sync, {}});
+            const Nanoseconds period = rate_uhz == 0 ? second : second / 10;
+            const Nanoseconds limit = period / 2'000;
+            // 500 ppm off is a pulse of another clock; a nanosecond more is not.
+            for (const Nanoseconds sign : {-1, 1}) {
+                if (off == 0) break;
+                const Nanoseconds at = bench.port.time + 200 * ms;
+                const Nanoseconds next = at + period + sign * (limit + (off > 0 ? 1 : 0));
+                bench.edge(sync_in, at);
+                bench.edge(sync_in, next);
+                bench.port.words.clear();
+                bench.run(next + 50 * ms);
+                CHECK((bench.trigger() > 0) == (off < 0));
+                if (off > 0) continue;
+                bench.run(next + 60 * ms);
+                // The grid begins with the pulse.
+                CHECK(bench.trigger() == next + 50 * ms - 2 * ms);
+                break;
+            }
+            if (off != 0) continue;
+            bench.edge(sync_in, 400 * ms);  // alone
+            bench.run(450 * ms);
+            CHECK(bench.trigger() == 0);
+        }
+    Bench bench;
+    bench.add_camera(0);
+    bench.configure();
+    bench.send(wire::Start{1, wire::start_on_sync, {}});
+    bench.edge(sync_in, 200 * ms);
+    bench.edge(sync_in, 1'200 * ms + 500 * us);
+    bench.run(1'260 * ms);
+    CHECK(bench.trigger() == 1'248 * ms + 500 * us);
+}
+
+TEST_CASE("board_inputs: a camera that waits for a sync pulse joins those that run at once") {
+    Bench bench;
+    bench.add_camera(0);
+    bench.add_camera(1);
+    bench.configure();
+    bench.send(wire::Start{1, wire::start_on_sync, {}});
+    bench.send(wire::Start{2, 0, {}});
+    bench.run(100 * ms);
+    CHECK(bench.trigger() == 0);
+    const auto running = bench.port.words.size();
+    CHECK(running > 0);
+    bench.edge(sync_in, 110 * ms);
+    bench.run(200 * ms);
+    CHECK(bench.trigger() % (50 * ms) == 48 * ms);
+}
+
+TEST_CASE("board_inputs: sync pulses that no longer fit the grid are told, and then followed") {
+    Bench bench;
+    bench.add_camera(0);
+    bench.configure();
+    bench.send(wire::Start{1, wire::start_on_sync, {}});
+    Nanoseconds at = 200 * ms;
+    for (int i = 0; i < 3; ++i, at += second) {
+        bench.edge(sync_in, at);
+        bench.run(at + ms);
+    }
+    CHECK(bench.events(wire::EventKind::sync_lost).empty());
+    at += 10 * ms;
+    for (int i = 0; i < 3; ++i, at += second) {
+        bench.edge(sync_in, at);
+        bench.run(at + ms);
+    }
+    const auto lost = bench.events(wire::EventKind::sync_lost);
+    const auto taken = bench.events(wire::EventKind::sync_taken);
+    REQUIRE(lost.size() == 1);
+    REQUIRE(taken.size() == 1);
+    CHECK(lost[0].value == 10 * ms);
+    CHECK(lost[0].time_ns == 3'210 * ms);
+    CHECK(taken[0].value == 10 * ms);
+    CHECK(taken[0].time_ns == 5'210 * ms);
+}
+
+TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse before they began") {
+    for (const std::uint32_t baud : {0U, 19'200U}) {
+        Bench bench;
+        bench.configuration.ports.options = wire::port_nmea;
+        bench.configuration.ports.nmea_baud = baud;
+        bench.configure();
+        CHECK(bench.port.baud == (baud == 0 ? 9'600 : baud));
+        const std::string line =
+            "$GPRMC,235959.00,A,4723.1,N,00832.4,E,0.02,31.6,311223,,,A*57\r\n";
+        bench.port.serial.assign(line.begin(), line.end());
+        bench.port.serial_byte = 10 * second / bench.port.baud;
+        const auto lasts = static_cast<Nanoseconds>(line.size()) * bench.port.serial_byte;
+        // It began two bytes after the pulse; the next pulse came before its end.
+        const Nanoseconds pulse = 100 * ms;
+        bench.port.serial_until = pulse + 2 * bench.port.serial_byte + lasts;
+        bench.edge(pps, pulse);
+        bench.edge(pps, pulse + 4 * bench.port.serial_byte);
+        bench.poll(200 * ms);
+        const auto labels = bench.events(wire::EventKind::utc_label);
+        REQUIRE(labels.size() == 1);
+        CHECK(labels[0].time_ns == pulse);
+        CHECK(labels[0].value == 1'704'067'199);
+    }
+    Bench bench;
+    bench.configure();
+    CHECK(bench.port.baud == 0);
+}
