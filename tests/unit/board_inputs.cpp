@@ -170,6 +170,7 @@ struct Bench {
         out.erase(std::remove_if(out.begin(), out.end(),
                                  [kind](const wire::Event& event) { return event.kind != kind; }),
                   out.end());
+        for (const wire::Event& event : out) CHECK(event.detail == 0);
         return out;
     }
     wire::Health health() {
@@ -237,6 +238,7 @@ TEST_CASE("board_inputs: each pulse is an event, with the number of its input") 
         CHECK(events[i].kind == expected[i].kind);
         CHECK(events[i].source == expected[i].source);
         CHECK(events[i].value == expected[i].number);
+        CHECK(events[i].detail == 0);
         CHECK(events[i].time_ns == expected[i].at);
     }
 }
@@ -284,6 +286,7 @@ TEST_CASE("board_inputs: an exposure counts once its edges have settled") {
     Running world;
     world.edge(0, world.began);
     world.poll(world.began + 3 * us);
+    CHECK(world.board.next_wake() <= world.began + 10 * us);
     world.edge(0, world.began + 4 * ms, false);
     world.edge(0, world.began + 4 * ms + us);
     world.edge(0, world.began + 4 * ms + 2 * us, false);
@@ -298,6 +301,22 @@ TEST_CASE("board_inputs: an exposure counts once its edges have settled") {
     CHECK(records[0].flags == wire::exposure_measured);
 }
 
+TEST_CASE("board_inputs: a start that has not settled when it is due is not given up") {
+    Running world;
+    const Nanoseconds due = world.began + 50 * ms;  // at the latest
+    world.run(due - 3 * us);
+    world.edge(0, due - 2 * us);
+    world.poll(due + us);
+    CHECK(world.all<wire::Exposure>().empty());
+    world.run(due + 10 * us);
+    world.edge(0, due + ms, false);
+    world.run(due + 2 * ms);
+    const auto records = world.all<wire::Exposure>();
+    REQUIRE_FALSE(records.empty());
+    CHECK(records[0].flags == wire::exposure_measured);
+    CHECK(records[0].start_ns == due - 2 * us);
+}
+
 TEST_CASE("board_inputs: where edges were lost, no start is paired with an end") {
     for (const bool ended : {false, true}) {
         Running world;
@@ -309,6 +328,7 @@ TEST_CASE("board_inputs: where edges were lost, no start is paired with an end")
         world.poll(world.began + 5 * ms);
         const auto events = world.events(wire::EventKind::edge_overflow);
         REQUIRE(events.size() == 1);
+        CHECK(events[0].source == 0);
         CHECK(events[0].value == 3);
         CHECK(events[0].time_ns == world.began + 5 * ms);
         CHECK(world.first_record().flags ==
@@ -407,22 +427,24 @@ TEST_CASE("board_inputs: a slave has the master's edges, and its grid point") {
 }
 
 TEST_CASE("board_inputs: a noisy input is told, and spoils the exposures only of the cameras") {
-    for (const std::uint8_t input : {std::uint8_t{0}, aux0}) {
+    for (const std::uint8_t input : {std::uint8_t{0}, std::uint8_t{input_imu_ready}, aux0}) {
         Running world;
         world.edge(0, world.began);
         world.edge(aux1, world.began + 10 * us);
-        for (int i = 0; i < 130; ++i)
+        for (int i = 0; i < 165; ++i)
             world.edge(input, world.began + 20 * us + i * 2 * us, i % 2 != 0);
         world.run(world.began + 3 * ms);
         const auto events = world.events(wire::EventKind::input_noisy);
         REQUIRE(events.size() == 1);
         CHECK(events[0].source == input);
+        CHECK(events[0].value == 0);
         CHECK((world.port.inputs >> input & 1U) == 0);
         if (input != 0) {
             world.edge(0, world.began + 4 * ms, false);
             world.poll(world.began + 5 * ms);
         }
-        CHECK((world.first_record().flags == wire::exposure_measured) == (input != 0));
+        CHECK(world.first_record().flags ==
+              (input != 0 ? wire::exposure_measured : wire::exposure_no_end));
         CHECK(world.health().noisy_inputs == 1);
     }
 }
@@ -462,8 +484,11 @@ TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the sec
     bench.add_camera(0);
     bench.configure();
     bench.send(wire::Start{1, wire::start_on_sync, {}});
-    bench.edge(sync_in, 200 * ms);
-    bench.edge(sync_in, 1'200 * ms + 500 * us);
+    for (const Nanoseconds at : {200 * ms, 1'200 * ms + 500 * us}) {
+        bench.run(at);
+        bench.edge(sync_in, at);
+        bench.poll(at + 10 * us);
+    }
     bench.run(1'260 * ms);
     CHECK(bench.trigger() == 1'248 * ms + 500 * us);
 }
@@ -482,6 +507,26 @@ TEST_CASE("board_inputs: a camera that waits for a sync pulse joins those that r
     bench.edge(sync_in, 110 * ms);
     bench.run(200 * ms);
     CHECK(bench.trigger() % (50 * ms) == 48 * ms);
+}
+
+TEST_CASE("board_inputs: what is on the grid goes on from a sync pulse") {
+    Bench bench;
+    bench.add_camera(0);
+    bench.configuration.ports.sync_rate_uhz = 10'000'000;
+    bench.configure();
+    bench.send(wire::Start{1, wire::start_on_sync, {}});
+    for (const Nanoseconds at : {203 * ms, 303 * ms, 403 * ms + 10 * us}) {
+        bench.run(at);
+        bench.edge(sync_in, at);
+        bench.poll(at + 10 * us);
+    }
+    bench.run(460 * ms);
+    // The sender's clock is slower by 100 ppm, as is known from the third pulse on.
+    CHECK(bench.trigger() == 453 * ms + 15 * us - 2 * ms);
+    bool synced = false;
+    for (const auto& [at, levels] : bench.port.words)
+        synced = synced || (at == 403 * ms && (levels >> output_sync & 1U) != 0);
+    CHECK(synced);
 }
 
 TEST_CASE("board_inputs: sync pulses that no longer fit the grid are told, and then followed") {
@@ -504,6 +549,8 @@ TEST_CASE("board_inputs: sync pulses that no longer fit the grid are told, and t
     const auto taken = bench.events(wire::EventKind::sync_taken);
     REQUIRE(lost.size() == 1);
     REQUIRE(taken.size() == 1);
+    CHECK(lost[0].source == 0);
+    CHECK(taken[0].source == 0);
     CHECK(lost[0].value == 10 * ms);
     CHECK(lost[0].time_ns == 3'210 * ms);
     CHECK(taken[0].value == 10 * ms);
@@ -530,10 +577,38 @@ TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse be
         bench.poll(200 * ms);
         const auto labels = bench.events(wire::EventKind::utc_label);
         REQUIRE(labels.size() == 1);
+        CHECK(labels[0].source == 0);
         CHECK(labels[0].time_ns == pulse);
         CHECK(labels[0].value == 1'704'067'199);
     }
     Bench bench;
     bench.configure();
     CHECK(bench.port.baud == 0);
+    bench.port.serial.assign(10, '$');  // they are of another part
+    bench.poll(10 * ms);
+    CHECK(bench.port.serial.size() == 10);
+}
+
+TEST_CASE(
+    "board_inputs: a sentence begins with its first byte, wherever that is among those read") {
+    const std::string line = "$GPRMC,235959.00,A,4723.1,N,00832.4,E,0.02,31.6,311223,,,A*57\r\n";
+    for (const std::size_t before : {0U, 5U, 31U, 40U})
+        for (const Nanoseconds late : {0, 1}) {
+            Bench bench;
+            bench.configuration.ports.options = wire::port_nmea;
+            bench.configure();
+            const std::string bytes = std::string(before, 'x') + line;
+            bench.port.serial.assign(bytes.begin(), bytes.end());
+            bench.port.serial_byte = 10 * second / 9'600;
+            const Nanoseconds begins = 300 * ms;
+            bench.port.serial_until =
+                begins + static_cast<Nanoseconds>(line.size()) * bench.port.serial_byte;
+            bench.edge(pps, 100 * ms);
+            bench.edge(pps, begins + late);
+            bench.poll(500 * ms);
+            bench.poll();
+            const auto labels = bench.events(wire::EventKind::utc_label);
+            REQUIRE(labels.size() == 1);
+            CHECK(labels[0].time_ns == (late == 0 ? begins : 100 * ms));
+        }
 }
