@@ -476,7 +476,7 @@ TEST_CASE("spi_imu: how many edges were lost follows from the period, unless mor
     CHECK(world.sample.number == 3);
 }
 
-TEST_CASE("spi_imu: new data within a reading spoils it; within its check it does not") {
+TEST_CASE("spi_imu: new data within a reading spoils it, within its check it does not") {
     for (const Nanoseconds after_end : {-1, 0, 1, 9'999}) {
         Running world;
         REQUIRE(world.read());
@@ -590,7 +590,8 @@ TEST_CASE("spi_imu: a sample is repeated when the part or its words say so") {
     CHECK((world.sample.flags & wire::imu_repeated) == 0);
 }
 
-TEST_CASE("spi_imu: readings that differ are compared with one more; the first of the two counts") {
+TEST_CASE(
+    "spi_imu: readings that differ are compared with one more, and the first of the two counts") {
     Running world(wire::imu_data_ready, 819'200, wire::ImuKind::adis16445);
     CHECK(world.bus.job.pause == 25'000);
     world.bus.updates = 1;
