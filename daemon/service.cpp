@@ -218,6 +218,7 @@ void Service::tell_output_step(const OutputStep& step) {
 Status Service::collect_status(HostTime now) {
     Status status;
     status.instance = configuration_.instance;
+    status.release = VERSAVIS_VERSION;
     status.started = started_;
     status.now = now;
     status.board_needed = board_needed();

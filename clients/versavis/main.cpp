@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iostream>
 
+#include "board/board_commands.hpp"
 #include "clock/clock.hpp"
 #include "pairing/pair_replay.hpp"
 #include "status/status_document.hpp"
@@ -117,6 +118,8 @@ int main(int argc, char** argv) {
 
     client::ClockCommands clock(app, [] { return stop_requested != 0; });
 
+    client::BoardCommands board(app, [] { return stop_requested != 0; });
+
     std::string stream;
     std::string output;
     double timeout_s = 5;
@@ -134,7 +137,7 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     // Commands that run until they are stopped end tidily; all others end at once.
-    if (watch || *tail_command || clock.records())
+    if (watch || *tail_command || clock.records() || board.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
     if (*list) {
@@ -151,6 +154,7 @@ int main(int argc, char** argv) {
         return done ? EX_OK : fail(done.error());
     }
     if (*replay) return replay_pairing(recording, decisions, json);
+    if (board.chosen()) return board.run(instance);
     if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});

@@ -8,6 +8,7 @@
 
 #include "configuration/board_configuration.hpp"
 #include "configuration/board_parts.hpp"
+#include "engine/board/firmware_file.hpp"
 
 namespace versavis::daemon {
 
@@ -70,7 +71,9 @@ std::string describe_mismatch(const wire::BoardHello& hello) {
     const bool older = hello.major < wire::protocol_major;
     return fmt::format("it speaks protocol {}.{}, this service {}.{}: {}", hello.major, hello.minor,
                        wire::protocol_major, wire::protocol_minor,
-                       older ? "flash the firmware of this release of the service"
+                       older ? "flash the firmware of this release of the service: stop it, then "
+                               "run 'versavis flash " +
+                                   board::installed_firmware().string() + "'"
                              : "install the service of its firmware's release, or flash the "
                                "firmware of this one");
 }

@@ -9,18 +9,13 @@
 #include <iterator>
 #include <utility>
 
+#include "engine/board/board_words.hpp"
+
 namespace versavis::daemon {
 
 namespace {
 
 using Part = wire::ConfigurationPart;
-
-/// By bit of wire::Present.
-constexpr const char* names[]{
-    "camera0",    "camera1",     "camera2", "camera3",    "light", "sync_output", "test_output",
-    "pps",        "aux0",        "aux1",    "sync_input", "spi",   "i2c",         "imu0_ready",
-    "imu1_ready", "accel_ready", "uart",    "imu_output", "memory"};
-static_assert((1U << std::size(names)) - 1U == wire::present_all);
 
 /// One part that the configuration asks for.
 struct Need {
@@ -224,18 +219,11 @@ std::string message(const Need& need, const std::string& board) {
 /// What the board refuses as a part that it lacks.
 bool means(const wire::Refusal& refusal, const Need& need) {
     return refusal.part == need.where && refusal.index == need.index && refusal.value >= 0 &&
-           refusal.value < static_cast<std::int64_t>(std::size(names)) &&
+           refusal.value < std::int64_t{board::part_count} &&
            need.part == 1U << static_cast<unsigned>(refusal.value);
 }
 
 }  // namespace
-
-std::vector<std::string> part_names(std::uint32_t present) {
-    std::vector<std::string> there;
-    for (unsigned bit = 0; bit < std::size(names); ++bit)
-        if (has(present, 1U << bit)) there.emplace_back(names[bit]);
-    return there;
-}
 
 std::vector<std::string> missing_parts(const Configuration& configuration,
                                        const wire::BoardHello& board) {

@@ -10,9 +10,6 @@
 
 namespace versavis::daemon {
 
-/// Names of the bits of wire::Present, as the status has them.
-std::vector<std::string> part_names(std::uint32_t present);
-
 /// Each part that the configuration asks for and this board lacks, as one message: place, key,
 /// what the board has, what to do.
 std::vector<std::string> missing_parts(const Configuration& configuration,

@@ -17,6 +17,7 @@
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 #include "wire/messages.hpp"
+#include "wire/usb_identity.hpp"
 
 namespace versavis::daemon {
 
@@ -29,8 +30,8 @@ struct BoardConfiguration {
     TomlEntry entry;
     std::string link = "usb";  ///< "usb" or "unix:PATH"
     std::string serial;        ///< empty: any
-    std::uint16_t usb_vendor = 0x1209;
-    std::uint16_t usb_product = 0x5653;
+    std::uint16_t usb_vendor = wire::usb_vendor;
+    std::uint16_t usb_product = wire::usb_product;
     bool keep_configuration = false;  ///< it also holds after the board's next power-up
     std::vector<double> input_delay_ns{0, 0, 0, 0};   ///< of its exposure inputs, wire to stamp
     std::vector<double> output_delay_ns{0, 0, 0, 0};  ///< of its trigger outputs, time to wire

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "board/board_event.hpp"
+#include "engine/board/firmware_file.hpp"
 #include "stream/status.hpp"
 
 namespace versavis::daemon {
@@ -394,12 +395,18 @@ Fault fault_of(const ImuFailure& failure) {
 }
 
 /// Of a board that runs: what is no fault of it, and to be known all the same.
-std::string board_remark(const BoardReport& board) {
+std::string board_remark(const Status& status) {
+    const BoardReport& board = status.board;
     if (!board.hint.empty()) return board.hint;
     if (board.unkept) return unkept_configuration;
     if (board.health.sync_state == wire::SyncState::lost)
         return "the pulses of the sync input do not fit the grid, which runs on by itself: check "
                "their cable, and that 'sync_rate_hz' is that of the board which sends them";
+    if (firmware_outdated(status))
+        return fmt::format(
+            "its firmware, {}, is older than this service, {}: stop the service, "
+            "then run 'versavis flash {}'",
+            board.firmware, status.release, board::installed_firmware().string());
     return "";
 }
 
@@ -501,7 +508,7 @@ Diagnosis diagnose_board(const Status& status) {
                         fmt::format("nothing came from it for {:.1f} s: check its cable and power",
                                     static_cast<double>(status.clock.since_contact.ns) * 1e-9),
                         known, in_time);
-    return conclude(Fault::none, board_remark(board), known, in_time);
+    return conclude(Fault::none, board_remark(status), known, in_time);
 }
 
 Diagnosis diagnose_clock(const Status& status) {

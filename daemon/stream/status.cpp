@@ -7,7 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "configuration/board_parts.hpp"
+#include "engine/board/board_words.hpp"
+#include "engine/board/firmware_version.hpp"
 
 namespace versavis::daemon {
 
@@ -26,35 +27,6 @@ json with_diagnosis(json device, const Diagnosis& diagnosis) {
     return device;
 }
 
-const char* to_string(wire::ResetCause cause) {
-    switch (cause) {
-        case wire::ResetCause::power_on: return "power_on";
-        case wire::ResetCause::pin: return "pin";
-        case wire::ResetCause::watchdog: return "watchdog";
-        case wire::ResetCause::brown_out: return "brown_out";
-        case wire::ResetCause::software: return "software";
-    }
-    return "unknown";
-}
-
-const char* to_string(wire::PpsState state) {
-    switch (state) {
-        case wire::PpsState::none: return "none";
-        case wire::PpsState::acquiring: return "acquiring";
-        case wire::PpsState::good: return "good";
-    }
-    return "unknown";
-}
-
-const char* to_string(wire::SyncState state) {
-    switch (state) {
-        case wire::SyncState::none: return "none";
-        case wire::SyncState::lost: return "lost";
-        case wire::SyncState::followed: return "followed";
-    }
-    return "unknown";
-}
-
 /// What is not known is null: a zero would be a claim.
 json known(bool is_known, Duration value) { return is_known ? json(value.ns) : json(nullptr); }
 /// Of an IMU, which the board drives.
@@ -64,7 +36,7 @@ const char* state(const ImuStatus& imu, const Status& status) {
     return imu.report.failure.times > 0 ? "failed" : "opening";
 }
 
-json board_json(const BoardReport& board, bool needed) {
+json board_json(const BoardReport& board, bool needed, bool outdated) {
     const wire::Health& health = board.health;
     const bool known = board.connections > 0;
     const bool good_pps = health.pps_state == wire::PpsState::good;
@@ -72,7 +44,8 @@ json board_json(const BoardReport& board, bool needed) {
             {"port", board.port},
             {"serial", board.serial},
             {"firmware", board.firmware},
-            {"present", known ? json(part_names(board.present)) : json(nullptr)},
+            {"firmware_outdated", known ? json(outdated) : json(nullptr)},
+            {"present", known ? json(board::part_names(board.present)) : json(nullptr)},
             {"fastest_imu_hz", known ? json(board.fastest_imu_millihertz * 1e-3) : json(nullptr)},
             {"nonce", board.nonce},
             {"connections", board.connections},
@@ -100,10 +73,10 @@ json board_json(const BoardReport& board, bool needed) {
             {"imu_errors", health.imu_errors[0] + health.imu_errors[1]},
             {"imu_restarts", health.imu_restarts},
             {"loop_max_ns", health.loop_max_ns},
-            {"reset_cause", to_string(health.reset_cause)},
-            {"pps", to_string(health.pps_state)},
+            {"reset_cause", board::to_string(health.reset_cause)},
+            {"pps", board::to_string(health.pps_state)},
             {"pps_error_ppb", good_pps ? json(health.pps_error_ppb) : json(nullptr)},
-            {"sync", to_string(health.sync_state)}};
+            {"sync", board::to_string(health.sync_state)}};
 }
 
 json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
@@ -193,6 +166,10 @@ json camera_json(const CameraStatus& status) {
 
 }  // namespace
 
+bool firmware_outdated(const Status& status) {
+    return board::is_older(status.board.firmware, status.release);
+}
+
 Health health(const Status& status) {
     Health worst = std::max(status.board_diagnosis.health, status.clock_diagnosis.health);
     for (const CameraStatus& camera : status.cameras)
@@ -233,12 +210,14 @@ std::string to_json(const Status& status) {
     const json document{
         {"schema", schema},
         {"instance", status.instance},
+        {"release", status.release},
         {"pid", ::getpid()},
         {"started_ns", status.started.ns},
         {"host_time_ns", status.now.ns},
         {"health", to_string(health(status))},
         {"board",
-         with_diagnosis(board_json(status.board, status.board_needed), status.board_diagnosis)},
+         with_diagnosis(board_json(status.board, status.board_needed, firmware_outdated(status)),
+                        status.board_diagnosis)},
         {"clock", with_diagnosis(clock_json(status.clock, status.grid), status.clock_diagnosis)},
         {"cameras", cameras},
         {"imus", imus},

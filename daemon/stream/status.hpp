@@ -44,6 +44,7 @@ struct StreamStatus {
 
 struct Status {
     std::string instance;
+    std::string release;  ///< of the service
     HostTime started;
     HostTime now;
     bool board_needed = true;
@@ -56,6 +57,9 @@ struct Status {
     std::vector<ImuStatus> imus;
     std::vector<StreamStatus> streams;
 };
+
+/// The board's firmware is of an older release than the service.
+bool firmware_outdated(const Status& status);
 
 /// That of the device that is worst off.
 Health health(const Status& status);

@@ -39,8 +39,6 @@ constexpr std::uint32_t capabilities =
     wire::capability_sync | wire::capability_imu_output | wire::capability_host_grid |
     wire::capability_nmea;
 
-Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
-
 unsigned test_output(const wire::PortConfiguration& ports) {
     if (ports.test_output == wire::test_at_test) return output_test;
     return ports.test_output == wire::test_at_sync ? output_sync
@@ -98,7 +96,7 @@ void Board::poll() {
     stirred_ = configuring_ || outputs_blocked_;
     poll_imus(now);
     poll_nmea();
-    poll_storage();
+    poll_storage(now);
     poll_health(now);
     if (transmitter_.pump()) more_ = true;
     if (configuring_ && outputs_.empty() && (all_idle() || now >= configure_at_)) more_ = true;
@@ -182,7 +180,8 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
     if (packet.read(expected)) {
         if (expected.camera < camera_count && expected.exposure_ns >= 0)
             cameras_[expected.camera].announce(expected.trigger, expected.exposure_ns);
-        return;
+        else
+            ++health_.ignored;
     }
     if (packet.read(reboot) && reboot.magic == wire::reboot_magic)
         hal_.rebooter.reboot(reboot.to_boot_loader != 0);
@@ -220,9 +219,9 @@ wire::BoardHello Board::introduction() const {
 }
 
 void Board::configure(const wire::Configuration& configuration) {
+    refused_ = 0;
     if (any_running())
         return answer_configuration(configuration.id, wire::ConfigurationStatus::running);
-    refused_ = 0;
     checked_id_ = configuration.id;
     check(configuration, hal_.facts, *this);
     if (refused_ != 0)
@@ -252,7 +251,6 @@ void Board::answer_configuration(std::uint32_t id, wire::ConfigurationStatus sta
     answer.refused = refused_;
     answer.origin_ns = grid_clock_.board_time(0);
     answer.taken = configuration_;
-    refused_ = 0;
     send(answer);
 }
 
@@ -269,6 +267,7 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     }
     std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
     for (unsigned i = 0; i < camera_count; ++i) {
+        cameras_[i].stop();  // a slave may still run
         cameras_[i].give_up();
         const bool lit = (configuration.illumination.cameras >> i & 1U) != 0;
         cameras_[i].configure(configuration.cameras[i],
@@ -283,7 +282,7 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
         inputs |= 1U << input_accel_ready;
     noise_.listen(inputs);
     exposing_ = 0;
-    slaves_ = routed_ = 0;
+    routed_ = 0;
     light_.configure(configuration.illumination, now);
     grid_clock_.begin(now, 0);
     apply_routes(true);
@@ -316,19 +315,14 @@ Routing::Switched Board::apply_routes(bool force) {
         if ((routed_ >> i & 1U) != 0) routes.master[i] = cameras_[i].master();
         if (cameras_[i].trigger_inverted()) routes.inverted_triggers |= bit;
     }
-    const std::uint8_t test = configuration_.ports.test;
-    if (test >= wire::test_imu0 && test < wire::test_rate) {
-        const auto port = static_cast<std::uint8_t>(test - wire::test_imu0);
-        if ((configuration_.imus[port].options & wire::imu_data_ready) != 0)
-            routes.test_input = static_cast<std::uint8_t>(input_imu_ready + port);
-    }
+    const unsigned port = configuration_.ports.test - unsigned{wire::test_imu0};
+    if (port < wire::imu_count && (configuration_.imus[port].options & wire::imu_data_ready) != 0)
+        routes.test_input = static_cast<std::uint8_t>(input_imu_ready + port);
     return hal_.routing.route(routes, force);
 }
 
 void Board::begin_trains(Nanoseconds now) {
     const wire::PortConfiguration& ports = configuration_.ports;
-    sync_.stop();
-    test_.stop();
     if (ports.sync_rate_uhz != 0)
         sync_.begin(output_sync, Grid(0, ports.sync_rate_uhz), grid_clock_, ports.pulse_ns, now);
     if (ports.test == wire::test_rate)
@@ -354,7 +348,6 @@ void Board::restore() {
     std::memcpy(&stored, bytes, sizeof stored);
     check(stored, hal_.facts, *this);
     if (refused_ == 0) apply(stored, hal_.clock.now());
-    refused_ = 0;
 }
 
 bool Board::any_running() const {
@@ -421,7 +414,7 @@ void Board::switch_slaves() {
     for (unsigned i = 0; i < camera_count; ++i) {
         CameraChannel& slave = cameras_[i];
         const auto bit = static_cast<std::uint8_t>(1U << i);
-        const bool wanted = (slaves_ & bit) != 0 && slave.enabled();
+        const bool wanted = (slaves_ & bit) != 0;
         if (!slave.is_slave() || slave.running() == wanted ||
             (exposing_ >> slave.master() & 1U) != 0)
             continue;
@@ -456,14 +449,16 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
     const bool late = outputs_.is_late(asked, left);
     if (output < camera_count && level != cameras_[output].trigger_inverted())
         cameras_[output].moved(asked, left, late);
-    if (output == output_light_gate) light_.moved(level, asked, left);
-    if (!late) return;
+    const bool gate = output == output_light_gate;
+    if (gate) light_.moved(level, asked, left);
+    // The gate closes as soon as it can, which is no sooner than the port can.
+    if (!late || (gate && !level)) return;
     ++health_.late_outputs;
     event(wire::EventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked, 0);
 }
 
 void Board::poll_configuration(Nanoseconds now) {
-    if (!configuring_ || (!all_idle() && now < configure_at_)) return;
+    if (!all_idle() && now < configure_at_) return;
     light_.stop(now);
     outputs_.rest(output_sync, false, now);
     outputs_.rest(output_test, false, now);
@@ -476,12 +471,12 @@ void Board::poll_configuration(Nanoseconds now) {
     answer_configuration(wanted_.id, wire::ConfigurationStatus::taken);
 }
 
-void Board::poll_storage() {
+void Board::poll_storage(Nanoseconds now) {
     if (!storing_) return;
     const Persist::Outcome outcome = hal_.persist.take_outcome();
     if (outcome == Persist::Outcome::busy) return;
     storing_ = false;
-    event(wire::EventKind::stored, 0, polled_, outcome == Persist::Outcome::stored ? 1 : 0, 0);
+    event(wire::EventKind::stored, 0, now, outcome == Persist::Outcome::stored ? 1 : 0, 0);
 }
 
 void Board::poll_imus(Nanoseconds now) {
@@ -497,7 +492,7 @@ void Board::poll_imus(Nanoseconds now) {
 
 void Board::poll_health(Nanoseconds now) {
     if (!greeted_ || now < next_health_) return;
-    next_health_ = max(next_health_ + health_interval, now);
+    next_health_ = now + health_interval;
     health_.board_time_ns = now;
     transmitter_.count_drops(health_);
     health_.receive_errors = decoder_.errors();

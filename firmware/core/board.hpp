@@ -50,7 +50,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void poll_edges(Nanoseconds now);
     void poll_cameras(Nanoseconds now);
     void poll_outputs(Nanoseconds now);
-    void poll_storage();
+    void poll_storage(Nanoseconds now);
     void poll_configuration(Nanoseconds now);
     void poll_imus(Nanoseconds now);
     void poll_nmea();
@@ -102,11 +102,11 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     Nanoseconds timers_ = 0;   ///< when cameras, light and outputs have something to do in any case
     Nanoseconds settled_ = 0;  ///< all edges before are known
     Nanoseconds output_progress_ = 0;
-    Nanoseconds next_health_ = 0;
+    Nanoseconds next_health_;
     Nanoseconds due_ = 0;  ///< when poll() has something to do next
-    Nanoseconds polled_ = 0;
-    Nanoseconds next_stray_ = 0;    ///< when the next stray edge may be reported
-    Nanoseconds configure_at_ = 0;  ///< at the latest
+    Nanoseconds polled_;
+    Nanoseconds next_stray_ = 0;  ///< when the next stray edge may be reported
+    Nanoseconds configure_at_;    ///< at the latest
     Nanoseconds last_sync_ = INT64_MIN / 2;
     Hal hal_;
     Identity identity_;

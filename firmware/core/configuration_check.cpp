@@ -71,9 +71,8 @@ bool slave(const wire::CameraConfiguration& camera) {
 }
 
 /// A master has an exposure line and a schedule of its own.
-bool can_be_master(const wire::Configuration& configuration, std::size_t master,
-                   std::size_t slave_index) {
-    if (master >= wire::camera_count || master == slave_index) return false;
+bool can_be_master(const wire::Configuration& configuration, std::size_t master) {
+    if (master >= wire::camera_count) return false;
     const wire::CameraConfiguration& camera = configuration.cameras[master];
     return enabled(camera) && !slave(camera) && (camera.flags & wire::camera_no_strobe) == 0;
 }
@@ -81,14 +80,13 @@ bool can_be_master(const wire::Configuration& configuration, std::size_t master,
 void check_master(const wire::Configuration& configuration, std::size_t index, Checker& checker) {
     const std::int64_t master = configuration.cameras[index].master;
     if (!slave(configuration.cameras[index]) ||
-        can_be_master(configuration, static_cast<std::size_t>(master), index))
+        can_be_master(configuration, static_cast<std::size_t>(master)))
         return;
     std::int64_t possible = -1;
     for (std::size_t i = 0; i < wire::camera_count && possible < 0; ++i)
-        if (can_be_master(configuration, i, index)) possible = static_cast<std::int64_t>(i);
+        if (can_be_master(configuration, i)) possible = static_cast<std::int64_t>(i);
     // The range names the cameras that could be one; if empty, none can.
-    checker.range(Field::master, master == possible ? -1 : master, possible < 0 ? 0 : possible,
-                  possible);
+    checker.range(Field::master, master, possible < 0 ? 0 : possible, possible);
 }
 
 void check_camera(const wire::Configuration& configuration, std::size_t index, Checker checker) {

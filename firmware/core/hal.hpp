@@ -94,7 +94,7 @@ struct Routes {
     /// Camera whose exposure line drives the trigger of this one: active while it exposes.
     /// not_routed: the schedule drives it.
     std::uint8_t master[camera_count] = {not_routed, not_routed, not_routed, not_routed};
-    std::uint8_t inverted_triggers = 0;   ///< bit mask: low is active, of routed triggers
+    std::uint8_t inverted_triggers = 0;   ///< bit mask: low is active, routed or not
     std::uint8_t inverted_exposures = 0;  ///< bit mask: low is exposing
     std::uint8_t light_cameras = 0;       ///< the light is gate and (lead or any of these exposes)
     bool light_inverted = false;
@@ -115,7 +115,9 @@ struct Routing {
         /// False: a master began meanwhile. A pulse of its slaves may be cut, or missing.
         bool clean = true;
     };
-    /// `force`: even while a master exposes; its pulse is cut, and `clean` says so.
+    /// `force`: even while a master exposes; its pulse is cut, and `clean` says so. The first one
+    /// of all makes the outputs drive their pins, triggers at rest and the others low, and may take
+    /// 300 us.
     virtual Switched route(const Routes& routes, bool force) = 0;
 
  protected:
@@ -263,7 +265,7 @@ struct PortFacts {
     std::uint32_t present = 0;                 ///< bits of wire::Present
     std::uint32_t fastest_imu_millihertz = 0;  ///< samples that it can read and pass on
     std::uint8_t output_grain_bits = 0;        ///< words leave at multiples of 2^this ns
-    Nanoseconds output_step = 1;               ///< between two words, at least
+    Nanoseconds output_step = 1;               ///< between two words, at least; on the grain
 
     Nanoseconds output_grain() const { return Nanoseconds{1} << output_grain_bits; }
 };

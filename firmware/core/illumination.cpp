@@ -122,7 +122,6 @@ void Illumination::open_gate(Nanoseconds on) {
     gate_on_ = outputs_.set(on, output_light_gate, true);
     gate_off_ = outputs_.set(gate_on_ + allowed, output_light_gate, false);
     last_off_ = gate_off_;
-    awaited_until_ = gate_on_ + start_patience;
     saved_ = earned(allowed);  // all counts as spent, until it is known how much really was
     saved_at_ = gate_off_;
 }

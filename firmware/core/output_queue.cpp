@@ -7,11 +7,14 @@ OutputQueue::OutputQueue(OutputSchedule& hardware, OutputMoves& moves, const Por
     : hardware_(hardware), moves_(moves), grain_(facts.output_grain()), step_(facts.output_step) {}
 
 Nanoseconds OutputQueue::set(Nanoseconds at, unsigned output, bool level, Nanoseconds hold) {
-    at = (at + grain_ / 2) & ~(grain_ - 1);
+    const auto on_grain = [this](Nanoseconds time) { return (time + grain_ / 2) & ~(grain_ - 1); };
+    at = on_grain(at);
     if (at < committed_until_ + step_) at = committed_until_ + step_;
     if (!has_room(output, 1)) return at;
     ++counts_[output];
-    insert({at, at, static_cast<std::uint32_t>(hold), static_cast<std::uint8_t>(output), level});
+    // What is put off by it stays on the grain.
+    insert({at, at, static_cast<std::uint32_t>(on_grain(hold)), static_cast<std::uint8_t>(output),
+            level});
     if (size_ > high_water_) high_water_ = size_;
     return at;
 }

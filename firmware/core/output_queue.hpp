@@ -105,10 +105,14 @@ class OutputQueue {
     /// Edges of pulses that may wait at an output: what 10 kHz needs for the furthest that a pulse
     /// train looks ahead. At half, such a train falls short; at twice, memory is wasted.
     static constexpr std::uint8_t pulse_room = 24;
-    /// Of the light's gate one light and the end of another, of its lead those of eight plans.
-    static constexpr std::uint8_t rooms[output_count] = {
-        pulse_room, pulse_room, pulse_room, pulse_room, 4, 18, pulse_room, pulse_room};
-    static constexpr std::size_t capacity = 6 * pulse_room + 4 + 18;
+    /// One light and the end of another.
+    static constexpr std::uint8_t gate_room = 4;
+    /// Those of eight plans, and one more.
+    static constexpr std::uint8_t lead_room = 18;
+    static constexpr std::uint8_t rooms[output_count] = {pulse_room, pulse_room, pulse_room,
+                                                         pulse_room, gate_room,  lead_room,
+                                                         pulse_room, pulse_room};
+    static constexpr std::size_t capacity = 6 * pulse_room + gate_room + lead_room;
 
     void insert(const PendingEdge& edge);
     void remove_first(std::size_t count);

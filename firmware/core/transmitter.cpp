@@ -63,6 +63,13 @@ void Transmitter::stage() {
     pop(queue);
 }
 
+template <class Message>
+constexpr bool is_aligned() {
+    constexpr MessageQueue queue = message_queues[queue_of(Message::type)];
+    return queue.offset % alignof(Message) == 0;
+}
+static_assert(is_aligned<wire::ClockAnswer>() && is_aligned<wire::ImuSample>());
+
 /// With the current time.
 void Transmitter::stamp(unsigned queue, std::uint8_t* message) {
     if (queue == queue_of(wire::Type::clock_answer)) {

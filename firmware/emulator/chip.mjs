@@ -3,6 +3,8 @@
 // right, and with an error where the chip would fault or the program is lost.
 import { RP2040 } from 'rp2040js';
 
+import { InstructionSet } from './instruction_set.mjs';
+
 export const ram_begin = 0x20000000;
 export const ram_size = 264 * 1024;
 const window_size = 0x1000;
@@ -16,38 +18,6 @@ const junk = 0xa5;
 
 const hex = (value) => `0x${(value >>> 0).toString(16)}`;
 
-// Who executes an instruction: rp2040js 1.4.1 as it is, or who puts it right.
-const as_emulated = 0;
-const adcs = 1; // V is wrong when the carry overflows
-const sbcs = 2;
-const shift_by_register = 3; // C is wrong by 0 and by more than 32 bits
-const push_lr_or_pop_pc = 4; // one cycle too few
-const refused = 5; // nobody: it does not belong into the core, or differs from the chip
-
-function is_refused(opcode) {
-    const stores_its_base = opcode >>> 11 === 0b11000 && (opcode >>> ((opcode >>> 8) & 7)) & 1;
-    const calls_link_register = opcode === 0x47f0;
-    const waits_or_signals = opcode >>> 8 === 0b10111111 && opcode !== 0xbf00; // NOP
-    const breaks = opcode >>> 8 === 0b10111110 || opcode >>> 8 === 0b11011110;
-    const calls_supervisor = opcode >>> 8 === 0b11011111;
-    const masks_interrupts = opcode >>> 5 === 0b10110110011;
-    const leaves = breaks || calls_supervisor || masks_interrupts;
-    return stores_its_base || calls_link_register || waits_or_signals || leaves;
-}
-
-function kind_of(opcode) {
-    const shifts_by_register = [0b0100000010, 0b0100000011, 0b0100000100, 0b0100000111];
-    if (is_refused(opcode)) return refused;
-    if (opcode >>> 6 === 0b0100000101) return adcs;
-    if (opcode >>> 6 === 0b0100000110) return sbcs;
-    if (shifts_by_register.includes(opcode >>> 6)) return shift_by_register;
-    const pushes_lr = opcode >>> 8 === 0b10110101;
-    const pops_pc = opcode >>> 8 === 0b10111101;
-    return pushes_lr || pops_pc ? push_lr_or_pop_pc : as_emulated;
-}
-
-const kinds = Uint8Array.from({ length: 0x10000 }, (_, opcode) => kind_of(opcode));
-
 export class Chip {
     /// `window` has read(offset) and write(offset, value) for the words at `window_begin`, or is
     /// left out.
@@ -55,6 +25,7 @@ export class Chip {
         this.emulator = new RP2040();
         this.core = this.emulator.core;
         this.registers = this.core.registers;
+        this.instructions = new InstructionSet(this.core);
         const lost = (component, message) => {
             throw new Error(`${component} at ${hex(this.pc)}: ${message}`);
         };
@@ -134,51 +105,7 @@ export class Chip {
     /// Executes one instruction. Returns its cycles.
     step() {
         const opcode = this.halves[(this.registers[program_counter] - ram_begin) >>> 1];
-        switch (kinds[opcode]) {
-            case adcs:
-                return this.add_with_carry(opcode, this.registers[(opcode >>> 3) & 7]);
-            case sbcs:
-                return this.add_with_carry(opcode, ~this.registers[(opcode >>> 3) & 7] >>> 0);
-            case shift_by_register:
-                return this.shift_by_register(opcode);
-            case push_lr_or_pop_pc:
-                return this.core.executeInstruction() + 1;
-            case refused:
-                throw new Error(`refused: instruction ${hex(opcode)} at ${hex(this.pc)}`);
-            default:
-                return this.core.executeInstruction();
-        }
-    }
-
-    add_with_carry(opcode, right) {
-        const { core, registers } = this;
-        const destination = opcode & 7;
-        const left = registers[destination];
-        const sum = left + right + (core.C ? 1 : 0);
-        const result = sum >>> 0;
-        registers[destination] = result;
-        core.N = result >>> 31 === 1;
-        core.Z = result === 0;
-        core.C = sum > 0xffffffff;
-        core.V = ((left ^ result) & (right ^ result)) >>> 31 === 1;
-        registers[program_counter] += 2;
-        return 1;
-    }
-
-    shift_by_register(opcode) {
-        const { core, registers } = this;
-        const destination = opcode & 7;
-        const value = registers[destination];
-        const count = registers[(opcode >>> 3) & 7] & 0xff;
-        if (count !== 0) {
-            const [result, carry] = shifts[(opcode >>> 6) & 7](value, count);
-            registers[destination] = result;
-            core.C = (carry & 1) === 1;
-        }
-        core.N = registers[destination] >>> 31 === 1;
-        core.Z = registers[destination] === 0;
-        registers[program_counter] += 2;
-        return 1;
+        return this.instructions.execute(opcode);
     }
 
     /// Sets up a call of `address` that returns to `back`.
@@ -188,21 +115,3 @@ export class Chip {
         this.registers[program_counter] = address & ~1;
     }
 }
-
-/// Result and carry of a shift by 1 to 255 bits, by the bits of the opcode.
-const shifts = {
-    2: (value, count) => [
-        count < 32 ? value << count : 0,
-        count <= 32 ? value >>> (32 - count) : 0,
-    ],
-    3: (value, count) => [
-        count < 32 ? value >>> count : 0,
-        count <= 32 ? value >>> (count - 1) : 0,
-    ],
-    4: (value, count) => [value >> Math.min(count, 31), value >> Math.min(count - 1, 31)],
-    7: (value, count) => {
-        const result =
-            count & 31 ? (value >>> (count & 31)) | (value << (32 - (count & 31))) : value;
-        return [result, result >>> 31];
-    },
-};

@@ -21,6 +21,7 @@ export class Image {
             .map((at) => ({
                 offset: this.word(at + 4),
                 address: this.word(at + 8),
+                physical: this.word(at + 12), // where it lies in flash
                 size: this.word(at + 16),
             }));
         this.read_sections();
@@ -80,6 +81,16 @@ export class Image {
         const map = new Int32Array(ram_size / 2).fill(-1);
         functions.forEach((symbol, index) => map.fill(index, (symbol.address - ram_begin) >>> 1));
         return { names: functions.map((symbol) => symbol.name), map };
+    }
+
+    /// [{address, bytes}, ...] of what is programmed into the chip.
+    programmed() {
+        return this.segments
+            .filter(({ size }) => size > 0)
+            .map(({ offset, physical, size }) => ({
+                address: physical,
+                bytes: this.bytes.subarray(offset, offset + size),
+            }));
     }
 
     load(chip) {

@@ -265,6 +265,8 @@ Routing::Switched NativeBoard::route(const Routes& routes, bool force) {
             if (master != not_routed && exposing(master)) clean = false;
     }
     if (!clean && !force) return {};
+    if (!driven_) levels_ |= routes.inverted_triggers;
+    driven_ = true;
     routes_ = routes;
     drive_pins(now_);
     return {now_ + 1, clean};

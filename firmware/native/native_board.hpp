@@ -201,6 +201,7 @@ class NativeBoard final : Clock64,
     bool words_full_ = false;  ///< and the core was told so
     Nanoseconds last_word_ = INT64_MIN / 2;
     std::uint32_t levels_ = 0;  ///< of the schedule
+    bool driven_ = false;       ///< the outputs drive their pins
     Routes routes_;
     std::uint32_t inputs_ = 0;  ///< levels
     std::uint32_t pins_ = 0;

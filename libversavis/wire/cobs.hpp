@@ -13,7 +13,8 @@ namespace versavis::wire {
 constexpr std::size_t cobs_bound(std::size_t size) { return size + size / 254 + 1; }
 
 /// Encodes `size` bytes of `data` to `out`, which has room for cobs_bound(size); returns the
-/// encoded size. `data` may be in that room, behind what it takes to stuff size bytes.
+/// encoded size. `data` may lie in that room, at least cobs_bound(size) - size bytes from its
+/// beginning.
 constexpr std::size_t cobs_encode(const std::uint8_t* data, std::size_t size, std::uint8_t* out) {
     constexpr std::ptrdiff_t full_run = 0xFF;  // its code included
     std::uint8_t* code_at = out;

@@ -24,11 +24,11 @@ inline constexpr auto crc32_table = make_crc32_table();
 
 /// CRC-32 with reflected polynomial 0xEDB88320, initial value and final exclusive-or 0xFFFFFFFF.
 constexpr std::uint32_t crc32(const std::uint8_t* data, std::size_t size) {
+    if (size == 0) return 0;
     const std::uint8_t* const end = data + size;
     std::uint32_t crc = 0xFFFFFFFFU;
-    if (size != 0) do
-            crc = detail::crc32_table[(crc ^ *data++) & 0xFFU] ^ (crc >> 8U);
-        while (data != end);
+    do crc = detail::crc32_table[(crc ^ *data++) & 0xFFU] ^ (crc >> 8U);
+    while (data != end);
     return ~crc;
 }
 

@@ -345,13 +345,15 @@ class Build:
         return {stem(one.source) for one in self.naming(mutant)}.union(*lines)
 
     def stages(self, mutant):
-        """Files of test cases that may get to a mutant, in groups: first that of the module itself,
-        then what is done soonest. If none does, all: perhaps it is computed at compile time."""
+        """Files of test cases that may get to a mutant, in groups: first those named after the
+        module, then what is done soonest. If none does, all: perhaps it is computed at compile
+        time."""
         module = stem(mutant.file)
         cases = self.cases(module)
         cases = cases & self.reaching(mutant) or cases
-        files = sorted(cases - {module}, key=lambda file: (self.durations[file], file))
-        stages, last_s = [[module]] if module in cases else [], math.inf
+        own = {file for file in cases if file == module or file.startswith(f"{module}_")}
+        files = sorted(cases - own, key=lambda file: (self.durations[file], file))
+        stages, last_s = [sorted(own)] if own else [], math.inf
         for file in files:
             if last_s + self.durations[file] > AT_ONCE_S:
                 stages.append([])

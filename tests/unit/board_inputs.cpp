@@ -1,12 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-#include <catch2/catch.hpp>
-#include <deque>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "board.hpp"
+#include "board_bench.hpp"
 
 using namespace versavis;
 using namespace versavis::firmware;
@@ -21,176 +14,11 @@ constexpr std::uint8_t aux0 = input_pulse + unsigned{wire::pulse_aux0};
 constexpr std::uint8_t aux1 = input_pulse + unsigned{wire::pulse_aux1};
 constexpr std::uint8_t sync_in = input_pulse + unsigned{wire::pulse_sync};
 
-/// A port whose time and edges are those of the test, and which does the rest at once.
-struct Port final : Clock64,
-                    OutputSchedule,
-                    EdgeStream,
-                    Routing,
-                    ImuBus,
-                    ImuUart,
-                    ImuOutput,
-                    ByteLink,
-                    Persist,
-                    Rebooter,
-                    Watchdog {
-    Nanoseconds now() override { return time; }
-    Nanoseconds push(Nanoseconds at, std::uint32_t levels) override {
-        words.emplace_back(at, levels);
-        return at;
-    }
-    void listen(std::uint32_t mask) override { inputs = mask; }
-    bool pop(Edge& edge) override {
-        if (edges.empty()) return false;
-        edge = edges.front();
-        edges.pop_front();
-        return true;
-    }
-    Nanoseconds settled() override { return time; }
-    std::uint32_t take_lost() override { return std::exchange(lost, 0); }
-    Switched route(const Routes& wanted, bool /*force*/) override {
-        routes = wanted;
-        return {time, true};
-    }
-    bool arm(const ImuJob& /*job*/) override { return true; }
-    bool take_reply(ImuReply& /*reply*/) override { return false; }
-    void disarm() override {}
-    void set_baud(std::uint32_t wanted) override { baud = wanted; }
-    void write(const std::uint8_t* data, std::size_t size) override {
-        sent.insert(sent.end(), data, data + size);
-    }
-    std::size_t read(std::uint8_t* data, std::size_t capacity, Nanoseconds& received) override {
-        const std::size_t size = std::min(capacity, serial.size());
-        std::copy_n(serial.begin(), size, data);
-        serial.erase(serial.begin(), serial.begin() + static_cast<std::ptrdiff_t>(size));
-        received = serial_until - static_cast<Nanoseconds>(serial.size()) * serial_byte;
-        return size;
-    }
-    void publish(const ImuImage& /*image*/) override {}
-    std::size_t free_space() override { return 100'000; }
-    std::size_t read(std::uint8_t* data, Nanoseconds& received) override {
-        if (packets.empty()) return 0;
-        const std::vector<std::uint8_t> packet = packets.front();
-        packets.pop_front();
-        std::copy(packet.begin(), packet.end(), data);
-        received = time;
-        return packet.size();
-    }
-    std::size_t load(std::uint8_t* /*data*/, std::size_t /*capacity*/) override { return 0; }
-    bool store(const std::uint8_t* /*data*/, std::size_t /*size*/) override { return true; }
-    Outcome take_outcome() override { return Outcome::stored; }
-    void reboot(bool /*to_boot_loader*/) override {}
-    void feed() override {}
-
-    Nanoseconds time = 0;
-    std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
-    std::deque<Edge> edges;
-    std::uint32_t lost = 0;
-    std::uint32_t inputs = 0;
-    Routes routes;
-    std::uint32_t baud = 0;
-    std::vector<std::uint8_t> serial;
-    Nanoseconds serial_until = 0;  ///< when the last byte has arrived
-    Nanoseconds serial_byte = 0;
-    std::vector<std::uint8_t> sent;
-    std::deque<std::vector<std::uint8_t>> packets;
-};
-
-PortFacts facts() {
-    PortFacts facts;
-    facts.present = wire::present_all;
-    facts.fastest_imu_millihertz = 8'000'000;
-    return facts;
-}
-
-/// A board that a host has greeted, at a port that does what the test says.
-struct Bench {
-    Bench() {
-        configuration.ports.inputs = 0xF;
-        configuration.ports.pulse_ns = 1'000'000;
-        send(wire::HostHello{wire::protocol_major, 0, {}});
-    }
-    template <class T>
-    void send(const T& message) {
-        wire::Frame frame{};
-        wire::encode(message, 1, sequence++, frame);
-        for (std::size_t at = 0; at < frame.size; at += link_packet_size)
-            port.packets.emplace_back(frame.bytes + at,
-                                      frame.bytes + std::min(frame.size, at + link_packet_size));
-        while (!port.packets.empty()) poll();
-    }
-    void configure() {
-        send(configuration);
-        while (board.next_wake() <= port.time) poll();
-        const auto answers = all<wire::ConfigurationAnswer>();
-        REQUIRE(answers.size() == 1);
-        REQUIRE(answers[0].status == wire::ConfigurationStatus::taken);
-    }
-    void add_camera(unsigned camera, std::uint32_t flags = 0) {
-        wire::CameraConfiguration& wanted = configuration.cameras[camera];
-        wanted.flags = wire::camera_enabled | flags;
-        wanted.rate_uhz = 20'000'000;
-        wanted.pulse_ns = 100'000;
-        wanted.exposure_ns = 4 * ms;
-        wanted.max_exposure_ns = 30 * ms;
-    }
-    void poll() { board.poll(); }
-    void poll(Nanoseconds at) {
-        port.time = at;
-        poll();
-    }
-    /// Polls when the board asks for it.
-    void run(Nanoseconds until) {
-        while (board.next_wake() <= until) poll(std::max(port.time, board.next_wake()));
-        do poll(until);
-        while (board.next_wake() <= until);
-    }
-    void edge(std::uint8_t input, Nanoseconds at, bool level = true) {
-        port.edges.push_back({at, input, level});
-    }
-    /// When the newest pulse of camera 0 began.
-    Nanoseconds trigger() {
-        Nanoseconds at = 0;
-        for (const auto& [left, levels] : port.words)
-            if ((levels & 1U) != 0) at = left;
-        return at;
-    }
-    /// All messages of a type that the board has sent.
-    template <class T>
-    std::vector<T> all() {
-        std::vector<T> out;
-        wire::Decoder decoder;
-        decoder.feed(port.sent.data(), port.sent.size(), [&](const wire::Packet& packet) {
-            T message{};
-            if (packet.read(message)) out.push_back(message);
-        });
-        return out;
-    }
-    std::vector<wire::Event> events(wire::EventKind kind) {
-        std::vector<wire::Event> out = all<wire::Event>();
-        out.erase(std::remove_if(out.begin(), out.end(),
-                                 [kind](const wire::Event& event) { return event.kind != kind; }),
-                  out.end());
-        for (const wire::Event& event : out) CHECK(event.detail == 0);
-        return out;
-    }
-    wire::Health health() {
-        const std::size_t before = all<wire::Health>().size();
-        while (all<wire::Health>().size() == before) run(board.next_wake());
-        return all<wire::Health>().back();
-    }
-
-    wire::Configuration configuration{};
-    std::uint32_t sequence = 0;
-    Port port;
-    Board board{Hal{port, port, port, port, port, port, port, port, port, port, port, facts()}, {}};
-};
-
 /// Camera 0 runs, and a pulse of it has begun.
 struct Running : Bench {
     Running() {
         add_camera(0);
-        add_camera(1, wire::camera_slave | wire::camera_no_strobe);
-        configuration.cameras[1].master = 0;
+        add_slave(1, 0);
         configure();
         send(wire::Start{1, 0, {}});
         while (trigger() == 0) poll(board.next_wake());
@@ -360,6 +188,27 @@ TEST_CASE("board_inputs: no start that waited while edges were lost is paired wi
     }
 }
 
+TEST_CASE("board_inputs: lost edges leave the light on for as long as an exposure may come") {
+    Bench bench;
+    bench.add_camera(0);
+    bench.configuration.illumination.cameras = 1;
+    bench.configuration.illumination.lead_ns = 100'000;
+    bench.configuration.illumination.max_on_ns = 20'000'000;
+    bench.configuration.illumination.duty_ppm = 500'000;
+    bench.configure();
+    bench.send(wire::Start{1, 0, {}});
+    bench.run(48 * ms);
+    bench.edge(0, 48 * ms);
+    bench.poll(48 * ms + 100 * us);
+    bench.port.lost = 1;
+    bench.poll(48 * ms + 200 * us);
+    bench.run(60 * ms);
+    REQUIRE_FALSE(bench.port.words.empty());
+    const auto& [at, levels] = bench.port.words.back();
+    CHECK(at == 49'900 * us);
+    CHECK((levels >> output_light_gate & 1U) == 0);
+}
+
 TEST_CASE("board_inputs: a slave is switched when its master does not expose, as far as is known") {
     for (const bool lost : {false, true}) {
         Running world;
@@ -384,8 +233,7 @@ TEST_CASE("board_inputs: a slave is switched when its master does not expose, as
 TEST_CASE("board_inputs: a slave is switched at an edge of its master, not of another camera") {
     Bench bench;
     bench.add_camera(0);
-    bench.add_camera(1, wire::camera_slave | wire::camera_no_strobe);
-    bench.configuration.cameras[1].master = 0;
+    bench.add_slave(1, 0);
     bench.add_camera(2);
     bench.configure();
     bench.edge(0, ms);
@@ -563,17 +411,17 @@ TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse be
         bench.configuration.ports.options = wire::port_nmea;
         bench.configuration.ports.nmea_baud = baud;
         bench.configure();
-        CHECK(bench.port.baud == (baud == 0 ? 9'600 : baud));
+        CHECK(bench.port.uart.baud == (baud == 0 ? 9'600 : baud));
         const std::string line =
             "$GPRMC,235959.00,A,4723.1,N,00832.4,E,0.02,31.6,311223,,,A*57\r\n";
-        bench.port.serial.assign(line.begin(), line.end());
-        bench.port.serial_byte = 10 * second / bench.port.baud;
-        const auto lasts = static_cast<Nanoseconds>(line.size()) * bench.port.serial_byte;
+        bench.port.uart.bytes.assign(line.begin(), line.end());
+        bench.port.uart.byte = 10 * second / bench.port.uart.baud;
+        const auto lasts = static_cast<Nanoseconds>(line.size()) * bench.port.uart.byte;
         // It began two bytes after the pulse; the next pulse came before its end.
         const Nanoseconds pulse = 100 * ms;
-        bench.port.serial_until = pulse + 2 * bench.port.serial_byte + lasts;
+        bench.port.uart.until = pulse + 2 * bench.port.uart.byte + lasts;
         bench.edge(pps, pulse);
-        bench.edge(pps, pulse + 4 * bench.port.serial_byte);
+        bench.edge(pps, pulse + 4 * bench.port.uart.byte);
         bench.poll(200 * ms);
         const auto labels = bench.events(wire::EventKind::utc_label);
         REQUIRE(labels.size() == 1);
@@ -583,10 +431,10 @@ TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse be
     }
     Bench bench;
     bench.configure();
-    CHECK(bench.port.baud == 0);
-    bench.port.serial.assign(10, '$');  // they are of another part
+    CHECK(bench.port.uart.baud == 0);
+    bench.port.uart.bytes.assign(10, '$');  // they are of another part
     bench.poll(10 * ms);
-    CHECK(bench.port.serial.size() == 10);
+    CHECK(bench.port.uart.bytes.size() == 10);
 }
 
 TEST_CASE(
@@ -598,11 +446,11 @@ TEST_CASE(
             bench.configuration.ports.options = wire::port_nmea;
             bench.configure();
             const std::string bytes = std::string(before, 'x') + line;
-            bench.port.serial.assign(bytes.begin(), bytes.end());
-            bench.port.serial_byte = 10 * second / 9'600;
+            bench.port.uart.bytes.assign(bytes.begin(), bytes.end());
+            bench.port.uart.byte = 10 * second / 9'600;
             const Nanoseconds begins = 300 * ms;
-            bench.port.serial_until =
-                begins + static_cast<Nanoseconds>(line.size()) * bench.port.serial_byte;
+            bench.port.uart.until =
+                begins + static_cast<Nanoseconds>(line.size()) * bench.port.uart.byte;
             bench.edge(pps, 100 * ms);
             bench.edge(pps, begins + late);
             bench.poll(500 * ms);

@@ -542,8 +542,10 @@ TEST_CASE("board_link: a board of another major version is told by it, and what 
     };
     const std::string own = fmt::format("{}.{}", wire::protocol_major, wire::protocol_minor);
     for (const std::size_t size : {std::size_t{48}, sizeof(wire::BoardHello)})
-        CHECK(hint(2, 2, size) == "it speaks protocol 2.2, this service " + own +
-                                      ": flash the firmware of this release of the service");
+        CHECK_THAT(hint(2, 2, size),
+                   Catch::StartsWith("it speaks protocol 2.2, this service " + own +
+                                     ": flash the firmware of this release of the service") &&
+                       Catch::Contains("'versavis flash /"));
     CHECK(hint(9, 1, 80) == "it speaks protocol 9.1, this service " + own +
                                 ": install the service of its firmware's release, or flash the "
                                 "firmware of this one");

@@ -12,6 +12,7 @@
 #include "../support/temporary_directory.hpp"
 #include "configuration/board_configuration.hpp"
 #include "configuration_check.hpp"
+#include "engine/board/board_words.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;
@@ -239,7 +240,7 @@ TEST_CASE("board_parts: what the service misses, the board refuses, and nothing 
         const wire::BoardHello board = board_without(parts);
         Refusals refusals;
         firmware::check(board_configuration(configuration), {board.present, 8'000'000}, refusals);
-        INFO("without " << fmt::format("{}", fmt::join(part_names(parts), ", ")));
+        INFO("without " << fmt::format("{}", fmt::join(board::part_names(parts), ", ")));
         CHECK(missing_parts(configuration, board).size() == refusals.all.size());
         for (const wire::Refusal& refusal : refusals.all) {
             CHECK(refusal.field == wire::ConfigurationField::present);
@@ -258,14 +259,14 @@ TEST_CASE("board_parts: what the service misses, the board refuses, and nothing 
 }
 
 TEST_CASE("board_parts: each bit has a name of its own, and those of newer boards have none") {
-    const auto all = part_names(~0U);
-    CHECK(all == part_names(wire::present_all));
+    const auto all = board::part_names(~0U);
+    CHECK(all == board::part_names(wire::present_all));
     CHECK(all.size() == 19);
     CHECK(std::set<std::string>(all.begin(), all.end()).size() == all.size());
-    CHECK(part_names(wire::present_light | wire::present_pulse0 << wire::pulse_sync |
-                     wire::present_memory) ==
+    CHECK(board::part_names(wire::present_light | wire::present_pulse0 << wire::pulse_sync |
+                            wire::present_memory) ==
           std::vector<std::string>{"light", "sync_input", "memory"});
-    CHECK(part_names(0).empty());
+    CHECK(board::part_names(0).empty());
 }
 
 TEST_CASE("board_parts: what an older firmware cannot do is told by its key") {

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "recorded_reports.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
 
@@ -26,32 +28,8 @@ struct Hardware final : OutputSchedule {
     }
 };
 
-struct Event {
-    wire::EventKind kind;
-    std::uint8_t source;
-    Nanoseconds at;
-    std::int64_t value;
-    std::uint16_t detail;
-    bool operator==(const Event& other) const {
-        return kind == other.kind && source == other.source && at == other.at &&
-               value == other.value && detail == other.detail;
-    }
-};
-
-struct Reports final : ChannelReports {
-    std::vector<wire::Exposure> exposures;
-    std::vector<Event> events;
-    std::vector<std::pair<Nanoseconds, Nanoseconds>> planned;
-    void exposure(const wire::Exposure& record) override { exposures.push_back(record); }
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-               std::uint16_t detail) override {
-        events.push_back({kind, source, at, value, detail});
-    }
-    void exposure_planned(std::uint8_t /*camera*/, Nanoseconds start,
-                          Nanoseconds duration) override {
-        planned.emplace_back(start, duration);
-    }
-};
+using Event = test::ReportedEvent;
+using Reports = test::RecordedReports;
 
 /// A camera at 20 Hz that is expected to expose for 4 ms, and its outputs; grid and board time are
 /// one. The test says what its exposure line does.
@@ -215,7 +193,11 @@ TEST_CASE("camera_channel: ticks count on the grid, and none is used twice until
         bench.channel.stop();
         bench.reports.exposures.clear();
         bench.clock.begin(1'250 * ms, 0);
-        bench.configure().start(1'200 * ms);
+        if (anew)
+            bench.channel.grid_began();
+        else
+            bench.configure();
+        bench.start(1'200 * ms);
         bench.run(1'300 * ms);
         bench.channel.give_up();
         REQUIRE_FALSE(bench.reports.exposures.empty());
@@ -417,7 +399,7 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
                 REQUIRE(told.kind == (single ? wire::EventKind::trigger_skipped
                                              : wire::EventKind::triggers_skipped));
                 REQUIRE(told.value == since + 1);
-                REQUIRE(told.detail == (single ? 1 : skipped));
+                REQUIRE(told.detail == static_cast<int>(single ? 1 : skipped));
             }
 }
 
@@ -623,6 +605,7 @@ TEST_CASE("camera_channel: edges that were lost end the wait for the end of an e
 
 TEST_CASE("camera_channel: a camera that is off, or has no exposure line, has no edges") {
     Bench off;
+    CHECK(off.channel.next_wake(0) == never);
     off.camera.flags = 0;
     off.configure().start(20 * ms);
     CHECK_FALSE(off.channel.running());

@@ -398,6 +398,7 @@ TEST_CASE("configuration_check: the board takes what is at a limit, and tells wh
     using Light = wire::IlluminationConfiguration;
     using Ports = wire::PortConfiguration;
     const Change slow = [](auto& all) { all.cameras[2].rate_uhz = 5'000'000; };
+    const Change fast = [](auto& all) { all.cameras[2].rate_uhz = 1'000'000'000; };
     const Change on_grid = [](auto& all) { all.imus[0].options = 0; };
     const Change by_i2c = [](auto& all) { all.imus[0].options |= wire::imu_i2c; };
     const Change with_sync = [](auto& all) { all.ports.sync_rate_uhz = 1'000'000; };
@@ -414,6 +415,7 @@ TEST_CASE("configuration_check: the board takes what is at a limit, and tells wh
         {Part::camera, Field::phase, 0, 19'999'999, camera(&Camera::phase_ns)},
         {Part::camera, Field::pulse, 1'000, 10'000'000, camera(&Camera::pulse_ns)},
         {Part::camera, Field::pulse, 1'000, 10'000'000, camera(&Camera::pulse_ns), slow},
+        {Part::camera, Field::pulse, 1'000, 500'000, camera(&Camera::pulse_ns), fast},
         {Part::camera, Field::latency, 0, 19'999'999, camera(&Camera::latency_ns)},
         {Part::camera, Field::latency, 0, 100'000'000, camera(&Camera::latency_ns), slow},
         {Part::camera, Field::gap, 0, 19'999'999, camera(&Camera::gap_ns)},
@@ -437,6 +439,8 @@ TEST_CASE("configuration_check: the board takes what is at a limit, and tells wh
         {Part::ports, Field::pulse, 1'000, 500'000, ports(&Ports::pulse_ns)},
         {Part::ports, Field::pulse, 1'000, 10'000'000, ports(&Ports::pulse_ns),
          test_of(wire::test_camera0 + 1)},
+        {Part::ports, Field::pulse, 1'000, 500'000, ports(&Ports::pulse_ns),
+         [&](auto& all) { fast(all), test_of(wire::test_camera0 + 2)(all); }},
         {Part::ports, Field::pulse, 1'000, 500'000, ports(&Ports::pulse_ns),
          test_of(wire::test_imu0)},
         {Part::ports, Field::pulse, 1'000, 2'500'000, ports(&Ports::pulse_ns),
@@ -475,34 +479,241 @@ TEST_CASE("configuration_check: the board takes what is at a limit, and tells wh
     }
 }
 
-TEST_CASE("configuration_check: the board tells each thing that it does not have") {
-    const auto only = [](std::uint32_t bit) -> Change {
-        return [bit](wire::Configuration& all) {
-            switch (bit) {
-                case wire::present_camera0 << 3U: all.cameras[3] = all.cameras[2]; break;
-                case wire::present_sync_output: all.ports.sync_rate_uhz = 1'000'000; break;
-                case wire::present_i2c: all.imus[0].options |= wire::imu_i2c; break;
-                case wire::present_accel_ready:
-                    all.imus[0].kind = wire::ImuKind::bmi088;
-                    all.imus[0].options |= wire::imu_accel_ready;
-                    break;
-                case wire::present_memory: all.flags = wire::configuration_store; break;
-                default: break;
+namespace {
+
+void add_camera(wire::Configuration& all, std::size_t index, std::uint32_t flags = 0) {
+    all.cameras[index] = valid().cameras[0];
+    all.cameras[index].flags |= flags;
+}
+void add_slave(wire::Configuration& all, std::size_t index, std::uint8_t master) {
+    add_camera(all, index, wire::camera_slave);
+    all.cameras[index].master = master;
+}
+Change spi_imu(wire::ImuKind kind, unsigned options) {
+    return [=](auto& all) {
+        all.imus[0] = {kind, 0, static_cast<std::uint8_t>(options), 0, 100'000};
+    };
+}
+Change uart_imu(unsigned options) {
+    return [=](auto& all) {
+        all.imus[1] = {wire::ImuKind::vn100, 0, static_cast<std::uint8_t>(options), 0, 100'000};
+    };
+}
+Change test_of(unsigned source, unsigned output = 0, std::uint32_t millihertz = 1'000) {
+    return [=](auto& all) {
+        all.ports.test = static_cast<std::uint8_t>(source);
+        all.ports.test_output = static_cast<std::uint8_t>(output);
+        all.ports.test_rate_millihertz = millihertz;
+        all.ports.pulse_ns = 1'000;
+    };
+}
+Change operator+(const Change& first, const Change& second) {
+    return [=](auto& all) { first(all), second(all); };
+}
+
+constexpr auto icm = wire::ImuKind::icm42688p;
+constexpr auto bmi = wire::ImuKind::bmi088;
+constexpr unsigned ready = wire::imu_data_ready;
+constexpr unsigned i2c = wire::imu_i2c;
+const Change sync_pulses = [](auto& all) {
+    all.ports.sync_rate_uhz = 1'000'000;
+    all.ports.pulse_ns = 1'000;
+};
+const Change nmea = [](auto& all) { all.ports.options |= wire::port_nmea; };
+const Change imu_output = [](auto& all) { all.ports.options |= wire::port_imu_output; };
+
+}  // namespace
+
+TEST_CASE("configuration_check: the board needs what is used, and nothing else") {
+    const std::pair<Change, std::uint32_t> cases[] = {
+        {[](auto& /*all*/) {}, 0},
+        {[](auto& all) { add_camera(all, 0); }, wire::present_camera0},
+        {[](auto& all) { add_camera(all, 2); }, wire::present_camera0 << 2U},
+        {spi_imu(icm, 0), wire::present_spi},
+        {spi_imu(icm, ready), wire::present_spi | wire::present_ready0},
+        {spi_imu(icm, ready | i2c), wire::present_i2c | wire::present_ready0},
+        {spi_imu(bmi, ready | wire::imu_accel_ready),
+         wire::present_spi | wire::present_ready0 | wire::present_accel_ready},
+        {uart_imu(0), wire::present_uart},
+        {uart_imu(ready), wire::present_uart | wire::present_ready0 << 1U},
+        {[](auto& all) { all.illumination = valid().illumination; }, wire::present_light},
+        {[](auto& all) { all.ports.inputs = 1; }, wire::present_pulse0},
+        {[](auto& all) { all.ports.inputs = 10; }, wire::present_pulse0 * 10U},
+        {test_of(wire::test_camera0 + 1), wire::present_test_output},
+        {test_of(wire::test_imu0), wire::present_test_output},
+        {test_of(wire::test_rate), wire::present_test_output},
+        {test_of(wire::test_rate, wire::test_at_sync), wire::present_sync_output},
+        {test_of(wire::test_rate, wire::test_at_camera0), wire::present_camera0},
+        {test_of(wire::test_rate, wire::test_at_camera0 + 3), wire::present_camera0 << 3U},
+        {sync_pulses, wire::present_sync_output},
+        {spi_imu(icm, 0) + imu_output, wire::present_spi | wire::present_imu_output},
+        {nmea, wire::present_uart},
+        {[](auto& all) { all.flags = wire::configuration_store; }, wire::present_memory}};
+    for (const auto& [change, needs] : cases) {
+        INFO("needs " << needs);
+        wire::Configuration all{};
+        change(all);
+        CHECK(refusals_of(all, needs).empty());
+        for (unsigned bit = 0; bit < 19; ++bit) {
+            const auto refusals = refusals_of(all, wire::present_all & ~(1U << bit));
+            REQUIRE(refusals.size() == (needs >> bit & 1U));
+            for (const wire::Refusal& refusal : refusals) {
+                CHECK(refusal.field == wire::ConfigurationField::present);
+                CHECK(refusal.value == bit);
+                CHECK(refusal.minimum == 0);
+                CHECK(refusal.maximum == -1);
             }
+        }
+    }
+}
+
+TEST_CASE("configuration_check: memory is a port, and an input that does not exist needs none") {
+    wire::Configuration all{};
+    all.flags = wire::configuration_store;
+    const auto refusals = refusals_of(all, 0);
+    REQUIRE(refusals.size() == 1);
+    CHECK(refusals[0].part == wire::ConfigurationPart::ports);
+    CHECK(refusals[0].index == 0);
+    all = {};
+    all.ports.inputs = 16;
+    CHECK(refusals_of(all, 0).size() == 1);
+}
+
+TEST_CASE("configuration_check: what does not fit something else is told, with what would") {
+    using Part = wire::ConfigurationPart;
+    using Field = wire::ConfigurationField;
+    struct Case {
+        Change change;
+        Part part;
+        unsigned index;
+        Field field;
+        std::int64_t value, minimum, maximum;
+    };
+    const auto slave_of = [](std::uint8_t master, std::uint32_t flags_of_2 = 0) -> Change {
+        return [=](auto& all) {
+            add_camera(all, 2, flags_of_2);
+            add_slave(all, 3, master);
         };
     };
-    for (unsigned bit = 0; bit < 19; ++bit) {
-        INFO("bit " << bit);
-        wire::Configuration all = valid();
-        only(1U << bit)(all);
-        CHECK(refusals_of(all).empty());
-        const auto refusals = refusals_of(all, wire::present_all & ~(1U << bit));
+    const auto options = [](wire::ImuKind kind, unsigned wanted, unsigned possible) -> Case {
+        return {spi_imu(kind, wanted), Part::imu, 0, Field::imu_options, wanted, 0, possible};
+    };
+    const auto filter = [](wire::ImuKind kind, std::uint8_t wanted, unsigned strongest) -> Case {
+        return {spi_imu(kind, 0) + [=](auto& all) { all.imus[0].filter = wanted; },
+                Part::imu,
+                0,
+                Field::imu_filter,
+                wanted,
+                0,
+                strongest};
+    };
+    const auto ports = [](const Change& change, Field field, std::int64_t value,
+                          std::int64_t maximum) -> Case {
+        return {change, Part::ports, 0, field, value, 0, maximum};
+    };
+    const Case cases[] = {
+        {[](auto& all) { add_camera(all, 1), all.cameras[1].rate_uhz = 0; }, Part::camera, 1,
+         Field::rate, 0, 100'000, 1'000'000'000},
+        // The range names a camera that could be the master, or none.
+        {slave_of(0), Part::camera, 3, Field::master, 0, 2, 2},
+        {slave_of(3), Part::camera, 3, Field::master, 3, 2, 2},
+        {slave_of(4) + spi_imu(wire::ImuKind::adis16448b, 0), Part::camera, 3, Field::master, 4, 2,
+         2},
+        {slave_of(3) + [](auto& all) { add_camera(all, 0); }, Part::camera, 3, Field::master, 3, 0,
+         0},
+        {slave_of(2, wire::camera_no_strobe), Part::camera, 3, Field::master, 2, 0, -1},
+        {slave_of(0) + [](auto& all) { add_camera(all, 1); }, Part::camera, 3, Field::master, 0, 1,
+         1},
+        {[](auto& all) { add_camera(all, 0), add_slave(all, 1, 0), add_slave(all, 3, 1); },
+         Part::camera, 3, Field::master, 1, 0, 0},
+        options(icm, ready | wire::imu_accel_ready, ready),
+        options(bmi, wire::imu_accel_ready, 0),
+        options(bmi, ready | i2c, ready),
+        options(icm, i2c, 0),
+        options(icm, ready | wire::imu_i2c_second, ready),
+        options(bmi, ready | i2c | wire::imu_i2c_second, ready),
+        options(icm, ready | i2c | 16U, ready | i2c),
+        filter(bmi, 3, 2),
+        {uart_imu(0) + [](auto& all) { all.imus[1].filter = 1; }, Part::imu, 1, Field::imu_filter,
+         1, 0, 0},
+        {[](auto& all) { all.illumination = {16, 0, 0, 0, 10'000, 1}; }, Part::illumination, 0,
+         Field::cameras, 16, 1, 15},
+        ports(test_of(8), Field::test, 8, wire::test_imu0),
+        ports(test_of(wire::test_imu0 + 1) + spi_imu(icm, ready) + uart_imu(0), Field::test,
+              wire::test_imu0 + 1, wire::test_imu0),
+        ports(test_of(8) + uart_imu(ready), Field::test, 8, wire::test_imu0 + 1),
+        ports(test_of(wire::test_rate, 6), Field::test_output, 6, 5),
+        ports(test_of(wire::test_rate, wire::test_at_sync) + sync_pulses, Field::test_output, 5, 4),
+        ports(
+            test_of(wire::test_rate, wire::test_at_camera0 + 3) +
+                [](auto& all) { add_camera(all, 3); },
+            Field::test_output, 4, 0),
+        {test_of(wire::test_rate, 0, 0), Part::ports, 0, Field::test_rate, 0, 100, 10'000'000},
+        ports(imu_output, Field::port_options, wire::port_imu_output, 0),
+        ports(uart_imu(0) + nmea, Field::port_options, wire::port_nmea, 1),
+        ports(uart_imu(0) + spi_imu(icm, 0) + nmea + imu_output, Field::port_options, 3, 1)};
+    for (const Case& one : cases) {
+        wire::Configuration all{};
+        one.change(all);
+        const auto refusals = refusals_of(all);
+        INFO("field " << int(one.field) << " " << one.value);
         REQUIRE(refusals.size() == 1);
-        CHECK(refusals[0].field == wire::ConfigurationField::present);
-        CHECK(refusals[0].value == bit);
-        CHECK(refusals[0].minimum == 0);
-        CHECK(refusals[0].maximum == -1);
+        CHECK(refusals[0].part == one.part);
+        CHECK(refusals[0].index == one.index);
+        CHECK(refusals[0].field == one.field);
+        CHECK(refusals[0].value == one.value);
+        CHECK(refusals[0].minimum == one.minimum);
+        CHECK(refusals[0].maximum == one.maximum);
     }
+}
+
+TEST_CASE("configuration_check: what fits is taken") {
+    const Change cases[] = {
+        [](auto& all) { add_camera(all, 2), add_slave(all, 0, 2), add_slave(all, 3, 2); },
+        [](auto& all) { add_camera(all, 0), add_slave(all, 3, 0); },
+        [](auto& all) { add_slave(all, 0, 3), add_camera(all, 3); },
+        spi_imu(icm, ready | i2c | wire::imu_i2c_second),
+        test_of(wire::test_imu0 + 1) + uart_imu(ready),
+        test_of(wire::test_rate, wire::test_at_camera0 + 2) + sync_pulses,
+        test_of(wire::test_rate, wire::test_at_sync), uart_imu(0) + spi_imu(icm, 0) + imu_output,
+        nmea + sync_pulses,
+        // What is not used may be anything.
+        [](auto& all) { all.cameras[0].pulse_ns = all.cameras[0].gap_ns = UINT32_MAX; },
+        [](auto& all) { all.imus[0].options = all.imus[1].filter = 0xFF; },
+        [](auto& all) { all.illumination.lead_ns = UINT32_MAX; },
+        [](auto& all) { all.ports.nmea_baud = all.ports.test_output = 77; },
+        // Pulses are as wide as they like where what they show has no rate.
+        test_of(wire::test_camera0) + [](auto& all) { all.ports.pulse_ns = 10'000'000; },
+        test_of(wire::test_imu0) + [](auto& all) { all.ports.pulse_ns = 10'000'000; }};
+    for (const Change& change : cases) {
+        wire::Configuration all{};
+        change(all);
+        CHECK(refusals_of(all).empty());
+    }
+}
+
+TEST_CASE("configuration_check: no IMU is faster than the board can read it") {
+    const auto fastest = [](std::size_t port, const Change& change, std::uint32_t board) {
+        wire::Configuration all{};
+        change(all);
+        all.imus[port].rate_millihertz = UINT32_MAX;
+        Refusals refusals;
+        firmware::check(all, {wire::present_all, board}, refusals);
+        REQUIRE(refusals.all.size() == 1);
+        CHECK(refusals.all[0].field == wire::ConfigurationField::imu_rate);
+        CHECK(refusals.all[0].minimum == 1'000);
+        return refusals.all[0].maximum;
+    };
+    const auto adis = wire::ImuKind::adis16448b;
+    CHECK(fastest(0, spi_imu(icm, ready), 8'000'000) == 8'000'000);
+    CHECK(fastest(0, spi_imu(icm, ready), 9'000'000) == 8'000'000);
+    CHECK(fastest(0, spi_imu(icm, ready), 7'999'999) == 7'999'999);
+    CHECK(fastest(0, spi_imu(icm, 0), 8'000'000) == 1'000'000);
+    CHECK(fastest(0, spi_imu(icm, 0), 999'999) == 999'999);
+    CHECK(fastest(0, spi_imu(adis, 0), 8'000'000) == 819'200);
+    CHECK(fastest(0, spi_imu(icm, ready | i2c), 8'000'000) == 1'000'000);
+    CHECK(fastest(1, uart_imu(0), 8'000'000) == 800'000);
+    CHECK(fastest(1, uart_imu(0), 799'999) == 799'999);
 }
 
 TEST_CASE("configuration_check: whatever is accepted, the board takes") {

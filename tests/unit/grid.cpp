@@ -65,7 +65,12 @@ TEST_CASE("grid: it skips to a tick within a period before an instant, and never
 }
 
 TEST_CASE("grid: one that was never set stays where it is") {
-    const Grid grid;
+    Grid grid;
     CHECK(grid.next() == 0);
     CHECK(grid.tick() == 0);
+    CHECK(grid.period() == 0);
+    grid.advance();
+    grid.advance_by(1'000);
+    CHECK(grid.next() == 0);
+    CHECK(grid.tick() == 1'001);
 }

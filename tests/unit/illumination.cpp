@@ -142,9 +142,11 @@ TEST_CASE("illumination: it is no matter of other cameras, or before it is confi
     CHECK(bench.gate() == Times{9'900 * us, 11 * ms});
 
     Illumination dark(bench.queue, bench.reports);
+    dark.poll(0, -1);  // at power-up
     dark.poll(20 * ms, 20 * ms);
     dark.plan(0, 25 * ms, ms, true, 20 * ms);
     CHECK(bench.queue.empty());
+    CHECK(bench.reports.all.empty());
 }
 
 TEST_CASE("illumination: it is on until the last of its cameras is done") {
@@ -294,6 +296,7 @@ TEST_CASE("illumination: with too little on-time it stays dark, and says so") {
 TEST_CASE("illumination: a lead whose light was refused ends when another is planned") {
     Bench bench(ms, 10'000);
     bench.light.plan(0, 10 * ms, ms, true, ms);
+    bench.light.plan(1, 10 * ms, ms, true, ms);
     bench.edge(10 * ms, 0, true);
     bench.edge(15 * ms, 0, false);
     bench.light.plan(0, 16 * ms, 9 * ms, false, 15'500 * us);
@@ -397,6 +400,20 @@ TEST_CASE("illumination: one that is refused leaves the others that wait as they
                                                     {output_light_gate, 11'900 * us, 0}});
     CHECK(bench.gate() ==
           Times{9'900 * us, 10'900 * us, 39'900 * us, 40'200 * us, 59'900 * us, 60'100 * us});
+}
+
+TEST_CASE("illumination: one that is refused brings back none that was forgotten") {
+    Bench bench(ms, 10'000);
+    for (const Nanoseconds start : {10 * ms, 40 * ms, 60 * ms})
+        bench.light.plan(0, start, ms, true, ms);
+    bench.edge(10 * ms, 0, true);
+    bench.edge(15 * ms, 0, false);
+    bench.light.stop(15 * ms);
+    bench.reports.all.clear();
+    bench.light.plan(0, 16 * ms, ms, true, 15 * ms);
+    CHECK(bench.reports.all == std::vector<Limited>{{output_light_gate, 15'900 * us, 0}});
+    bench.run(70 * ms);
+    CHECK(bench.gate() == Times{9'900 * us, 10'900 * us});
 }
 
 TEST_CASE("illumination: eight exposures are planned, one more gets no light and is told") {

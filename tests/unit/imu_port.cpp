@@ -4,30 +4,15 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "recorded_reports.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
 
 namespace {
 
-struct Event {
-    wire::EventKind kind;
-    int source;
-    Nanoseconds at;
-    std::int64_t value;
-    int detail;
-    bool operator==(const Event&) const = default;
-};
-
-struct Reports final : ChannelReports {
-    void exposure(const wire::Exposure& /*record*/) override {}
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-               std::uint16_t detail) override {
-        events.push_back({kind, source, at, value, detail});
-    }
-    void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/,
-                          Nanoseconds /*duration*/) override {}
-    std::vector<Event> events;
-};
+using Event = test::ReportedEvent;
+using Reports = test::RecordedReports;
 
 struct Port final : ImuPort {
     using ImuPort::count_error;

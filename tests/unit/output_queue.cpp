@@ -258,10 +258,31 @@ TEST_CASE("output_queue: a late pulse puts off those behind it, at its own outpu
                                                {0, false, 210'000, 220'000}});
 }
 
+TEST_CASE("output_queue: what is put off is passed by what waits at others, however late it is") {
+    Bench bench;
+    bench.queue.pulse(100'000, 0, true, 50'000);
+    bench.queue.set(100'000, output_light_lead, true);
+    bench.queue.set(120'000, 1, true);
+    bench.hardware.soonest = 1'000'000;
+    CHECK(bench.queue.commit(1'000'000));
+    CHECK(bench.hardware.words ==
+          Words{{1'000'000, 0b10'0001}, {1'000'001, 0b10'0011}, {1'050'000, 0b10'0010}});
+}
+
 TEST_CASE("output_queue: two edges of one output at one instant leave in two words") {
     Bench bench;
     bench.queue.pulse(20'000, 0, true, 10'000);
     bench.queue.set(30'000, 0, true, 1);
     CHECK(bench.queue.commit(0));
     CHECK(bench.hardware.words == Words{{20'000, 1}, {30'000, 0}, {30'001, 1}});
+}
+
+TEST_CASE("output_queue: a pulse of any width has both edges on the grain") {
+    PortFacts facts;
+    facts.output_grain_bits = 3;
+    facts.output_step = 24;
+    Bench bench(facts);
+    bench.queue.pulse(80'000, 0, true, 1001);
+    bench.queue.commit(0);
+    CHECK(bench.hardware.words == Words{{80'000, 1}, {81'000, 0}});
 }

@@ -133,6 +133,22 @@ TEST_CASE("status: what a board has is named, and of one that was never met noth
                Catch::Contains("it has camera0, spi, imu1_ready; IMUs up to 2048.5 Hz\n"));
 }
 
+TEST_CASE("status: firmware of an older release is told, and of a board never met nothing") {
+    Status status = healthy();
+    status.release = "0.2.0";
+    status.board.firmware = "versavis 0.1.9";
+    const auto outdated = [&] {
+        const auto document = nlohmann::json::parse(to_json(status));
+        CHECK(document["release"] == "0.2.0");
+        return document["board"]["firmware_outdated"];
+    };
+    CHECK(outdated().is_null());
+    status.board.connections = 1;
+    CHECK(outdated() == true);
+    status.board.firmware = "versavis 0.2.0";
+    CHECK(outdated() == false);
+}
+
 TEST_CASE("status: the board's clock against PPS is known while PPS is good, and not else") {
     Status status = healthy();
     status.board.health.pps_error_ppb = -250;

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "recorded_reports.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
 using wire::EventKind;
@@ -92,25 +94,8 @@ Bytes packet(std::uint64_t startup = second) {
     return packet.bytes();
 }
 
-struct Event {
-    EventKind kind;
-    int source;
-    Nanoseconds at;
-    std::int64_t value;
-    int detail;
-    bool operator==(const Event&) const = default;
-};
-
-struct Reports final : ChannelReports {
-    void exposure(const wire::Exposure& /*record*/) override {}
-    void event(EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-               std::uint16_t detail) override {
-        events.push_back({kind, source, at, value, detail});
-    }
-    void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/,
-                          Nanoseconds /*duration*/) override {}
-    std::vector<Event> events;
-};
+using Event = test::ReportedEvent;
+using Reports = test::RecordedReports;
 
 struct Uart final : ImuUart {
     void set_baud(std::uint32_t wanted) override {
@@ -674,6 +659,17 @@ TEST_CASE("vn100: a sample has the time of the newest edge before its packet") {
         if (i > 0) CHECK(world.samples.back().time_ns == edge);
     }
     CHECK(world.samples.size() == 5);
+}
+
+TEST_CASE("vn100: a packet that comes twice is stamped once") {
+    Running world;
+    const Nanoseconds edge = 2 * second;
+    world.sample(edge, second);
+    world.sample(edge + base, second + static_cast<std::uint64_t>(base));
+    CHECK(world.stamped());
+    world.send(packet(second + static_cast<std::uint64_t>(base)), edge + base + 900 * us);
+    REQUIRE(world.samples.size() == 3);
+    CHECK_FALSE(world.stamped());
 }
 
 TEST_CASE("vn100: without a data-ready line no sample is stamped by an edge") {

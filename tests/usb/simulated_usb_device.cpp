@@ -45,8 +45,11 @@ UsbDescription describe(const std::string& serial) {
 
 class CdcAcmFunction final : public UsbFunction {
  public:
-    CdcAcmFunction(const std::string& serial, SimulatedUsbDevice::OnReceive on_receive)
-        : description_{describe(serial)}, on_receive_{std::move(on_receive)} {}
+    CdcAcmFunction(const std::string& serial, SimulatedUsbDevice::OnReceive on_receive,
+                   std::function<void()> on_touch)
+        : description_{describe(serial)},
+          on_receive_{std::move(on_receive)},
+          on_touch_{std::move(on_touch)} {}
 
     const UsbDescription& description() const override { return description_; }
     int control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
@@ -62,6 +65,7 @@ class CdcAcmFunction final : public UsbFunction {
     void silence() {
         const std::lock_guard lock{receive_mutex_};
         on_receive_ = nullptr;
+        on_touch_ = nullptr;
     }
     bool line_state_set() const { return line_state_set_; }
     void send(std::span<const std::byte> bytes) {
@@ -70,12 +74,22 @@ class CdcAcmFunction final : public UsbFunction {
     }
 
  private:
+    void line_state_changed(bool dtr);
+
     const UsbDescription description_;
     Bytes line_coding_{0x00, 0xc2, 0x01, 0x00, 0, 0, 8};  // 115200 8N1
     std::atomic<bool> line_state_set_ = false;
     std::mutex receive_mutex_;
     SimulatedUsbDevice::OnReceive on_receive_;
+    std::function<void()> on_touch_;
 };
+
+void CdcAcmFunction::line_state_changed(bool dtr) {
+    const Bytes touch{0xb0, 0x04, 0x00, 0x00, 0, 0, 8};  // 1200 8N1
+    line_state_set_ = dtr;
+    const std::lock_guard lock{receive_mutex_};
+    if (!dtr && line_coding_ == touch && on_touch_) on_touch_();
+}
 
 int CdcAcmFunction::control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
                             Bytes& reply) {
@@ -88,16 +102,18 @@ int CdcAcmFunction::control(std::span<const std::uint8_t> setup, std::span<const
             reply = line_coding_;
             return 0;
         case 0x2122:  // SET_CONTROL_LINE_STATE; bit 0 is DTR
-            line_state_set_ = (setup[2] & 1) != 0;
+            line_state_changed((setup[2] & 1) != 0);
             return 0;
         default: return -EPIPE;
     }
 }
 
 SimulatedUsbDevice::SimulatedUsbDevice(UMockdevTestbed* testbed, std::string serial,
-                                       OnReceive on_receive, std::chrono::milliseconds idle_hold)
-    : function_{std::make_shared<CdcAcmFunction>(serial, std::move(on_receive))},
-      device_{testbed, "1-1", function_, idle_hold} {}
+                                       OnReceive on_receive, const std::string& port,
+                                       std::function<void()> on_touch)
+    : function_{std::make_shared<CdcAcmFunction>(serial, std::move(on_receive),
+                                                 std::move(on_touch))},
+      device_{testbed, port, function_} {}
 
 SimulatedUsbDevice::~SimulatedUsbDevice() {
     device_.unplug();

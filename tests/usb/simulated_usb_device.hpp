@@ -6,7 +6,6 @@
 
 #include <umockdev.h>
 
-#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -28,8 +27,9 @@ class SimulatedUsbDevice {
     /// already running it can be called before the constructor has returned.
     using OnReceive = std::function<void(std::span<const std::byte>)>;
 
+    /// `port` as in sysfs. `on_touch`: the host closed the port at 1200 baud; the same holds.
     SimulatedUsbDevice(UMockdevTestbed* testbed, std::string serial, OnReceive on_receive,
-                       std::chrono::milliseconds idle_hold = std::chrono::milliseconds{1});
+                       const std::string& port = "1-1", std::function<void()> on_touch = {});
     ~SimulatedUsbDevice();
     SimulatedUsbDevice(const SimulatedUsbDevice&) = delete;
     SimulatedUsbDevice& operator=(const SimulatedUsbDevice&) = delete;

@@ -282,7 +282,9 @@ int UsbfsNode::start(Urb urb) {
     // Like the kernel, take an interface the caller forgot to claim.
     const int claimed = claim(urb.client, pipe->second.interface);
     if (claimed < 0) return claimed;
-    if ((endpoint & USB_DIR_IN) == 0) {
+    if (halted(endpoint)) {
+        finish(std::move(urb), -EPIPE);
+    } else if ((endpoint & USB_DIR_IN) == 0) {
         urb.fields().actual_length = urb.fields().buffer_length;
         function_->receive(endpoint, urb.payload());
         finish(std::move(urb), 0);

@@ -272,7 +272,8 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     const Nanoseconds off = edges_[newest] - stamp_ - since_last;
     const bool agrees = off < base_period / 2 && -off < base_period / 2;
     stamp_ = edges_[newest];
-    if (!agrees) return;
+    // A clock that stood still, or began anew, says nothing about the edge.
+    if (since_last <= 0 || !agrees) return;
     sample.time_ns = stamp_;
     sample.flags |= wire::imu_stamped;
 }

@@ -11,6 +11,14 @@ std::uintptr_t misaligned(const void* pointer) {
     return reinterpret_cast<std::uintptr_t>(pointer) % sizeof(Word);
 }
 
+constexpr std::size_t block_size = 4 * sizeof(Word);
+
+/// The processor has instructions for several words, which the compiler does not use for this.
+inline void copy_block(unsigned char*& to, const unsigned char*& from) {
+    __asm__ volatile("ldmia %1!, {r3-r6}\n stmia %0!, {r3-r6}"
+                     : "+l"(to), "+l"(from)::"r3", "r4", "r5", "r6", "memory");
+}
+
 }  // namespace
 
 extern "C" {
@@ -20,6 +28,7 @@ void* memcpy(void* to, const void* from, std::size_t size) {
     const auto* in = static_cast<const unsigned char*>(from);
     if (misaligned(out) == misaligned(in)) {
         for (; size > 0 && misaligned(out) != 0; --size) *out++ = *in++;
+        for (; size >= block_size; size -= block_size) copy_block(out, in);
         for (; size >= sizeof(Word); size -= sizeof(Word), out += sizeof(Word), in += sizeof(Word))
             *reinterpret_cast<Word*>(out) = *reinterpret_cast<const Word*>(in);
     }

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/board_commands.hpp"
+
+#include <fmt/format.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "board/board_info.hpp"
+#include "engine/board/firmware_file.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+int fail(const Error& error) {
+    fmt::print(stderr, "versavis: {}\n", error.message());
+    return EX_UNAVAILABLE;
+}
+
+/// One line that is written over and over. To a file it would be a line for each step.
+class ProgressLine {
+ public:
+    ~ProgressLine() { end(); }
+
+    void show(const char* what, std::size_t done, std::size_t all) {
+        if (!terminal_) return;
+        fmt::print(stderr, "\r\x1b[K{} {} %", what, 100 * done / all);
+        std::fflush(stderr);
+        shown_ = true;
+    }
+
+    void end() {
+        if (shown_) fmt::print(stderr, "\r\x1b[K");
+        shown_ = false;
+    }
+
+ private:
+    const bool terminal_ = isatty(STDERR_FILENO) != 0;
+    bool shown_ = false;
+};
+
+}  // namespace
+
+BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
+    : flash_(app.add_subcommand(
+          "flash",
+          "Put new firmware into the board: erase, write and verify it, then wait until it runs. "
+          "The service must not have the board. When interrupted, run it again "
+          "(docs/user/board.md)")),
+      board_(app.add_subcommand("board", "The trigger board itself: facts, reset, self-test")),
+      stop_(std::move(stop)) {
+    board_->require_subcommand(1);
+    add_flash();
+    add_info();
+    add_reset();
+    add_self_test();
+}
+
+void BoardCommands::add_flash() {
+    flash_->add_option("file", file_, "UF2 file (default: the one that was installed)");
+    add_choice(*flash_);
+    flash_->add_flag("--json", json_, "Print the outcome as a JSON object");
+}
+
+void BoardCommands::add_info() {
+    info_ = board_->add_subcommand(
+        "info",
+        "Show version, serial number, parts and counters of the board. When the service has it, it "
+        "is asked; else the board is, which stops its cameras");
+    add_choice(*info_);
+    info_->add_flag("--json", json_,
+                    "Print a JSON object with the keys of `board` in the status document "
+                    "(docs/contracts/status.md)");
+}
+
+void BoardCommands::add_reset() {
+    reset_ = board_->add_subcommand(
+        "reset",
+        "Reset the board, or start it out of its boot loader. The service must not have "
+        "it");
+    add_choice(*reset_);
+    reset_->add_flag("--json", json_, "Print a JSON object");
+}
+
+void BoardCommands::add_self_test() {
+    self_test_ = board_->add_subcommand(
+        "selftest",
+        "Send pulses at each output and measure them at the inputs that wires join them to. "
+        "Disconnect cameras and light first. The service must not have the board. Exits 0 if a "
+        "wire was found and all are well, 1 if not (docs/user/board.md)");
+    add_choice(*self_test_);
+    self_test_
+        ->add_option("--wire", wires_,
+                     "A wire that must be there, test=aux0 for example; may be repeated")
+        ->type_name("OUTPUT=INPUT")
+        ->allow_extra_args(false);
+    self_test_->add_flag("--json", json_, "Print a JSON object");
+}
+
+void BoardCommands::add_choice(CLI::App& command) {
+    command.add_option("--serial", choice_.serial,
+                       "Serial number of the board, if there are several");
+    command.add_option("--port", choice_.port,
+                       "Where it is plugged in, usb:1-2 for example, if there are several");
+}
+
+bool BoardCommands::chosen() const { return flash_->parsed() || board_->parsed(); }
+
+int BoardCommands::run(const std::string& instance) {
+    instance_ = instance;
+    if (flash_->parsed()) return flash_board();
+    if (info_->parsed()) return show_info();
+    return reset_->parsed() ? reset() : test();
+}
+
+int BoardCommands::flash_board() {
+    const auto installed = board::installed_firmware();
+    if (file_.empty() && !std::filesystem::exists(installed))
+        return fail({installed.string(), "is not installed",
+                     "name a UF2 file: './dev firmware' builds one, and releases have it"});
+    ProgressLine line;
+    FlashSettings settings{file_.empty() ? installed.string() : file_, choice_, instance_, stop_};
+    settings.progress = [&](const char* what, std::size_t done, std::size_t all) {
+        line.show(what, done, all);
+    };
+    const auto flashed = flash(settings);
+    line.end();
+    if (!flashed) return fail(flashed.error());
+    fmt::print("{}", to_text(*flashed, json_));
+    return EX_OK;
+}
+
+int BoardCommands::show_info() {
+    const auto info = board_info(choice_, instance_);
+    if (!info) return fail(info.error());
+    fmt::print("{}", json_ ? info->dump() + "\n" : board_text(*info));
+    return EX_OK;
+}
+
+int BoardCommands::reset() {
+    const auto board = reset_board({choice_, instance_, stop_});
+    if (!board) return fail(board.error());
+    fmt::print("{}", to_text(*board, json_));
+    return EX_OK;
+}
+
+int BoardCommands::test() {
+    ProgressLine line;
+    SelfTestSettings settings{choice_, instance_, wires_, stop_};
+    settings.progress = [&](const char* what, std::size_t done, std::size_t all) {
+        line.show(what, done, all);
+    };
+    const auto tested = self_test(settings);
+    line.end();
+    if (!tested) return fail(tested.error());
+    fmt::print("{}", to_text(*tested, json_));
+    return tested->passed ? EX_OK : EXIT_FAILURE;
+}
+
+}  // namespace versavis::client

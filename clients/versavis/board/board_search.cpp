@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/board_search.hpp"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include "board/picoboot.hpp"
+#include "wire/usb_identity.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// Between two looks at the bus. At half, the bus is listed twice as often; at twice, a board is
+/// met later.
+constexpr Duration look_interval = milliseconds(50);
+
+bool fits(const FoundBoard& board, const BoardChoice& choice) {
+    return (choice.port.empty() || choice.port == board.device.port()) &&
+           (choice.serial.empty() || choice.serial == board.serial);
+}
+
+Unexpected<> no_board(const std::vector<FoundBoard>& all, const BoardChoice& choice) {
+    if (all.empty())
+        return failure("USB",
+                       fmt::format("no board ({:04x}:{:04x}), and no boot loader ({:04x}:{:04x})",
+                                   wire::usb_vendor, wire::usb_product, boot_loader_vendor,
+                                   boot_loader_product),
+                       "plug it in, or hold its BOOTSEL button while you do; 'lsusb' lists what is "
+                       "there");
+    std::string others;
+    for (const FoundBoard& board : all) others += (others.empty() ? "" : ", ") + board.text();
+    const std::string wanted = choice.serial.empty() ? choice.port : "serial " + choice.serial;
+    return failure("USB", fmt::format("no board with {}, but {}", wanted, others),
+                   "correct --serial or --port; a boot loader does not know its serial number, and "
+                   "is chosen with --port");
+}
+
+}  // namespace
+
+std::string FoundBoard::text() const {
+    return fmt::format(
+        "{} ({})", device.port(),
+        in_boot_loader ? "boot loader" : "serial " + (serial.empty() ? "unknown" : serial));
+}
+
+std::vector<FoundBoard> list_boards(const UsbBus& bus) {
+    std::vector<FoundBoard> boards;
+    for (const UsbDevice& device : bus.find(wire::usb_vendor, wire::usb_product)) {
+        const auto handle = device.open();
+        boards.push_back({device, false, handle ? handle->serial() : ""});
+    }
+    for (const UsbDevice& device : bus.find(boot_loader_vendor, boot_loader_product))
+        boards.push_back({device, true, ""});
+    return boards;
+}
+
+Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice) {
+    const std::vector<FoundBoard> all = list_boards(bus);
+    std::vector<FoundBoard> fitting;
+    std::string names;
+    for (const FoundBoard& board : all) {
+        if (!fits(board, choice)) continue;
+        fitting.push_back(board);
+        names += (names.empty() ? "" : ", ") + board.text();
+    }
+    if (fitting.empty()) return no_board(all, choice);
+    if (fitting.size() > 1)
+        return failure("USB", fmt::format("{} boards: {}", fitting.size(), names),
+                       "choose one with --serial or --port");
+    return fitting.front();
+}
+
+std::optional<UsbDevice> wait_for_board(const UsbBus& bus, const std::string& port,
+                                        bool in_boot_loader, Duration timeout,
+                                        const std::function<bool()>& stop) {
+    const std::uint16_t vendor = in_boot_loader ? boot_loader_vendor : wire::usb_vendor;
+    const std::uint16_t product = in_boot_loader ? boot_loader_product : wire::usb_product;
+    const HostTime deadline = host_now() + timeout;
+    while (!stop() && host_now() < deadline) {
+        for (const UsbDevice& device : bus.find(vendor, product))
+            if (device.port() == port) return device;
+        const timespec pause{0, look_interval.ns};
+        nanosleep(&pause, nullptr);
+    }
+    return std::nullopt;
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Finds the one board that a command means, be it running or in its boot loader.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "board/usb_bus.hpp"
+
+namespace versavis::client {
+
+/// What the user says of the board; empty: there is only one.
+struct BoardChoice {
+    std::string serial;
+    std::string port;  ///< as UsbDevice::port()
+};
+
+struct FoundBoard {
+    UsbDevice device;
+    bool in_boot_loader = false;
+    std::string serial;  ///< empty: in its boot loader, which does not know it, or not to be opened
+
+    std::string text() const;
+};
+
+std::vector<FoundBoard> list_boards(const UsbBus& bus);
+
+/// Error: none fits, or more than one.
+Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice);
+
+/// The board at this port, once it is there and runs, or is in its boot loader. None: not in time,
+/// or `stop` said so.
+std::optional<UsbDevice> wait_for_board(const UsbBus& bus, const std::string& port,
+                                        bool in_boot_loader, Duration timeout,
+                                        const std::function<bool()>& stop);
+
+}  // namespace versavis::client

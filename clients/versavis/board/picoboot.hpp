@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The RP2040's own boot loader: erases, writes and reads its flash by PICOBOOT, the vendor's USB
+// interface (RP2040 datasheet, "USB PICOBOOT interface").
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "board/usb_bus.hpp"
+
+namespace versavis::client {
+
+/// How the chip names itself while its boot loader runs.
+inline constexpr std::uint16_t boot_loader_vendor = 0x2E8A;
+inline constexpr std::uint16_t boot_loader_product = 0x0003;
+
+/// Each call waits for its end. After an error the boot loader takes commands again, if it is still
+/// there.
+class Picoboot {
+ public:
+    /// Claims the interface, and the flash for this program alone: the drive that the boot loader
+    /// also is goes away.
+    static Expected<Picoboot> open(const UsbDevice& device);
+
+    /// Whole sectors.
+    Expected<> erase(std::uint32_t address, std::uint32_t size);
+    /// Whole pages, which are erased.
+    Expected<> write(std::uint32_t address, std::span<const std::uint8_t> bytes);
+    Expected<> read(std::uint32_t address, std::span<std::uint8_t> into);
+    /// Starts what is in the flash.
+    Expected<> reboot();
+
+ private:
+    struct Command;
+
+    Picoboot(UsbHandle handle, UsbFunction function, std::string where)
+        : handle_(std::move(handle)), function_(function), where_(std::move(where)) {}
+
+    Expected<> take_over();
+    UsbExpected<> reset();
+    Expected<> run(const Command& command, std::span<std::uint8_t> in,
+                   std::span<const std::uint8_t> out);
+    UsbExpected<> exchange(const Command& command, std::span<std::uint8_t> in,
+                           std::span<const std::uint8_t> out);
+    Error explain(const Command& command, const UsbError& error);
+    std::string reason(const Command& command);
+
+    UsbHandle handle_;
+    UsbFunction function_;
+    std::string where_;
+    std::uint32_t token_ = 0;
+};
+
+}  // namespace versavis::client

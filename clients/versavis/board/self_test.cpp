@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board/self_test.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "board/board_access.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// What is sent: a wire passes it on whatever drives it, and the board's filters let it pass. At
+/// half the period, slow isolators fail; at twice, the test takes twice the time.
+constexpr Duration pulse_period = milliseconds(10);
+constexpr Duration pulse_width = milliseconds(1);
+constexpr std::uint32_t pulse_rate_millihertz = 100'000;
+
+/// Exposures are slower: cameras are.
+constexpr Duration exposure_period = milliseconds(20);
+constexpr std::uint32_t exposure_rate_uhz = 50'000'000;
+
+/// Pulses that are looked at. At half, a contact that fails now and then passes; at twice, the test
+/// takes twice the time.
+constexpr std::size_t pulse_count = 20;
+
+/// Until so many have come, or none will. At half, a host that is busy misses some; at twice, lines
+/// that are not wired take twice the time.
+constexpr Duration collect_patience = milliseconds(800);
+
+/// For the answer to a configuration, which waits for exposures under way.
+constexpr Duration answer_patience = seconds(1);
+
+constexpr std::array output_names{"test", "trigger0", "trigger1", "trigger2", "trigger3", "sync"};
+constexpr std::array input_names{"pps", "aux0", "aux1", "sync_input"};
+static_assert(input_names.size() == wire::pulse_input_count);
+
+std::string exposure_name(unsigned camera) { return fmt::format("exposure{}", camera); }
+
+/// Bit of wire::Present of what test pulses can leave at; by wire::TestOutput.
+std::uint32_t part_of(unsigned output) {
+    if (output == wire::test_at_test) return wire::present_test_output;
+    if (output == wire::test_at_sync) return wire::present_sync_output;
+    return wire::present_camera0 << (output - wire::test_at_camera0);
+}
+
+/// Of an event; none: it is of no pulse input.
+std::optional<unsigned> input_of(const wire::Event& event) {
+    switch (event.kind) {
+        case wire::EventKind::pps: return wire::pulse_pps;
+        case wire::EventKind::aux_pulse: return wire::pulse_aux0 + unsigned{event.source & 1U};
+        case wire::EventKind::sync_pulse: return wire::pulse_sync;
+        default: return std::nullopt;
+    }
+}
+
+using EdgesByInput = std::array<std::vector<std::int64_t>, wire::pulse_input_count>;
+
+class Tester {
+ public:
+    Tester(const SelfTestSettings& settings, Conversation& board, const wire::BoardHello& hello)
+        : settings_(settings), board_(board), present_(hello.present) {}
+
+    Expected<> run() {
+        auto done = test_outputs();
+        // Whatever was found, its outputs rest.
+        auto rested = configure({});
+        return done ? rested : done;
+    }
+
+    std::vector<TestedLine> lines;
+
+ private:
+    bool has(std::uint32_t part) const { return (present_ & part) != 0; }
+
+    Expected<> test_outputs() {
+        for (unsigned output = 0; output < output_names.size(); ++output) {
+            settings_.progress("testing", output, output_names.size());
+            if (!has(part_of(output))) continue;
+            if (settings_.stop()) return failure("self-test", "stopped");
+            const std::size_t before = lines.size();
+            if (auto done = test_pulses(output); !done) return done;
+            const bool trigger =
+                output >= wire::test_at_camera0 && output < wire::test_at_camera0 + 4U;
+            if (trigger)
+                if (auto done = test_exposures(output - wire::test_at_camera0); !done) return done;
+            if (lines.size() == before) lines.push_back({output_names[output], "", {}});
+        }
+        return {};
+    }
+
+    /// By the events of the pulse inputs. They tell one kind of edges at a time; pulses begin at
+    /// multiples of the period, so that the other kind can be seen later.
+    Expected<> test_pulses(unsigned output) {
+        const SentPulses sent{pulse_period, pulse_width, pulse_count};
+        auto rising = collect_pulses(output, false);
+        if (!rising) return Unexpected(rising.error());
+        const bool heard = std::any_of(rising->begin(), rising->end(),
+                                       [&](const auto& edges) { return hears(sent, edges); });
+        if (!heard) return {};
+        auto falling = collect_pulses(output, true);
+        if (!falling) return Unexpected(falling.error());
+        for (unsigned input = 0; input < input_names.size(); ++input) {
+            const LoopFinding finding = check_loop(sent, {(*rising)[input], (*falling)[input]});
+            if (finding.result != LoopResult::open)
+                lines.push_back({output_names[output], input_names[input], finding});
+        }
+        return {};
+    }
+
+    Expected<EdgesByInput> collect_pulses(unsigned output, bool falling) {
+        wire::Configuration configuration{};
+        configuration.ports.inputs =
+            static_cast<std::uint8_t>(present_ / wire::present_pulse0 & 0x0FU);
+        configuration.ports.falling = falling ? configuration.ports.inputs : std::uint8_t{0};
+        configuration.ports.test = wire::test_rate;
+        configuration.ports.test_rate_millihertz = pulse_rate_millihertz;
+        configuration.ports.test_output = static_cast<std::uint8_t>(output);
+        configuration.ports.pulse_ns = static_cast<std::uint32_t>(pulse_width.ns);
+        if (auto done = configure(configuration); !done) return Unexpected(done.error());
+        EdgesByInput edges;
+        const auto enough = [&](const wire::Packet& packet) {
+            wire::Event event{};
+            if (!packet.read(event)) return false;
+            const auto input = input_of(event);
+            // Those of the configuration before may still come.
+            if (!input || event.time_ns < configured_ns_) return false;
+            edges[*input].push_back(event.time_ns);
+            return edges[*input].size() > pulse_count;
+        };
+        if (auto heard = board_.listen(enough, collect_patience); !heard)
+            return Unexpected(heard.error());
+        return edges;
+    }
+
+    /// By the records of a camera whose trigger is wired to its exposure line.
+    Expected<> test_exposures(unsigned camera) {
+        wire::Configuration configuration{};
+        wire::CameraConfiguration& tested = configuration.cameras[camera];
+        tested.flags = wire::camera_enabled;
+        tested.rate_uhz = exposure_rate_uhz;
+        tested.pulse_ns = static_cast<std::uint32_t>(pulse_width.ns);
+        tested.exposure_ns = pulse_width.ns;
+        tested.max_exposure_ns = exposure_period.ns / 2;
+        if (auto done = configure(configuration); !done) return done;
+        const auto mask = static_cast<std::uint8_t>(1U << camera);
+        if (auto sent = board_.send(wire::Start{mask, 0, {}}); !sent) return sent;
+        SeenEdges edges;
+        std::optional<std::int64_t> first;  // trigger: pulses begin at whole periods from it
+        const auto enough = [&](const wire::Packet& packet) {
+            wire::Exposure record{};
+            if (!packet.read(record) || record.camera != camera ||
+                record.trigger_ns < configured_ns_)
+                return false;
+            if (!first) first = record.trigger_ns;
+            if (record.start_ns != wire::no_time)
+                edges.rising_ns.push_back(record.start_ns - *first);
+            if (record.end_ns != wire::no_time) edges.falling_ns.push_back(record.end_ns - *first);
+            return std::min(edges.rising_ns.size(), edges.falling_ns.size()) >= pulse_count;
+        };
+        if (auto heard = board_.listen(enough, collect_patience); !heard)
+            return Unexpected(heard.error());
+        if (auto sent = board_.send(wire::Stop{mask, {}}); !sent) return sent;
+        const LoopFinding finding = check_loop({exposure_period, pulse_width, pulse_count}, edges);
+        if (finding.result != LoopResult::open)
+            lines.push_back(
+                {output_names[wire::test_at_camera0 + camera], exposure_name(camera), finding});
+        return {};
+    }
+
+    Expected<> configure(wire::Configuration configuration) {
+        configuration.id = ++id_;
+        if (auto sent = board_.send(configuration); !sent) return sent;
+        wire::ConfigurationAnswer answer{};
+        std::string refusals;
+        const auto answered = [&](const wire::Packet& packet) {
+            wire::Refusal refusal{};
+            if (packet.read(refusal) && refusal.id == id_)
+                refusals +=
+                    fmt::format(" (part {}, field {}, value {})", static_cast<int>(refusal.part),
+                                static_cast<int>(refusal.field), refusal.value);
+            return packet.read(answer) && answer.id == id_;
+        };
+        const auto heard = board_.listen(answered, answer_patience);
+        if (!heard) return Unexpected(heard.error());
+        if (!*heard)
+            return failure("self-test", "the board does not answer its configuration",
+                           "reset it: versavis board reset");
+        if (answer.status != wire::ConfigurationStatus::taken)
+            return failure("self-test", "the board refuses to send test pulses" + refusals,
+                           "update its firmware: versavis flash");
+        configured_ns_ = answer.origin_ns;
+        return {};
+    }
+
+    const SelfTestSettings& settings_;
+    Conversation& board_;
+    const std::uint32_t present_;
+    std::uint32_t id_ = 0;
+    std::int64_t configured_ns_ = 0;  ///< board time
+};
+
+struct Wire {
+    std::string output;
+    std::string input;
+};
+
+Expected<std::vector<Wire>> parse(const std::vector<std::string>& texts) {
+    std::vector<Wire> wires;
+    for (const std::string& text : texts) {
+        const auto equals = text.find('=');
+        const Wire wire{text.substr(0, equals),
+                        equals == std::string::npos ? "" : text.substr(equals + 1)};
+        const bool output = std::count(output_names.begin(), output_names.end(), wire.output) != 0;
+        const bool pulse = std::count(input_names.begin(), input_names.end(), wire.input) != 0;
+        const bool exposure = wire.output.rfind("trigger", 0) == 0 &&
+                              wire.input == "exposure" + wire.output.substr(7);
+        if (!output || !(pulse || exposure))
+            return failure("--wire " + text, "is no output and input",
+                           "write test, sync or trigger0 to trigger3, '=', and pps, aux0, aux1 or "
+                           "sync_input; or trigger0=exposure0, and so on");
+        wires.push_back(wire);
+    }
+    return wires;
+}
+
+/// A wire that was asked for and is not there is a failure.
+void demand(std::vector<TestedLine>& lines, const std::vector<Wire>& wires) {
+    for (const Wire& wire : wires) {
+        const auto there = [&](const TestedLine& line) {
+            return line.output == wire.output && line.input == wire.input;
+        };
+        if (std::any_of(lines.begin(), lines.end(), there)) continue;
+        LoopFinding missing;
+        missing.result = LoopResult::failed;
+        missing.hint = "no pulse came: check the wire, then what drives it and what receives it";
+        // In place of the remark that the output is open.
+        std::erase_if(lines, [&](const TestedLine& line) {
+            return line.output == wire.output && line.input.empty();
+        });
+        lines.push_back({wire.output, wire.input, missing});
+    }
+}
+
+bool passed(const std::vector<TestedLine>& lines) {
+    bool any = false;
+    for (const TestedLine& line : lines) {
+        if (line.finding.result == LoopResult::failed) return false;
+        any = any || line.finding.result == LoopResult::ok;
+    }
+    return any;
+}
+
+const char* to_string(LoopResult result) {
+    switch (result) {
+        case LoopResult::open: return "open";
+        case LoopResult::ok: return "ok";
+        case LoopResult::failed: return "failed";
+    }
+    return "failed";
+}
+
+std::string line_text(const TestedLine& line) {
+    const LoopFinding& finding = line.finding;
+    if (finding.result == LoopResult::open)
+        return fmt::format("{:<8} open    no input hears it: not wired?\n", line.output);
+    std::string text =
+        fmt::format("{:<8} {:<7} at {}", line.output, to_string(finding.result), line.input);
+    if (finding.period.ns > 0)
+        text += fmt::format(": period {:.3f} ms, width {:.1f} us",
+                            static_cast<double>(finding.period.ns) * 1e-6,
+                            static_cast<double>(finding.width.ns) * 1e-3);
+    return text + (finding.hint.empty() ? "" : "; " + finding.hint) + "\n";
+}
+
+nlohmann::json line_json(const TestedLine& line) {
+    const bool measured = line.finding.period.ns > 0;
+    nlohmann::json json{{"output", line.output}, {"result", to_string(line.finding.result)},
+                        {"input", nullptr},      {"period_ns", nullptr},
+                        {"width_ns", nullptr},   {"hint", line.finding.hint}};
+    if (!line.input.empty()) json["input"] = line.input;
+    if (measured) {
+        json["period_ns"] = line.finding.period.ns;
+        json["width_ns"] = line.finding.width.ns;
+    }
+    return json;
+}
+
+}  // namespace
+
+Expected<SelfTest> self_test(const SelfTestSettings& settings) {
+    const auto wires = parse(settings.wires);
+    if (!wires) return Unexpected(wires.error());
+    const auto bus = UsbBus::open();
+    if (!bus) return Unexpected(bus.error());
+    const auto found = find_board(*bus, settings.board);
+    if (!found) return Unexpected(found.error());
+    if (found->in_boot_loader)
+        return failure("board at " + found->device.port(), "is in its boot loader",
+                       "put firmware into it first: versavis flash");
+    auto board = open_board(*found, settings.instance);
+    if (!board) return Unexpected(board.error());
+    const auto greeting = board->greet();
+    if (!greeting) return Unexpected(greeting.error());
+    if (!greeting->understood)
+        return failure("board at " + found->device.port(),
+                       "has " + greeting->firmware() + ", which this program does not speak",
+                       "flash the firmware of the same release: versavis flash");
+    Tester tester(settings, *board, greeting->hello);
+    if (auto done = tester.run(); !done) return Unexpected(done.error());
+    SelfTest test{greeting->serial(), greeting->firmware(), std::move(tester.lines)};
+    demand(test.lines, *wires);
+    test.passed = passed(test.lines);
+    return test;
+}
+
+std::string to_text(const SelfTest& test, bool json) {
+    if (json) {
+        nlohmann::json lines = nlohmann::json::array();
+        for (const TestedLine& line : test.lines) lines.push_back(line_json(line));
+        return nlohmann::json{{"serial", test.serial},
+                              {"firmware", test.firmware},
+                              {"passed", test.passed},
+                              {"lines", lines}}
+                   .dump() +
+               "\n";
+    }
+    std::string out = fmt::format("board {}, {}\n", test.serial, test.firmware);
+    for (const TestedLine& line : test.lines) out += line_text(line);
+    const bool wired = std::any_of(test.lines.begin(), test.lines.end(),
+                                   [](const TestedLine& line) { return !line.input.empty(); });
+    if (!wired) out += "nothing was tested: wire outputs to inputs (docs/user/board.md)\n";
+    return out;
+}
+
+}  // namespace versavis::client

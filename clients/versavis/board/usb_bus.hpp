@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The USB devices that the tool talks to, through libusb.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "versavis/error.hpp"
+#include "versavis/time.hpp"
+
+struct libusb_context;
+struct libusb_device;
+struct libusb_device_handle;
+
+namespace versavis::client {
+
+/// Why something on USB was not done.
+enum class UsbFault {
+    gone,     ///< the device is not there any more
+    stalled,  ///< it refuses
+    late,     ///< it did not answer in time
+    busy,     ///< another program has it
+    denied,   ///< this user may not
+    foreign,  ///< it lacks the function that is looked for
+    other,
+};
+
+struct UsbError {
+    UsbFault fault = UsbFault::other;
+    int code = 0;  ///< of libusb
+
+    /// As an error of the device named `where`.
+    Error as_error(const std::string& where, const std::string& what) const;
+};
+
+template <class T = void>
+using UsbExpected = Expected<T, UsbError>;
+
+/// Where the function of a class lies within a device.
+struct UsbFunction {
+    int interface = -1;
+    std::uint8_t endpoint_in = 0;
+    std::uint8_t endpoint_out = 0;
+
+    bool complete() const { return interface >= 0 && endpoint_in != 0 && endpoint_out != 0; }
+};
+
+/// A device that is open. Interfaces that were claimed are given back with it.
+class UsbHandle {
+ public:
+    explicit UsbHandle(std::shared_ptr<libusb_device_handle> handle) : handle_(std::move(handle)) {}
+
+    /// Its first interface of this class.
+    UsbFunction function(std::uint8_t interface_class) const;
+    std::string serial() const;
+
+    /// Takes the interface from the kernel, too, if that has a driver for it.
+    UsbExpected<> claim(int interface);
+
+    /// How many bytes came, at most as many as `into` has room for. Those that came before a
+    /// time-out are no failure.
+    UsbExpected<std::size_t> read(std::uint8_t endpoint, std::span<std::uint8_t> into,
+                                  Duration timeout);
+    UsbExpected<> write(std::uint8_t endpoint, std::span<const std::uint8_t> bytes,
+                        Duration timeout);
+    /// Both sides begin anew with it.
+    UsbExpected<> clear_halt(std::uint8_t endpoint);
+    /// A request to an interface, in or out by its type.
+    UsbExpected<std::size_t> control(std::uint8_t type, std::uint8_t request, std::uint16_t value,
+                                     int interface, std::span<std::uint8_t> data, Duration timeout);
+
+ private:
+    std::shared_ptr<libusb_device_handle> handle_;
+};
+
+/// A device on the bus. It need not be there any more.
+class UsbDevice {
+ public:
+    UsbDevice(std::shared_ptr<libusb_context> context, libusb_device* device);
+
+    UsbExpected<UsbHandle> open() const;
+    /// As the service names it: bus, then the ports of the hubs on the way.
+    const std::string& port() const { return port_; }
+
+ private:
+    std::shared_ptr<libusb_context> context_;
+    std::shared_ptr<libusb_device> device_;
+    std::string port_;
+};
+
+class UsbBus {
+ public:
+    static Expected<UsbBus> open();
+
+    /// All devices of this vendor and product.
+    std::vector<UsbDevice> find(std::uint16_t vendor, std::uint16_t product) const;
+
+ private:
+    explicit UsbBus(std::shared_ptr<libusb_context> context) : context_(std::move(context)) {}
+
+    std::shared_ptr<libusb_context> context_;
+};
+
+}  // namespace versavis::client

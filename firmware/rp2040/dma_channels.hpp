@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Who uses which channel of the direct memory access.
+#pragma once
+
+namespace versavis::rp2040 {
+
+enum DmaUse : unsigned {
+    dma_states = 0,
+    dma_counts = 1,
+    dma_spi_transmit = 2,
+    dma_spi_receive = 3,
+};
+
+}  // namespace versavis::rp2040

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "imu_bus_port.hpp"
+
+#include <cstring>
+
+#include "clocks.hpp"
+#include "dma_channels.hpp"
+#include "i2c_registers.hpp"
+#include "state_machine.hpp"
+
+namespace versavis::rp2040 {
+
+namespace {
+
+using firmware::ImuReply;
+using firmware::ImuTransfer;
+using firmware::not_routed;
+using Bus = ImuTransfer::Bus;
+
+constexpr std::size_t word_size = 2;
+
+/// Of the board's clock.
+constexpr Nanoseconds clock_step = 1'000;
+
+/// An I2C transfer that has not ended by then is given up. At half, a part that stretches its clock
+/// is; at twice, it is more than the HAL says.
+constexpr Nanoseconds i2c_patience = 9'000'000;
+
+/// An alarm that lies so far ahead is not missed. At half, it may be; at twice, what is due begins
+/// a microsecond later.
+constexpr std::uint32_t alarm_margin_us = 2;
+
+constexpr std::uint32_t alarm_bit = 1U << 1U;
+
+void select(std::uint8_t chip, bool selected) {
+    const std::uint32_t pin = 1U << (chip == 0 ? pin_spi_select0 : pin_spi_select1);
+    (selected ? sio().out_clear : sio().out_set) = pin;
+}
+
+void set_spi_clock(std::uint32_t hz) {
+    constexpr std::uint32_t mode_3 = 1U << 7U | 1U << 6U;
+    constexpr std::uint32_t bits_8 = 7;
+    constexpr std::uint32_t most_steps = 256;
+    // The clock is divided by prescale * steps; prescale is even.
+    const std::uint32_t ratio = (clock_hz - 1) / hz + 1;
+    std::uint32_t prescale = 2;
+    while (prescale < 254 && ratio > prescale * most_steps) prescale += 2;
+    std::uint32_t steps = (ratio + prescale - 1) / prescale;
+    if (steps > most_steps) steps = most_steps;
+    spi0().control1 = 0;
+    spi0().prescale = prescale;
+    spi0().control0 = mode_3 | bits_8 | (steps - 1) << 8U;
+    spi0().control1 = 1U << 1U;
+}
+
+void set_up_i2c() {
+    constexpr std::uint32_t master = 1U << 0U;
+    constexpr std::uint32_t fast = 2U << 1U;
+    constexpr std::uint32_t restart = 1U << 5U;
+    constexpr std::uint32_t no_slave = 1U << 6U;
+    constexpr std::uint32_t empty_at_end = 1U << 8U;
+    // Of 125 MHz: 1.5 us low, 1.0 us high and data that hold for 0.3 us make 400 kHz.
+    restart_blocks(reset_i2c1);
+    i2c1().enable = 0;
+    i2c1().control = master | fast | restart | no_slave | empty_at_end;
+    i2c1().fast_low = 188;
+    i2c1().fast_high = 124;
+    i2c1().hold = 38;
+    i2c1().receive_threshold = 0;
+    i2c1().transmit_threshold = 0;
+    i2c1().interrupt_mask = 0;
+}
+
+enum I2cInterrupt : std::uint32_t {
+    i2c_received = 1U << 2U,
+    i2c_wants_more = 1U << 4U,
+    i2c_aborted = 1U << 6U,
+    i2c_stopped = 1U << 9U,
+};
+
+constexpr unsigned i2c_fifo = 16;
+
+DmaChannel& transmit_channel() { return dma().channels[dma_spi_transmit]; }
+DmaChannel& receive_channel() { return dma().channels[dma_spi_receive]; }
+
+Nanoseconds later(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
+
+}  // namespace
+
+void ImuBusPort::set_up() {
+    for (const unsigned pin : {pin_spi_receive, pin_spi_clock, pin_spi_transmit})
+        set_function(pin, function_spi);
+    sio().out_set = 1U << pin_spi_select0 | 1U << pin_spi_select1;
+    sio().enable_set = 1U << pin_spi_select0 | 1U << pin_spi_select1;
+    set_function(pin_spi_select0, function_sio);
+    set_function(pin_i2c_data, function_i2c);
+    set_function(pin_i2c_clock, function_i2c);
+    set_up_i2c();
+    set_up_spi();
+    transmit_channel().write_address = reinterpret_cast<std::uintptr_t>(&spi0().data);
+    transmit_channel().alias1_control = dma_enable | dma_bytes | dma_increment_read |
+                                        dma_chain_to(dma_spi_transmit) |
+                                        dma_paced_by(request_spi0_transmit);
+    receive_channel().read_address = reinterpret_cast<std::uintptr_t>(&spi0().data);
+    receive_channel().alias1_control = dma_enable | dma_bytes | dma_increment_write |
+                                       dma_chain_to(dma_spi_receive) |
+                                       dma_paced_by(request_spi0_receive);
+    dma().interrupt1_enable = 1U << dma_spi_receive;
+    set_bits(timer().interrupt_enable, alarm_bit);
+}
+
+/// As after a reset: nothing of an earlier transfer is left.
+void ImuBusPort::set_up_spi() {
+    constexpr std::uint32_t both_directions = 3;
+    restart_blocks(reset_spi0);
+    spi0().dma = both_directions;
+    spi_hz_ = 0;
+}
+
+/// The edges of a pin since they were last forgotten.
+bool ImuBusPort::edge_latched() const {
+    return (io_bank().latched[pin_ / 8] >> (pin_ % 8 * 4) & gpio_rises) != 0;
+}
+void ImuBusPort::forget_edge() { io_bank().latched[pin_ / 8] = gpio_rises << (pin_ % 8 * 4); }
+
+void ImuBusPort::watch_edge(bool watch) {
+    Register& enable = io_bank().interrupt_enable[pin_ / 8];
+    const std::uint32_t bit = gpio_rises << (pin_ % 8 * 4);
+    if (watch)
+        set_bits(enable, bit);
+    else
+        clear_bits(enable, bit);
+}
+
+bool ImuBusPort::arm(const firmware::ImuJob& job) {
+    const bool free = state_ == State::idle || (state_ == State::done && taken_ == job_.count);
+    if (!free) return false;
+    state_ = State::idle;
+    copy_job(job);
+    index_ = taken_ = 0;
+    pausing_ = clock_.now() < free_at_;
+    prepare();
+    if (job.input == not_routed) {
+        const InterruptsOff undisturbed;
+        begin_no_sooner_than(job.after);
+        return true;
+    }
+    pin_ = pin_of_input(job.input);
+    // One that came before may be the one that is waited for, or be so new that it is not known.
+    Nanoseconds rise = firmware::never;
+    if (edge_latched()) {
+        forget_edge();
+        rise = edges_.last_rise(job.input);
+        const Nanoseconds begun = clock_.now();
+        while ((rise == firmware::never || rise <= job.after) &&
+               clock_.now() - begun <= EdgePort::known_after)
+            rise = edges_.last_rise(job.input);
+    }
+    const InterruptsOff undisturbed;
+    if (rise != firmware::never && rise > job.after) {
+        forget_edge();
+        begin_when_free();
+    } else {
+        state_ = State::waits_for_edge;
+        watch_edge(true);
+    }
+    return true;
+}
+
+/// Only what is used: most of a job is room.
+void ImuBusPort::copy_job(const firmware::ImuJob& job) {
+    job_.pause = job.pause;
+    job_.count = job.count;
+    for (unsigned i = 0; i < job.count; ++i) {
+        constexpr std::size_t head = offsetof(ImuTransfer, bytes);
+        std::memcpy(&job_.transfers[i], &job.transfers[i], head + job.transfers[i].size);
+    }
+}
+
+bool ImuBusPort::take_reply(ImuReply& out) {
+    if (state_ != State::done || taken_ == job_.count) return false;
+    const std::size_t size = job_.transfers[taken_].size;
+    std::memcpy(&out, &replies_[taken_++], offsetof(ImuReply, bytes) + size);
+    return true;
+}
+
+void ImuBusPort::disarm() {
+    const InterruptsOff undisturbed;
+    watch_edge(false);
+    if (state_ == State::transfers) {
+        dma().abort = 1U << dma_spi_transmit | 1U << dma_spi_receive;
+        while (dma().abort != 0) {
+        }
+        dma().interrupt1_status = 1U << dma_spi_receive;
+        select(0, false);
+        select(1, false);
+        if (is_spi())
+            set_up_spi();
+        else
+            set_up_i2c();
+        pause_from(clock_.now() + clock_step);
+    }
+    state_ = State::idle;
+    job_.count = 0;
+    in_gap_ = false;
+}
+
+void ImuBusPort::data_ready() {
+    // First of all what the part waits for.
+    if (state_ == State::waits_for_edge) begin_when_free();
+    forget_edge();
+    watch_edge(false);
+}
+
+/// The pause since the transfer before has passed, or is waited for.
+void ImuBusPort::begin_when_free() {
+    if (!pausing_ || clock_.now() >= free_at_) return begin();
+    state_ = State::waits_for_time;
+    set_alarm(free_at_);
+}
+
+/// For the time that the job says.
+void ImuBusPort::pause_from(Nanoseconds at) {
+    free_at_ = at + job_.pause;
+    pausing_ = true;
+}
+
+void ImuBusPort::begin_no_sooner_than(Nanoseconds at) {
+    if (clock_.now() >= at) return begin_when_free();
+    state_ = State::waits_for_time;
+    set_alarm(later(at, free_at_));
+}
+
+void ImuBusPort::set_alarm(Nanoseconds at) {
+    alarm_at_ = at;
+    // Far ones come in steps: an alarm knows but 32 bits.
+    constexpr Nanoseconds furthest = 1'000'000'000;
+    const Nanoseconds ahead = at - clock_.now();
+    std::uint32_t steps = alarm_margin_us;
+    if (ahead > furthest)
+        steps = furthest / 1000;
+    else if (ahead > alarm_margin_us * 1000)
+        steps = (static_cast<std::uint32_t>(ahead) + 999) / 1000;
+    timer().alarms[1] = timer().low + steps;
+}
+
+void ImuBusPort::time_reached() {
+    timer().raw_interrupts = alarm_bit;
+    if (clock_.now() < alarm_at_) return set_alarm(alarm_at_);
+    if (state_ == State::waits_for_time) return begin();
+    if (state_ != State::transfers) return;
+    if (in_gap_) return begin_part();
+    if (!is_spi()) end_i2c(true);
+}
+
+/// All that can be done before the transfer begins.
+void ImuBusPort::prepare() {
+    position_ = 0;
+    reply().refused = false;
+    if (!is_spi()) return;
+    if (transfer().clock_hz != spi_hz_) {
+        spi_hz_ = transfer().clock_hz;
+        set_spi_clock(spi_hz_);
+    }
+    if (transfer().chip != 0) set_function(pin_spi_select1, function_sio);
+    prepare_part();
+}
+
+/// All of the transfer, or with gaps its next word.
+void ImuBusPort::prepare_part() {
+    const std::size_t left = transfer().size - position_;
+    part_ = transfer().word_gap_ns != 0 && left > word_size ? word_size : left;
+    transmit_channel().read_address =
+        reinterpret_cast<std::uintptr_t>(transfer().bytes + position_);
+    transmit_channel().count = part_;
+    receive_channel().write_address = reinterpret_cast<std::uintptr_t>(reply().bytes + position_);
+    receive_channel().count = part_;
+}
+
+void ImuBusPort::begin() {
+    const std::uint32_t now_us = timer().low;
+    if (is_spi())
+        begin_part();
+    else
+        begin_i2c();
+    state_ = State::transfers;
+    started_us_ = now_us;
+    pausing_ = false;
+}
+
+void ImuBusPort::begin_part() {
+    select(transfer().chip, true);
+    dma().trigger = 1U << dma_spi_transmit | 1U << dma_spi_receive;
+    in_gap_ = false;
+}
+
+void ImuBusPort::transferred() {
+    dma().interrupt1_status = 1U << dma_spi_receive;
+    if (state_ != State::transfers) return;
+    select(transfer().chip, false);
+    position_ += part_;
+    if (position_ == transfer().size) return end_transfer();
+    in_gap_ = true;
+    prepare_part();
+    set_alarm(clock_.now() + transfer().word_gap_ns);
+}
+
+void ImuBusPort::end_transfer() {
+    // The clock is up to one step behind: with it, no transfer seems to start before its edge.
+    const std::uint32_t ended_us = timer().low;
+    const Nanoseconds ended = clock_.at(ended_us) + clock_step;
+    reply().started = ended - Nanoseconds{ended_us - started_us_} * 1000;
+    reply().ended = ended;
+    pause_from(ended);
+    if (++index_ == job_.count) {
+        state_ = State::done;
+        return attention_.ask();
+    }
+    prepare();
+    begin_when_free();
+}
+
+void ImuBusPort::begin_i2c() {
+    set_function(pin_i2c_clock, function_i2c);
+    received_ = 0;
+    reply().bytes[0] = transfer().bytes[0];
+    i2c1().enable = 0;
+    i2c1().target = transfer().chip;
+    i2c1().enable = 1;
+    static_cast<void>(i2c1().clear_all);
+    set_alarm(clock_.now() + i2c_patience);
+    feed_i2c();
+}
+
+void ImuBusPort::feed_i2c() {
+    constexpr std::uint32_t read = 1U << 8U;
+    constexpr std::uint32_t stop = 1U << 9U;
+    constexpr std::uint32_t restart = 1U << 10U;
+    const bool reads = transfer().bus == Bus::i2c_read;
+    while (position_ < transfer().size && i2c1().transmit_level < i2c_fifo &&
+           (!reads || position_ < received_ + i2c_fifo)) {
+        std::uint32_t word = reads && position_ > 0 ? read : transfer().bytes[position_];
+        if (reads && position_ == 1) word |= restart;
+        if (++position_ == transfer().size) word |= stop;
+        i2c1().data = word;
+    }
+    const bool more = position_ < transfer().size;
+    i2c1().interrupt_mask = i2c_received | i2c_aborted | i2c_stopped |
+                            (more && !reads ? std::uint32_t{i2c_wants_more} : 0U);
+}
+
+void ImuBusPort::i2c_moved() {
+    const std::uint32_t causes = i2c1().interrupts;
+    if (state_ != State::transfers) {
+        i2c1().interrupt_mask = 0;
+        return;
+    }
+    while (i2c1().receive_level > 0 && received_ + 1 < transfer().size)
+        reply().bytes[++received_] = static_cast<std::uint8_t>(i2c1().data);
+    if ((causes & i2c_aborted) != 0) return end_i2c(true);
+    if ((causes & i2c_stopped) != 0) return end_i2c(false);
+    feed_i2c();
+}
+
+void ImuBusPort::end_i2c(bool refused) {
+    i2c1().interrupt_mask = 0;
+    static_cast<void>(i2c1().clear_all);
+    reply().refused = refused;
+    if (refused) set_up_i2c();
+    end_transfer();
+}
+
+}  // namespace versavis::rp2040

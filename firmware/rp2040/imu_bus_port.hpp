@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Jobs of the IMU's buses: they begin at an edge or at a time, and go on by interrupts.
+#pragma once
+
+#include "attention.hpp"
+#include "edge_port.hpp"
+
+namespace versavis::rp2040 {
+
+class ImuBusPort final : public firmware::ImuBus {
+ public:
+    ImuBusPort(BoardClock& clock, EdgePort& edges, Attention& attention)
+        : clock_(clock), edges_(edges), attention_(attention) {}
+
+    void set_up();
+
+    bool arm(const firmware::ImuJob& job) override;
+    bool take_reply(firmware::ImuReply& reply) override;
+    void disarm() override;
+
+    // From interrupts:
+    void data_ready();
+    void time_reached();
+    void transferred();
+    void i2c_moved();
+
+ private:
+    enum class State : std::uint8_t { idle, waits_for_edge, waits_for_time, transfers, done };
+
+    const firmware::ImuTransfer& transfer() const { return job_.transfers[index_]; }
+    firmware::ImuReply& reply() { return replies_[index_]; }
+    bool is_spi() const { return transfer().bus == firmware::ImuTransfer::Bus::spi; }
+    void set_up_spi();
+    void copy_job(const firmware::ImuJob& job);
+    bool edge_latched() const;
+    void forget_edge();
+    void watch_edge(bool watch);
+    void begin_when_free();
+    void pause_from(Nanoseconds at);
+    void begin_no_sooner_than(Nanoseconds at);
+    void set_alarm(Nanoseconds at);
+    void prepare();
+    void prepare_part();
+    void begin();
+    void begin_part();
+    void begin_i2c();
+    void feed_i2c();
+    void end_i2c(bool refused);
+    void end_transfer();
+
+    BoardClock& clock_;
+    EdgePort& edges_;
+    Attention& attention_;
+    volatile State state_ = State::idle;
+    bool in_gap_ = false;  ///< between two words of a transfer
+    Nanoseconds alarm_at_ = 0;
+    Nanoseconds free_at_ = 0;  ///< when the next transfer may begin
+    bool pausing_ = false;     ///< which may not have come yet
+    std::uint32_t started_us_ = 0;
+    unsigned index_ = 0;        ///< of the transfer
+    std::size_t position_ = 0;  ///< in its bytes
+    std::size_t part_ = 0;      ///< of them, that goes on without a gap
+    std::size_t received_ = 0;  ///< by I2C, after the first
+    std::uint32_t spi_hz_ = 0;
+    unsigned taken_ = 0;
+    unsigned pin_ = 0;  ///< that starts the job
+    firmware::ImuJob job_;
+    firmware::ImuReply replies_[firmware::max_transfers];
+};
+
+}  // namespace versavis::rp2040

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Output words at their times: a queue in memory, of which the sequencer gets what is due soon.
+#pragma once
+
+#include "attention.hpp"
+#include "board_clock.hpp"
+#include "state_machine.hpp"
+
+namespace versavis::rp2040 {
+
+class OutputPort final : public firmware::OutputSchedule {
+ public:
+    static constexpr unsigned grain_bits = 3;
+    static_assert(1U << grain_bits == cycle_ns);
+    static constexpr Nanoseconds step = sequencer::shortest_cycles * cycle_ns;
+
+    OutputPort(BoardClock& clock, Attention& attention) : clock_(clock), attention_(attention) {}
+
+    /// The sequencer is ready to start, and its first word with it.
+    void set_up();
+
+    /// From the timer's interrupt, and from the one of the block when it was asked for.
+    void commit();
+
+    Nanoseconds push(Nanoseconds at, std::uint32_t levels) override;
+
+    /// The first word of all, so that the outputs rest at these levels; returns when it leaves.
+    Nanoseconds rest(std::uint32_t levels);
+
+ private:
+    struct Word {
+        Nanoseconds at;
+        std::uint32_t levels;
+    };
+    static constexpr unsigned capacity = 64;
+    static constexpr unsigned fifo = 8;
+
+    Nanoseconds add(Nanoseconds at, std::uint32_t levels);
+    void send_next(Nanoseconds until);
+    void send(Nanoseconds at, std::uint32_t levels);
+    const Word& front() const { return words_[first_]; }
+
+    BoardClock& clock_;
+    Attention& attention_;
+    StateMachine machine_{0, sequencer::machine};
+    unsigned first_ = 0;
+    volatile unsigned size_ = 0;
+    volatile bool wants_room_ = false;
+    unsigned count_ = 0;             ///< of words ever pushed
+    std::uint32_t levels_ = 0;       ///< of the last word sent
+    Nanoseconds sent_ = 0;           ///< when the last word leaves that was sent
+    Nanoseconds last_ = 0;           ///< and the last one of all
+    Nanoseconds recent_[fifo] = {};  ///< when the newest words leave
+    Word words_[capacity] = {};
+};
+
+}  // namespace versavis::rp2040

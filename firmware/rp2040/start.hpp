@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The functions that the table of vectors names.
+#pragma once
+
+extern "C" {
+[[noreturn]] void firmware_main();
+void on_commit_time();
+void on_bus_time();
+void on_wake_time();
+void on_usb();
+void on_usb_work();
+void on_change();
+void on_ring_end();
+void on_bus_dma();
+void on_data_ready();
+void on_uart();
+void on_i2c();
+}
+
+namespace versavis::rp2040 {
+
+/// As if power had come back, but for the reason that is told.
+[[noreturn]] void restart_at_once();
+
+}  // namespace versavis::rp2040

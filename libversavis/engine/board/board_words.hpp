@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a board says of itself, in the words of the status document.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "wire/messages.hpp"
+
+namespace versavis::board {
+
+/// Bits of wire::Present that have a name.
+inline constexpr std::size_t part_count = 19;
+static_assert((1U << part_count) - 1U == wire::present_all);
+
+/// Names of the bits of wire::Present that are set.
+std::vector<std::string> part_names(std::uint32_t present);
+
+const char* to_string(wire::ResetCause cause);
+const char* to_string(wire::PpsState state);
+const char* to_string(wire::SyncState state);
+
+}  // namespace versavis::board

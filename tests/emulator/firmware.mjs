@@ -1,0 +1,568 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The real firmware on the emulated chip does what its ports promise, to the cycle.
+//
+// usage: firmware.mjs IMAGE.uf2 IMAGE.elf [NAME...]     NAME: part of a test's name
+import { Icm42688p } from './icm42688p.mjs';
+import { readFileSync } from 'node:fs';
+import { Image } from './image.mjs';
+import { Rig, cycle_ns, pin } from './rig.mjs';
+
+const [image, symbols, ...names] = process.argv.slice(2);
+const quick_usb = { usb_times: { debounce_ms: 1, reset_ms: 1, recovery_ms: 1 } };
+
+function check(condition, what) {
+    if (!condition) throw new Error(what);
+}
+/// Extremes of what the test measured, by what it was.
+let measured = {};
+
+function check_within(value, least, most, what) {
+    const [lowest, highest] = measured[what] ?? [value, value];
+    measured[what] = [Math.min(lowest, value), Math.max(highest, value)];
+    check(value >= least && value <= most, `${what}: ${value}, not from ${least} to ${most}`);
+}
+
+/// The board does nothing any more, as if its code had a loop without an end.
+function hang(machine) {
+    const { address } = new Image(readFileSync(symbols)).symbols.find(({ name }) =>
+        name.endsWith('Board4pollEv'),
+    );
+    const branch_to_itself = 0xe7fe;
+    machine.bus.ram[(address & ~1) - 0x20000000] = branch_to_itself & 0xff;
+    machine.bus.ram[(address & ~1) + 1 - 0x20000000] = branch_to_itself >> 8;
+}
+
+/// Runs until the board stops by itself, and tells why.
+function end_of(rig, limit_ms) {
+    return rig.machine.run_until(rig.machine.now + limit_ms * 125_000);
+}
+
+/// The board with the flash of another, which has stopped.
+function next_life(rig) {
+    const next = new Rig(image, quick_usb, rig.machine.reboot());
+    next.connect();
+    return next;
+}
+
+/// The board when power is back, which it lost now.
+const after_power_cut = (rig) => new Rig(image, { ...quick_usb, flash: rig.machine.cut_power() });
+
+/// Pulses of its own at the test output, as a configuration that needs no host.
+const pulses_at = (test_rate_mhz) => ({
+    store: true,
+    ports: { test: 7, test_rate_mhz, pulse: 10_000 },
+});
+
+function count_pulses(rig, ms) {
+    let pulses = 0;
+    rig.on_pin(pin.test, (cycle, level) => (pulses += level ? 1 : 0));
+    rig.run_ms(ms);
+    return pulses;
+}
+
+/// The cycle at which the board's time is 0, by its first exposure record.
+function zero_of(rig, camera, output = 0) {
+    const first = rig.host.all('exposure').find((record) => record.camera === output);
+    return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
+}
+
+const tests = {
+    'no output is driven before a configuration': () => {
+        const rig = new Rig(image, quick_usb);
+        const outputs = [19, 20, 21, 22, pin.sync, pin.test, pin.light];
+        const driven = outputs.reduce((bits, gpio) => bits | (1 << gpio), 0);
+        rig.connect();
+        check((rig.machine.driven & driven) === 0, 'an output is driven');
+        rig.configure({ cameras: { 0: {} } });
+        check((rig.machine.driven & driven) === driven, 'an output is not driven');
+    },
+
+    'a trigger that is low when active rests high from its first moment on': () => {
+        const rig = new Rig(image, quick_usb);
+        const levels = [];
+        rig.connect();
+        rig.machine.watch([20]);
+        const seen = rig.machine.on_output;
+        rig.machine.on_output = (entry) => {
+            if ((entry.driven >>> 20) & 1) levels.push((entry.levels >>> 20) & 1);
+            rig.moved(entry);
+        };
+        rig.configure({ cameras: { 1: { flags: 3 } } });
+        rig.run_ms(5);
+        check(levels.length > 0 && levels.every((level) => level === 1), `levels ${levels}`);
+    },
+
+    'triggers are on the grid to the cycle, and cameras of a tick leave in the same one': () => {
+        const rig = new Rig(image, quick_usb);
+        // Each exposure and each camera has other fractions of what the stamps resolve.
+        let exposures = 0;
+        const cameras = [0, 1, 2, 3].map((output) =>
+            rig.add_camera(output, {
+                latency: 1000 + 7 * output,
+                exposure: () => 125_000 + ((exposures++ * 13) % 64),
+            }),
+        );
+        rig.connect();
+        const camera = { latency: 8000, rate_uhz: 200_000_000, exposure: 1_000_000,
+            max_exposure: 4_000_000 };
+        const { origin } = rig.configure({ cameras: [camera, camera, camera, camera] });
+        rig.host.start();
+        rig.run_ms(300);
+        const records = rig.host.all('exposure');
+        check(records.length >= 4 * 55, `${records.length} records`);
+        const zero = zero_of(rig, cameras[0]);
+        for (const record of records) {
+            const { triggers, starts, ends } = cameras[record.camera];
+            const index = record.trigger - 1;
+            const stamp_error = (stamp, cycle) => stamp - (cycle - zero) * cycle_ns;
+            check(stamp_error(record.triggered, triggers[index]) === 0, 'trigger off its schedule');
+            check_within(stamp_error(record.start, starts[index]), -48, 48, 'start');
+            check_within(stamp_error(record.end, ends[index]), -48, 48, 'end');
+            const middle = origin + record.tick * 5_000_000;
+            // The exposures differ by up to 512 ns.
+            check_within((record.start + record.end) / 2 - middle, -600, 600, 'middle');
+        }
+        check(rig.host.bad === 0 && rig.host.gaps === 0, 'packets were lost');
+        check(rig.host.all('event').length === 0, JSON.stringify(rig.host.all('event')));
+    },
+
+    'cameras with equal exposures are triggered in the same cycle': () => {
+        const rig = new Rig(image, quick_usb);
+        const cameras = [0, 1, 2, 3].map((output) => rig.add_camera(output));
+        rig.connect();
+        rig.configure({ cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })) });
+        rig.host.start();
+        rig.run_ms(300);
+        check(cameras[0].triggers.length >= 12, `${cameras[0].triggers.length} triggers`);
+        for (const { triggers } of cameras)
+            check(triggers.join() === cameras[0].triggers.join(), 'cameras are not in step');
+    },
+
+    'a slave follows its master within 50 ns, and the light the exposures within 100 ns': () => {
+        const rig = new Rig(image, quick_usb);
+        const master = rig.add_camera(0, { latency: 1003 });
+        const slave = rig.add_camera(1, { latency: 1000, exposure: () => 200_000 });
+        const lights = [];
+        rig.on_pin(pin.light, (cycle, level) => lights.push({ cycle, level }));
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8024 }, { flags: 17, master: 0, latency: 8000 }],
+            light: { cameras: 1, lead: 0, longest: 10_000_000, duty_ppm: 1_000_000 },
+        });
+        rig.host.start();
+        rig.run_ms(300);
+        check(slave.triggers.length >= 10, `${slave.triggers.length} pulses of the slave`);
+        const behind = (cycle, cycles) => cycles.map((each) => (cycle - each) * cycle_ns)
+            .filter((ns) => ns >= 0).reduce((least, ns) => Math.min(least, ns), Infinity);
+        for (const cycle of slave.triggers)
+            check_within(behind(cycle, master.starts), 0, 50, 'slave');
+        check(lights.length >= 20, `${lights.length} changes of the light`);
+        for (const { cycle, level } of lights)
+            check_within(behind(cycle, level ? master.starts : master.ends), 0, 100, 'light');
+        check(rig.host.all('event').length === 0, JSON.stringify(rig.host.all('event')));
+    },
+
+    'an IMU is read within 2 us of its edge, and each sample has the edge\'s stamp': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        const period = 152_671; // 819 Hz
+        const imu = new Icm42688p(rig.machine, {
+            select: pin.spi_select,
+            ready: pin.imu_ready,
+            period,
+        });
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            imus: [{ kind: 6, options: 1, rate_mhz: 1_000_000 }],
+        });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        rig.host.start();
+        const from = rig.machine.now + 125_000;
+        imu.run(from, from + 200 * period);
+        rig.run_ms(200 * 1.2214 + 5);
+        const zero = zero_of(rig, camera);
+        const samples = rig.host.all('imu');
+        check(samples.length === 200, `${samples.length} samples of 200`);
+        samples.forEach((sample, index) => {
+            const edge = (imu.edges[index] - zero) * cycle_ns;
+            check((sample.flags & ~8) === 0 && (sample.flags & 8) !== 0, `flags ${sample.flags}`);
+            check_within(sample.time - edge, -48, 48, 'stamp of a sample');
+            check(sample.accel[0] === index + 1 + 1, `sample ${index} is ${sample.accel}`);
+        });
+        imu.begins.forEach((begin, index) =>
+            check_within((begin - imu.edges[index]) * cycle_ns, 0, 2000, 'first clock'),
+        );
+    },
+
+    'an IMU at 4 kHz and four cameras at 200 Hz with light are not too much': () => {
+        const rig = new Rig(image, quick_usb);
+        const period = 31_250;
+        const imu = new Icm42688p(rig.machine, {
+            select: pin.spi_select,
+            ready: pin.imu_ready,
+            period,
+        });
+        for (const output of [0, 1, 2, 3]) rig.add_camera(output, { exposure: () => 125_000 });
+        rig.connect();
+        const camera = { latency: 8000, rate_uhz: 200_000_000, exposure: 1_000_000,
+            max_exposure: 3_000_000 };
+        rig.configure({
+            cameras: [camera, camera, camera, camera],
+            imus: [{ kind: 6, options: 1, rate_mhz: 4_000_000 }],
+            light: { cameras: 15, lead: 0, longest: 3_000_000, duty_ppm: 1_000_000 },
+        });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        rig.host.start();
+        const from = rig.machine.now + 125_000;
+        imu.run(from, from + 2000 * period);
+        rig.run_ms(505);
+        const samples = rig.host.all('imu');
+        check(samples.length === 2000, `${samples.length} samples of 2000`);
+        check(samples.every(({ flags }) => flags === 8), 'a sample is flagged');
+        check(rig.host.all('event').length === 1, JSON.stringify(rig.host.all('event').slice(1)));
+        check(rig.host.all('exposure').every(({ flags }) => flags === 1), 'an exposure is flagged');
+    },
+
+    'readings that a new configuration ends leave nothing behind': () => {
+        for (const options of [1, 5]) {
+            const rig = new Rig(image, quick_usb);
+            const is_i2c = options === 5;
+            const period = is_i2c ? 125_000 : 31_250;
+            const imu = new Icm42688p(rig.machine, {
+                select: is_i2c ? undefined : pin.spi_select,
+                ready: pin.imu_ready,
+                period,
+            });
+            rig.connect();
+            const rate_mhz = is_i2c ? 1_000_000 : 4_000_000;
+            const settings = (filter) => ({ imus: [{ kind: 6, options, filter, rate_mhz }] });
+            imu.run(rig.machine.now, rig.machine.now + 3_000 * 125_000);
+            for (let filter = 0; filter < 16; ++filter) {
+                rig.configure(settings(filter % 2));
+                const before = rig.host.all('imu').length;
+                rig.run_until('read', () => rig.host.all('imu').length > before + 5);
+                rig.run_ms(1 + filter * 0.037);
+            }
+            check(rig.host.all('imu').every(({ flags }) => (flags & 3) === 0), 'a bad sample');
+            check(!rig.host.has_event(11) && !rig.host.has_event(12), 'a failure');
+        }
+    },
+
+    'the test output copies a data-ready line, and sync pulses leave at their rate': () => {
+        const rig = new Rig(image, quick_usb);
+        const imu = new Icm42688p(rig.machine, {
+            select: pin.spi_select,
+            ready: pin.imu_ready,
+            period: 152_439,
+        });
+        const copies = [];
+        const syncs = [];
+        rig.on_pin(pin.test, (cycle, level) => level && copies.push(cycle));
+        rig.on_pin(pin.sync, (cycle, level) => level && syncs.push(cycle));
+        rig.connect();
+        rig.configure({
+            imus: [{ kind: 6, options: 1, rate_mhz: 1_000_000 }],
+            ports: { test: 5, sync_rate_uhz: 10_000_000, pulse: 10_000 },
+        });
+        const from = rig.machine.now + 125_000;
+        imu.run(from, from + 500 * 152_439);
+        rig.run_ms(600);
+        check(copies.length >= 480 && syncs.length >= 5, `${copies.length}, ${syncs.length}`);
+        copies.forEach((cycle, index) =>
+            check_within((cycle - imu.edges[index]) * cycle_ns, 0, 50, 'copy'),
+        );
+        for (let i = 1; i < syncs.length; ++i)
+            check(syncs[i] - syncs[i - 1] === 12_500_000, `sync after ${syncs[i] - syncs[i - 1]}`);
+    },
+
+    'an IMU on I2C is read, and each sample has its edge\'s stamp': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        const period = 250_000; // 500 Hz
+        const imu = new Icm42688p(rig.machine, { ready: pin.imu_ready, period });
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            imus: [{ kind: 6, options: 5, rate_mhz: 500_000 }],
+        });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        rig.host.start();
+        const from = rig.machine.now + 125_000;
+        imu.run(from, from + 50 * period);
+        rig.run_ms(110);
+        const zero = zero_of(rig, camera);
+        const samples = rig.host.all('imu');
+        check(samples.length === 50, `${samples.length} samples of 50`);
+        samples.forEach((sample, index) => {
+            const edge = (imu.edges[index] - zero) * cycle_ns;
+            check(sample.flags === 8, `flags ${sample.flags}`);
+            check_within(sample.time - edge, -48, 48, 'stamp of a sample');
+            check(sample.accel[0] === index + 1 + 1, `sample ${index} is ${sample.accel}`);
+        });
+    },
+
+    'an I2C bus without a part is told, and harms nothing else': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            imus: [{ kind: 6, options: 5, rate_mhz: 500_000 }],
+        });
+        rig.host.start();
+        rig.run_ms(300);
+        check(rig.host.has_event(11) || rig.host.has_event(12), 'the IMU is not told as missing');
+        check(camera.triggers.length >= 12, `${camera.triggers.length} triggers`);
+    },
+
+    'a sentence at the UART names the pulse before it': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.machine.set_input(pin.pps, 0, 0);
+        rig.connect();
+        rig.configure({ ports: { inputs: 1, options: 2 } });
+        const pulse = rig.machine.now + 125_000;
+        rig.machine.set_input(pin.pps, 1, pulse);
+        rig.machine.set_input(pin.pps, 0, pulse + 125_000);
+        const body = 'GPRMC,120000.00,A,4722.6,N,00832.9,E,0.0,0.0,010120,,,A';
+        const sum = [...body].reduce((all, letter) => all ^ letter.charCodeAt(0), 0);
+        const digits = sum.toString(16).toUpperCase().padStart(2, '0');
+        const sentence = `$${body}*${digits}\r\n`;
+        rig.machine.uart[0].send(Buffer.from(sentence), pulse + 6_250_000, 9600);
+        rig.run_ms(200);
+        const named = rig.host.all('event').filter(({ event }) => event === 13);
+        check(named.length === 1, `${named.length} names`);
+        check(named[0].value === Date.UTC(2020, 0, 1, 12) / 1000, `it is ${named[0].value}`);
+        check(named[0].time === rig.host.all('event').find(({ event }) => event === 5).time, 'time');
+    },
+
+    'a clock answer says when the request came and when it left, to 2 us': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        const sent = [];
+        const came = [];
+        rig.connect();
+        rig.configure({ cameras: [{}] });
+        rig.host.start();
+        rig.run_ms(50);
+        const zero = zero_of(rig, camera);
+        rig.machine.usb.logs = true;
+        rig.machine.usb.log.length = 0;
+        for (let id = 0; id < 20; ++id) {
+            rig.host.ask_time(id);
+            rig.run_ms(3.37);
+        }
+        for (const entry of rig.machine.usb.log) {
+            if (entry.result !== 'ack' || entry.endpoint !== 1) continue;
+            if (entry.kind === 'out') sent.push(entry.cycle);
+            if (entry.kind === 'in') came.push(entry.cycle);
+        }
+        // The log has the ends of transactions, with the handshake and the gap before it.
+        const handshake_ns = (19 + 4) * (1000 / 12);
+        const answers = rig.host.all('clock');
+        const follow_ups = rig.host.all('follow_up');
+        check(answers.length === 20 && follow_ups.length === 20, `${answers.length} answers`);
+        const nearest = (ns, cycles) => cycles
+            .map((cycle) => ns - (cycle - zero) * cycle_ns + handshake_ns)
+            .reduce((best, error) => (Math.abs(error) < Math.abs(best) ? error : best), Infinity);
+        for (const { received } of answers)
+            check_within(nearest(received, sent), -2000, 2000, 'received');
+        for (const follow_up of follow_ups)
+            check_within(nearest(follow_up.sent, came), -2000, 0, 'sent');
+    },
+
+    'pulses at the inputs are stamped within 48 ns': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        const inputs = [
+            { gpio: pin.pps, event: 5 },
+            { gpio: pin.aux0, event: 6 },
+            { gpio: pin.sync_input, event: 7 },
+        ];
+        for (const { gpio } of inputs) rig.machine.set_input(gpio, 0, 0);
+        rig.connect();
+        rig.configure({ cameras: [{}], ports: { inputs: 0b1011 } });
+        rig.host.start();
+        const from = rig.machine.now;
+        inputs.forEach((input, index) => {
+            input.edges = Array.from({ length: 20 }, (_, k) => from + k * 625_013 + index * 1_009);
+            for (const edge of input.edges) {
+                rig.machine.set_input(input.gpio, 1, edge);
+                rig.machine.set_input(input.gpio, 0, edge + 12_500);
+            }
+        });
+        rig.run_ms(120);
+        const zero = zero_of(rig, camera);
+        for (const { event, edges } of inputs) {
+            const stamps = rig.host.all('event').filter((told) => told.event === event);
+            check(stamps.length === edges.length, `${stamps.length} events ${event}`);
+            stamps.forEach(({ time }, index) =>
+                check_within(time - (edges[index] - zero) * cycle_ns, -48, 48, `event ${event}`),
+            );
+        }
+    },
+
+    'a line that never rests is ignored, and harms nothing else': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        rig.connect();
+        rig.configure({ cameras: [{ latency: 8000 }], ports: { inputs: 0b10 } });
+        rig.host.start();
+        const from = rig.machine.now;
+        for (let k = 0; k < 20_000; ++k) rig.machine.set_input(pin.aux0, k % 2, from + 60 * k);
+        rig.run_ms(300);
+        const events = rig.host.all('event');
+        const ignored = events.some(({ event, source }) => event === 8 && source === 7);
+        check(ignored, 'it was not ignored');
+        const measured = rig.host.all('exposure').filter(({ flags }) => (flags & 1) !== 0);
+        check(measured.length >= camera.triggers.length - 2, `${measured.length} exposures`);
+    },
+
+    'what a host did not read in time is told, and nothing else is wrong': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.add_camera(0, { exposure: () => 12_500 });
+        rig.connect();
+        rig.configure({
+            cameras: [{ rate_uhz: 1_000_000_000, pulse: 10_000, latency: 8000, exposure: 100_000,
+                max_exposure: 500_000 }],
+        });
+        rig.host.start();
+        rig.run_ms(50);
+        rig.machine.usb.set_reading(false);
+        rig.run_ms(400);
+        rig.machine.usb.set_reading(true);
+        rig.run_ms(1200);
+        const { bad, gaps } = rig.host;
+        check(bad === 0 && gaps === 0, `${bad} bad packets, ${gaps} gaps`);
+        const triggers = rig.host.all('exposure').map(({ trigger }) => trigger);
+        const missing = triggers.at(-1) - triggers.length;
+        const { replaced } = rig.host.last('health');
+        check(missing > 50 && missing === replaced, `${missing} missing, ${replaced} told`);
+    },
+
+    'a board restarts when told to, and says so': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        const { serial } = rig.host.last('hello');
+        rig.host.reboot(false);
+        check(end_of(rig, 100) === 'watchdog', 'it did not restart');
+        const hello = next_life(rig).host.last('hello');
+        check(hello.reset_cause === 4 && hello.serial === serial, JSON.stringify(hello));
+    },
+
+    'the boot loader comes when told to': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        rig.host.reboot(true);
+        check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+    },
+
+    'the boot loader comes by a touch at 1200 baud, even when the code hangs': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        hang(rig.machine);
+        rig.run_ms(10);
+        rig.machine.usb.set_line_coding(1200);
+        rig.machine.usb.set_line_state(false, false);
+        check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+    },
+
+    'code that hangs is ended by the watchdog within a second': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        hang(rig.machine);
+        check(end_of(rig, 1100) === 'watchdog', 'no reset');
+        check(next_life(rig).host.last('hello').reset_cause === 2, 'another cause');
+    },
+
+    'a stored configuration is in force from power-up': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        rig.configure(pulses_at(1_000_000));
+        rig.run_until('stored', () =>
+            rig.host.all('event').some(({ event, value }) => event === 17 && value === 1),
+        );
+        const next = after_power_cut(rig);
+        const pulses = count_pulses(next, 50);
+        check(pulses >= 40 && pulses <= 50, `${pulses} pulses in 50 ms`);
+        next.connect();
+        check(next.host.last('hello').reset_cause === 0, 'another cause');
+    },
+
+    'without power in the middle of storing, the old or the new configuration remains': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        rig.configure(pulses_at(1_000_000));
+        rig.run_ms(200);
+        rig.configure(pulses_at(2_000_000));
+        const found = new Set();
+        for (let cut = 0; cut < 60; ++cut) {
+            const next = after_power_cut(rig);
+            next.run_ms(5);
+            const rate = Math.round(count_pulses(next, 20) / 20);
+            check(rate === 1 || rate === 2, `${rate} kHz after cut ${cut}`);
+            found.add(rate);
+            rig.run_ms(cut < 20 ? 0.3 : 1.7);
+        }
+        check(found.size === 2, 'not both were found');
+    },
+
+    'nothing slips when the stamps\' counter wraps, after 68.7 s': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        rig.connect();
+        rig.configure({ cameras: [{ latency: 8000, rate_uhz: 5_000_000 }] });
+        rig.host.start();
+        rig.run_ms(75_000);
+        const zero = zero_of(rig, camera);
+        const records = rig.host.all('exposure');
+        check(records.length >= 370, `${records.length} records`);
+        for (const { trigger, triggered, start, end } of records) {
+            const at = (cycle) => (cycle - zero) * cycle_ns;
+            check(triggered === at(camera.triggers[trigger - 1]), `trigger ${trigger}`);
+            check_within(start - at(camera.starts[trigger - 1]), -48, 48, 'start');
+            check_within(end - at(camera.ends[trigger - 1]), -48, 48, 'end');
+        }
+    },
+
+    'four cameras at 50 Hz and an IMU at 820 Hz take at most 10.3 % of the processor': () => {
+        const rig = new Rig(image, quick_usb);
+        const period = 152_439;
+        const imu = new Icm42688p(rig.machine, {
+            select: pin.spi_select,
+            ready: pin.imu_ready,
+            period,
+        });
+        for (const output of [0, 1, 2, 3]) rig.add_camera(output);
+        rig.connect();
+        rig.configure({
+            cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })),
+            imus: [{ kind: 6, options: 1, rate_mhz: 1_000_000 }],
+        });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        rig.host.start();
+        imu.run(rig.machine.now + 125_000, rig.machine.now + 600 * period);
+        rig.run_ms(200);
+        const { now, sleep_cycles } = rig.machine;
+        rig.run_ms(400);
+        const slept = (rig.machine.sleep_cycles - sleep_cycles) / (rig.machine.now - now);
+        check_within(100 * (1 - slept), 0, 10.3, 'percent of the processor');
+    },
+};
+
+let failed = 0;
+for (const [name, test] of Object.entries(tests)) {
+    if (names.length > 0 && !names.some((part) => name.includes(part))) continue;
+    measured = {};
+    try {
+        test();
+        const figures = Object.entries(measured).map(([what, [lowest, highest]]) =>
+            `    ${what}: ${lowest.toFixed(1)} to ${highest.toFixed(1)}\n`,
+        );
+        process.stdout.write(`ok: ${name}\n${figures.join('')}`);
+    } catch (error) {
+        ++failed;
+        process.stdout.write(`FAILED: ${name}: ${error.stack}\n`);
+    }
+}
+process.exitCode = failed === 0 ? 0 : 1;

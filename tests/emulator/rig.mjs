@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The firmware on the emulated chip, with cameras at its pins and a host on its USB.
+import { readFileSync } from 'node:fs';
+import { Machine } from './machine.mjs';
+import { Host } from './protocol.mjs';
+
+export const cycle_ns = 8;
+export const cycles_of_ns = (ns) => Math.round(ns / cycle_ns);
+const cycles_per_ms = 125_000;
+
+export const pin = { exposure: 15, trigger: 19, exposing: 23, lead: 24, gate: 25, sync: 26,
+    test: 27, light: 28, imu_ready: 8, spi_select: 5, pps: 11, aux0: 12, aux1: 13, sync_input: 14 };
+
+export class Rig {
+    /// On `machine`, or a new one that starts from the image.
+    constructor(image, options = {}, machine = undefined) {
+        this.machine =
+            machine ?? new Machine({ flash: readFileSync(image), ram_only: true, ...options });
+        this.machine.watch([19, 20, 21, 22, 23, 24, 25, 26, 27, 28]);
+        this.listeners = [];
+        this.levels = 0;
+        this.machine.on_output = (entry) => this.moved(entry);
+        this.host = new Host((bytes) => this.machine.usb.write(bytes));
+        this.machine.usb.on_bytes = (bytes) => this.host.receive(bytes);
+    }
+
+    moved({ cycle, levels, driven }) {
+        const now = levels & driven;
+        const changed = now ^ this.levels;
+        this.levels = now;
+        for (const listener of this.listeners) {
+            const bit = 1 << listener.gpio;
+            if (changed & bit) listener.call(cycle, (now & bit) !== 0);
+        }
+    }
+    on_pin(gpio, call) {
+        this.listeners.push({ gpio, call });
+    }
+
+    /// A camera at this output; returns what happened: cycles of triggers and exposures.
+    add_camera(output, { latency = 1000, exposure = () => 375_000 } = {}) {
+        const camera = { triggers: [], starts: [], ends: [] };
+        this.machine.set_input(pin.exposure + output, 0, 0);
+        this.on_pin(pin.trigger + output, (cycle, level) => {
+            if (!level) return;
+            const start = cycle + latency;
+            const end = start + exposure(camera.triggers.length);
+            camera.triggers.push(cycle);
+            camera.starts.push(start);
+            camera.ends.push(end);
+            this.machine.set_input(pin.exposure + output, 1, start);
+            this.machine.set_input(pin.exposure + output, 0, end);
+        });
+        return camera;
+    }
+
+    run_ms(ms) {
+        const why = this.machine.run_until(this.machine.now + Math.round(ms * cycles_per_ms));
+        if (why !== 'time') throw new Error(`the board stopped: ${why}`);
+    }
+
+    /// Runs until `condition` holds, at most so long.
+    run_until(what, condition, limit_ms = 1000) {
+        for (let ms = 0; ms < limit_ms; ++ms) {
+            if (condition()) return;
+            this.run_ms(1);
+        }
+        throw new Error(`not within ${limit_ms} ms: ${what}`);
+    }
+
+    connect() {
+        this.run_until('configured on USB', () => this.machine.usb.state === 'configured');
+        this.machine.usb.set_line_state(true, true);
+        this.run_ms(5);
+        this.host.hello();
+        this.run_until('hello', () => this.host.last('hello') !== undefined);
+    }
+
+    configure(configuration) {
+        const before = this.host.all('answer').length;
+        this.host.configure(configuration);
+        this.run_until('configured', () => this.host.all('answer').length > before);
+        const answer = this.host.last('answer');
+        if (answer.status !== 0)
+            throw new Error(`refused: ${JSON.stringify(this.host.all('refusal'))}`);
+        return answer;
+    }
+}

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The firmware in real time on a simulated bus, with wires from its outputs to its inputs.
+#pragma once
+
+#include <umockdev.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "native_board.hpp"
+#include "simulated_usb_device.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::test {
+
+/// From a pin that is an output to an input; late by so much, as a line with much load is.
+struct LoopWire {
+    unsigned pin = 0;  ///< 0 to 3: triggers; else of firmware::Pin
+    std::uint8_t input = 0;
+    firmware::Nanoseconds late_rise = 0;
+    firmware::Nanoseconds late_fall = 0;
+};
+
+class LoopedBoard {
+ public:
+    LoopedBoard(UMockdevTestbed* testbed, std::string serial, std::vector<LoopWire> wires);
+    ~LoopedBoard();
+    LoopedBoard(const LoopedBoard&) = delete;
+    LoopedBoard& operator=(const LoopedBoard&) = delete;
+
+    /// It was told to reboot, which it did.
+    unsigned reboots() const;
+    unsigned output_changes() const;
+
+ private:
+    void run();
+    void boot(wire::ResetCause cause);
+    void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
+    void exchange_bytes();
+    firmware::Nanoseconds now() const { return (host_now() - booted_).ns; }
+
+    UMockdevTestbed* testbed_;
+    const std::string serial_;
+    const std::vector<LoopWire> wires_;
+
+    mutable std::mutex mutex_;
+    std::condition_variable heard_;
+    std::vector<std::uint8_t> received_;
+    unsigned reboots_ = 0;
+    unsigned output_changes_ = 0;
+    bool stop_ = false;
+
+    // Of the thread.
+    HostTime booted_;
+    std::uint32_t nonce_ = 0;
+    std::uint32_t pins_ = 0;
+    bool rebooting_ = false;
+    std::unique_ptr<firmware::NativeBoard> board_;
+    std::unique_ptr<SimulatedUsbDevice> device_;
+
+    std::condition_variable plugged_;
+    std::thread thread_;
+};
+
+}  // namespace versavis::test
