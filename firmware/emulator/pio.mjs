@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A PIO block: four state machines, their registers, flags and interrupts.
+//
+// pio.on_start = (cycle) => ...: called when machines are started.
 import { fault, hex } from './fault.mjs';
 import { StateMachine } from './pio_machine.mjs';
 
@@ -328,6 +330,7 @@ export class Pio {
             if (value & (bit << 8)) machine.set_divider(machine.clkdiv, true, now);
             machine.set_enabled((value & bit) !== 0, now);
         }
+        if (value & 15) this.on_start?.(now);
     }
 
     write_machine(offset, value) {

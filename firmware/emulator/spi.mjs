@@ -6,6 +6,7 @@
 //     exchange(word, { begin, end, bits }) => word, called at the end of each frame, and may have
 //     select(is_selected, cycle).
 // spi.on_frame = ({ begin, end, bits }) => ...: called at the begin of each frame.
+// spi.hold(is_held): the clock stands still after the frame under way, or runs again.
 // spi.exchange_as_master(word): for the slave mode; returns what the chip sends meanwhile.
 import { fault, hex } from './fault.mjs';
 
@@ -22,6 +23,7 @@ export class Spi {
         Object.assign(this, { name, clock, pins, interrupts, line, clocks });
         this.devices = [];
         this.signal = () => {}; // (is_receive) to the DMA
+        this.is_held = false;
         this.reset();
     }
 
@@ -76,7 +78,7 @@ export class Spi {
 
     begin_frame() {
         if (this.event !== undefined || this.tx.length === 0) return;
-        if (!this.is_enabled || this.is_slave) return;
+        if (!this.is_enabled || this.is_slave || this.is_held) return;
         this.check_clock();
         const word = this.tx.shift();
         this.signal(false);
@@ -85,6 +87,11 @@ export class Spi {
         const end = begin + bits * period;
         this.event = this.clock.at(end, () => this.end_frame(word, { begin, end, bits }));
         this.on_frame?.({ begin, end, bits });
+    }
+
+    hold(is_held) {
+        this.is_held = is_held;
+        this.begin_frame();
     }
 
     check_clock() {

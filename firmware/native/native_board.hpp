@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <optional>
 #include <queue>
 #include <random>
@@ -15,12 +14,9 @@
 #include "board.hpp"
 #include "hal.hpp"
 #include "port_model.hpp"
+#include "virtual_board.hpp"
 
 namespace versavis::firmware {
-
-/// Pins that are outputs, as Environment sees them. The triggers of cameras 0 to 3 are bits 0
-/// to 3.
-enum Pin : std::uint8_t { pin_light = 4, pin_sync = 6, pin_test = 7 };
 
 /// Stands between the core and its hardware, and sees each poll.
 struct CoreTap {
@@ -34,30 +30,10 @@ struct CoreTap {
     ~CoreTap() = default;
 };
 
-/// What is connected to the board. Called from run_until(), with the instants at which the hardware
-/// would act. A function that is not set is not connected.
-struct Environment {
-    std::function<void(Nanoseconds at, std::uint32_t pins)> outputs_changed;
-    /// A transfer that started at `at`: fills `received`, as long as what was transmitted.
-    /// False: no part acknowledged; it counts on I2C only.
-    std::function<bool(Nanoseconds at, const ImuTransfer& transfer,
-                       std::span<std::uint8_t> received)>
-        imu_transfer;
-    std::function<void(Nanoseconds at, std::uint32_t baud, std::span<const std::uint8_t> bytes)>
-        uart_sent;
-    std::function<void(Nanoseconds at)> imu_output_ready;
-    std::function<void(bool to_boot_loader)> reboot;
-    /// What else happens around the board, and when next: it also comes while the core works.
-    std::function<Nanoseconds()> next_event;
-    std::function<void(Nanoseconds at)> fire;
-    /// What the board stores, and finds when it starts.
-    std::vector<std::uint8_t>* flash = nullptr;
-    CoreTap* tap = nullptr;
-};
-
 /// Events happen at the instants of the model, not when the process wakes up: a late call of
 /// run_until() catches up on everything in between, in order. Not thread-safe.
-class NativeBoard final : Clock64,
+class NativeBoard final : public VirtualBoard,
+                          Clock64,
                           OutputSchedule,
                           EdgeStream,
                           Routing,
@@ -70,44 +46,31 @@ class NativeBoard final : Clock64,
  public:
     NativeBoard(const Identity& identity, Environment environment, Nanoseconds boot = 0,
                 const PortModel& model = {});
-    NativeBoard(const NativeBoard&) = delete;
-    NativeBoard& operator=(const NativeBoard&) = delete;
 
-    /// An edge at an input, not before the current time.
-    void schedule_edge(const Edge& edge) { edges_.push(edge); }
+    void schedule_edge(const Edge& edge) override { edges_.push(edge); }
 
     /// Level of an input at rest, before its first edge.
     void set_level(std::uint8_t input, bool level);
 
-    /// Bytes of the host that entered the board at `at`; handled by the next run_until().
-    void receive(std::span<const std::uint8_t> bytes, Nanoseconds at);
-
-    /// Bytes of the IMU on the UART whose last one arrives at `at`, in the order of time.
-    void uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at);
-
-    /// Runs everything up to and including `until`.
-    void run_until(Nanoseconds until);
+    void receive(std::span<const std::uint8_t> bytes, Nanoseconds at) override;
+    void uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at) override;
+    void run_until(Nanoseconds until) override;
 
     /// From now on the code stalls while the hardware continues, or both continue.
     void set_stalled(bool stalled) { stalled_ = stalled; }
     /// True: the code stalled for longer than the watchdog allows.
     bool watchdog_bit() const { return watchdog_bit_; }
 
-    /// From now on no IMU transfer completes, or all of them do again.
-    void set_imu_bus_stuck(bool stuck) { imu_bus_stuck_ = stuck; }
+    void set_imu_bus_stuck(bool stuck) override { imu_bus_stuck_ = stuck; }
 
     /// From now on another part holds the I2C bus, or has released it.
     void set_i2c_held(bool held) { i2c_held_ = held; }
 
-    /// When run_until() has something to do next, if no bytes come.
-    Nanoseconds next_wake() const;
-    /// Of the core; beyond run_until() while it worked for longer.
-    Nanoseconds time() const { return now_; }
-
-    /// Bytes for the host not consumed yet; when full, the core has to wait.
-    std::span<const std::uint8_t> transmitted() const { return transmitted_; }
-    /// They left at `at`, or later.
-    void consume(std::size_t size, Nanoseconds at);
+    Nanoseconds next_wake() const override;
+    Nanoseconds time() const override { return now_; }
+    /// When they fill the link's capacity, the core has to wait.
+    std::span<const std::uint8_t> transmitted() const override { return transmitted_; }
+    void consume(std::size_t size, Nanoseconds at) override;
     void set_link_capacity(std::size_t bytes) { link_capacity_ = bytes; }
 
     /// What another SPI master reads from the second port in one selection.

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <signal.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,6 +18,7 @@
 #include <system_error>
 
 #include "engine/clock/output_clock.hpp"
+#include "native_board.hpp"
 
 namespace versavis::rig {
 
@@ -60,6 +62,12 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                                                        HostTime zero, const Motion& motion,
                                                        GroundTruth& truth,
                                                        std::vector<TriggeredCamera*> cameras) {
+    std::unique_ptr<EmulatedChip> chip;
+    if (!scenario.board.image.empty()) {
+        auto emulated = EmulatedChip::create(scenario.board.image);
+        if (!emulated) return Unexpected(emulated.error());
+        chip = std::move(*emulated);
+    }
     sockaddr_un self{};
     self.sun_family = AF_UNIX;
     if (socket_path.size() >= sizeof self.sun_path)
@@ -75,13 +83,21 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
         return failure(socket_path, fmt::format("cannot listen: {}", reason),
                        "choose another with --socket");
     }
-    return std::unique_ptr<BoardHost>(
-        new BoardHost(scenario, socket_path, zero, motion, truth, std::move(cameras), listener));
+    try {
+        return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, motion, truth,
+                                                        std::move(cameras), std::move(chip),
+                                                        listener));
+    } catch (const std::exception& error) {
+        ::close(listener);
+        return failure(scenario.board.image, error.what(),
+                       "see the line before; ./dev firmware builds an image that starts");
+    }
 }
 
 BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
                      const Motion& motion, GroundTruth& truth,
-                     std::vector<TriggeredCamera*> cameras, int listener)
+                     std::vector<TriggeredCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
+                     int listener)
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
@@ -91,7 +107,8 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
            [&motion](firmware::Nanoseconds at) { return felt(motion, HostTime{at}); }),
       truth_(truth),
       cameras_(std::move(cameras)),
-      listener_(listener) {
+      listener_(listener),
+      chip_(std::move(chip)) {
     if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
     boot({}, clock_errors_, zero);
     thread_ = std::thread([this] { run(); });
@@ -110,7 +127,6 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)() ^
                                                 static_cast<std::uint64_t>(host_now().ns));
     serial_.copy(identity.serial, sizeof identity.serial - 1);
-    clock_ = std::make_unique<SkewedClock>(zero, clock);
     pins_ = 0;
     imu_samples_ = 0;
     next_utc_s_ = 0;
@@ -122,6 +138,15 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
         return true;
     };
     environment.reboot = [this](bool) { reset(); };
+    if (chip_) {
+        // Its time begins with it, and it says itself who it is.
+        board_ = std::make_unique<EmulatedBoard>(*chip_, std::move(environment));
+        ClockErrors from_start = clock;
+        from_start.offset_ns = board_->time();
+        clock_ = std::make_unique<SkewedClock>(host_now(), from_start);
+        return;
+    }
+    clock_ = std::make_unique<SkewedClock>(zero, clock);
     board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(environment), board_now());
 }
 
@@ -141,7 +166,8 @@ void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransf
     }
     if (suffers(FaultKind::imu_noisy)) imu_.corrupt(1);
     imu_.transfer(instant.ns, transfer, received);
-    const bool sample = transfer.word_gap_ns == 0;  // register accesses have gaps
+    // Register accesses have gaps, and come word by word where the chip makes them.
+    const bool sample = transfer.word_gap_ns == 0 && transfer.size > 2;
     if (sample)
         truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++,
                                  instant - nanoseconds(imu_.filter_delay())});
@@ -168,6 +194,15 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
 }
 
 void BoardHost::run() {
+    try {
+        live();
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "versavis-rig: {}\n", error.what());
+        ::kill(::getpid(), SIGTERM);
+    }
+}
+
+void BoardHost::live() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
         if (utc_) hear_gnss();

@@ -13,12 +13,14 @@
 #include <vector>
 
 #include "adis_device.hpp"
+#include "board.hpp"
+#include "emulated_board.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "ground_truth.hpp"
-#include "native_board.hpp"
 #include "scene.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
+#include "virtual_board.hpp"
 
 namespace versavis::rig {
 
@@ -40,9 +42,10 @@ class BoardHost {
  private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
               const Motion& motion, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
-              int listener);
+              std::unique_ptr<EmulatedChip> chip, int listener);
 
     void run();
+    void live();
     void boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero);
     void restart();
     void wait(HostTime until) const;
@@ -72,7 +75,8 @@ class BoardHost {
     int host_ = -1;
 
     std::unique_ptr<SkewedClock> clock_;
-    std::unique_ptr<firmware::NativeBoard> board_;
+    std::unique_ptr<EmulatedChip> chip_;  ///< none: the core runs in this process
+    std::unique_ptr<firmware::VirtualBoard> board_;
     std::uint64_t life_ = 0;
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};

@@ -26,7 +26,7 @@ int fail(const Error& error, int code) {
 }
 
 int run(const std::string& scenario_path, const std::string& socket_path,
-        const std::string& truth_path) {
+        const std::string& truth_path, const std::string& image) {
     // Threads inherit the mask: only sigwait() below sees these signals.
     sigset_t signals;
     sigemptyset(&signals);
@@ -35,6 +35,7 @@ int run(const std::string& scenario_path, const std::string& socket_path,
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     auto scenario = load_scenario(scenario_path);
     if (!scenario) return fail(scenario.error(), EX_CONFIG);
+    scenario->board.image = image;
     run_like_hardware();
     auto rig = Rig::start(*scenario, socket_path, truth_path);
     if (!rig) return fail(rig.error(), EX_UNAVAILABLE);
@@ -109,11 +110,21 @@ int main(int argc, char** argv) {
     std::string scenario_path;
     std::string socket_path = "/tmp/versavis-rig.socket";
     std::string truth_path;
+    std::string board = "native";
+    std::string image = EmulatedChip::default_image();
     auto* run_command = app.add_subcommand(
         "run", "Run the rig of a scenario until it is interrupted (SIGINT or SIGTERM)");
     run_command->add_option("scenario", scenario_path, "Scenario file (docs/user/rig.md)")
         ->required();
     run_command->add_option("--socket", socket_path, "Unix socket of the board")
+        ->capture_default_str();
+    run_command
+        ->add_option("--board", board,
+                     "native: its firmware as a part of this process; rp2040: "
+                     "as it is flashed, on the emulated chip")
+        ->check(CLI::IsMember({"native", "rp2040"}))
+        ->capture_default_str();
+    run_command->add_option("--image", image, "Firmware for the rp2040, an .elf or .uf2")
         ->capture_default_str();
     run_command->add_option("--truth", truth_path,
                             "File for the ground truth, one JSON object per line");
@@ -140,6 +151,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
-    if (*run_command) return run(scenario_path, socket_path, truth_path);
+    if (*run_command)
+        return run(scenario_path, socket_path, truth_path, board == "native" ? "" : image);
     return run_judge(scenario_path, settings, as_json);
 }

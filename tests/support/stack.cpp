@@ -56,7 +56,8 @@ Stack::~Stack() {
 void Stack::start_rig() {
     rig_ = std::make_unique<Process>(
         std::vector<std::string>{program("versavis-rig"), "run", scenario_path_, "--socket",
-                                 socket_path(), "--truth", truth_path()},
+                                 socket_path(), "--truth", truth_path(), "--board",
+                                 settings_.board},
         log_path("rig.log"));
     if (!rig_->wait_for_output("rig ready", seconds(20)))
         throw std::runtime_error("rig: " + rig_->output());

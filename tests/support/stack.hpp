@@ -35,6 +35,7 @@ struct StackSettings {
     std::vector<std::string> extras{};     ///< more keys of the service, by camera
     std::string imu_extra{};               ///< more keys of the IMU
     unsigned absent = 0;                   ///< cameras, the last ones, that the rig lacks
+    std::string board = "native";          ///< of the rig
     /// What the service is told of the cameras' exposure lines: those of the rig are prompt.
     std::string lines = "strobe_rising_us = [0, 0]\nstrobe_falling_us = [0, 0]\n";
 };

@@ -88,6 +88,22 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     CHECK_FALSE(std::filesystem::exists(stream_path("e2e", "cam0")));
 }
 
+// The tag has it wait for the firmware's image.
+TEST_CASE("end to end: the firmware as it is flashed stamps like the native board", "[emulator]") {
+    StackSettings settings{"chip", 97, 2, 20, "exposure_us = 4000", "", ""};
+    settings.board = "rp2040";
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const rig::Verdict verdict = judge(stack, 6);
+    CHECK(verdict.ok);
+    for (const auto& name : {"cam0", "cam1"})
+        CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(0.5));
+    CHECK(verdict.streams.at("imu0").rate_hz == Approx(200).margin(5));
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["board"]["lost_packets"] == 0);
+}
+
 TEST_CASE("end to end: a slave is exposed by its master, and its stamps are its own") {
     StackSettings settings{"slave", 29, 2, 20, "exposure_us = 4000", "", ""};
     settings.slave_extra = "master = \"cam0\"";

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "emulated_board.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <system_error>
+
+#include "../../firmware/rp2040/pins.hpp"
+
+extern char** environ;
+
+namespace versavis::rig {
+
+namespace {
+
+using firmware::Nanoseconds;
+using nlohmann::json;
+
+constexpr Nanoseconds cycle_ns = 8;
+
+/// Bytes take so long between the board and its owner, each way. At half, the board cannot run
+/// ahead; at twice, answers take longer than on a real bus.
+constexpr Nanoseconds way = 300'000;
+
+/// Less than the way: nothing that the host sends later can reach the board sooner than that. So
+/// far it runs ahead of an owner whose other inputs are known, and then what it sends is ready when
+/// it is due, however long the emulation took. At half, the owner looks twice as often; at twice,
+/// bytes of the host come too late.
+constexpr Nanoseconds lead = 200'000;
+
+/// The cycle in which an instant is over.
+std::int64_t cycle_of(Nanoseconds at) { return (at + cycle_ns - 1) / cycle_ns; }
+
+std::string to_hex(std::span<const std::uint8_t> bytes) {
+    return fmt::format("{:02x}", fmt::join(bytes, ""));
+}
+
+std::vector<std::uint8_t> from_hex(const std::string& text) {
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t i = 0; i + 1 < text.size(); i += 2)
+        bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
+    return bytes;
+}
+
+/// GPIO that the owner sees, by their bit in Environment.
+constexpr rp2040::SignalPin seen_pins[] = {
+    {0, rp2040::pin_trigger0},
+    {1, rp2040::pin_trigger0 + 1},
+    {2, rp2040::pin_trigger0 + 2},
+    {3, rp2040::pin_trigger0 + 3},
+    {firmware::pin_light, rp2040::pin_light},
+    {firmware::pin_sync, rp2040::pin_sync_output},
+    {firmware::pin_test, rp2040::pin_test_output},
+};
+
+json wiring() {
+    json watched = json::array();
+    for (const rp2040::SignalPin& each : seen_pins) watched.push_back(each.pin);
+    return {{"watch", watched}, {"selects", {+rp2040::pin_spi_select0, +rp2040::pin_spi_select1}}};
+}
+
+json nothing() {
+    return {{"inputs", json::array()}, {"usb", json::array()}, {"uart", json::array()}};
+}
+
+}  // namespace
+
+std::string EmulatedChip::default_image() { return VERSAVIS_FIRMWARE; }
+
+Expected<std::unique_ptr<EmulatedChip>> EmulatedChip::create(const std::string& image) {
+    const std::string script = VERSAVIS_EMULATOR "/lock_step.mjs";
+    for (const std::string& file : {image, script})
+        if (!std::filesystem::exists(file))
+            return failure(file, "there is no such file",
+                           "run ./dev firmware for the image, or give another with --image");
+    int sockets[2];
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) != 0)
+        return failure("socketpair", std::generic_category().message(errno), "try again");
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, sockets[1], STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, sockets[1], STDOUT_FILENO);
+    std::vector<std::string> arguments = {"node", script, image, wiring().dump()};
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    pid_t process = -1;
+    const int error = posix_spawnp(&process, "node", &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    ::close(sockets[1]);
+    if (error != 0) {
+        ::close(sockets[0]);
+        return failure("node", std::generic_category().message(error), "install nodejs");
+    }
+    return std::unique_ptr<EmulatedChip>(new EmulatedChip(process, sockets[0]));
+}
+
+EmulatedChip::~EmulatedChip() {
+    ::close(socket_);
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+}
+
+json EmulatedChip::read() {
+    std::size_t end = 0;
+    while ((end = text_.find('\n')) == std::string::npos) {
+        char buffer[16'384];
+        const ssize_t size = ::recv(socket_, buffer, sizeof buffer, 0);
+        if (size <= 0) throw std::runtime_error("the emulated board has ended");
+        text_.append(buffer, static_cast<std::size_t>(size));
+    }
+    json line = json::parse(text_.substr(0, end));
+    text_.erase(0, end + 1);
+    return line;
+}
+
+void EmulatedChip::write(const json& line) {
+    const std::string text = line.dump() + "\n";
+    for (std::size_t sent = 0; sent < text.size();) {
+        const ssize_t size = ::send(socket_, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
+        if (size <= 0) throw std::runtime_error("the emulated board has ended");
+        sent += static_cast<std::size_t>(size);
+    }
+}
+
+EmulatedBoard::EmulatedBoard(EmulatedChip& chip, firmware::Environment environment)
+    : chip_(chip),
+      environment_(std::move(environment)),
+      pending_(std::make_unique<json>(nothing())) {
+    chip_.write({{"start", true}});
+    now_ = chip_.read().at("now").get<std::int64_t>() * cycle_ns;
+}
+
+EmulatedBoard::~EmulatedBoard() = default;
+
+void EmulatedBoard::schedule_edge(const firmware::Edge& edge) {
+    (*pending_)["inputs"].push_back(
+        {rp2040::pin_of_input(edge.input), edge.level ? 1 : 0, cycle_of(edge.at)});
+}
+
+void EmulatedBoard::receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
+    (*pending_)["usb"].push_back({to_hex(bytes), cycle_of(at + way)});
+}
+
+void EmulatedBoard::uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
+    (*pending_)["uart"].push_back({to_hex(bytes), cycle_of(at)});
+}
+
+Nanoseconds EmulatedBoard::next_wake() const {
+    return on_its_way_.empty() ? now_ : std::min(now_, on_its_way_.front().at);
+}
+
+void EmulatedBoard::consume(std::size_t size, Nanoseconds /*at*/) {
+    transmitted_.erase(transmitted_.begin(),
+                       transmitted_.begin() + static_cast<std::ptrdiff_t>(size));
+}
+
+void EmulatedBoard::run_until(Nanoseconds until) {
+    const Nanoseconds target = environment_.next_event ? until : until + lead;
+    while (now_ < until && !stopped_) step_to(target);
+    for (; !on_its_way_.empty() && on_its_way_.front().at <= until; on_its_way_.pop_front()) {
+        const auto& bytes = on_its_way_.front().bytes;
+        transmitted_.insert(transmitted_.end(), bytes.begin(), bytes.end());
+    }
+}
+
+/// Or to the next event around the board.
+void EmulatedBoard::step_to(Nanoseconds until) {
+    if (!environment_.next_event) return run_to(until);
+    const Nanoseconds event = environment_.next_event();
+    run_to(std::clamp(event, now_, until));
+    if (event <= now_) environment_.fire(event);
+}
+
+/// Or to the first change of an output.
+void EmulatedBoard::run_to(Nanoseconds until) {
+    json command = std::exchange(*pending_, nothing());
+    command["until"] = until / cycle_ns;
+    command["reads"] = true;
+    command["held"] = stuck_;
+    chip_.write(command);
+    json answer = chip_.read();
+    for (; answer.contains("transfer"); answer = chip_.read())
+        answer_transfer(answer.at("transfer"));
+    const auto reached = answer.at("now").get<std::int64_t>();
+    now_ = reached * cycle_ns;
+    // Less than a cycle cannot be run.
+    if (reached >= until / cycle_ns) now_ = std::max(now_, until);
+    take(answer);
+}
+
+void EmulatedBoard::answer_transfer(const json& asked) {
+    firmware::ImuTransfer transfer;
+    const auto bytes = from_hex(asked.at("bytes").get<std::string>());
+    if (bytes.size() > sizeof transfer.bytes) throw std::runtime_error("too long a transfer");
+    transfer.chip = asked.at("select").get<std::uint8_t>();
+    transfer.size = static_cast<std::uint8_t>(bytes.size());
+    transfer.clock_hz = asked.at("hz").get<std::uint32_t>();
+    std::copy(bytes.begin(), bytes.end(), transfer.bytes);
+    std::vector<std::uint8_t> received(bytes.size(), 0xFF);
+    if (environment_.imu_transfer)
+        environment_.imu_transfer(asked.at("at").get<std::int64_t>() * cycle_ns, transfer,
+                                  received);
+    chip_.write({{"bytes", to_hex(received)}});
+}
+
+void EmulatedBoard::take(const json& answer) {
+    for (const json& packet : answer.at("usb"))
+        on_its_way_.push_back({packet.at(0).get<std::int64_t>() * cycle_ns + way,
+                               from_hex(packet.at(1).get<std::string>())});
+    take_pins(answer.at("pins"));
+    const auto uart = from_hex(answer.at("uart").at(0).get<std::string>());
+    if (!uart.empty() && environment_.uart_sent)
+        environment_.uart_sent(now_, answer.at("uart").at(1).get<std::uint32_t>(), uart);
+    if (!answer.contains("stopped")) return;
+    stopped_ = true;
+    if (environment_.reboot) environment_.reboot(answer.at("stopped") == "boot loader");
+}
+
+void EmulatedBoard::take_pins(const json& pins) {
+    for (const json& change : pins) {
+        const auto levels = change.at(1).get<std::uint32_t>();
+        std::uint32_t seen = 0;
+        for (const rp2040::SignalPin& each : seen_pins)
+            seen |= (levels >> each.pin & 1U) << each.signal;
+        if (seen == std::exchange(pins_, seen)) continue;
+        if (environment_.outputs_changed)
+            environment_.outputs_changed(change.at(0).get<std::int64_t>() * cycle_ns, seen);
+    }
+}
+
+}  // namespace versavis::rig
