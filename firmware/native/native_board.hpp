@@ -49,17 +49,14 @@ class NativeBoard final : public VirtualBoard,
 
     void schedule_edge(const Edge& edge) override { edges_.push(edge); }
 
-    /// Level of an input at rest, before its first edge.
-    void set_level(std::uint8_t input, bool level);
-
+    void set_level(std::uint8_t input, bool level) override;
     void receive(std::span<const std::uint8_t> bytes, Nanoseconds at) override;
     void uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at) override;
     void run_until(Nanoseconds until) override;
 
     /// From now on the code stalls while the hardware continues, or both continue.
     void set_stalled(bool stalled) { stalled_ = stalled; }
-    /// True: the code stalled for longer than the watchdog allows.
-    bool watchdog_bit() const { return watchdog_bit_; }
+    bool watchdog_bit() const override { return watchdog_bit_; }
 
     void set_imu_bus_stuck(bool stuck) override { imu_bus_stuck_ = stuck; }
 
@@ -68,10 +65,9 @@ class NativeBoard final : public VirtualBoard,
 
     Nanoseconds next_wake() const override;
     Nanoseconds time() const override { return now_; }
-    /// When they fill the link's capacity, the core has to wait.
     std::span<const std::uint8_t> transmitted() const override { return transmitted_; }
     void consume(std::size_t size, Nanoseconds at) override;
-    void set_link_capacity(std::size_t bytes) { link_capacity_ = bytes; }
+    void set_link_capacity(std::size_t bytes) override { link_capacity_ = bytes; }
 
     /// What another SPI master reads from the second port in one selection.
     std::vector<std::uint16_t> read_imu_output(std::span<const std::uint16_t> words);

@@ -62,6 +62,15 @@ class VirtualBoard {
     /// From now on no IMU transfer completes, or all of them do again.
     virtual void set_imu_bus_stuck(bool stuck) = 0;
 
+    /// True: the code stalled for longer than the watchdog allows.
+    virtual bool watchdog_bit() const = 0;
+
+    /// Level of an input at rest, before its first edge.
+    virtual void set_level(std::uint8_t input, bool level) = 0;
+
+    /// Bytes that the host's side holds; when it is full, the board has to wait.
+    virtual void set_link_capacity(std::size_t bytes) = 0;
+
     /// When run_until() has something to do next, if no bytes come.
     virtual Nanoseconds next_wake() const = 0;
     /// How far it has run; it may be beyond what run_until() was asked for.

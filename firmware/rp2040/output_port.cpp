@@ -9,12 +9,12 @@ namespace versavis::rp2040 {
 namespace {
 
 /// How often words are sent. At half, it takes twice the processor's time; at twice, the sequencer
-/// runs dry, as it does after an interrupt that is held up for 100 us.
-constexpr std::uint32_t commit_interval_us = 300;
+/// runs dry, as it does after an interrupt that is held up for 50 us.
+constexpr std::uint32_t commit_interval_us = 250;
 
 /// How far ahead they are sent: a word leaves no sooner after it was pushed. At half, the sequencer
 /// runs dry; at twice, the core comes too late.
-constexpr Nanoseconds ahead = 400'000;
+constexpr Nanoseconds ahead = 300'000;
 
 /// Within that time after a word has left, its room in the sequencer's FIFO is taken again. At
 /// half, an interrupt that is held up makes words late without telling; at twice, more of eight

@@ -16,8 +16,6 @@
 
 #include "../../firmware/rp2040/pins.hpp"
 
-extern char** environ;
-
 namespace versavis::rig {
 
 namespace {
@@ -27,13 +25,13 @@ using nlohmann::json;
 
 constexpr Nanoseconds cycle_ns = 8;
 
-/// Bytes take so long between the board and its owner, each way. At half, the board cannot run
-/// ahead; at twice, answers take longer than on a real bus.
-constexpr Nanoseconds way = 300'000;
+/// Bytes take so long between the board and an owner in real time, each way. At half, the board
+/// cannot run ahead; at twice, answers take longer than on a real bus.
+constexpr Nanoseconds real_way = 300'000;
 
 /// Less than the way: nothing that the host sends later can reach the board sooner than that. So
-/// far it runs ahead of an owner whose other inputs are known, and then what it sends is ready when
-/// it is due, however long the emulation took. At half, the owner looks twice as often; at twice,
+/// far it runs ahead of such an owner, and then what it sends is ready when it is due, however long
+/// the emulation took. At half, the owner looks twice as often; at twice,
 /// bytes of the host come too late.
 constexpr Nanoseconds lead = 200'000;
 
@@ -135,7 +133,8 @@ void EmulatedChip::write(const json& line) {
 EmulatedBoard::EmulatedBoard(EmulatedChip& chip, firmware::Environment environment)
     : chip_(chip),
       environment_(std::move(environment)),
-      pending_(std::make_unique<json>(nothing())) {
+      pending_(std::make_unique<json>(nothing())),
+      way_(environment_.next_event ? 0 : real_way) {
     chip_.write({{"start", true}});
     now_ = chip_.read().at("now").get<std::int64_t>() * cycle_ns;
 }
@@ -148,7 +147,7 @@ void EmulatedBoard::schedule_edge(const firmware::Edge& edge) {
 }
 
 void EmulatedBoard::receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
-    (*pending_)["usb"].push_back({to_hex(bytes), cycle_of(at + way)});
+    (*pending_)["usb"].push_back({to_hex(bytes), cycle_of(at + way_)});
 }
 
 void EmulatedBoard::uart_receive(std::span<const std::uint8_t> bytes, Nanoseconds at) {
@@ -167,10 +166,7 @@ void EmulatedBoard::consume(std::size_t size, Nanoseconds /*at*/) {
 void EmulatedBoard::run_until(Nanoseconds until) {
     const Nanoseconds target = environment_.next_event ? until : until + lead;
     while (now_ < until && !stopped_) step_to(target);
-    for (; !on_its_way_.empty() && on_its_way_.front().at <= until; on_its_way_.pop_front()) {
-        const auto& bytes = on_its_way_.front().bytes;
-        transmitted_.insert(transmitted_.end(), bytes.begin(), bytes.end());
-    }
+    deliver(until);
 }
 
 /// Or to the next event around the board.
@@ -178,14 +174,23 @@ void EmulatedBoard::step_to(Nanoseconds until) {
     if (!environment_.next_event) return run_to(until);
     const Nanoseconds event = environment_.next_event();
     run_to(std::clamp(event, now_, until));
+    deliver(now_);
     if (event <= now_) environment_.fire(event);
+}
+
+/// To the host, what has arrived there at `at`.
+void EmulatedBoard::deliver(Nanoseconds at) {
+    for (; !on_its_way_.empty() && on_its_way_.front().at <= at; on_its_way_.pop_front()) {
+        const auto& bytes = on_its_way_.front().bytes;
+        transmitted_.insert(transmitted_.end(), bytes.begin(), bytes.end());
+    }
 }
 
 /// Or to the first change of an output.
 void EmulatedBoard::run_to(Nanoseconds until) {
     json command = std::exchange(*pending_, nothing());
     command["until"] = until / cycle_ns;
-    command["reads"] = true;
+    command["reads"] = transmitted_.size() < link_capacity_;
     command["held"] = stuck_;
     chip_.write(command);
     json answer = chip_.read();
@@ -215,7 +220,7 @@ void EmulatedBoard::answer_transfer(const json& asked) {
 
 void EmulatedBoard::take(const json& answer) {
     for (const json& packet : answer.at("usb"))
-        on_its_way_.push_back({packet.at(0).get<std::int64_t>() * cycle_ns + way,
+        on_its_way_.push_back({packet.at(0).get<std::int64_t>() * cycle_ns + way_,
                                from_hex(packet.at(1).get<std::string>())});
     take_pins(answer.at("pins"));
     const auto uart = from_hex(answer.at("uart").at(0).get<std::string>());
@@ -223,6 +228,8 @@ void EmulatedBoard::take(const json& answer) {
         environment_.uart_sent(now_, answer.at("uart").at(1).get<std::uint32_t>(), uart);
     if (!answer.contains("stopped")) return;
     stopped_ = true;
+    bitten_ = answer.at("stopped") == "watchdog";
+    if (bitten_) return;
     if (environment_.reboot) environment_.reboot(answer.at("stopped") == "boot loader");
 }
 

@@ -53,6 +53,9 @@ class EmulatedBoard final : public firmware::VirtualBoard {
     void uart_receive(std::span<const std::uint8_t> bytes, firmware::Nanoseconds at) override;
     void run_until(firmware::Nanoseconds until) override;
     void set_imu_bus_stuck(bool stuck) override { stuck_ = stuck; }
+    bool watchdog_bit() const override { return bitten_; }
+    void set_level(std::uint8_t input, bool level) override { schedule_edge({0, input, level}); }
+    void set_link_capacity(std::size_t bytes) override { link_capacity_ = bytes; }
     firmware::Nanoseconds next_wake() const override;
     firmware::Nanoseconds time() const override { return now_; }
     std::span<const std::uint8_t> transmitted() const override { return transmitted_; }
@@ -64,6 +67,7 @@ class EmulatedBoard final : public firmware::VirtualBoard {
         std::vector<std::uint8_t> bytes;
     };
 
+    void deliver(firmware::Nanoseconds at);
     void step_to(firmware::Nanoseconds until);
     void run_to(firmware::Nanoseconds until);
     void answer_transfer(const nlohmann::json& transfer);
@@ -76,8 +80,11 @@ class EmulatedBoard final : public firmware::VirtualBoard {
     std::deque<Packet> on_its_way_;            ///< to the host
     std::unique_ptr<nlohmann::json> pending_;  ///< the next command
     std::uint32_t pins_ = 0;
+    firmware::Nanoseconds way_;
+    std::size_t link_capacity_ = std::size_t{64} * 1024;
     bool stuck_ = false;
     bool stopped_ = false;
+    bool bitten_ = false;  ///< by the watchdog
     std::vector<std::uint8_t> transmitted_;
 };
 

@@ -10,7 +10,7 @@ namespace {
 std::vector<std::uint16_t> burst(Scenario& world) {
     std::vector<std::uint16_t> words(14);
     words[0] = 0x3E00;
-    return world.board().read_imu_output(words);
+    return world.native_board().read_imu_output(words);
 }
 
 void check_words(const std::vector<std::uint16_t>& words, Nanoseconds at,
@@ -45,7 +45,7 @@ TEST_CASE(
     REQUIRE(world.begin());
     world.run(second);
     const std::uint16_t question[] = {0x5600, 0x0000};
-    CHECK(world.board().read_imu_output(question)[1] == 16448);
+    CHECK(world.native_board().read_imu_output(question)[1] == 16448);
     for (int i = 0; i < 500; ++i) {
         world.run(3 * ms);
         const std::vector<std::uint16_t> words = burst(world);

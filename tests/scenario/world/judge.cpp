@@ -107,9 +107,9 @@ void World::judge_record(const wire::Exposure& record, const TruePulse& pulse,
     const bool sees_end = sees_start && pulse.fault != Fault::end_lost && !overlong;
     if (has(record, wire::exposure_measured) != sees_end) wrong("measured or not");
     if (has(record, wire::exposure_no_start) == sees_start) wrong("start seen or not");
-    if (sees_start && record.start_ns != stamped(pulse.start)) wrong("start");
+    if (sees_start && !is_stamp(record.start_ns, pulse.start)) wrong("start");
     if (!sees_start && record.start_ns != wire::no_time) wrong("start invented");
-    if (sees_end && record.end_ns != stamped(pulse.end)) wrong("end");
+    if (sees_end && !is_stamp(record.end_ns, pulse.end)) wrong("end");
     if (!sees_end && record.end_ns != wire::no_time) wrong("end invented");
     if (overlong && !has(record, wire::exposure_overlong)) wrong("not overlong");
 }
@@ -140,12 +140,14 @@ void World::judge_imu(unsigned port, std::string& out) {
         return;
     }
     const imu::ImuModel& model = *imu::find_model(samples[0].kind);
-    std::vector<Nanoseconds> ready = ready_times_[port];
-    for (Nanoseconds& at : ready) at = stamped(at);
+    const std::vector<Nanoseconds>& ready = ready_times_[port];
     const bool paced = (configuration.imus[port].options & wire::imu_data_ready) != 0;
-    const auto index_of = [&ready](Nanoseconds at) {
-        const auto found = std::lower_bound(ready.begin(), ready.end(), at);
-        return found != ready.end() && *found == at ? found - ready.begin() : std::ptrdiff_t{-1};
+    const auto index_of = [&](Nanoseconds stamp) {
+        const auto found = std::find_if(
+            std::lower_bound(ready.begin(), ready.end(), stamp - stamp_error_), ready.end(),
+            [&](Nanoseconds at) { return stamped(at) >= stamp - stamp_error_; });
+        return found != ready.end() && is_stamp(stamp, *found) ? found - ready.begin()
+                                                               : std::ptrdiff_t{-1};
     };
     const wire::ImuConfiguration& asked = configuration.imus[port];
     const Duration filtered_for =
@@ -213,11 +215,12 @@ void World::judge_imu(unsigned port, std::string& out) {
 /// The accelerometer's values were read soon after the stamp; their age is in 32 ns.
 void World::judge_accel_age(const wire::ImuSample& sample, std::string& out) const {
     const auto reads = spi_imu_->accel_reads();
-    const auto read =
-        std::lower_bound(reads.begin(), reads.end(), std::pair(sample.time_ns, INT64_MIN));
+    const auto read = std::lower_bound(reads.begin(), reads.end(),
+                                       std::pair(sample.time_ns - stamp_error_, INT64_MIN));
     if (read == reads.end()) return complain(out, "sample {} was not read", sample.number);
     const Nanoseconds age = sample.time_ns - stamped(read->second);
-    if (!accel_ready_wired_ || std::abs(age - Nanoseconds{sample.accel_age} * 32) >= 32)
+    if (!accel_ready_wired_ ||
+        std::abs(age - Nanoseconds{sample.accel_age} * 32) >= 32 + 2 * stamp_error_)
         complain(out, "sample {}: its accelerometer's values are {} ns old, not {}", sample.number,
                  age, sample.accel_age * 32);
 }
@@ -238,9 +241,13 @@ void World::judge_pulses(std::string& out) {
                          events[i - 1].value);
         std::set<Nanoseconds> edges;
         for (const Nanoseconds at : source.fired) edges.insert(stamped(at));
-        for (const wire::Event& event : events)
-            if (edges.erase(event.time_ns) == 0)
+        for (const wire::Event& event : events) {
+            const auto edge = edges.lower_bound(event.time_ns - stamp_error_);
+            if (edge == edges.end() || *edge > event.time_ns + stamp_error_)
                 complain(out, "input {}: no edge at {}", input, event.time_ns);
+            else
+                edges.erase(edge);
+        }
         if (!drops_allowed && events.size() + 3 < source.fired.size())
             complain(out, "input {}: {} events of {} pulses", input, events.size(),
                      source.fired.size());

@@ -15,15 +15,23 @@ using firmware::never;
 
 namespace {
 
-/// What VERSAVIS_PORT names: a port without limits whose calls take no time, one whose calls take
-/// "2us", "4us" or a "random" time, or one that is as coarse as a "chip" as well.
-firmware::PortModel named_model(std::uint64_t seed) {
+std::string_view port_name() {
     const char* variable = std::getenv("VERSAVIS_PORT");
-    const std::string_view name = variable == nullptr ? "" : variable;
+    return variable == nullptr ? "" : variable;
+}
+
+/// The firmware as it is flashed.
+bool is_emulated() { return port_name() == "rp2040"; }
+
+/// What VERSAVIS_PORT names: a port without limits whose calls take no time, one whose calls take
+/// "2us", "4us" or a "random" time, one that is as coarse as a "chip" as well, or the "rp2040"
+/// itself.
+firmware::PortModel named_model(std::uint64_t seed) {
+    const std::string_view name = port_name();
     if (name.empty()) return {};
     if (name == "2us") return firmware::slow_model(2 * us, seed);
     if (name == "4us") return firmware::slow_model(4 * us, seed);
-    if (name == "chip") return firmware::chip_model(2 * us, seed);
+    if (name == "chip" || is_emulated()) return firmware::chip_model(2 * us, seed);
     if (name != "random") throw std::runtime_error(fmt::format("no port is called '{}'", name));
     std::mt19937_64 random(seed);
     const auto draw = [&random](std::uint64_t below) {
@@ -81,8 +89,22 @@ void World::make_board(wire::ResetCause cause) {
     pins_ = 0;
     const auto nonce =
         static_cast<std::uint32_t>(seed_ * 1000 + static_cast<std::uint64_t>(now_ / ms) + 1);
-    board_ = std::make_unique<firmware::NativeBoard>(firmware::Identity{nonce, cause, "TEST"},
-                                                     std::move(environment), now_, model_);
+    if (is_emulated()) {
+        if (board_)
+            throw std::logic_error(
+                "the clock of a chip that restarts begins anew: not with "
+                "VERSAVIS_PORT=rp2040");
+        auto chip = rig::EmulatedChip::create(rig::EmulatedChip::default_image());
+        if (!chip) throw std::runtime_error(chip.error().message());
+        chip_ = std::move(*chip);
+        board_ = std::make_unique<rig::EmulatedBoard>(*chip_, std::move(environment));
+        stamp_error_ = 48;
+        now_ = board_->time();
+        next_read_ = now_ + ms;
+    } else {
+        board_ = std::make_unique<firmware::NativeBoard>(firmware::Identity{nonce, cause, "TEST"},
+                                                         std::move(environment), now_, model_);
+    }
     board_->set_link_capacity(link_capacity_);
     for (const auto& [output, camera] : cameras_)
         if (camera->settings().strobe_inverted) board_->set_level(camera->settings().input, true);
@@ -309,10 +331,17 @@ void World::run(Nanoseconds duration) {
     now_ = std::max(now_, end);
 }
 
+firmware::NativeBoard& World::native_board() {
+    auto* native = dynamic_cast<firmware::NativeBoard*>(board_.get());
+    if (native == nullptr)
+        throw std::logic_error("the emulated chip cannot do that: not with VERSAVIS_PORT=rp2040");
+    return *native;
+}
+
 void World::stall_board(Nanoseconds duration) {
-    board_->set_stalled(true);
+    native_board().set_stalled(true);
     run(duration);
-    board_->set_stalled(false);
+    native_board().set_stalled(false);
 }
 
 void World::finish() {
@@ -333,7 +362,7 @@ Nanoseconds World::grid_time(unsigned camera, std::uint64_t tick) const {
 Nanoseconds World::rounding() const {
     if (model_.edge_grain_ns == 1) return 0;
     return (Nanoseconds{1} << model_.output_grain_bits) / 2 + model_.output_step_ns +
-           model_.edge_grain_ns;
+           model_.edge_grain_ns + stamp_error_;
 }
 
 Nanoseconds World::grid_error(const wire::Exposure& record) const {

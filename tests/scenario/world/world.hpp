@@ -3,6 +3,7 @@
 // keeps what really happened, and judges the reports by it.
 #pragma once
 
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "camera_model.hpp"
+#include "emulated_board.hpp"
 #include "host_model.hpp"
 #include "inertial.hpp"
 #include "native_board.hpp"
@@ -88,7 +90,9 @@ class World {
     void reboot(wire::ResetCause cause);
 
     Nanoseconds now() const { return now_; }
-    firmware::NativeBoard& board() { return *board_; }
+    firmware::VirtualBoard& board() { return *board_; }
+    /// What only a board in this process can do. Throws on the emulated chip.
+    firmware::NativeBoard& native_board();
     Inbox& inbox() { return host_.inbox; }
     CameraModel& camera(unsigned output) { return *cameras_.at(output); }
     /// Lines over time, recorded since record_trace().
@@ -115,6 +119,10 @@ class World {
     /// As the port stamps it.
     Nanoseconds stamped(Nanoseconds at) const {
         return at / model_.edge_grain_ns * model_.edge_grain_ns;
+    }
+    /// A stamp is that of an edge at `at`.
+    bool is_stamp(Nanoseconds stamp, Nanoseconds at) const {
+        return std::abs(stamp - stamped(at)) <= stamp_error_;
     }
     /// Middle of a measured exposure relative to its grid point, as exact as the port allows; 0 for
     /// one that says it was late on a slow port.
@@ -155,6 +163,8 @@ class World {
 
     std::uint64_t seed_;
     firmware::PortModel model_;
+    /// How far stamps may be from those of the model: of the chip, what the firmware promises.
+    Nanoseconds stamp_error_ = 0;
     firmware::CoreTap* tap_;
     Nanoseconds now_ = 0;
     std::vector<std::uint8_t> flash_;
@@ -188,7 +198,8 @@ class World {
     int reboots_ = 0;
     Trace trace_;
     bool tracing_ = false;
-    std::unique_ptr<firmware::NativeBoard> board_;
+    std::unique_ptr<rig::EmulatedChip> chip_;
+    std::unique_ptr<firmware::VirtualBoard> board_;
 };
 
 }  // namespace versavis::scenario
