@@ -60,6 +60,11 @@ constexpr rp2040::SignalPin seen_pins[] = {
     {firmware::pin_test, rp2040::pin_test_output},
 };
 
+/// Where this program was built: no path of it may stand in what is installed.
+std::filesystem::path build_directory() {
+    return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path();
+}
+
 json wiring() {
     json watched = json::array();
     for (const rp2040::SignalPin& each : seen_pins) watched.push_back(each.pin);
@@ -72,14 +77,17 @@ json nothing() {
 
 }  // namespace
 
-std::string EmulatedChip::default_image() { return VERSAVIS_FIRMWARE; }
+std::string EmulatedChip::default_image() {
+    return build_directory() / "firmware" / "versavis.uf2";
+}
 
 Expected<std::unique_ptr<EmulatedChip>> EmulatedChip::create(const std::string& image) {
-    const std::string script = VERSAVIS_EMULATOR "/lock_step.mjs";
+    const std::string script = build_directory() / "emulator" / "lock_step.mjs";
     for (const std::string& file : {image, script})
         if (!std::filesystem::exists(file))
             return failure(file, "there is no such file",
-                           "run ./dev firmware for the image, or give another with --image");
+                           "the emulated board runs where the project was built, after './dev demo "
+                           "--board rp2040'");
     int sockets[2];
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) != 0)
         return failure("socketpair", std::generic_category().message(errno), "try again");
