@@ -27,7 +27,9 @@ constexpr double magnetic_lsb_t = 1e-4 / 7000;
 /// loaded machine delivers late count as missing; at twice the run only takes longer.
 constexpr Duration in_flight = milliseconds(300);
 
-/// A stream must be back after this.
+/// A stream must be back after this, where the machine has nothing else to do: a brief run, which
+/// is one of many tests of a busy machine, shows how long it took and fails only if it is never
+/// back.
 constexpr Duration longest_recovery = seconds(1);
 
 /// A stream that is not back after this does not come back.
@@ -318,7 +320,7 @@ class Run {
             if (!row.recovery) sum.recovery.reset();
             slow = slow || !row.recovery;
             if (row.damaged == 0 || !row.recovery) continue;  // the first start is no recovery
-            slow = slow || *row.recovery > longest_recovery;
+            slow = slow || (!settings_.brief && *row.recovery > longest_recovery);
             if (sum.recovery) sum.recovery = std::max(*sum.recovery, *row.recovery);
         }
         print(sum);

@@ -9,10 +9,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "../../firmware/rp2040/pins.hpp"
 
@@ -31,8 +33,8 @@ constexpr Nanoseconds real_way = 300'000;
 
 /// Less than the way: nothing that the host sends later can reach the board sooner than that. So
 /// far it runs ahead of such an owner, and then what it sends is ready when it is due, however long
-/// the emulation took. At half, the owner looks twice as often; at twice,
-/// bytes of the host come too late.
+/// the emulation took. At half, the owner looks twice as often; at twice, bytes of the host come
+/// too late.
 constexpr Nanoseconds lead = 200'000;
 
 /// The cycle in which an instant is over.
@@ -237,7 +239,6 @@ void EmulatedBoard::take(const json& answer) {
     if (!answer.contains("stopped")) return;
     stopped_ = true;
     bitten_ = answer.at("stopped") == "watchdog";
-    if (bitten_) return;
     if (environment_.reboot) environment_.reboot(answer.at("stopped") == "boot loader");
 }
 

@@ -8,6 +8,7 @@
 #include <deque>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,11 +81,11 @@ class EmulatedBoard final : public firmware::VirtualBoard {
     std::deque<Packet> on_its_way_;            ///< to the host
     std::unique_ptr<nlohmann::json> pending_;  ///< the next command
     std::uint32_t pins_ = 0;
-    firmware::Nanoseconds way_;
+    firmware::Nanoseconds way_;  ///< of bytes, between the board and its owner
     std::size_t link_capacity_ = std::size_t{64} * 1024;
     bool stuck_ = false;
-    bool stopped_ = false;
-    bool bitten_ = false;  ///< by the watchdog
+    bool stopped_ = false;  ///< its life is over
+    bool bitten_ = false;   ///< by the watchdog
     std::vector<std::uint8_t> transmitted_;
 };
 

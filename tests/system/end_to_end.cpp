@@ -104,6 +104,29 @@ TEST_CASE("end to end: the firmware as it is flashed stamps like the native boar
     CHECK(status["board"]["lost_packets"] == 0);
 }
 
+TEST_CASE("end to end: the emulated board restarts, and its stamps are right again", "[emulator]") {
+    StackSettings settings{"chipreset", 98, 1, 20, "", "", ""};
+    settings.board = "rp2040";
+    settings.faults = "[[fault]]\nkind = \"board_reset\"\ncamera = \"cam0\"\nat_exposure = 40\n";
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(
+        [](const auto& status) { return status["board"]["connections"] == 2 && healthy(status); });
+    CHECK(judge(stack, 3).ok);
+}
+
+TEST_CASE("end to end: an image that does not start is told by its name", "[emulator]") {
+    Stack stack({"noimage", 99, 1, 20, "", "", ""});
+    const std::string image = GENERATE(VERSAVIS_SOURCE_DIR "/README.md", "/nowhere/versavis.uf2");
+    std::string output;
+    CHECK(run({program("versavis-rig"), "run", stack.scenario_path(), "--socket",
+               stack.socket_path(), "--board", "rp2040", "--image", image},
+              stack.log_path("image.log"), &output) == 69);
+    CHECK_THAT(output, Catch::Contains("versavis-rig: " + image) &&
+                           (Catch::Contains("no such file") || Catch::Contains("boot2")));
+}
+
 TEST_CASE("end to end: a slave is exposed by its master, and its stamps are its own") {
     StackSettings settings{"slave", 29, 2, 20, "exposure_us = 4000", "", ""};
     settings.slave_extra = "master = \"cam0\"";
