@@ -130,8 +130,9 @@ void Illumination::close_gate(Nanoseconds now) {
     if (!open()) return;
     const Nanoseconds closed =
         min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
+    const Nanoseconds unused = gate_off_ - closed;
     last_off_ = closed;
-    saved_ = gate_off_ - closed + earned(closed - gate_on_);
+    saved_ += unused - earned(unused);  // what a late end cost is already taken off
     saved_at_ = closed;
     gate_off_ = never;
 }

@@ -456,6 +456,92 @@ TEST_CASE("board: an output that leaves later by rounding is not late, and its r
     CHECK(bench.health().late_outputs == 0);
 }
 
+TEST_CASE("board: what is due leaves before the edges that a late poll has to look through") {
+    Cameras bench(1);
+    bench.configure();
+    bench.send(wire::Start{1, 0, {}});
+    bench.run(60 * ms);
+    const Nanoseconds due = bench.trigger() + 50 * ms;
+    bench.run(due - 700 * us);
+    bench.port.pushed.clear();
+    for (int i = 0; i < 4; ++i)
+        bench.edge(input_pulse + unsigned{wire::pulse_aux0}, due - 500 * us + i * 100 * us);
+    bench.port.edge_takes = 200 * us;
+    bench.poll(due - 10 * us);
+    CHECK(bench.trigger() == due);
+    REQUIRE_FALSE(bench.port.pushed.empty());
+    CHECK(bench.port.pushed[0] == due - 10 * us);
+}
+
+TEST_CASE("board: an exposure that does not come is told as soon as all edges are known") {
+    const auto told_after = [](Nanoseconds edge_lag) {
+        Cameras bench(1);
+        bench.port.edge_lag = edge_lag;
+        bench.configuration.cameras[0].rate_uhz = 2'000'000;
+        bench.configure();
+        bench.run(10 * second);
+        bench.send(wire::Start{1, 0, {}});
+        while (bench.all<wire::Exposure>().empty()) bench.run(bench.board.next_wake());
+        const wire::Exposure record = bench.all<wire::Exposure>()[0];
+        CHECK(record.start_ns == wire::no_time);
+        return bench.port.time - record.trigger_ns;
+    };
+    const Nanoseconds at_once = told_after(0);
+    CHECK(told_after(300 * us) >= at_once + 300 * us);
+    CHECK(told_after(300 * us) <= at_once + 400 * us);
+}
+
+TEST_CASE("board: a sample leaves as soon as the edges of its time are known") {
+    PortModel model;
+    model.edge_lag_ns = 300 * us;
+    World world(1, model);
+    world.add_imu(
+        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+        wire::ImuKind::adis16448b, 102.4, true);
+    REQUIRE(world.begin());
+    world.run(second);
+    REQUIRE(world.inbox().samples[0].size() > 50);
+    for (const wire::ImuSample& sample : world.inbox().samples[0])
+        REQUIRE(sample.departure_ns < 2'000'000);
+}
+
+TEST_CASE("board: samples are served at the second port where the configuration says so") {
+    for (const bool serves : {false, true}) {
+        World world;
+        world.add_imu(
+            std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
+            wire::ImuKind::adis16448b, 819.2, true);
+        if (serves) world.configuration.ports.options = wire::port_imu_output;
+        REQUIRE(world.begin());
+        world.run(second);
+        const std::uint16_t question[] = {0x5600, 0x0000};
+        CHECK((world.native_board().read_imu_output(question)[1] != 0) == serves);
+    }
+}
+
+TEST_CASE("board: light that went out late counts for as long as it was on") {
+    const auto limited = [](Nanoseconds late) {
+        Cameras bench(1);
+        bench.configuration.illumination = {1, 0, 0, 0, 10'000'000, 90'000};  // 4.5 ms of 50 ms
+        bench.configure();
+        bench.send(wire::Start{1, 0, {}});
+        bench.run(50 * ms);
+        bench.port.late = late;
+        for (int i = 0; i < 60; ++i) {
+            const Nanoseconds trigger = bench.trigger();
+            bench.edge(0, trigger);
+            bench.poll(std::max(trigger, bench.port.time));
+            bench.run(trigger + 3'400 * us);
+            bench.edge(0, trigger + 3'400 * us, false);
+            bench.poll(trigger + 3'400 * us);
+            bench.run(trigger + 49 * ms + 900 * us);
+        }
+        return bench.events(wire::EventKind::illumination_limited).size();
+    };
+    CHECK(limited(0) == 0);
+    CHECK(limited(800 * us) > 10);
+}
+
 TEST_CASE("board: after a pause, nobody waits for what a trigger did that has not left yet") {
     Cameras bench(1);
     bench.configuration.illumination = {1, 0, 0, 1'000'000, 20'000'000, 500'000};

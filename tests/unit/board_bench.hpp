@@ -50,6 +50,7 @@ struct BenchPort final : Clock64,
     Nanoseconds push(Nanoseconds at, std::uint32_t levels) override {
         if (outputs_full) return never;
         words.emplace_back(at + late, levels);
+        pushed.push_back(time);
         return at + late;
     }
     void listen(std::uint32_t mask) override { inputs = mask; }
@@ -57,9 +58,10 @@ struct BenchPort final : Clock64,
         if (edges.empty()) return false;
         edge = edges.front();
         edges.pop_front();
+        time += edge_takes;
         return true;
     }
-    Nanoseconds settled() override { return time; }
+    Nanoseconds settled() override { return time - edge_lag; }
     std::uint32_t take_lost() override { return std::exchange(lost, 0); }
     Switched route(const Routes& wanted, bool force) override {
         if (master_exposes && !force) return {};
@@ -99,9 +101,12 @@ struct BenchPort final : Clock64,
     PortFacts facts;
     Nanoseconds time = 0;
     std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
+    std::vector<Nanoseconds> pushed;  ///< when each word came
     bool outputs_full = false;
     Nanoseconds late = 0;  ///< words leave so much later than they should
     std::deque<Edge> edges;
+    Nanoseconds edge_takes = 0;  ///< to pop one
+    Nanoseconds edge_lag = 0;    ///< until an edge is known
     std::uint32_t lost = 0;
     std::uint32_t inputs = ~0U;
     Routes routes;

@@ -250,9 +250,11 @@ TEST_CASE("illumination: on-time is earned by the duty, and spent while the gate
         CAPTURE(duty_ppm);
         Bench bench(10 * ms, duty_ppm);
         bench.expose(0, 10 * ms, 14 * ms);
-        // Of 10 ms at 9.9 ms 4.1 are spent, and what the duty gives until 24 ms is earned.
-        const Nanoseconds earned = 4'100 * us * duty_ppm / 1'000'000 + 10 * duty_ppm;
-        CHECK(bench.budget(24 * ms) == std::min(10 * ms, 5'900 * us + earned));
+        // Of 10 ms at 9.9 ms 5.9 are left, and what the duty gives until 24 ms is earned.
+        const auto by_duty = [duty_ppm](Nanoseconds span) { return span * duty_ppm / 1'000'000; };
+        const Nanoseconds left = 5'900 * us - by_duty(5'900 * us);
+        CHECK(bench.budget(24 * ms) ==
+              std::min(10 * ms, left + by_duty(10 * ms) + by_duty(10 * ms)));
     }
     Bench slow(10 * ms, 1);
     CHECK(slow.budget(10 * ms) == 10 * ms);
