@@ -19,9 +19,9 @@
 namespace versavis::firmware {
 
 struct Identity {
-    std::uint32_t nonce = 0;  ///< drawn at boot
+    std::uint32_t nonce;  ///< drawn at boot
     wire::ResetCause reset_cause = wire::ResetCause::power_on;
-    char serial[16] = {};
+    char serial[sizeof wire::BoardHello::serial];
 };
 
 class Board final : private ChannelReports, private RefusalSink, private OutputMoves {

@@ -166,7 +166,7 @@ void firmware_main() {
     all.flash.begin();
     char serial[17];
     name_board(all.flash, serial);
-    firmware::Identity identity;
+    firmware::Identity identity{};
     identity.nonce = random_word();
     identity.reset_cause = cause;
     for (unsigned i = 0; i < sizeof identity.serial; ++i) identity.serial[i] = serial[i];
