@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera_model.hpp"
 
+#include <utility>
+
 namespace versavis::scenario {
 
 void CameraModel::emit(Edges& edges, Nanoseconds at, bool exposing) const {
@@ -29,6 +31,16 @@ CameraModel::Edges CameraModel::trigger_line(Nanoseconds at, bool level) {
     return edges;
 }
 
+void CameraModel::show(TruePulse& pulse, Edges& edges) {
+    const bool silent = pulse.fault == Fault::no_strobe;
+    const bool stuck = std::exchange(stuck_, pulse.fault == Fault::stuck);
+    const bool falls = !silent && !stuck_ && pulse.fault != Fault::end_lost;
+    pulse.start_seen = !silent && !stuck && pulse.fault != Fault::start_lost;
+    pulse.end_seen = pulse.start_seen && falls;
+    if (pulse.start_seen) emit(edges, pulse.start, true);
+    if (falls) emit(edges, pulse.end, false);
+}
+
 CameraModel::Edges CameraModel::begin(Nanoseconds at) {
     Edges edges;
     TruePulse pulse;
@@ -46,14 +58,13 @@ CameraModel::Edges CameraModel::begin(Nanoseconds at) {
         pulse.start = at + latency;
         if (settings_.trigger_width) {
             width_start_ = pulse.start;
+            pulse.start_seen = pulse.end_seen = true;
             free_at_ = firmware::never;
             emit(edges, pulse.start, true);
         } else {
             pulse.end = pulse.start + settings_.exposure(pulses_.size() + 1, pulse.start);
             free_at_ = pulse.end + settings_.readout;
-            const bool silent = pulse.fault == Fault::no_strobe;
-            if (!silent && pulse.fault != Fault::start_lost) emit(edges, pulse.start, true);
-            if (!silent && pulse.fault != Fault::end_lost) emit(edges, pulse.end, false);
+            show(pulse, edges);
         }
     }
     pulses_.push_back(pulse);

@@ -25,6 +25,7 @@ enum class Fault {
     no_strobe,   ///< neither edge is seen
     start_lost,  ///< the start edge is not seen
     end_lost,    ///< the line falls only with the start of the next exposure, unseen
+    stuck,       ///< the line stays active until the end of the next exposure that is not
     late_start,  ///< it starts a millisecond late
 };
 
@@ -50,6 +51,8 @@ struct TruePulse {
     bool taken = false;
     bool into_busy = false;  ///< it came while the camera exposed or read out
     Fault fault = Fault::none;
+    bool start_seen = false;  ///< the exposure line tells it
+    bool end_seen = false;
     Nanoseconds start = 0;
     Nanoseconds end = 0;
     Nanoseconds width = 0;       ///< of the trigger pulse
@@ -72,12 +75,14 @@ class CameraModel {
 
  private:
     void emit(Edges& edges, Nanoseconds at, bool exposing) const;
+    void show(TruePulse& pulse, Edges& edges);
     Edges begin(Nanoseconds at);
 
     CameraSettings settings_;
     std::mt19937_64 random_;
     std::vector<TruePulse> pulses_;
     Nanoseconds free_at_ = 0;
+    bool stuck_ = false;  ///< the exposure line is active since an exposure that has ended
     std::optional<Nanoseconds> width_start_;
     Nanoseconds inactive_at_ = -second;
 };

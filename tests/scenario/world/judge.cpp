@@ -102,9 +102,8 @@ void World::judge_record(const wire::Exposure& record, const TruePulse& pulse,
         return;
     }
     const bool overlong = pulse.taken && pulse.end - pulse.start > camera.max_exposure_ns;
-    const bool sees_start =
-        pulse.taken && pulse.fault != Fault::no_strobe && pulse.fault != Fault::start_lost;
-    const bool sees_end = sees_start && pulse.fault != Fault::end_lost && !overlong;
+    const bool sees_start = pulse.start_seen;
+    const bool sees_end = pulse.end_seen && !overlong;
     if (has(record, wire::exposure_measured) != sees_end) wrong("measured or not");
     if (has(record, wire::exposure_no_start) == sees_start) wrong("start seen or not");
     if (sees_start && !is_stamp(record.start_ns, pulse.start)) wrong("start");
@@ -284,8 +283,8 @@ void World::judge_light(std::string& out) {
             const bool lit =
                 std::any_of(lights_.begin(), lights_.end(), [&](const Interval& interval) {
                     const Nanoseconds latest =
-                        pulse.start - light.lead_ns + model->settings().jitter;
-                    return interval.on <= latest && interval.off >= pulse.end;
+                        pulse.start - light.lead_ns + model->settings().jitter + rounding();
+                    return interval.on <= latest && interval.off >= pulse.end - rounding();
                 });
             if (!lit)
                 complain(out, "camera {}: the exposure at {} was not lit throughout", output,
