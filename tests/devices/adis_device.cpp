@@ -200,6 +200,7 @@ void AdisDevice::transfer(Nanoseconds at, const firmware::ImuTransfer& transfer,
         return;
     }
     for (std::size_t i = 0; i < received.size() / 2; ++i) {
+        if (resetting(at)) ++breaches_;  // since the word before
         put(i, response_);
         const unsigned address = transfer.bytes[2 * i];
         response_ = 0;

@@ -153,6 +153,10 @@ TEST_CASE("adis: a register is written byte by byte, and read by a word that ask
     CHECK(write.word_gap_ns == 25'000);
     REQUIRE(write.size == 4);
     CHECK(Words(write.bytes, write.bytes + 4) == Words{0xB6, 0x34, 0xB7, 0x12});
+    // Nothing may follow a command that resets the part.
+    const ImuTransfer reset = access_of(ImuKind::adis16470, {Action::write, 0, 0x68, 0x80, 300});
+    REQUIRE(reset.size == 2);
+    CHECK(Words(reset.bytes, reset.bytes + 2) == Words{0xE8, 0x80});
     const ImuTransfer question = access_of(ImuKind::adis16448b, {Action::expect, 0, 0x56, 1, 0});
     CHECK(question.clock_hz == 1'000'000);
     CHECK(question.word_gap_ns == 25'000);

@@ -82,6 +82,8 @@ void Adis::access(const SetupStep& step, ImuTransfer& transfer) const {
     }
     transfer.bytes[0] = static_cast<std::uint8_t>(0x80U | step.address);
     transfer.bytes[1] = static_cast<std::uint8_t>(step.value);
+    // All commands are in the low byte; while the part resets, it must not be asked for more.
+    if (step.address == facts_.command_register) transfer.size = 2;
     transfer.bytes[2] = static_cast<std::uint8_t>(transfer.bytes[0] + 1U);
     transfer.bytes[3] = static_cast<std::uint8_t>(step.value >> 8U);
 }
