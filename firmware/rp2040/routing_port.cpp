@@ -14,12 +14,16 @@ bool same_light(const Routes& a, const Routes& b) {
            a.light_limit == b.light_limit;
 }
 
-/// Triggers of slaves, and whether a camera of the light exposes, by the cameras that do.
+/// Triggers of slaves, and whether a camera of the light exposes, by the cameras that do. Others
+/// are at rest: what is there is what a pin shows from when it is switched over until the router
+/// runs.
 std::uint32_t routed_levels(const Routes& routes, std::uint32_t exposing) {
     std::uint32_t levels = (exposing & routes.light_cameras) != 0 ? 1U << camera_count : 0;
-    for (unsigned i = 0; i < camera_count; ++i)
-        if (routes.master[i] != not_routed)
-            levels |= ((exposing >> routes.master[i] ^ routes.inverted_triggers >> i) & 1U) << i;
+    for (unsigned i = 0; i < camera_count; ++i) {
+        const std::uint32_t active =
+            routes.master[i] == not_routed ? 0 : exposing >> routes.master[i];
+        levels |= ((active ^ routes.inverted_triggers >> i) & 1U) << i;
+    }
     return levels;
 }
 

@@ -156,6 +156,8 @@ EmulatedBoard::EmulatedBoard(EmulatedChip& chip, firmware::Environment environme
 
 EmulatedBoard::~EmulatedBoard() = default;
 
+Nanoseconds EmulatedBoard::edge_time(Nanoseconds at) { return cycle_of(at) * cycle_ns; }
+
 void EmulatedBoard::schedule_edge(const firmware::Edge& edge) {
     (*pending_)["inputs"].push_back(
         {rp2040::pin_of_input(edge.input), edge.level ? 1 : 0, cycle_of(edge.at)});

@@ -46,6 +46,8 @@ class EmulatedChip {
 /// and IMU output.
 class EmulatedBoard final : public firmware::VirtualBoard {
  public:
+    /// When an edge that is scheduled for `at` reaches the chip's pins: in the next cycle.
+    static firmware::Nanoseconds edge_time(firmware::Nanoseconds at);
     EmulatedBoard(EmulatedChip& chip, firmware::Environment environment);
     ~EmulatedBoard() override;
 

@@ -116,8 +116,12 @@ class World {
     /// How far what the port does may be from what was asked, as coarse as it is: half a grain of
     /// an output, a step between two words, and a grain of the stamps.
     Nanoseconds rounding() const;
-    /// As the port stamps it.
+    /// How much later than its grid point a reading of an IMU may begin: on the chip, behind
+    /// another interrupt.
+    Nanoseconds reading_delay() const { return chip_ ? 2 * us : 0; }
+    /// As the port stamps it. An edge reaches the emulated chip with its next cycle.
     Nanoseconds stamped(Nanoseconds at) const {
+        if (chip_) return rig::EmulatedBoard::edge_time(at);
         return at / model_.edge_grain_ns * model_.edge_grain_ns;
     }
     /// A stamp is that of an edge at `at`.
