@@ -5,6 +5,7 @@
 // i2c.attach(address, device): `device` has start(is_read, cycle) => acknowledges,
 //     write(byte, cycle) => acknowledges, read(cycle) => byte, and may have stop(cycle). Where no
 //     device is, the address is not acknowledged.
+// i2c.hold(is_held): somebody holds the bus after the byte under way, or releases it.
 import { fault, hex } from './fault.mjs';
 
 const fifo_depth = 16;
@@ -69,6 +70,7 @@ export class I2c {
     constructor({ name, clock, interrupts, line }) {
         Object.assign(this, { name, clock, interrupts, line });
         this.devices = new Map();
+        this.is_held = false;
         this.signal = () => {};
         this.reset();
     }
@@ -88,6 +90,11 @@ export class I2c {
 
     attach(address, device) {
         this.devices.set(address, device);
+    }
+
+    hold(is_held) {
+        this.is_held = is_held;
+        this.advance();
     }
 
     get is_enabled() {
@@ -111,6 +118,7 @@ export class I2c {
     /// Takes the next command, unless one is under way.
     advance() {
         if (this.event !== undefined || this.tx.length === 0 || !this.is_enabled) return;
+        if (this.is_held) return;
         const command = this.tx.shift();
         this.signal(false);
         const is_read = (command & is_read_command) !== 0;

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The emulated board in the time that another process gives it:
 //
-//   node lock_step.mjs IMAGE '{"watch": [GPIO...], "selects": [GPIO...]}'
+//   node lock_step.mjs IMAGE '{"watch": [GPIO...], "selects": [GPIO...], "i2c": [ADDRESS...]}'
 //
 // An object of JSON per line. Standard input has commands, each answered by one line when it is
 // done; all instants are cycles since the board's time began.
 //
 //   {"until": CYCLE, "inputs": [[GPIO, LEVEL, CYCLE]...], "usb": [[HEX, CYCLE]...],
-//    "uart": [[HEX, CYCLE OF ITS END]...], "reads": does the host, "held": is the SPI bus}
+//    "uart": [[HEX, CYCLE OF ITS END]...], "reads": does the host, "held": is the SPI bus,
+//    "i2c_held": is the I2C bus}
 //   -> {"now": CYCLE, "pins": [[CYCLE, LEVELS OF ALL GPIO]...], "usb": [[CYCLE, HEX]...],
 //       "uart": [HEX, BAUD], "stopped": nothing or what stopped it}
 // runs to that cycle, or right after the first change of a GPIO of `watch`.
@@ -18,6 +19,12 @@
 // When a byte was sent to the part that one of `selects` selects,
 //   {"transfer": {"at": CYCLE, "select": INDEX, "hz": CLOCK, "bytes": HEX}}
 // asks what it answers: {"bytes": HEX}.
+//
+// For each byte to or from the register of a part at one of the addresses `i2c`,
+//   {"transfer": {"at": CYCLE, "address": ADDRESS, "reads": does the chip, "hz": CLOCK,
+//                 "bytes": HEX of the register, and of the byte}}
+// asks the same as if it were a transfer of its own, begun at `at`: {"bytes": HEX,
+// "acknowledged": is it}; without a byte, whether the part is there.
 import { readFileSync, readSync, writeSync } from 'node:fs';
 import { ram_begin } from './chip.mjs';
 import { Fault, fault } from './fault.mjs';
@@ -96,9 +103,49 @@ class DistantPart {
     }
 }
 
+/// An I2C part of the other process, whose register addresses count up.
+class DistantRegisters {
+    constructor(board, address) {
+        Object.assign(this, { board, address });
+    }
+
+    start(is_read, cycle) {
+        if (!is_read) this.register = undefined;
+        return this.ask(is_read, cycle, [this.register ?? 0]).acknowledged;
+    }
+
+    write(byte, cycle) {
+        if (this.register === undefined) {
+            this.register = byte;
+            return true;
+        }
+        const before = 2; // the address, the register
+        return this.ask(false, this.begin(cycle, before), [this.register++, byte]).acknowledged;
+    }
+
+    read(cycle) {
+        const before = 3; // the address, the register, the address once more
+        const { bytes } = this.ask(true, this.begin(cycle, before), [this.register++, 0]);
+        return from_hex(bytes)[1];
+    }
+
+    /// Of a transfer in which a byte that has just ended comes after others.
+    begin(cycle, before) {
+        return cycle - (before + 1) * 9 * this.board.machine.i2c[1].bit_cycles;
+    }
+
+    ask(reads, cycle, bytes) {
+        const { machine, lines, zero } = this.board;
+        const hz = Math.round(clk_hz / machine.i2c[1].bit_cycles);
+        const asked = { at: cycle - zero, address: this.address, reads, hz, bytes: to_hex(bytes) };
+        lines.write({ transfer: asked });
+        return lines.read();
+    }
+}
+
 class Board {
-    constructor(lines, { watch, selects }) {
-        Object.assign(this, { lines, watch, selects });
+    constructor(lines, { watch, selects, i2c }) {
+        Object.assign(this, { lines, watch, selects, i2c });
     }
 
     start() {
@@ -119,6 +166,8 @@ class Board {
         this.selects.forEach((gpio, index) =>
             machine.spi[0].attach({ gpio, device: new DistantPart(this, index) }),
         );
+        for (const address of this.i2c)
+            machine.i2c[1].attach(address, new DistantRegisters(this, address));
         while (machine.usb.state !== 'configured') this.run_for_a_moment();
         let is_open = false;
         machine.usb.set_line_state(true, true, () => (is_open = true));
@@ -144,6 +193,7 @@ class Board {
         }
         machine.usb.set_reading(command.reads);
         machine.spi[0].hold(command.held);
+        machine.i2c[1].hold(command.i2c_held);
     }
 
     run(command) {

@@ -59,9 +59,7 @@ class NativeBoard final : public VirtualBoard,
     bool watchdog_bit() const override { return watchdog_bit_; }
 
     void set_imu_bus_stuck(bool stuck) override { imu_bus_stuck_ = stuck; }
-
-    /// From now on another part holds the I2C bus, or has released it.
-    void set_i2c_held(bool held) { i2c_held_ = held; }
+    void set_i2c_held(bool held) override { i2c_held_ = held; }
 
     Nanoseconds next_wake() const override;
     Nanoseconds time() const override { return now_; }

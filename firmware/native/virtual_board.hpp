@@ -61,6 +61,8 @@ class VirtualBoard {
 
     /// From now on no IMU transfer completes, or all of them do again.
     virtual void set_imu_bus_stuck(bool stuck) = 0;
+    /// From now on another part holds the I2C bus, or has released it.
+    virtual void set_i2c_held(bool held) = 0;
 
     /// True: the code stalled for longer than the watchdog allows.
     virtual bool watchdog_bit() const = 0;

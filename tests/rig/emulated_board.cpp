@@ -72,10 +72,15 @@ std::filesystem::path build_directory() {
     return std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path();
 }
 
+/// Where the parts that the firmware knows may be.
+constexpr int i2c_addresses[] = {0x68, 0x69};
+
 json wiring() {
     json watched = json::array();
     for (const rp2040::SignalPin& each : seen_pins) watched.push_back(each.pin);
-    return {{"watch", watched}, {"selects", {+rp2040::pin_spi_select0, +rp2040::pin_spi_select1}}};
+    return {{"watch", watched},
+            {"selects", {+rp2040::pin_spi_select0, +rp2040::pin_spi_select1}},
+            {"i2c", i2c_addresses}};
 }
 
 json nothing() {
@@ -210,6 +215,7 @@ void EmulatedBoard::run_to(Nanoseconds until) {
     command["until"] = until / cycle_ns;
     command["reads"] = transmitted_.size() < link_capacity_;
     command["held"] = stuck_;
+    command["i2c_held"] = i2c_held_;
     chip_.write(command);
     json answer = chip_.read();
     for (; answer.contains("transfer"); answer = chip_.read())
@@ -225,15 +231,20 @@ void EmulatedBoard::answer_transfer(const json& asked) {
     firmware::ImuTransfer transfer;
     const auto bytes = from_hex(asked.at("bytes").get<std::string>());
     if (bytes.size() > sizeof transfer.bytes) throw std::runtime_error("too long a transfer");
-    transfer.chip = asked.at("select").get<std::uint8_t>();
+    const bool spi = asked.contains("select");
+    if (!spi)
+        transfer.bus = asked.at("reads").get<bool>() ? firmware::ImuTransfer::Bus::i2c_read
+                                                     : firmware::ImuTransfer::Bus::i2c_write;
+    transfer.chip = asked.at(spi ? "select" : "address").get<std::uint8_t>();
     transfer.size = static_cast<std::uint8_t>(bytes.size());
     transfer.clock_hz = asked.at("hz").get<std::uint32_t>();
     std::copy(bytes.begin(), bytes.end(), transfer.bytes);
     std::vector<std::uint8_t> received(bytes.size(), 0xFF);
-    if (environment_.imu_transfer)
+    const bool acknowledged =
+        environment_.imu_transfer &&
         environment_.imu_transfer(asked.at("at").get<std::int64_t>() * cycle_ns, transfer,
                                   received);
-    chip_.write({{"bytes", to_hex(received)}});
+    chip_.write({{"bytes", to_hex(received)}, {"acknowledged", acknowledged}});
 }
 
 void EmulatedBoard::take(const json& answer) {

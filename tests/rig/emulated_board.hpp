@@ -42,8 +42,7 @@ class EmulatedChip {
 };
 
 /// One life of it, from its start to a restart. Its time begins at 0 when it starts; the
-/// constructor returns when USB is set up. It has no I2C parts, and of Environment no flash, tap
-/// and IMU output.
+/// constructor returns when USB is set up. Of Environment it has no flash, tap and IMU output.
 class EmulatedBoard final : public firmware::VirtualBoard {
  public:
     /// When an edge that is scheduled for `at` reaches the chip's pins: in the next cycle.
@@ -56,6 +55,7 @@ class EmulatedBoard final : public firmware::VirtualBoard {
     void uart_receive(std::span<const std::uint8_t> bytes, firmware::Nanoseconds at) override;
     void run_until(firmware::Nanoseconds until) override;
     void set_imu_bus_stuck(bool stuck) override { stuck_ = stuck; }
+    void set_i2c_held(bool held) override { i2c_held_ = held; }
     bool watchdog_bit() const override { return bitten_; }
     void set_level(std::uint8_t input, bool level) override { schedule_edge({0, input, level}); }
     void set_link_capacity(std::size_t bytes) override { link_capacity_ = bytes; }
@@ -86,6 +86,7 @@ class EmulatedBoard final : public firmware::VirtualBoard {
     firmware::Nanoseconds way_;  ///< of bytes, between the board and its owner
     std::size_t link_capacity_ = std::size_t{64} * 1024;
     bool stuck_ = false;
+    bool i2c_held_ = false;
     bool stopped_ = false;  ///< its life is over
     bool bitten_ = false;   ///< by the watchdog
     std::vector<std::uint8_t> transmitted_;

@@ -83,9 +83,9 @@ TEST_CASE(
     world.add_camera(0);
     REQUIRE(world.begin());
     world.run(2 * second);
-    world.native_board().set_i2c_held(true);
+    world.board().set_i2c_held(true);
     world.run(length);
-    world.native_board().set_i2c_held(false);
+    world.board().set_i2c_held(false);
     const std::size_t before = world.inbox().samples[0].size();
     world.run(3 * second);
     world.finish();
