@@ -71,7 +71,7 @@ class Illumination {
     Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last told to close
     Nanoseconds saved_ = 0;               ///< on-time that may be spent, as of saved_at_
     Nanoseconds saved_at_ = 0;
-    Plan plans_[max_plans];
+    Plan plans_[max_plans] = {};
 };
 
 }  // namespace versavis::firmware

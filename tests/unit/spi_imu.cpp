@@ -679,6 +679,9 @@ TEST_CASE("spi_imu: the age of the accelerometer's values is told when its edge 
         {{-100 * us - period + off, -100 * us}, age(-100 * us)},
         {{-100 * us - period + off + 1, -100 * us}, unknown},
         // One that came sooner than it was due.
+        {{end - 2 * period + off / 2, end - period + off / 2, end}, unknown},
+        {{end - 2 * period + off / 2, end - period + off / 2, end + 1},
+         age(end - period + off / 2)},
         {{first + 1 - 2 * period + off, first + 1 - period + off, first + 1}, unknown},
         {{-100 * us - period, -100 * us, -100 * us + period / 8 - 1}, age(-100 * us)},  // an echo
     };
