@@ -82,5 +82,6 @@ TEST_CASE(
     for (const wire::Exposure& record : world.inbox().exposures[0])
         if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
     world.send(wire::Reboot{wire::reboot_magic, 1});
+    world.run(ms);
     CHECK(world.reboots() == 1);
 }
