@@ -272,7 +272,8 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
         const bool lit = (configuration.illumination.cameras >> i & 1U) != 0;
         cameras_[i].configure(configuration.cameras[i],
                               lit ? configuration.illumination.lead_ns : 0);
-        outputs_.rest(i, cameras_[i].trigger_inverted(), now);
+        // Before any trigger, and not so soon that a port whose words take time is late.
+        outputs_.rest(i, cameras_[i].trigger_inverted(), now + OutputQueue::horizon);
         if (cameras_[i].has_strobe()) inputs |= 1U << i;
     }
     for (unsigned port = 0; port < wire::imu_count; ++port)

@@ -29,7 +29,9 @@ void run_a_million(std::uint32_t rate_uhz) {
 
 }  // namespace
 
-TEST_CASE("011-no-drift-7: a million triggers at 7 Hz") { run_a_million(7'000'000); }
-TEST_CASE("011-no-drift-14: a million triggers at 14 Hz") { run_a_million(14'000'000); }
-TEST_CASE("011-no-drift-90: a million triggers at 90 Hz") { run_a_million(90'000'000); }
-TEST_CASE("011-no-drift-29.97: a million triggers at 29.97 Hz") { run_a_million(29'970'000); }
+TEST_CASE("011-no-drift-7: a million triggers at 7 Hz", "[native]") { run_a_million(7'000'000); }
+TEST_CASE("011-no-drift-14: a million triggers at 14 Hz", "[native]") { run_a_million(14'000'000); }
+TEST_CASE("011-no-drift-90: a million triggers at 90 Hz", "[native]") { run_a_million(90'000'000); }
+TEST_CASE("011-no-drift-29.97: a million triggers at 29.97 Hz", "[native]") {
+    run_a_million(29'970'000);
+}

@@ -31,7 +31,8 @@ void check_words(const std::vector<std::uint16_t>& words, Nanoseconds at,
 TEST_CASE(
     "027-imu-output: a flight controller reads any IMU as an ADIS16448, and the host's samples do "
     "not "
-    "suffer") {
+    "suffer",
+    "[native]") {
     const bool adis = GENERATE(true, false);
     Scenario world;
     if (adis)
@@ -56,7 +57,8 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "027-imu-output-alone: with a stored configuration it serves from power-up, without any host") {
+    "027-imu-output-alone: with a stored configuration it serves from power-up, without any host",
+    "[native]") {
     Scenario world;
     auto device =
         std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion);
@@ -83,7 +85,8 @@ TEST_CASE(
                    static_cast<std::int16_t>(before[2])) < 20);
 }
 
-TEST_CASE("027-power-fails: what was stored before is in force until the new one is safe") {
+TEST_CASE("027-power-fails: what was stored before is in force until the new one is safe",
+          "[native]") {
     firmware::PortModel model;
     model.store_ns = 400 * ms;
     Scenario world(1, model);

@@ -6,7 +6,8 @@ using namespace versavis::scenario;
 
 TEST_CASE(
     "029-board-stalls: code that stands still past its triggers skips them, tells, and goes on at "
-    "once") {
+    "once",
+    "[native]") {
     const Nanoseconds stall = GENERATE(500 * us, 3 * ms, 30 * ms, 130 * ms);
     Scenario world;
     for (unsigned camera = 0; camera < 4; ++camera) world.add_camera(camera, {}, 50'000'000);
@@ -42,7 +43,8 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("029-watchdog: code that stands still for good is reset, and the host is told why") {
+TEST_CASE("029-watchdog: code that stands still for good is reset, and the host is told why",
+          "[native]") {
     Scenario world;
     world.add_camera(0);
     REQUIRE(world.begin());

@@ -7,7 +7,8 @@ using namespace versavis::scenario;
 TEST_CASE(
     "034-random-faults: whatever cameras, strobes, code and host do at once, no record says what "
     "did not "
-    "happen") {
+    "happen",
+    "[native]") {
     const auto seed = GENERATE(range(1U, 41U));
     Scenario world(seed);
     std::mt19937_64 random(seed);

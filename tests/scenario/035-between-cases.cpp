@@ -89,7 +89,8 @@ TEST_CASE("035-pulses-that-would-meet: two triggers never become one pulse") {
 }
 
 TEST_CASE(
-    "035-stall-at-a-trigger: words that could not be handed over in time leave as whole pulses") {
+    "035-stall-at-a-trigger: words that could not be handed over in time leave as whole pulses",
+    "[native]") {
     Scenario world;
     world.add_camera(0, {}, 100'000'000);
     world.configuration.cameras[0].pulse_ns = 2'000'000;
@@ -126,7 +127,8 @@ TEST_CASE(
 
 TEST_CASE(
     "035-edges-lost: what was lost makes no record of two exposures, and a slave says that it may "
-    "miscount") {
+    "miscount",
+    "[native]") {
     Scenario world;
     world.add_camera(0, exposing_for(300 * us), 1'000'000'000);
     add_slave(world, 1);

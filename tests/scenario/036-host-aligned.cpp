@@ -74,9 +74,9 @@ TEST_CASE(
     REQUIRE(board.middles(0).size() > 1'000);
     REQUIRE(board.middles(1).size() > 2'500);
     for (const Nanoseconds middle : board.middles(0))
-        REQUIRE(std::abs(off_grid(middle, 0, 50 * ms)) <= 20);
+        REQUIRE(std::abs(off_grid(middle, 0, 50 * ms)) <= 20 + board.world.rounding());
     for (const Nanoseconds middle : board.middles(1))
-        REQUIRE(std::abs(off_grid(middle, 7 * ms, 20 * ms)) <= 20);
+        REQUIRE(std::abs(off_grid(middle, 7 * ms, 20 * ms)) <= 20 + board.world.rounding());
 }
 
 TEST_CASE(

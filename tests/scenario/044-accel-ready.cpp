@@ -99,7 +99,7 @@ TEST_CASE("044-accel-ready-not-asked: the part's line stays as it is after a res
     CHECK(world.judge() == "");
 }
 
-TEST_CASE("044-accel-ready-lost: no age is of an edge before others that were lost") {
+TEST_CASE("044-accel-ready-lost: no age is of an edge before others that were lost", "[native]") {
     firmware::PortModel model;
     model.edges = 16;
     Scenario world(1, model);

@@ -60,7 +60,8 @@ TEST_CASE("046-ready-echo-i2c: a reading that takes longer than the echo is none
     CHECK(world.inbox().healths.back().imu_restarts == 0);
 }
 
-TEST_CASE("046-ready-lost: after lost edges the numbers go on, and no stamp is another's") {
+TEST_CASE("046-ready-lost: after lost edges the numbers go on, and no stamp is another's",
+          "[native]") {
     const Part part = GENERATE(values<Part>({
         {"adis16448b", wire::ImuKind::adis16448b, 819.2},
         {"adis16445", wire::ImuKind::adis16445, 200},
@@ -91,8 +92,8 @@ TEST_CASE("046-ready-lost: after lost edges the numbers go on, and no stamp is a
     CHECK(world.judge() == "");  // the numbers are those of the edges
 }
 
-TEST_CASE(
-    "046-ready-late: after a stall the next reading begins with its data, not in the middle") {
+TEST_CASE("046-ready-late: after a stall the next reading begins with its data, not in the middle",
+          "[native]") {
     // On I2C a reading that begins late would last until the data after it.
     Scenario world;
     auto device = std::make_unique<devices::Icm42688pDevice>(&World::motion);

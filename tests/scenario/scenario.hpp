@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every scenario starts with: a World that writes its trace to the directory $VERSAVIS_VCD.
+// What every scenario starts with: a World that writes its trace to the directory $VERSAVIS_VCD, and
+// what the host heard to the directory $VERSAVIS_LOG.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 
 #include "adis_device.hpp"
 #include "byte_register_device.hpp"
+#include "message_log.hpp"
 #include "world.hpp"
 
 namespace versavis::scenario {
@@ -22,11 +27,24 @@ class Scenario : public World {
     Scenario(const Scenario&) = delete;
     Scenario& operator=(const Scenario&) = delete;
     ~Scenario() {
-        const char* directory = std::getenv("VERSAVIS_VCD");
-        if (directory == nullptr) return;
-        const std::string name = Catch::getResultCapture().getCurrentTestName();
-        std::ofstream(std::string(directory) + "/" + name.substr(0, name.find(':')) + ".vcd")
-            << trace().vcd();
+        if (const char* directory = std::getenv("VERSAVIS_VCD"))
+            std::ofstream(fmt::format("{}/{}.vcd", directory, name())) << trace().vcd();
+        if (const char* directory = std::getenv("VERSAVIS_LOG"))
+            std::ofstream(log_path(directory)) << message_log(inbox());
+    }
+
+ private:
+    static std::string name() {
+        const std::string test = Catch::getResultCapture().getCurrentTestName();
+        return test.substr(0, test.find(':'));
+    }
+
+    /// Another one for each World of the same scenario.
+    static std::string log_path(const char* directory) {
+        for (unsigned number = 1;; ++number) {
+            const std::string path = fmt::format("{}/{}-{}.log", directory, name(), number);
+            if (!std::filesystem::exists(path)) return path;
+        }
     }
 };
 
