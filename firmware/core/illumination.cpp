@@ -66,14 +66,16 @@ void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds dura
     open_next(now);
 }
 
-/// The union of the leads of all plans; there is no edge where they overlap.
+/// The union of the leads of all plans that are not over; there is no edge where they overlap.
 void Illumination::set_leads(Nanoseconds now) {
-    const bool on_now = outputs_.cancel(output_light_lead);
-    if (on_now && plans_[0].on > now) outputs_.set(now, output_light_lead, false);
+    bool on_now = outputs_.cancel(output_light_lead);
     for (std::size_t i = 0; i < plan_count_;) {
         const Nanoseconds on = plans_[i].on;
         Nanoseconds off = plans_[i].lead_off;
         for (++i; i < plan_count_ && plans_[i].on <= off; ++i) off = max(off, plans_[i].lead_off);
+        if (off <= now) continue;
+        if (on_now && on > now) outputs_.set(now, output_light_lead, false);
+        on_now = false;
         outputs_.set(max(on, now), output_light_lead, true);
         outputs_.set(off, output_light_lead, false);
     }

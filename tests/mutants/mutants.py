@@ -39,9 +39,9 @@ import source_mutants  # noqa: E402
 EQUIVALENT = "tests/mutants/equivalent.txt"
 USAGE, BROKEN_TOOL, INTERRUPTED = 64, 70, 130
 
-# A mutant that takes so much longer than the program without one, and a second, will not end. That
-# one counts lines, and takes about three times as long as without.
-PATIENCE, SLACK_S = 2, 1
+# A mutant that takes so many times as long as the program without one, and so many seconds more,
+# will not end. That one counts lines, and takes about three times as long as without.
+PATIENCE, SLACK_S = 3, 2
 COMPILE_LIMIT_S = 120
 MEMORY_LIMIT = 1 << 30
 OUTPUT_LIMIT = 16 << 20

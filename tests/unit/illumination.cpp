@@ -352,6 +352,28 @@ TEST_CASE("illumination: leads that touch or overlap are one") {
     CHECK(bench.lead() == Times{9'900 * us, 14 * ms, 15'900 * us, 16'050 * us});
 }
 
+TEST_CASE("illumination: a lead that is over is not begun once more by the next plan") {
+    for (const Nanoseconds planned : {10'050 * us - 1, 10'050 * us, 12 * ms}) {
+        Bench bench;
+        bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
+        bench.run(10 * ms);
+        bench.light.plan(1, 20 * ms, 4 * ms, true, planned);  // before it is polled again
+        bench.run(30 * ms);
+        const Times leads = bench.lead();
+        CHECK(Times{leads.end() - 2, leads.end()} == Times{19'900 * us, 20'050 * us});
+        CHECK(leads[1] == 10'050 * us);
+        CHECK(leads.size() == 4);
+    }
+    // Its end was put off, since nobody polled: it ends at once.
+    Bench bench;
+    bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
+    bench.run(9 * ms);
+    bench.light.plan(1, 20 * ms, 4 * ms, true, 13 * ms);
+    bench.polled = 13 * ms;
+    bench.run(30 * ms);
+    CHECK(bench.lead() == Times{9'900 * us, 13 * ms, 19'900 * us, 20'050 * us});
+}
+
 TEST_CASE("illumination: it stays on for an exposure whose lead is on its way") {
     for (const Nanoseconds later : {0, 1}) {
         Bench bench;
