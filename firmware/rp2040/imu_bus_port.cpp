@@ -32,10 +32,12 @@ constexpr std::uint32_t alarm_margin_us = 2;
 
 constexpr std::uint32_t alarm_bit = 1U << 1U;
 
-void select(std::uint8_t chip, bool selected) {
-    const std::uint32_t pin = 1U << (chip == 0 ? pin_spi_select0 : pin_spi_select1);
-    (selected ? sio().out_clear : sio().out_set) = pin;
+constexpr std::uint32_t select_bit(std::uint8_t chip) {
+    return 1U << (chip == 0 ? pin_spi_select0 : pin_spi_select1);
 }
+
+/// Less urgent than what asks for it.
+void ask_for_i2c() { interrupt_controller().set_pending = 1U << interrupt_i2c1; }
 
 void set_spi_clock(std::uint32_t hz) {
     constexpr std::uint32_t mode_3 = 1U << 7U | 1U << 6U;
@@ -117,19 +119,20 @@ void ImuBusPort::set_up_spi() {
     spi_hz_ = 0;
 }
 
-/// The edges of a pin since they were last forgotten.
-bool ImuBusPort::edge_latched() const {
-    return (io_bank().latched[pin_ / 8] >> (pin_ % 8 * 4) & gpio_rises) != 0;
+/// The pin that starts the job; its edges since they were last forgotten are latched.
+void ImuBusPort::choose_edge(unsigned pin) {
+    edge_bank_ = pin / 8;
+    edge_bit_ = gpio_rises << (pin % 8 * 4);
 }
-void ImuBusPort::forget_edge() { io_bank().latched[pin_ / 8] = gpio_rises << (pin_ % 8 * 4); }
+bool ImuBusPort::edge_latched() const { return (io_bank().latched[edge_bank_] & edge_bit_) != 0; }
+void ImuBusPort::forget_edge() { io_bank().latched[edge_bank_] = edge_bit_; }
 
 void ImuBusPort::watch_edge(bool watch) {
-    Register& enable = io_bank().interrupt_enable[pin_ / 8];
-    const std::uint32_t bit = gpio_rises << (pin_ % 8 * 4);
+    Register& enable = io_bank().interrupt_enable[edge_bank_];
     if (watch)
-        set_bits(enable, bit);
+        set_bits(enable, edge_bit_);
     else
-        clear_bits(enable, bit);
+        clear_bits(enable, edge_bit_);
 }
 
 bool ImuBusPort::arm(const firmware::ImuJob& job) {
@@ -145,7 +148,7 @@ bool ImuBusPort::arm(const firmware::ImuJob& job) {
         begin_no_sooner_than(job.after);
         return true;
     }
-    pin_ = pin_of_input(job.input);
+    choose_edge(pin_of_input(job.input));
     // One that came before may be the one that is waited for, or be so new that it is not known.
     Nanoseconds rise = firmware::never;
     if (edge_latched()) {
@@ -192,8 +195,7 @@ void ImuBusPort::disarm() {
         while (dma().abort != 0) {
         }
         dma().interrupt1_status = 1U << dma_spi_receive;
-        select(0, false);
-        select(1, false);
+        sio().out_set = select_bit(0) | select_bit(1);
         if (is_spi())
             set_up_spi();
         else
@@ -203,6 +205,7 @@ void ImuBusPort::disarm() {
     state_ = State::idle;
     job_.count = 0;
     in_gap_ = false;
+    i2c_asks_ = I2cAsks::nothing;
 }
 
 void ImuBusPort::data_ready() {
@@ -215,8 +218,7 @@ void ImuBusPort::data_ready() {
 /// The pause since the transfer before has passed, or is waited for.
 void ImuBusPort::begin_when_free() {
     if (!pausing_ || clock_.now() >= free_at_) return begin();
-    state_ = State::waits_for_time;
-    set_alarm(free_at_);
+    wait_until(free_at_);
 }
 
 /// For the time that the job says.
@@ -227,8 +229,14 @@ void ImuBusPort::pause_from(Nanoseconds at) {
 
 void ImuBusPort::begin_no_sooner_than(Nanoseconds at) {
     if (clock_.now() >= at) return begin_when_free();
+    wait_until(later(at, free_at_));
+}
+
+/// An alarm of an earlier time may come at any instruction.
+void ImuBusPort::wait_until(Nanoseconds at) {
+    const InterruptsOff undisturbed;
     state_ = State::waits_for_time;
-    set_alarm(later(at, free_at_));
+    set_alarm(at);
 }
 
 void ImuBusPort::set_alarm(Nanoseconds at) {
@@ -250,14 +258,17 @@ void ImuBusPort::time_reached() {
     if (state_ == State::waits_for_time) return begin();
     if (state_ != State::transfers) return;
     if (in_gap_) return begin_part();
-    if (!is_spi()) end_i2c(true);
+    if (is_spi()) return;
+    i2c_asks_ = I2cAsks::end;
+    ask_for_i2c();
 }
 
 /// All that can be done before the transfer begins.
 void ImuBusPort::prepare() {
     position_ = 0;
     reply().refused = false;
-    if (!is_spi()) return;
+    select_bit_ = is_spi() ? select_bit(transfer().chip) : 0;
+    if (select_bit_ == 0) return;
     if (transfer().clock_hz != spi_hz_) {
         spi_hz_ = transfer().clock_hz;
         set_spi_clock(spi_hz_);
@@ -277,19 +288,21 @@ void ImuBusPort::prepare_part() {
     receive_channel().count = part_;
 }
 
+/// SPI begins here and now; I2C takes longer than more urgent interrupts may wait.
 void ImuBusPort::begin() {
-    const std::uint32_t now_us = timer().low;
-    if (is_spi())
+    started_us_ = timer().low;
+    if (select_bit_ != 0) {
         begin_part();
-    else
-        begin_i2c();
+    } else {
+        i2c_asks_ = I2cAsks::begin;
+        ask_for_i2c();
+    }
     state_ = State::transfers;
-    started_us_ = now_us;
     pausing_ = false;
 }
 
 void ImuBusPort::begin_part() {
-    select(transfer().chip, true);
+    sio().out_clear = select_bit_;
     dma().trigger = 1U << dma_spi_transmit | 1U << dma_spi_receive;
     in_gap_ = false;
 }
@@ -297,11 +310,12 @@ void ImuBusPort::begin_part() {
 void ImuBusPort::transferred() {
     dma().interrupt1_status = 1U << dma_spi_receive;
     if (state_ != State::transfers) return;
-    select(transfer().chip, false);
+    sio().out_set = select_bit_;
     position_ += part_;
     if (position_ == transfer().size) return end_transfer();
-    in_gap_ = true;
     prepare_part();
+    const InterruptsOff undisturbed;  // by an alarm of an earlier time
+    in_gap_ = true;
     set_alarm(clock_.now() + transfer().word_gap_ns);
 }
 
@@ -321,6 +335,7 @@ void ImuBusPort::end_transfer() {
 }
 
 void ImuBusPort::begin_i2c() {
+    started_us_ = timer().low;
     set_function(pin_i2c_clock, function_i2c);
     received_ = 0;
     reply().bytes[0] = transfer().bytes[0];
@@ -328,7 +343,11 @@ void ImuBusPort::begin_i2c() {
     i2c1().target = transfer().chip;
     i2c1().enable = 1;
     static_cast<void>(i2c1().clear_all);
-    set_alarm(clock_.now() + i2c_patience);
+    {
+        const InterruptsOff undisturbed;
+        set_alarm(clock_.now() + i2c_patience);
+        i2c_asks_ = I2cAsks::nothing;
+    }
     feed_i2c();
 }
 
@@ -355,6 +374,8 @@ void ImuBusPort::i2c_moved() {
         i2c1().interrupt_mask = 0;
         return;
     }
+    if (i2c_asks_ == I2cAsks::begin) return begin_i2c();
+    if (i2c_asks_ == I2cAsks::end) return end_i2c(true);
     while (i2c1().receive_level > 0 && received_ + 1 < transfer().size)
         reply().bytes[++received_] = static_cast<std::uint8_t>(i2c1().data);
     if ((causes & i2c_aborted) != 0) return end_i2c(true);
@@ -365,6 +386,7 @@ void ImuBusPort::i2c_moved() {
 void ImuBusPort::end_i2c(bool refused) {
     i2c1().interrupt_mask = 0;
     static_cast<void>(i2c1().clear_all);
+    i2c_asks_ = I2cAsks::nothing;
     reply().refused = refused;
     if (refused) set_up_i2c();
     end_transfer();

@@ -26,18 +26,21 @@ class ImuBusPort final : public firmware::ImuBus {
 
  private:
     enum class State : std::uint8_t { idle, waits_for_edge, waits_for_time, transfers, done };
+    enum class I2cAsks : std::uint8_t { nothing, begin, end };
 
     const firmware::ImuTransfer& transfer() const { return job_.transfers[index_]; }
     firmware::ImuReply& reply() { return replies_[index_]; }
     bool is_spi() const { return transfer().bus == firmware::ImuTransfer::Bus::spi; }
     void set_up_spi();
     void copy_job(const firmware::ImuJob& job);
+    void choose_edge(unsigned pin);
     bool edge_latched() const;
     void forget_edge();
     void watch_edge(bool watch);
     void begin_when_free();
     void pause_from(Nanoseconds at);
     void begin_no_sooner_than(Nanoseconds at);
+    void wait_until(Nanoseconds at);
     void set_alarm(Nanoseconds at);
     void prepare();
     void prepare_part();
@@ -52,7 +55,8 @@ class ImuBusPort final : public firmware::ImuBus {
     EdgePort& edges_;
     Attention& attention_;
     volatile State state_ = State::idle;
-    bool in_gap_ = false;  ///< between two words of a transfer
+    volatile I2cAsks i2c_asks_ = I2cAsks::nothing;  ///< by an interrupt that is more urgent
+    volatile bool in_gap_ = false;                  ///< between two words of a transfer
     Nanoseconds alarm_at_ = 0;
     Nanoseconds free_at_ = 0;  ///< when the next transfer may begin
     bool pausing_ = false;     ///< which may not have come yet
@@ -63,7 +67,9 @@ class ImuBusPort final : public firmware::ImuBus {
     std::size_t received_ = 0;  ///< by I2C, after the first
     std::uint32_t spi_hz_ = 0;
     unsigned taken_ = 0;
-    unsigned pin_ = 0;  ///< that starts the job
+    std::uint32_t select_bit_ = 0;  ///< of the transfer's part; 0: on I2C
+    unsigned edge_bank_ = 0;        ///< of the pin that starts the job
+    std::uint32_t edge_bit_ = 0;
     firmware::ImuJob job_;
     firmware::ImuReply replies_[firmware::max_transfers];
 };

@@ -111,8 +111,8 @@ void start_ports() {
     enable_interrupt(interrupt_usb, 0);
     enable_interrupt(interrupt_gpio, 0);
     enable_interrupt(interrupt_timer1, 0);
-    enable_interrupt(interrupt_dma1, 0);
-    enable_interrupt(interrupt_i2c1, 0);
+    enable_interrupt(interrupt_dma1, 1);
+    enable_interrupt(interrupt_i2c1, 1);
     enable_interrupt(interrupt_dma0, 1);
     enable_interrupt(interrupt_timer0, 1);
     enable_interrupt(interrupt_pio0_1, 1);

@@ -66,6 +66,26 @@ function zero_of(rig, camera, output = 0) {
     return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
 }
 
+/// How many microseconds each interrupt of priority 0 takes, from here on.
+function urgent_times(machine) {
+    const entry_and_exit = 28;
+    const { interrupts } = machine;
+    const times = [];
+    const begin = interrupts.begin.bind(interrupts);
+    const end = interrupts.end.bind(interrupts);
+    let begun;
+    interrupts.begin = (exception) => {
+        if (interrupts.priority_of(exception) === 0) begun = machine.now;
+        begin(exception);
+    };
+    interrupts.end = () => {
+        if (interrupts.priority_of(interrupts.active.at(-1)) === 0)
+            times.push((machine.now - begun + entry_and_exit) * cycle_ns * 1e-3);
+        end();
+    };
+    return times;
+}
+
 const tests = {
     'no output is driven before a configuration': () => {
         const rig = new Rig(image, quick_usb);
@@ -522,6 +542,31 @@ const tests = {
             check(triggered === at(camera.triggers[trigger - 1]), `trigger ${trigger}`);
             check_within(start - at(camera.starts[trigger - 1]), -48, 48, 'start');
             check_within(end - at(camera.ends[trigger - 1]), -48, 48, 'end');
+        }
+    },
+
+    'the most urgent interrupts take at most 1.4 us, entry and exit included': () => {
+        for (const options of [1, 5]) {
+            const rig = new Rig(image, quick_usb);
+            const period = 125_000;
+            const imu = new Icm42688p(rig.machine, {
+                select: options === 1 ? pin.spi_select : undefined,
+                ready: pin.imu_ready,
+                period,
+            });
+            for (const output of [0, 1, 2, 3]) rig.add_camera(output);
+            rig.connect();
+            rig.configure({
+                cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })),
+                imus: [{ kind: 6, options, rate_mhz: 1_000_000 }],
+            });
+            const times = urgent_times(rig.machine);
+            imu.run(rig.machine.now + 125_000, rig.machine.now + 900 * period);
+            rig.run_until('set up the IMU', () => rig.host.has_event(10));
+            rig.host.start();
+            rig.run_ms(600);
+            check(times.length > 1000, `${times.length} of them`);
+            for (const us of times) check_within(us, 0, 1.4, 'interrupt');
         }
     },
 
