@@ -47,3 +47,17 @@ TEST_CASE("011-no-drift-90: a million triggers at 90 Hz", "[native]") {
 TEST_CASE("011-no-drift-29.97: a million triggers at 29.97 Hz", "[native]") {
     run_triggers(million, 29'970'000);
 }
+
+TEST_CASE("011-microseconds: a chip's counter of them wraps after 71.6 minutes, nothing slips") {
+    Scenario world;
+    world.add_camera(0, {}, 1'000'000);
+    world.add_pulses(wire::pulse_pps, 300 * ms, 1e9 + 12'000);
+    REQUIRE(world.begin());
+    world.run(4'500 * second);
+    world.finish();
+    CHECK(world.judge() == "");
+    CHECK(world.inbox().exposures[0].size() >= 4'499);
+    CHECK(world.inbox().events_of(wire::EventKind::pps).size() >= 4'499);
+    for (const wire::Exposure& record : world.inbox().exposures[0])
+        if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
+}

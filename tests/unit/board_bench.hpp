@@ -235,4 +235,25 @@ struct Bench {
     Board board;
 };
 
+/// Everything but the answers to a start is at its default: cameras at 20 Hz, on the same grid.
+struct Cameras : Bench {
+    explicit Cameras(unsigned count, std::uint32_t flags = 0) {
+        for (unsigned i = 0; i < count; ++i) add_camera(i, flags);
+    }
+    /// A bit for each output that had a pulse since the last call.
+    unsigned pulsed() {
+        unsigned outputs = 0;
+        for (unsigned i = 0; i < output_count; ++i) outputs |= pulses(i).empty() ? 0 : 1U << i;
+        port.words.clear();
+        return outputs;
+    }
+    void run_for(Nanoseconds duration) { run(port.time + duration); }
+};
+
+/// A VN-100 at the UART, and an ADIS16448 at the SPI.
+inline void add_imus(Bench& bench, std::uint8_t options) {
+    bench.configuration.imus[0] = {wire::ImuKind::adis16448b, 0, options, 0, 400'000};
+    bench.configuration.imus[1] = {wire::ImuKind::vn100, 0, options, 0, 300'000};
+}
+
 }  // namespace versavis::firmware
