@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every scenario starts with: a World that writes its trace to the directory $VERSAVIS_VCD, and
-// what the host heard to the directory $VERSAVIS_LOG.
+// What every scenario starts with: a World that writes its trace to the directory $VERSAVIS_VCD,
+// and what the host heard to the directory $VERSAVIS_LOG.
 #pragma once
 
 #include <fmt/format.h>
