@@ -250,6 +250,12 @@ TEST_CASE("nmea_reader: a line may end in either way, and begins with its sign")
         reader.pulse(0);
         CHECK(feed(reader, text, 100 * ms).empty());
     }
+    NmeaReader reader;
+    reader.begin(115'200);
+    reader.pulse(0);
+    CHECK(feed(reader, line + "\r\n", 100 * ms).size() == 1);
+    // The sign of the one before does not count for the next.
+    CHECK(feed(reader, rmc("120001", "010120").substr(1) + "\r\n", 200 * ms).empty());
 }
 
 TEST_CASE("nmea_reader: a sentence has at most 100 characters") {
