@@ -62,7 +62,10 @@ class Area:
 
 AREAS = [
     Area("firmware/core", "firmware_tests", {"011-no-drift": {"grid"}}),
-    Area("libversavis/engine/pairing", "pairing_tests", {"matrix": set()}),
+    Area("libversavis/engine/pairing", "pairing_tests"),
+    Area("libversavis/engine/ring", "ring_tests"),
+    Area("libversavis/client", "ring_tests"),
+    Area("libversavis/include/versavis/ring", "ring_tests"),
 ]
 
 STATUSES = {
