@@ -42,6 +42,7 @@ class ImuBusPort final : public firmware::ImuBus {
     void begin_no_sooner_than(Nanoseconds at);
     void wait_until(Nanoseconds at);
     void set_alarm(Nanoseconds at);
+    void cancel_alarm();
     void prepare();
     void prepare_part();
     void begin();
@@ -57,9 +58,10 @@ class ImuBusPort final : public firmware::ImuBus {
     volatile State state_ = State::idle;
     volatile I2cAsks i2c_asks_ = I2cAsks::nothing;  ///< by an interrupt that is more urgent
     volatile bool in_gap_ = false;                  ///< between two words of a transfer
+    bool pausing_ = false;                          ///< `free_at_` may not have come yet
     Nanoseconds alarm_at_ = 0;
-    Nanoseconds free_at_ = 0;  ///< when the next transfer may begin
-    bool pausing_ = false;     ///< which may not have come yet
+    bool alarm_is_step_ = false;  ///< on the way to that time
+    Nanoseconds free_at_ = 0;     ///< when the next transfer may begin
     std::uint32_t started_us_ = 0;
     unsigned index_ = 0;        ///< of the transfer
     std::size_t position_ = 0;  ///< in its bytes

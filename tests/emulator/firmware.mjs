@@ -66,11 +66,12 @@ function zero_of(rig, camera, output = 0) {
     return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
 }
 
-/// With four cameras and an IMU at work; its options are 1 on SPI, 5 on I2C.
+/// With four cameras and an IMU at work; its options are 1 on SPI, 5 on I2C, 0 on SPI
+/// without data-ready.
 function busy_rig(options, period) {
     const rig = new Rig(image, quick_usb);
     const imu = new Icm42688p(rig.machine, {
-        select: options === 1 ? pin.spi_select : undefined,
+        select: options === 5 ? undefined : pin.spi_select,
         ready: pin.imu_ready,
         period,
     });
@@ -237,7 +238,7 @@ const tests = {
 
     'an IMU at 4 kHz and four cameras at 200 Hz with light are not too much': () => {
         const rig = new Rig(image, quick_usb);
-        const period = 31_250;
+        const period = 31_235; // by and by, each phase between edge and grid point
         const imu = new Icm42688p(rig.machine, {
             select: pin.spi_select,
             ready: pin.imu_ready,
@@ -340,6 +341,24 @@ const tests = {
             check_within(sample.time - edge, -48, 48, 'stamp of a sample');
             check(sample.accel[0] === index + 1 + 1, `sample ${index} is ${sample.accel}`);
         });
+    },
+
+    'a reading on I2C is not taken for one that hung nine milliseconds before': () => {
+        const rig = new Rig(image, quick_usb);
+        const imu = new Icm42688p(rig.machine, { ready: pin.imu_ready });
+        rig.connect();
+        rig.configure({ imus: [{ kind: 6, options: 5, rate_mhz: 100_000 }] });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        let edge = rig.machine.now + 125_000;
+        for (let us = 470; us <= 490; us += 0.25) {
+            imu.period = Math.round(125 * (9_000 + us));
+            imu.run(edge, edge + 1);
+            edge += imu.period;
+        }
+        rig.run_ms((edge - rig.machine.now) / 125_000);
+        const samples = rig.host.all('imu');
+        check(samples.length === imu.edges.length, `${samples.length} of ${imu.edges.length}`);
+        check(samples.every(({ flags }) => flags === 8), 'a sample is flagged');
     },
 
     'an I2C bus without a part is told, and harms nothing else': () => {
@@ -565,23 +584,23 @@ const tests = {
         }
     },
 
-    'the most urgent interrupts take at most 1.4 us, entry and exit included': () => {
-        for (const options of [1, 5]) {
+    'the most urgent interrupts take at most 1 us, entry and exit included': () => {
+        for (const options of [0, 1, 5]) {
             const rig = busy_rig(options, 125_000);
             const times = urgent_times(rig.machine);
             rig.run_ms(600);
             check(times.length > 1000, `${times.length} of them`);
-            for (const us of times) check_within(us, 0, 1.4, 'interrupt');
+            for (const us of times) check_within(us, 0, 1, 'interrupt');
         }
     },
 
-    'four cameras at 50 Hz and an IMU at 820 Hz take at most 10.4 % of the processor': () => {
+    'four cameras at 50 Hz and an IMU at 820 Hz take at most 10 % of the processor': () => {
         const rig = busy_rig(1, 152_439);
         rig.run_ms(200);
         const { now, sleep_cycles } = rig.machine;
         rig.run_ms(400);
         const slept = (rig.machine.sleep_cycles - sleep_cycles) / (rig.machine.now - now);
-        check_within(100 * (1 - slept), 0, 10.4, 'percent of the processor');
+        check_within(100 * (1 - slept), 0, 10, 'percent of the processor');
     },
 };
 

@@ -11,12 +11,23 @@ std::uintptr_t misaligned(const void* pointer) {
     return reinterpret_cast<std::uintptr_t>(pointer) % sizeof(Word);
 }
 
-constexpr std::size_t block_size = 4 * sizeof(Word);
-
-/// The processor has instructions for several words, which the compiler does not use for this.
-inline void copy_block(unsigned char*& to, const unsigned char*& from) {
-    __asm__ volatile("ldmia %1!, {r3-r6}\n stmia %0!, {r3-r6}"
-                     : "+l"(to), "+l"(from)::"r3", "r4", "r5", "r6", "memory");
+/// Copies whole words, four at a time, then one. Leaves pointers and size at what remains. The
+/// compiler does not use the instructions that go on to the next word for this.
+inline void copy_words(unsigned char*& to, const unsigned char*& from, std::size_t& size) {
+    __asm__ volatile(
+        "  b 2f\n"
+        "1: ldmia %1!, {r3-r6}\n"
+        "  stmia %0!, {r3-r6}\n"
+        "2: sub %2, #16\n"
+        "  bcs 1b\n"
+        "  add %2, #16\n"
+        "  b 4f\n"
+        "3: ldmia %1!, {r3}\n"
+        "  stmia %0!, {r3}\n"
+        "4: sub %2, #4\n"
+        "  bcs 3b\n"
+        "  add %2, #4\n"
+        : "+l"(to), "+l"(from), "+l"(size)::"r3", "r4", "r5", "r6", "cc", "memory");
 }
 
 }  // namespace
@@ -28,9 +39,7 @@ void* memcpy(void* to, const void* from, std::size_t size) {
     const auto* in = static_cast<const unsigned char*>(from);
     if (misaligned(out) == misaligned(in)) {
         for (; size > 0 && misaligned(out) != 0; --size) *out++ = *in++;
-        for (; size >= block_size; size -= block_size) copy_block(out, in);
-        for (; size >= sizeof(Word); size -= sizeof(Word), out += sizeof(Word), in += sizeof(Word))
-            *reinterpret_cast<Word*>(out) = *reinterpret_cast<const Word*>(in);
+        copy_words(out, in, size);
     }
     for (; size > 0; --size) *out++ = *in++;
     return to;
