@@ -120,7 +120,8 @@ class Processes:
             process = subprocess.Popen(
                 [*(["prlimit", *limits] if limits else []), *map(str, command)],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
-                start_new_session=True, **options)
+                # A file that would become too large is an error, and does not end the program.
+                start_new_session=True, restore_signals=False, **options)
             self.running.add(process)
         try:
             ended = self.ends_within(process, 5 * limit_s if limit_s else math.inf)
@@ -414,15 +415,17 @@ class Coverage:
     def object(self, one):
         return self.directory / one.path.replace("/", "_")
 
-    def run(self, command):
+    def run(self, command, **limits):
         return self.build.processes.output_of(command, env=self.build.environment,
-                                              cwd=self.build.directory)
+                                              cwd=self.build.directory, **limits)
 
     def compile(self, one):
         self.run([*with_output(one.command, str(self.object(one))), "-O0", "--coverage"])
 
     def lines(self, counts):
         """Of sources of the area: file, line and how often it ran."""
+        if not counts:
+            return
         for text in self.run(["gcov", "-r", "--json-format", "--stdout", *counts]).splitlines():
             for source in json.loads(text)["files"] if text.startswith("{") else ():
                 file = os.path.normpath(source["file"])
@@ -443,7 +446,8 @@ class Coverage:
     def measure(self, file):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         try:
-            self.run([self.program, "-#", "-w", "NoTests", "-r", "compact", spec([file])])
+            self.run([self.program, "-#", "-w", "NoTests", "-r", "compact", spec([file])],
+                     memory=MEMORY_LIMIT)
         except Failure as failure:
             raise Failure(f"{file} fails without any mutant: {failure}") from None
         after = resource.getrusage(resource.RUSAGE_CHILDREN)

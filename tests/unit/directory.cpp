@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ring/directory.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <set>
+#include <utility>
 
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
@@ -26,6 +29,78 @@ TEST_CASE("directory: one owner at a time, readable for its group only") {
                    Catch::Contains("another versavisd"));
     }
     CHECK(OwnedDirectory::claim(path));
+}
+
+namespace {
+
+/// Descriptors of this process that are open now.
+std::set<int> open_files() {
+    std::set<int> found;
+    for (int file = 0; file < 1024; ++file)
+        if (::fcntl(file, F_GETFD) >= 0) found.insert(file);
+    return found;
+}
+
+/// Without standard input: what is opened next has its number.
+class NoInput {
+ public:
+    NoInput() : input_(::dup(0)) { ::close(0); }
+    ~NoInput() {
+        ::dup2(input_, 0);
+        ::close(input_);
+    }
+    NoInput(const NoInput&) = delete;
+    NoInput& operator=(const NoInput&) = delete;
+
+ private:
+    int input_;
+};
+
+}  // namespace
+
+TEST_CASE("directory: the lock is one file, which programs that are started do not get") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    const auto before = open_files();
+    {
+        auto owner = OwnedDirectory::claim(path);
+        REQUIRE(owner);
+        const auto locked = open_files();
+        REQUIRE(locked.size() == before.size() + 1);
+        for (const int file : locked)
+            if (before.count(file) == 0) CHECK((::fcntl(file, F_GETFD) & FD_CLOEXEC) != 0);
+        CHECK_FALSE(OwnedDirectory::claim(path));
+        CHECK(open_files() == locked);
+        const OwnedDirectory moved = std::move(*owner);
+        CHECK(open_files() == locked);
+        CHECK_FALSE(OwnedDirectory::claim(path));
+    }
+    CHECK(open_files() == before);
+}
+
+TEST_CASE("directory: a service without standard input locks as well, and lets go") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    const NoInput closed;
+    {
+        auto owner = OwnedDirectory::claim(path);
+        REQUIRE(owner);
+        CHECK(::fcntl(0, F_GETFD) >= 0);
+        CHECK_FALSE(OwnedDirectory::claim(path));
+    }
+    CHECK(::fcntl(0, F_GETFD) < 0);
+    CHECK(OwnedDirectory::claim(path));
+}
+
+TEST_CASE("directory: one above it that is made can be entered by all, whatever the umask") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const mode_t mask = ::umask(0077);
+    const bool claimed = OwnedDirectory::claim(parent.path() / "above" / "instance").has_value();
+    ::umask(mask);
+    REQUIRE(claimed);
+    struct stat info {};
+    REQUIRE(::stat((parent.path() / "above").c_str(), &info) == 0);
+    CHECK((info.st_mode & 0777U) == 0755U);
 }
 
 TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
