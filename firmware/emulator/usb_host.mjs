@@ -6,8 +6,8 @@
 // set_reading(bool): a host that does not read. on_configured, on_error = (text) => ...
 // control({ type, request, value, index, length, data }, (result) => ...): bytes, or a text when it
 // failed. set_line_coding(baud), set_line_state(dtr, rts), suspend(), resume(), disconnect(),
-// connect(). `state` is 'detached', 'attached', 'configured' or 'suspended'; with `logs` set, `log`
-// has each transaction.
+// connect(), reset(). on_lost = () => ...: the device has left by itself. `state` is 'detached',
+// 'attached', 'configured' or 'suspended'; with `logs` set, `log` has each transaction.
 import { fault } from './fault.mjs';
 
 // 12 Mbit/s at 125 MHz.
@@ -98,8 +98,9 @@ export class UsbHost {
 
     on_attach(is_attached) {
         if (!this.plugged) return;
-        if (is_attached) this.begin();
-        else this.lose();
+        if (is_attached) return this.begin();
+        this.lose();
+        this.on_lost?.();
     }
 
     begin() {
@@ -130,6 +131,13 @@ export class UsbHost {
     connect() {
         this.plugged = true;
         if (this.device.is_attached) this.begin();
+    }
+
+    /// Sets the device up anew, as after an error.
+    reset() {
+        this.lose();
+        this.state = 'attached';
+        this.reset_bus();
     }
 
     reset_bus() {
@@ -387,14 +395,18 @@ export class UsbHost {
     /// Queues `bytes` at the cycle `at`, cut into packets; a last full one is followed by an empty.
     write(bytes, at = this.clock.now) {
         const copy = Uint8Array.from(bytes);
-        this.clock.at(Math.max(at, this.clock.now), () => {
-            const packets = Math.floor(copy.length / packet_max) + 1;
-            for (let i = 0; i < packets; ++i) {
-                const packet = copy.subarray(i * packet_max, (i + 1) * packet_max);
-                this.outgoing.push({ bytes: packet, at: this.clock.now });
-            }
-            this.plan_later();
-        });
+        this.clock.at(Math.max(at, this.clock.now), () =>
+            this.queue(copy, Math.floor(copy.length / packet_max) + 1),
+        );
+    }
+
+    /// Queues so many packets, and only these.
+    queue(bytes, packets) {
+        for (let i = 0; i < packets; ++i) {
+            const packet = bytes.subarray(i * packet_max, (i + 1) * packet_max);
+            this.outgoing.push({ bytes: packet, at: this.clock.now });
+        }
+        this.plan_later();
     }
 
     set_reading(reads) {

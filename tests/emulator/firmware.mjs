@@ -392,7 +392,8 @@ const tests = {
         const named = rig.host.all('event').filter(({ event }) => event === 13);
         check(named.length === 1, `${named.length} names`);
         check(named[0].value === Date.UTC(2020, 0, 1, 12) / 1000, `it is ${named[0].value}`);
-        check(named[0].time === rig.host.all('event').find(({ event }) => event === 5).time, 'time');
+        const pulse_event = rig.host.all('event').find(({ event }) => event === 5);
+        check(named[0].time === pulse_event.time, 'time');
     },
 
     'a clock answer says when the request came and when it left, to 2 us': () => {

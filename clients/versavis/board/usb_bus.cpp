@@ -93,10 +93,17 @@ std::string UsbHandle::serial() const {
                     : "";
 }
 
+// The last first: a driver of several interfaces looks for all of them when it gets its first one.
+UsbHandle::~UsbHandle() {
+    for (auto interface = claimed_.rbegin(); interface != claimed_.rend(); ++interface)
+        libusb_release_interface(handle_.get(), *interface);
+}
+
 UsbExpected<> UsbHandle::claim(int interface) {
     libusb_set_auto_detach_kernel_driver(handle_.get(), 1);
     const int code = libusb_claim_interface(handle_.get(), interface);
     if (code != 0) return usb_failure(code);
+    claimed_.push_back(interface);
     return {};
 }
 

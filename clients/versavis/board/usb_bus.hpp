@@ -48,10 +48,14 @@ struct UsbFunction {
     bool complete() const { return interface >= 0 && endpoint_in != 0 && endpoint_out != 0; }
 };
 
-/// A device that is open. Interfaces that were claimed are given back with it.
+/// A device that is open. Interfaces that were claimed are given back with it, and the kernel's
+/// driver has them again.
 class UsbHandle {
  public:
     explicit UsbHandle(std::shared_ptr<libusb_device_handle> handle) : handle_(std::move(handle)) {}
+    UsbHandle(UsbHandle&&) noexcept = default;
+    UsbHandle& operator=(UsbHandle&&) = delete;
+    ~UsbHandle();
 
     /// Its first interface of this class.
     UsbFunction function(std::uint8_t interface_class) const;
@@ -74,6 +78,7 @@ class UsbHandle {
 
  private:
     std::shared_ptr<libusb_device_handle> handle_;
+    std::vector<int> claimed_;
 };
 
 /// A device on the bus. It need not be there any more.
