@@ -77,7 +77,7 @@ std::uint64_t start_ticks_of(std::uint32_t pid) {
     std::string line;
     std::getline(stat, line);
     std::size_t at = line.rfind(')');  // the command may contain spaces
-    if (at != std::string::npos && (line[at + 2] == 'Z' || line[at + 2] == 'X')) return 0;
+    if (at != std::string::npos && line[at + 2] == 'Z') return 0;
     for (int field = 3; field <= 22 && at != std::string::npos; ++field)
         at = line.find(' ', at + 1);
     return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where a reader begins, what it makes of a writer that died, lied or took back, and how it waits.
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <thread>
+#include <vector>
+
+#include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
+#include "engine/ring/writer.hpp"
+#include "versavis/ring/reader.hpp"
+
+using namespace versavis;
+using namespace versavis::ring;
+
+namespace {
+
+struct Streams {
+    test::TemporaryDirectory directory{"/dev/shm"};
+
+    Writer events(std::uint32_t descriptors = 8) {
+        return *Writer::create(directory.path(), {"events", StreamKind::events, descriptors});
+    }
+    Writer frames(std::uint32_t slots, std::uint64_t size = page_size) {
+        return *Writer::create(directory.path(), {"frames", StreamKind::frames, 8, slots, size});
+    }
+    Reader open(const std::string& name, Reader::From from = Reader::From::newest) {
+        auto opened = Reader::open(directory.path() / name, from);
+        REQUIRE(opened);
+        return std::move(*opened);
+    }
+    Mapping map(const std::string& name) {
+        return *Mapping::open(directory.path() / name, Mapping::Access::read_write);
+    }
+    std::string refusal(const std::string& name) {
+        const auto opened = Reader::open(directory.path() / name);
+        return opened ? "" : opened.error().message();
+    }
+};
+
+void publish(Writer& writer, std::uint32_t length, std::uint8_t fill = 1) {
+    const auto slot = writer.acquire();
+    REQUIRE(slot);
+    std::memset(writer.slot_data(*slot), fill, length);
+    writer.publish(*slot, length, OutputTime{}, {});
+}
+
+int in_process(const std::function<int()>& body) {
+    const pid_t child = ::fork();
+    if (child == 0) ::_exit(body());
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+std::int64_t processor_time_ns() {
+    timespec used{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    return used.tv_sec * 1'000'000'000 + used.tv_nsec;
+}
+
+/// Until the thread of this number sleeps in the kernel.
+void await_sleep(pid_t thread) {
+    const std::string path = "/proc/self/task/" + std::to_string(thread) + "/stat";
+    for (std::string line; line.empty() || line[line.rfind(')') + 2] != 'S';) {
+        std::ifstream file(path);
+        std::getline(file, line);
+        std::this_thread::yield();
+    }
+}
+
+/// How long a thread waits for a change of `word` that `act` tells of.
+Duration slept_through(const std::atomic<std::uint32_t>& word, const std::function<void()>& act) {
+    std::atomic<pid_t> number{0};
+    Duration slept;
+    std::thread sleeper([&] {
+        const std::uint32_t before = word;
+        number = ::gettid();
+        const HostTime begun = host_now();
+        futex_wait(word, before, seconds(30).ns);
+        slept = host_now() - begun;
+    });
+    while (number == 0) std::this_thread::yield();
+    await_sleep(number);
+    act();
+    sleeper.join();
+    return slept;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Streams, "ring_reader: a copy has all of the payload, and nothing beyond") {
+    Writer writer = frames(2);
+    Reader reader = open("frames");
+    for (std::uint32_t size = 0; size <= 200; ++size) {
+        const auto slot = writer.acquire();
+        REQUIRE(slot);
+        for (std::uint32_t i = 0; i < size; ++i)
+            writer.slot_data(*slot)[i] = static_cast<std::byte>(i * 7 + size);
+        writer.publish(*slot, size, OutputTime{}, {});
+        const Item item = reader.next();
+        REQUIRE(item.found == Found::item);
+        REQUIRE(item.payload_size == size);
+        std::vector<std::byte> copy(size + 16, std::byte{0xA5});
+        REQUIRE(reader.copy(item, copy.data()));
+        for (std::uint32_t i = 0; i < copy.size(); ++i)
+            REQUIRE(copy[i] == (i < size ? static_cast<std::byte>(i * 7 + size) : std::byte{0xA5}));
+    }
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: the last slot is read to its end, which is the file's") {
+    Writer writer = frames(2);
+    Reader reader = open("frames");
+    for (int i = 0; i < 2; ++i) publish(writer, page_size, 9);
+    std::vector<std::byte> copy(page_size);
+    for (int i = 0; i < 2; ++i) CHECK(reader.copy(reader.next(), copy.data()));
+    CHECK(copy.back() == std::byte{9});
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: an item without payload is intact, and a copy of nothing") {
+    Writer writer = events();
+    Reader reader = open("events");
+    for (int lap = 0; lap < 3; ++lap)
+        for (std::uint64_t i = 0; i < 8; ++i) {
+            writer.publish(OutputTime{}, {1, i});
+            const Item item = reader.next();
+            REQUIRE(item.found == Found::item);
+            CHECK(item.payload == nullptr);
+            CHECK(item.payload_size == 0);
+            CHECK(item.slot == no_slot);
+            CHECK(reader.intact(item));
+            CHECK(reader.copy(item, nullptr));
+        }
+    CHECK_FALSE(reader.copy({Found::item, 0, 0, {}, {}, nullptr, 5}, nullptr));
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ring back") {
+    Writer writer = events();
+    for (std::uint64_t i = 0; i < 3; ++i) writer.publish(OutputTime{}, {i});
+    CHECK(open("events", Reader::From::oldest).next().number == 0);
+    for (std::uint64_t i = 3; i < 20; ++i) writer.publish(OutputTime{}, {i});
+    const Item item = open("events", Reader::From::oldest).next();
+    CHECK(item.found == Found::item);
+    CHECK(item.number == 16);
+    CHECK(open("events").next().found == Found::nothing);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one item is lost") {
+    Writer writer = frames(4);
+    Reader reader = open("frames");
+    publish(writer, 10);
+    for (int i = 0; i < 4; ++i) CHECK(writer.acquire());
+    const Item lost = reader.next();
+    CHECK(lost.found == Found::lost);
+    CHECK(lost.lost == 1);
+    CHECK(lost.number == 1);
+    CHECK(reader.next().found == Found::nothing);
+    writer.publish(2, 10, OutputTime{}, {});
+    CHECK(reader.next().number == 1);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a slot that is not there, or too small, is no item") {
+    Writer writer = frames(2);
+    const Mapping mapping = map("frames");
+    const auto found_with = [&](std::uint64_t length, std::uint64_t slot) {
+        Reader reader = open("frames");
+        publish(writer, 10);
+        Descriptor& descriptor = mapping.descriptor(writer.head() - 1);
+        const std::uint64_t real = descriptor.length_and_slot;
+        if (slot >= 2) descriptor.slot_generation = 0;  // as the words behind the last one
+        descriptor.length_and_slot = length << 32U | (slot == 0 ? real & 0xFFFFFFFFU : slot);
+        return reader.next().found;
+    };
+    CHECK(found_with(page_size, 0) == Found::item);
+    CHECK(found_with(page_size + 1, 0) == Found::lost);
+    CHECK(found_with(10, 2) == Found::lost);
+    CHECK(found_with(10, 0xFFFFFFFE) == Found::lost);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: an item of a larger ring that was before is not intact") {
+    auto large = std::make_unique<Writer>(frames(4));
+    Reader reader = open("frames");
+    for (int i = 0; i < 3; ++i) publish(*large, 10);
+    Item item;
+    for (int i = 0; i < 3; ++i) item = reader.next();
+    REQUIRE(item.slot == 2);
+    Writer small = frames(2);
+    large.reset();
+    REQUIRE(reader.next().found == Found::restarted);
+    item.slot_generation = 0;
+    CHECK_FALSE(reader.intact(item));
+}
+
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: a writer lives while its heart beats, and is found by its start") {
+    Writer writer = events();
+    Reader reader = open("events");
+    CHECK(reader.writer_pid() == static_cast<std::uint32_t>(::getpid()));
+    CHECK(reader.writer_found());
+    for (const auto& [age_s, alive] : {std::pair{0, true}, {2, true}, {4, false}, {60, false}}) {
+        writer.heartbeat(host_now() - seconds(age_s));
+        CHECK(reader.writer_alive() == alive);
+        CHECK(reader.next().found == (alive ? Found::nothing : Found::gone));
+    }
+    // What it published before it fell silent is read all the same.
+    writer.publish(OutputTime{}, {});
+    CHECK(reader.next().found == Found::item);
+    const Mapping mapping = map("events");
+    mapping.header().writer_start_ticks += 1;
+    CHECK_FALSE(reader.writer_found());
+    mapping.header().writer_start_ticks -= 1;
+    mapping.header().writer_pid = 0x7FFFFFFF;
+    CHECK_FALSE(reader.writer_found());
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read is told so, and what to do") {
+    CHECK_THAT(refusal("absent"),
+               Catch::Contains("no such stream") && Catch::Contains("is the service running?"));
+    Writer writer = events();
+    if (::geteuid() != 0) return;  // only root can become somebody else
+    CHECK(::chmod(directory.path().c_str(), 0700) == 0);
+    CHECK(in_process([&] {
+              if (::setegid(12345) != 0 || ::seteuid(12345) != 0) return 2;
+              const std::string text = refusal("events");
+              return text.find("permission denied") != std::string::npos &&
+                             text.find("join the group") != std::string::npos
+                         ? 0
+                         : 1;
+          }) == 0);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {
+    Writer writer = events();
+    Reader reader = open("events");
+    const HostTime begun = host_now();
+    const std::int64_t used = processor_time_ns();
+    CHECK(reader.wait(milliseconds(200)).found == Found::nothing);
+    CHECK(host_now() - begun >= milliseconds(200));
+    CHECK(processor_time_ns() - used < milliseconds(100).ns);
+    writer.publish(OutputTime{}, {});
+    CHECK(reader.wait(seconds(20)).found == Found::item);
+    CHECK(reader.wait({}).found == Found::nothing);
+}
+
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: a sleeper wakes at each item, and when the segment ends "
+                 "[threads]",
+                 "[threads]") {
+    auto writer = std::make_unique<Writer>(events());
+    const Mapping mapping = map("events");
+    const auto& wake = mapping.header().wake;
+    CHECK(slept_through(wake, [&] { writer->publish(OutputTime{}, {}); }) < seconds(15));
+    CHECK(slept_through(wake, [&] { writer.reset(); }) < seconds(15));
+}
+
+TEST_CASE("ring_reader: a wait without news lasts as long as was asked") {
+    const std::atomic<std::uint32_t> word{7};
+    for (const Duration span : {milliseconds(30), milliseconds(1100)}) {
+        const HostTime begun = host_now();
+        futex_wait(word, 7, span.ns);
+        CHECK(host_now() - begun >= span);
+    }
+    const HostTime begun = host_now();
+    futex_wait(word, 8, seconds(30).ns);
+    CHECK(host_now() - begun < seconds(15));
+}
+
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: no mixture of two items is taken from one descriptor [threads]",
+                 "[threads]") {
+    Writer writer = events(1);
+    Reader reader = open("events");
+    std::atomic<bool> done{false};
+    std::thread writing([&] {
+        for (std::uint64_t i = 0; i < 200'000; ++i) {
+            Metadata metadata;
+            metadata.fill(i);
+            writer.publish(OutputTime{static_cast<std::int64_t>(i)}, metadata);
+        }
+        done = true;
+    });
+    while (!done) {
+        const Item item = reader.next();
+        if (item.found != Found::item) continue;
+        for (const std::uint64_t word : item.metadata) REQUIRE(word == item.number);
+        REQUIRE(item.time.ns == static_cast<std::int64_t>(item.number));
+    }
+    writing.join();
+}
