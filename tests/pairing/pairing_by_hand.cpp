@@ -1,0 +1,486 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pairing fed by hand, piece by piece: what comes back, when, and for which reason.
+#include <catch2/catch.hpp>
+#include <vector>
+
+#include "engine/pairing/pairing.hpp"
+
+using namespace versavis;
+using namespace versavis::pairing;
+
+namespace {
+
+/// All that pairing decided, in order.
+class Told final : public Outcome {
+ public:
+    struct Frame {
+        std::uint64_t id;
+        EventReason reason;
+        std::uint64_t guess;  ///< trigger; 0: none
+    };
+    struct Pulse {
+        std::uint64_t trigger;
+        EventReason reason;
+    };
+
+    void paired(const Arrival& arrival, const Exposure& exposure) override {
+        pairs.emplace_back(arrival.block_id, exposure.trigger);
+    }
+    void frame_unpaired(const Arrival& arrival, EventReason reason,
+                        const Exposure* guess) override {
+        frames.push_back({arrival.block_id, reason, guess == nullptr ? 0 : guess->trigger});
+    }
+    void exposure_unpaired(const Exposure& exposure, EventReason reason) override {
+        pulses.push_back({exposure.trigger, reason});
+    }
+    void locked(const Exposure& first) override { locks.push_back(first.trigger); }
+    void slipped(const Arrival& at) override { slips.push_back(at.block_id); }
+
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;  ///< ids and triggers
+    std::vector<Frame> frames;
+    std::vector<Pulse> pulses;
+    std::vector<std::uint64_t> locks;
+    std::vector<std::uint64_t> slips;
+};
+
+bool operator==(const Told::Pulse& a, const Told::Pulse& b) {
+    return a.trigger == b.trigger && a.reason == b.reason;
+}
+std::ostream& operator<<(std::ostream& out, const Told::Pulse& pulse) {
+    return out << pulse.trigger << ": " << to_string(pulse.reason);
+}
+
+constexpr Duration period = milliseconds(50);
+constexpr Duration exposed_for = milliseconds(5);
+constexpr Duration record_after = milliseconds(2);  ///< the end of the exposure
+constexpr Duration frame_after = milliseconds(20);
+constexpr Duration host_ahead = seconds(1000);  ///< of the board
+constexpr Duration camera_ahead = seconds(7);
+/// Grid points of a start: no other alignment of them has the same gaps.
+constexpr std::uint64_t pattern[] = {1, 2, 4, 5, 8, 9, 11, 12, 15, 17, 18, 20};
+
+/// One camera that takes each trigger, its board, and pairing.
+struct Bench {
+    explicit Bench(const Limits& limits = made(), std::uint64_t first_id = 1)
+        : pairing(limits, told), next_id(first_id) {}
+
+    static Limits made() {
+        Limits limits;
+        limits.period = period;
+        limits.stamped = Instant::start;
+        return limits;
+    }
+
+    static Exposure exposure(std::uint64_t trigger, std::uint64_t tick) {
+        Exposure made;
+        made.trigger = trigger;
+        made.tick = tick;
+        made.start = BoardTime{} + seconds(5) + period * static_cast<std::int64_t>(tick);
+        made.end = made.start + exposed_for;
+        made.end_on_host = made.earliest_on_host = HostTime{made.end.ns} + host_ahead;
+        made.recorded = made.end_on_host + record_after;
+        return made;
+    }
+
+    static Arrival frame(std::uint64_t id, const Exposure& of) {
+        Arrival made;
+        made.block_id = id;
+        made.camera_time = CameraTime{of.start.ns} + camera_ahead;
+        made.arrived = of.end_on_host + frame_after;
+        return made;
+    }
+
+    Exposure next(std::uint64_t steps = 1) { return exposure(next_trigger++, tick += steps); }
+
+    /// A trigger, its record and its frame.
+    void take(std::uint64_t steps = 1) {
+        const Exposure one = next(steps);
+        pairing.add(one);
+        pairing.add(frame(next_id++, one));
+        now = one.end_on_host + frame_after;
+    }
+
+    void lock() {
+        const std::uint64_t base = tick;
+        for (const std::uint64_t at : pattern) take(base + at - tick);
+        REQUIRE(pairing.state() == State::locked);
+        for (int i = 0; i < 10; ++i) take();
+    }
+
+    Told told;
+    Pairing pairing;
+    std::uint64_t next_trigger = 1;
+    std::uint64_t next_id;
+    std::uint64_t tick = 0;
+    HostTime now;
+};
+
+}  // namespace
+
+TEST_CASE("pairing_by_hand: each state has its name") {
+    CHECK(std::string(to_string(State::searching)) == "searching");
+    CHECK(std::string(to_string(State::checking)) == "checking");
+    CHECK(std::string(to_string(State::locked)) == "locked");
+    CHECK(std::string(to_string(static_cast<State>(9))) == "unknown");
+    CHECK(static_cast<int>(Start::pattern) == 1);
+    CHECK(static_cast<int>(Start::slow) == 2);
+    CHECK(static_cast<int>(Start::steady) == 3);
+}
+
+TEST_CASE("pairing_by_hand: a camera that takes all is paired from its first frame on") {
+    Bench bench;
+    bench.lock();
+    REQUIRE(bench.told.pairs.size() == 22);
+    for (const auto& [id, trigger] : bench.told.pairs) CHECK(id == trigger);
+    CHECK(bench.told.locks == std::vector<std::uint64_t>{1});
+    CHECK(bench.told.frames.empty());
+    CHECK(bench.told.pulses.empty());
+    CHECK(bench.told.slips.empty());
+}
+
+TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the life before") {
+    Bench bench;
+    bench.lock();
+    bench.pairing.add(Shortfall{24, EventReason::frame_incomplete});
+    const Exposure waits = bench.next();
+    bench.pairing.add(waits);
+    const Exposure late = bench.next();
+    bench.pairing.add(Bench::frame(24, late));  // its record has not come
+    Exposure odd = bench.next();
+    odd.start = odd.start + period * 7;
+    bench.pairing.add(odd);
+    bench.told = {};
+    bench.pairing.reset();
+    CHECK(bench.pairing.state() == State::searching);
+    REQUIRE(bench.told.frames.size() == 1);
+    CHECK(bench.told.frames[0].id == 24);
+    CHECK(bench.told.frames[0].reason == EventReason::reset);
+    CHECK(bench.told.pulses ==
+          std::vector<Told::Pulse>{{23, EventReason::reset}, {25, EventReason::reset}});
+    CHECK_FALSE(bench.pairing.due(bench.now + seconds(60)));
+    // The next life counts, and stamps, in its own way.
+    bench.told = {};
+    bench.tick = 0;
+    bench.next_trigger = 1;
+    bench.next_id = 1'000;
+    bench.lock();
+    CHECK(bench.told.pairs.size() == 22);
+    CHECK(bench.told.frames.empty());
+    CHECK(bench.told.slips.empty());
+}
+
+TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one") {
+    Bench bench;
+    CHECK(bench.pairing.first_start() == Start::pattern);
+    CHECK(bench.pairing.stamped() == Instant::start);
+    Limits limits = Bench::made();
+    limits.camera_clock = false;
+    limits.stamped = Instant::end;
+    bench.pairing.set_limits(limits);
+    CHECK(bench.pairing.first_start() == Start::slow);
+    CHECK(bench.pairing.stamped() == Instant::end);
+    // A grid of half the period: by the one before, each record would be off.
+    limits = Bench::made();
+    limits.period = period / 2;
+    bench.pairing.set_limits(limits);
+    for (std::uint64_t i = 1; i < 6; ++i) {
+        Exposure one = Bench::exposure(i, i);
+        one.start = BoardTime{} + seconds(5) + limits.period * static_cast<std::int64_t>(i);
+        bench.pairing.add(one);
+    }
+    CHECK(bench.told.pulses.empty());
+}
+
+TEST_CASE("pairing_by_hand: a trigger without frame says what became of the frame") {
+    Bench bench;
+    bench.lock();
+    const auto lost = [&](const std::vector<Shortfall>& shortfalls, unsigned count) {
+        bench.told = {};
+        for (unsigned i = 0; i < count; ++i) {
+            bench.pairing.add(bench.next());
+            ++bench.next_id;
+        }
+        for (const Shortfall& shortfall : shortfalls) bench.pairing.add(shortfall);
+        bench.take();
+        REQUIRE(bench.told.pairs.size() == 1);
+        std::vector<EventReason> reasons;
+        for (const auto& pulse : bench.told.pulses) reasons.push_back(pulse.reason);
+        return reasons;
+    };
+    using Reasons = std::vector<EventReason>;
+    CHECK(lost({}, 1) == Reasons{EventReason::frame_missing});
+    CHECK(lost({{bench.next_id, EventReason::wrong_size}}, 1) == Reasons{EventReason::wrong_size});
+    CHECK(lost({{0, EventReason::no_buffer}}, 1) == Reasons{EventReason::no_buffer});
+    // Of two, each has its own; a number that none has explains none.
+    CHECK(lost({{bench.next_id + 1, EventReason::no_buffer}}, 2) ==
+          Reasons{EventReason::frame_missing, EventReason::no_buffer});
+    CHECK(lost({{bench.next_id + 9, EventReason::no_buffer}}, 1) ==
+          Reasons{EventReason::frame_missing});
+}
+
+TEST_CASE("pairing_by_hand: of frames known to be lost, the newest 32 are remembered") {
+    for (const unsigned later : {31U, 32U}) {
+        Bench bench;
+        bench.lock();
+        bench.told = {};
+        bench.pairing.add(Shortfall{bench.next_id, EventReason::wrong_size});
+        for (unsigned i = 0; i < later; ++i)
+            bench.pairing.add(Shortfall{bench.next_id + 1000 + i, EventReason::no_buffer});
+        bench.pairing.add(bench.next());
+        ++bench.next_id;
+        bench.take();
+        REQUIRE(bench.told.pulses.size() == 1);
+        CHECK(bench.told.pulses[0].reason ==
+              (later == 31 ? EventReason::wrong_size : EventReason::frame_missing));
+    }
+}
+
+TEST_CASE("pairing_by_hand: frames that wait are bounded, and the oldest goes first") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    std::vector<Exposure> held_up;
+    for (std::uint64_t i = 0; i < 9; ++i) {
+        held_up.push_back(bench.next());
+        bench.pairing.add(Bench::frame(bench.next_id++, held_up.back()));
+        CHECK(bench.told.frames.size() == (i < 8 ? 0 : 1));
+    }
+    CHECK(bench.told.frames[0].id == 23);
+    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
+    CHECK(bench.pairing.state() == State::locked);
+    // While nothing is known, it is unproved.
+    Bench other;
+    for (std::uint64_t i = 1; i <= 9; ++i)
+        other.pairing.add(Bench::frame(i, Bench::exposure(i, i)));
+    REQUIRE(other.told.frames.size() == 1);
+    CHECK(other.told.frames[0].reason == EventReason::unproved);
+    CHECK(other.told.frames[0].guess == 0);
+}
+
+TEST_CASE("pairing_by_hand: a frame waits for its record as long as the limits say") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    const Arrival waits = Bench::frame(bench.next_id++, bench.next());
+    bench.pairing.add(waits);
+    const HostTime until = waits.arrived + usual_exposure_wait;
+    CHECK_FALSE(bench.pairing.due(until));
+    bench.pairing.advance(until);
+    CHECK(bench.told.frames.empty());
+    CHECK(bench.pairing.due(until + nanoseconds(1)));
+    bench.pairing.advance(until + nanoseconds(1));
+    REQUIRE(bench.told.frames.size() == 1);
+    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
+}
+
+TEST_CASE("pairing_by_hand: while it searches, frames wait for ten seconds and ten periods") {
+    Bench bench;
+    const Arrival waits = Bench::frame(1, Bench::exposure(1, 1));
+    bench.pairing.add(waits);
+    const HostTime until = waits.arrived + seconds(10) + period * 10;
+    CHECK_FALSE(bench.pairing.due(until));
+    CHECK(bench.pairing.due(until + nanoseconds(1)));
+    bench.pairing.advance(until + nanoseconds(1));
+    REQUIRE(bench.told.frames.size() == 1);
+    CHECK(bench.told.frames[0].reason == EventReason::unproved);
+}
+
+TEST_CASE(
+    "pairing_by_hand: a trigger waits for its frame, and knows whether the camera is silent") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    const Exposure waits = bench.next();
+    bench.pairing.add(waits);
+    const Duration patience = usual_latest_arrival + usual_exposure_wait;
+    const HostTime until = waits.earliest_on_host + patience;
+    bench.pairing.advance(until);
+    CHECK(bench.told.pulses.empty());
+    CHECK(bench.pairing.due(until + nanoseconds(1)));
+    SECTION("nothing came since") {
+        bench.pairing.advance(until + nanoseconds(1));
+        CHECK(bench.told.pulses ==
+              std::vector<Told::Pulse>{{waits.trigger, EventReason::camera_silent}});
+    }
+    SECTION("a frame came, of another exposure") {
+        Arrival other = Bench::frame(bench.next_id + 1, bench.next());
+        other.arrived = until - patience + milliseconds(1);
+        bench.pairing.add(other);
+        bench.pairing.advance(until + nanoseconds(1));
+        REQUIRE_FALSE(bench.told.pulses.empty());
+        CHECK(bench.told.pulses[0] == Told::Pulse{waits.trigger, EventReason::frame_missing});
+    }
+}
+
+TEST_CASE("pairing_by_hand: a search keeps 32 exposures, however old") {
+    Bench bench;
+    for (int i = 0; i < 33; ++i) bench.pairing.add(bench.next());
+    const HostTime later = Bench::exposure(33, 33).end_on_host + seconds(60);
+    CHECK(bench.pairing.due(later));
+    bench.pairing.advance(later);
+    REQUIRE(bench.told.pulses.size() == 1);
+    CHECK(bench.told.pulses[0].trigger == 1);
+    CHECK(bench.told.pulses[0].reason == EventReason::unproved);
+    CHECK_FALSE(bench.pairing.due(later + seconds(60)));
+}
+
+TEST_CASE("pairing_by_hand: a single record that is off is refused, and changes nothing") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    Exposure lie = bench.next();
+    lie.start = lie.start + period * 3;
+    bench.pairing.add(lie);
+    CHECK(bench.told.pulses.empty());  // it may be a step: others will show
+    ++bench.next_id;
+    bench.take();
+    CHECK(bench.told.pulses == std::vector<Told::Pulse>{{lie.trigger, EventReason::mismatch}});
+    bench.take();
+    CHECK(bench.pairing.state() == State::locked);
+    CHECK(bench.told.pairs.size() == 2);
+}
+
+TEST_CASE("pairing_by_hand: three records that agree on another time are a step") {
+    Bench bench;
+    bench.lock();
+    const Exposure waits = bench.next();
+    bench.pairing.add(waits);
+    bench.told = {};
+    std::vector<Exposure> stepped;
+    for (int i = 0; i < 3; ++i) {
+        Exposure one = bench.next();
+        one.start = one.start + seconds(3);
+        one.end = one.end + seconds(3);
+        stepped.push_back(one);
+    }
+    for (int i = 0; i < 2; ++i) bench.pairing.add(stepped[i]);
+    CHECK(bench.pairing.state() == State::locked);
+    CHECK(bench.told.pulses.empty());
+    bench.pairing.add(stepped[2]);
+    CHECK(bench.pairing.state() == State::searching);
+    CHECK(bench.told.pulses == std::vector<Told::Pulse>{{waits.trigger, EventReason::reset}});
+    CHECK(bench.pairing.wanted_start(bench.now + seconds(60)) == Start::pattern);
+}
+
+TEST_CASE("pairing_by_hand: two that are off, each in its own way, are two lies") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    std::vector<Exposure> lies{bench.next(), bench.next(), bench.next()};
+    for (std::size_t i = 0; i < lies.size(); ++i) {
+        lies[i].start = lies[i].start + seconds(3) * static_cast<std::int64_t>(i + 1);
+        bench.pairing.add(lies[i]);
+    }
+    CHECK(bench.pairing.state() == State::locked);
+    CHECK(bench.told.pulses == std::vector<Told::Pulse>{{lies[0].trigger, EventReason::mismatch},
+                                                        {lies[1].trigger, EventReason::mismatch}});
+}
+
+TEST_CASE(
+    "pairing_by_hand: starts that find nothing are asked for less and less, each third slow") {
+    Bench bench;
+    HostTime now = HostTime{} + host_ahead;
+    std::uint64_t id = 1;
+    const auto wait_for_start = [&] {
+        Duration waited;
+        const HostTime begun = now;
+        for (int i = 0; i < 4000; ++i) {
+            Arrival arrival;
+            arrival.block_id = id++;
+            arrival.arrived = now;
+            arrival.camera_time = CameraTime{now.ns} + camera_ahead;
+            bench.pairing.add(arrival);
+            if (bench.pairing.wanted_start(now)) break;
+            now = now + milliseconds(10);
+        }
+        waited = now - begun;
+        return waited;
+    };
+    const Duration quick = seconds(1) + usual_latest_arrival;
+    const Duration slow = seconds(6) + usual_latest_arrival;
+    const auto within = [](Duration waited, Duration expected) {
+        CHECK(waited > expected - milliseconds(10));
+        CHECK(waited <= expected + milliseconds(20));
+    };
+    CHECK(wait_for_start() <= milliseconds(200));
+    CHECK(bench.pairing.wanted_start(now) == Start::pattern);
+    bench.pairing.start_requested(Start::pattern, now);
+    CHECK_FALSE(bench.pairing.wanted_start(now + seconds(1000)));  // no frame since
+    within(wait_for_start(), quick);
+    CHECK(bench.pairing.wanted_start(now) == Start::pattern);
+    bench.pairing.start_requested(Start::pattern, now);
+    within(wait_for_start(), quick);
+    CHECK(bench.pairing.wanted_start(now) == Start::slow);
+    bench.pairing.start_requested(Start::slow, now);
+    within(wait_for_start(), slow);
+    CHECK(bench.pairing.wanted_start(now) == Start::pattern);
+    bench.pairing.start_requested(Start::pattern, now);
+    within(wait_for_start(), quick);
+    bench.pairing.start_requested(Start::pattern, now);
+    within(wait_for_start(), quick * 2);
+    CHECK(bench.pairing.wanted_start(now) == Start::slow);
+    bench.pairing.start_requested(Start::slow, now);
+    within(wait_for_start(), slow * 3);
+}
+
+TEST_CASE(
+    "pairing_by_hand: frames that come once more, or after newer ones, are no loss of others") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    const Exposure first = bench.next();
+    const Exposure second = bench.next();
+    bench.pairing.add(first);
+    bench.pairing.add(second);
+    bench.pairing.add(Bench::frame(bench.next_id + 1, second));
+    bench.pairing.add(Bench::frame(bench.next_id + 1, second));
+    bench.pairing.add(Bench::frame(bench.next_id, first));
+    CHECK(bench.told.pairs.size() == 1);
+    REQUIRE(bench.told.frames.size() == 2);
+    for (const auto& frame : bench.told.frames) CHECK(frame.reason == EventReason::out_of_order);
+    CHECK(bench.told.slips.empty());
+    // They explain no trigger that has no frame.
+    bench.next_id += 2;
+    bench.pairing.add(bench.next());
+    ++bench.next_id;
+    bench.take();
+    CHECK(bench.told.pulses.back().reason == EventReason::frame_missing);
+}
+
+TEST_CASE("pairing_by_hand: a silent exposure line tells that a trigger was ignored") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    Exposure silent = bench.next();
+    silent.exposed = false;
+    bench.pairing.add(silent);
+    bench.take();
+    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.told.pulses ==
+          std::vector<Told::Pulse>{{silent.trigger, EventReason::trigger_ignored}});
+}
+
+TEST_CASE(
+    "pairing_by_hand: frames of another stamp than any exposure's are a slip, then a search") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    // The clock jumps by 2.4 periods and the ids by 300: nothing is left to go by.
+    bench.next_id += 300;
+    for (int i = 0; i < 30 && bench.pairing.state() != State::searching; ++i) {
+        const Exposure one = bench.next();
+        bench.pairing.add(one);
+        Arrival arrival = Bench::frame(bench.next_id, one);
+        bench.next_id += 3;
+        arrival.camera_time = arrival.camera_time + milliseconds(120) * (i + 1);
+        bench.pairing.add(arrival);
+    }
+    CHECK(bench.pairing.state() == State::searching);
+    CHECK(bench.told.pairs.empty());
+    CHECK(bench.told.slips.size() == 1);
+    REQUIRE_FALSE(bench.told.frames.empty());
+    CHECK(bench.told.frames.size() == 5);
+    for (std::size_t i = 0; i + 1 < bench.told.frames.size(); ++i)
+        CHECK(bench.told.frames[i].reason == EventReason::unproved);
+    CHECK(bench.told.frames.back().reason == EventReason::mismatch);
+}
