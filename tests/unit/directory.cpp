@@ -103,6 +103,19 @@ TEST_CASE("directory: one above it that is made can be entered by all, whatever 
     CHECK((info.st_mode & 0777U) == 0755U);
 }
 
+TEST_CASE("directory: one that cannot be made, or not locked, says why") {
+    test::TemporaryDirectory parent("/dev/shm");
+    parent.write("file", "");
+    CHECK_THAT(OwnedDirectory::claim(parent.path() / "file" / "instance").error().message(),
+               Catch::Contains("cannot be created"));
+    CHECK_THAT(OwnedDirectory::claim("/proc/instance").error().message(),
+               Catch::Contains("cannot be created"));
+    const auto path = parent.path() / "instance";
+    std::filesystem::create_directories(path / ".lock");
+    std::filesystem::permissions(path, std::filesystem::perms(0750));
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("cannot be locked"));
+}
+
 TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     test::TemporaryDirectory parent("/dev/shm");
     auto directory = OwnedDirectory::claim(parent.path() / "instance");

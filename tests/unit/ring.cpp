@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,9 +11,12 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <thread>
+#include <vector>
 
 #include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring/reader.hpp"
 
@@ -256,11 +260,20 @@ TEST_CASE_METHOD(Fixture, "ring: the directory's owner must own the segment") {
 TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
     CHECK_FALSE(Writer::create(directory.path(), {"odd", StreamKind::events, 7}));
     CHECK_FALSE(Writer::create(directory.path(), {"", StreamKind::events, 8}));
-    CHECK_FALSE(Writer::create(directory.path() / "absent", {"name", StreamKind::events, 8}));
+    CHECK_THAT(Writer::create(directory.path() / "absent", {"name", StreamKind::events, 8})
+                   .error()
+                   .message(),
+               Catch::Contains("cannot be created"));
     const auto huge =
         Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
     REQUIRE_FALSE(huge);
-    CHECK_THAT(huge.error().message(), Catch::Contains("/dev/shm"));
+    CHECK_THAT(huge.error().message(),
+               Catch::Contains("cannot reserve 1073741824 MiB") && Catch::Contains("/dev/shm"));
+    CHECK(std::filesystem::is_empty(directory.path()));
+    std::filesystem::create_directory(directory.path() / "taken");
+    CHECK_THAT(Writer::create(directory.path(), {"taken", StreamKind::events, 8}).error().message(),
+               Catch::Contains("cannot be renamed into place"));
+    std::filesystem::remove(directory.path() / "taken");
     CHECK(std::filesystem::is_empty(directory.path()));
 }
 
@@ -276,6 +289,20 @@ bool in_process(const std::function<bool()>& body) {
 
 bool write_line(const char* path, const std::string& line) {
     return static_cast<bool>(std::ofstream(path) << line << std::flush);
+}
+
+/// As one that has no room left among its addresses.
+bool cannot_be_mapped(const std::filesystem::path& directory) {
+    const rlimit little{1, 1};
+    ::setrlimit(RLIMIT_AS, &little);
+    const auto writer = Writer::create(directory, {"frames", StreamKind::frames, 8, 4, 1 << 20});
+    return !writer && writer.error().message().find("cannot be mapped") != std::string::npos &&
+           std::filesystem::is_empty(directory);
+}
+
+std::size_t open_files() {
+    const std::filesystem::directory_iterator files("/proc/self/fd");
+    return static_cast<std::size_t>(std::distance(begin(files), end(files)));
 }
 
 /// /dev/shm of this process alone, of 3 MiB.
@@ -302,11 +329,21 @@ bool made_anew_in_tight_memory() {
         for (int i = 0; i < 3; ++i) writer->publish(*writer->acquire(), 1, {}, {});
         ::_exit(0);  // without its destructor
     });
-    auto reader = Reader::open(std::filesystem::path(memory) / "frames", Reader::From::oldest);
-    if (!left || !reader) return false;
-    const Item held = reader->next();
+    const auto path = std::filesystem::path(memory) / "frames";
+    auto reader = Reader::open(path, Reader::From::oldest);
+    const auto dead = Mapping::open(path, Mapping::Access::read_only);
+    if (!left || !reader || !dead) return false;
+    std::vector<Item> held;
+    for (int i = 0; i < 2; ++i) held.push_back(reader->next());
+    std::vector<std::uint64_t> before;
+    for (std::uint32_t slot = 0; slot < 4; ++slot) before.push_back(dead->generation(slot));
+    const std::size_t files = open_files();
     auto writer = Writer::create(memory, shape);
-    if (held.found != Found::item || !writer || reader->intact(held)) return false;
+    if (!writer || open_files() != files) return false;
+    for (const Item& item : held)
+        if (item.found != Found::item || reader->intact(item)) return false;
+    for (std::uint32_t slot = 0; slot < 4; ++slot)
+        if (dead->generation(slot) != before[slot] + 2) return false;
     writer->publish(*writer->acquire(), 1, {}, {});
     Item item = reader->next();
     while (item.found == Found::lost) item = reader->next();
@@ -314,6 +351,24 @@ bool made_anew_in_tight_memory() {
 }
 
 }  // namespace
+
+TEST_CASE_METHOD(Fixture, "ring: one that cannot be mapped leaves nothing behind") {
+    CHECK(in_process([&] { return cannot_be_mapped(directory.path()); }));
+}
+
+TEST_CASE_METHOD(Fixture,
+                 "ring: a service without standard input writes as well, and no file stays") {
+    const std::size_t files = open_files();
+    const int input = ::dup(0);
+    ::close(0);
+    {
+        const Writer writer = frame_writer();
+        CHECK(open_files() == files);
+    }
+    CHECK(open_files() == files);
+    ::dup2(input, 0);
+    ::close(input);
+}
 
 TEST_CASE("ring: a dead writer's memory is used again where there is no other") {
     if (!in_process(make_memory_tight)) {

@@ -152,6 +152,7 @@ TEST_CASE_METHOD(Ring, "ring_layout: an item without payload, in its descriptor"
     for (std::size_t i = 0; i < metadata.size(); ++i) metadata[i] = 100 + i;
     writer.publish(OutputTime{-5}, metadata);
     const std::string file = bytes("events");
+    CHECK(u32(file, 52) == 3);
     const std::size_t descriptor = 4096 + (9 % 8) * 128;
     CHECK(u64(file, descriptor) == 2 * 9 + 2);
     CHECK(u64(file, descriptor + 8) == 0);
@@ -227,6 +228,15 @@ TEST_CASE_METHOD(Ring, "ring_layout: the file is for its owner and the group, an
         ++files;
     }
     CHECK(files == 1);
+}
+
+TEST_CASE("ring_layout: kinds of streams have the numbers of the document") {
+    CHECK(static_cast<int>(StreamKind::frames) == 1);
+    CHECK(static_cast<int>(StreamKind::imu) == 2);
+    CHECK(static_cast<int>(StreamKind::events) == 3);
+    CHECK(static_cast<int>(StreamKind::status) == 4);
+    CHECK(static_cast<int>(StreamKind::evidence) == 5);
+    CHECK(static_cast<int>(StreamKind::clock) == 6);
 }
 
 TEST_CASE_METHOD(Ring, "ring_layout: names up to 63 characters") {

@@ -143,6 +143,19 @@ TEST_CASE_METHOD(Streams, "ring_reader: an item without payload is intact, and a
     CHECK_FALSE(reader.copy({Found::item, 0, 0, {}, {}, nullptr, 5}, nullptr));
 }
 
+TEST_CASE_METHOD(Streams, "ring_reader: where nothing is, the item says so") {
+    Writer writer = events();
+    const Item item = open("events").next();
+    CHECK(item.found == Found::nothing);
+    CHECK(item.lost == 0);
+    CHECK(item.number == 0);
+    CHECK(item.time.ns == 0);
+    CHECK(item.payload == nullptr);
+    CHECK(item.payload_size == 0);
+    CHECK(item.slot == no_slot);
+    CHECK(item.slot_generation == 0);
+}
+
 TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ring back") {
     Writer writer = events();
     for (std::uint64_t i = 0; i < 3; ++i) writer.publish(OutputTime{}, {i});

@@ -49,7 +49,8 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
     std::string text;
     file >> text;
     text.erase(std::remove(text.begin(), text.end(), '-'), text.end());
-    for (std::size_t i = 0; i < 16 && 2 * i + 2 <= text.size(); ++i)
+    text.resize(2 * sizeof boot_id, '0');
+    for (std::size_t i = 0; i < sizeof boot_id; ++i)
         boot_id[i] =
             static_cast<std::uint8_t>(std::strtoul(text.substr(2 * i, 2).c_str(), nullptr, 16));
 }
@@ -76,7 +77,6 @@ void release(const std::filesystem::path& path, const Mapping& dead) {
     // SYNC 4: release fence here, acquire fence in Reader::intact(), as in Writer::acquire().
     std::atomic_thread_fence(std::memory_order_release);
     const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-    if (file < 0) return;
     const auto begin = static_cast<off_t>(header.slots_at);
     ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
                 static_cast<off_t>(header.total_size) - begin);
@@ -100,7 +100,7 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.generations_at = header.descriptors_at + shape.descriptor_count * sizeof(Descriptor);
     header.slots_at =
         round_up(header.generations_at + shape.slot_count * generation_stride, page_size);
-    shape.name.copy(header.name, sizeof header.name - 1);
+    shape.name.copy(header.name, sizeof header.name);
     header.head.store(shape.first_item, std::memory_order_relaxed);
     header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
     header.heartbeat_ns.store(host_now().ns, std::memory_order_relaxed);
@@ -135,12 +135,18 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     }
     if (!allocated) return Unexpected(allocated.error());
     auto mapping = Mapping::open_unchecked(temporary, Mapping::Access::read_write);
-    if (!mapping) return Unexpected(mapping.error());
+    if (!mapping) {
+        ::unlink(temporary.c_str());
+        return Unexpected(mapping.error());
+    }
     fill_header(mapping->header(), shape, size);
     // The name points to the new segment before readers of the old one wake up and look for it.
-    if (::rename(temporary.c_str(), path.c_str()) != 0)
+    if (::rename(temporary.c_str(), path.c_str()) != 0) {
+        const int error = errno;
+        ::unlink(temporary.c_str());
         return failure(path.string(),
-                       fmt::format("cannot be renamed into place: {}", reason(errno)));
+                       fmt::format("cannot be renamed into place: {}", reason(error)));
+    }
     if (old) retire(old->header(), WriterState::superseded);
     return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
 }
