@@ -146,3 +146,160 @@ TEST_CASE("alignment: a missing record leaves it open") {
     holed.frames = bench.frames;
     CHECK(holed.align().empty());
 }
+
+namespace {
+
+/// A record of this number, the `recorded`-th, with so many silent ones until it.
+Record recorded(std::uint64_t trigger, std::uint64_t count, std::uint64_t silent = 0,
+                bool exposed = true) {
+    Record record;
+    record.exposure.trigger = trigger;
+    record.exposure.exposed = exposed;
+    record.recorded = count;
+    record.silent = silent;
+    return record;
+}
+
+}  // namespace
+
+TEST_CASE("alignment: a frame arrives within its limits after the end of its exposure") {
+    Limits limits;
+    limits.earliest_arrival = -milliseconds(5);
+    limits.latest_arrival = milliseconds(500);
+    Exposure exposure;
+    exposure.earliest_on_host = HostTime{1'000'000'000};
+    const auto possible = [&](Duration after) {
+        Arrival arrival;
+        arrival.arrived = exposure.earliest_on_host + after;
+        return arrival_possible(limits, arrival, exposure);
+    };
+    CHECK(possible(-milliseconds(5)));
+    CHECK_FALSE(possible(-milliseconds(5) - nanoseconds(1)));
+    CHECK(possible(milliseconds(500)));
+    CHECK_FALSE(possible(milliseconds(500) + nanoseconds(1)));
+}
+
+TEST_CASE("alignment: triggers that a camera may have ignored are silent, or without record") {
+    const Record from = recorded(10, 10, 2);
+    CHECK(perhaps_not_taken(from, recorded(11, 11, 2)) == 0);
+    CHECK(perhaps_not_taken(from, recorded(15, 15, 2)) == 0);
+    CHECK(perhaps_not_taken(from, recorded(15, 15, 3)) == 1);
+    CHECK(perhaps_not_taken(from, recorded(15, 13, 2)) == 2);
+    CHECK(perhaps_not_taken(from, recorded(15, 13, 3)) == 3);
+    // Whether the last one was taken is not asked.
+    CHECK(perhaps_not_taken(from, recorded(15, 15, 3, false)) == 0);
+    CHECK(perhaps_not_taken(from, recorded(15, 15, 4, false)) == 1);
+    CHECK(perhaps_not_taken(from, recorded(12, 12, 9)) == 1);
+    // Records that came twice as often as triggers take nothing away.
+    CHECK(perhaps_not_taken(from, recorded(12, 19, 2)) == 0);
+}
+
+TEST_CASE("alignment: ids count triggers, or those that were taken, and else it takes faults") {
+    const Record from = recorded(10, 10);
+    for (const auto& [step, faults] :
+         {std::pair{0U, 2U}, {1U, 2U}, {2U, 2U}, {3U, 2U}, {4U, 1U}, {5U, 0U}, {6U, 2U}})
+        CHECK(step_faults(step, from, recorded(15, 15)) == faults);
+    for (const auto& [step, faults] :
+         {std::pair{1U, 2U}, {2U, 1U}, {3U, 0U}, {4U, 0U}, {5U, 0U}, {6U, 2U}})
+        CHECK(step_faults(step, from, recorded(15, 14, 1)) == faults);
+    CHECK(step_faults(1, from, recorded(10, 10)) == 2);
+    CHECK(step_faults(1, from, recorded(9, 9)) == 2);
+    CHECK(step_faults(1, from, recorded(11, 11)) == 0);
+    CHECK(faults_to_refute == 2);
+}
+
+TEST_CASE("alignment: lengths differ by more than 0.2 ms and a twentieth") {
+    for (const Duration measured : {milliseconds(1), milliseconds(4)})
+        for (const int side : {-1, 1}) {
+            CHECK_FALSE(lengths_differ(measured + microseconds(200) * side, measured));
+            CHECK(lengths_differ(measured + (microseconds(200) + nanoseconds(1)) * side, measured));
+        }
+    CHECK_FALSE(lengths_differ(milliseconds(105), milliseconds(100)));
+    CHECK(lengths_differ(milliseconds(105) + nanoseconds(1), milliseconds(100)));
+    CHECK(lengths_differ(milliseconds(95) - nanoseconds(1), milliseconds(100)));
+    Arrival arrival;
+    arrival.exposure = milliseconds(3);
+    Exposure exposure;
+    exposure.end = exposure.start + milliseconds(2);
+    CHECK(length_contradicts(arrival, exposure));
+    exposure.kind = StampKind::predicted_middle;
+    CHECK_FALSE(length_contradicts(arrival, exposure));
+    exposure.kind = StampKind::measured_middle;
+    arrival.exposure = {};
+    CHECK_FALSE(length_contradicts(arrival, exposure));
+    arrival.exposure = milliseconds(2);
+    CHECK_FALSE(length_contradicts(arrival, exposure));
+}
+
+TEST_CASE("alignment: five frames prove a start by the clock, three by arrival") {
+    CHECK(frames_for_proof(true) == 5);
+    CHECK(frames_for_proof(false) == 3);
+    Bench far({0, 20, 40});
+    for (const std::uint64_t trigger : {1, 2, 3}) far.frame(trigger);
+    CHECK(far.align(Instant::arrival) == Triggers{1, 2, 3});
+    far.frames.pop_back();
+    CHECK(far.align(Instant::arrival).empty());
+}
+
+TEST_CASE("alignment: by arrival, each neighbour is further away than a frame may be late") {
+    const Limits limits;
+    const Duration window = limits.latest_arrival - limits.earliest_arrival;
+    for (const Duration gap : {window, window + nanoseconds(1)})
+        for (const std::size_t place : {1U, 2U, 3U}) {
+            Bench bench({0, 20, 40, 60});
+            ExposureLog moved(limits.period);
+            BoardTime start{1'000'000'000};
+            for (std::size_t i = 0; i < 4; ++i) {
+                if (i > 0) start = start + (i == place ? gap : seconds(1));
+                Exposure exposure = bench.exposures[i].exposure;
+                exposure.start = start;
+                exposure.end = start + milliseconds(2);
+                exposure.end_on_host = exposure.earliest_on_host = HostTime{exposure.end.ns};
+                moved.add(exposure);
+            }
+            bench.exposures = moved;
+            for (const std::uint64_t trigger : {1, 2, 3}) bench.frame(trigger);
+            CHECK(bench.align(Instant::arrival).empty() == (gap == window));
+        }
+}
+
+TEST_CASE("alignment: times a quarter of a gap off are of an exposure, and no further") {
+    for (const auto& [off_ns, found] : {std::pair{12'500'000LL, true},
+                                        {12'500'001LL, false},
+                                        {-12'500'000LL, true},
+                                        {-12'500'001LL, false}}) {
+        Bench bench({0, 1, 3, 4, 7, 9, 11});
+        for (const std::uint64_t trigger : {1, 2, 3, 4, 5}) bench.frame(trigger);
+        // The first frame's difference of the clocks is tried; the others are off by all of it.
+        for (std::size_t i = 1; i < 5; ++i) bench.frames[i].camera_time.ns += off_ns;
+        const bool aligned = !bench.align().empty();
+        CHECK((aligned || !found));
+    }
+}
+
+TEST_CASE("alignment: one that is later than the others by 0.6 gaps is not proved with them") {
+    for (const auto& [late, kept] :
+         {std::pair{milliseconds(33), true}, {milliseconds(33) + nanoseconds(1), false}}) {
+        Bench bench({0, 1, 3, 4, 7, 9, 11});
+        for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6})
+            bench.frame(trigger, trigger == 3 ? late : milliseconds(3));
+        CHECK(bench.align() == (kept ? Triggers{1, 2, 3, 4, 5, 6} : Triggers{1, 2, 0, 4, 5, 6}));
+    }
+}
+
+TEST_CASE("alignment: an exposure has one frame at most, and none that it had before") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5}) bench.frame(trigger);
+    SECTION("two frames of one") {
+        bench.frame(5);
+        CHECK(bench.align().empty());
+    }
+    SECTION("one that was published") {
+        bench.exposures.find(2)->used = true;
+        CHECK(bench.align().empty());
+    }
+    SECTION("an id that counts one too few") {
+        for (std::size_t i = 3; i < 5; ++i) --bench.frames[i].block_id;
+        CHECK(bench.align().empty());
+    }
+}

@@ -26,3 +26,32 @@ TEST_CASE("block_id: long ids stay as they are") {
         CHECK(ids.unwrap(id) == id);
     CHECK(ids.unwrap(1) == 1);  // begun anew, not wrapped
 }
+
+TEST_CASE("block_id: half a lap either way is the way it went") {
+    for (const std::uint64_t last : {1U, 1'000U, 40'000U, 65'535U}) {
+        BlockIdUnwrapper ids;
+        for (std::uint64_t id = 1; id <= 65'535; ++id) ids.unwrap(id);
+        const std::uint64_t now = 65'535 + last;
+        for (std::uint64_t id = 1; id <= last; ++id) ids.unwrap(id);
+        for (const std::uint64_t step : {1U, 2U, 32'766U, 32'767U}) {
+            BlockIdUnwrapper forward = ids;
+            CHECK(forward.unwrap((now + step - 1) % 65'535 + 1) == now + step);
+        }
+        for (const std::uint64_t step : {1U, 2U, 32'766U, 32'767U}) {
+            BlockIdUnwrapper back = ids;
+            CHECK(back.unwrap((now - step - 1) % 65'535 + 1) == now - step);
+            CHECK(back.unwrap((now - 1) % 65'535 + 1) == now);
+        }
+    }
+}
+
+TEST_CASE("block_id: the first number may be any, and 65536 ends all wraps") {
+    for (const std::uint64_t first : {0U, 1U, 40'000U, 65'535U}) {
+        BlockIdUnwrapper ids;
+        CHECK(ids.unwrap(first) == first);
+    }
+    BlockIdUnwrapper ids;
+    CHECK(ids.unwrap(65'536) == 65'536);
+    CHECK(ids.unwrap(3) == 3);
+    CHECK(ids.unwrap(70'000) == 70'000);
+}

@@ -112,3 +112,63 @@ TEST_CASE("exposure_log: an exposure that outlasts the next ones is found by its
     CHECK(log.near(Instant::arrival, 5'180'000'000, 5'000'000)->exposure.trigger == 2);
     CHECK(log.near(Instant::arrival, 5'102'000'000, 5'000'000)->exposure.trigger == 3);
 }
+
+TEST_CASE("exposure_log: near means within the tolerance, to the nanosecond, at either side") {
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 3; ++i) log.add(exposure(static_cast<std::uint64_t>(i) + 1, 50 * i));
+    for (const auto& [instant, at_ns] : {std::pair{Instant::start, 50'000'000LL},
+                                         {Instant::middle, 51'000'000LL},
+                                         {Instant::end, 52'000'000LL},
+                                         {Instant::arrival, 5'052'000'000LL}}) {
+        CHECK(log[1].instant_ns(instant) == at_ns);
+        for (const int side : {-1, 1}) {
+            CHECK(log.near(instant, at_ns + side * 1'000, 1'000) == &log[1]);
+            CHECK(log.near(instant, at_ns + side * 1'001, 1'000) == nullptr);
+        }
+        CHECK(log.near(instant, at_ns, 0) == &log[1]);
+        // Of two that are as far away, the later.
+        CHECK(log.near(instant, at_ns + 25'000'000, 25'000'000) == &log[2]);
+    }
+}
+
+TEST_CASE("exposure_log: a record is found by its number while it is kept") {
+    ExposureLog log(milliseconds(50));
+    CHECK(log.empty());
+    for (std::uint64_t i = 1; i <= 3; ++i) log.add(exposure(i, static_cast<std::int64_t>(i) * 50));
+    CHECK(log.size() == 3);
+    CHECK(log.find(2) == &log[1]);
+    CHECK(log.find(4) == nullptr);
+    CHECK(log.pop_front().exposure.trigger == 1);
+    CHECK(log.find(1) == nullptr);
+    CHECK(log.front().exposure.trigger == 2);
+    CHECK(log.back().exposure.trigger == 3);
+    CHECK(log.back().recorded == 3);
+    CHECK(log.back().silent == 0);
+    CHECK_FALSE(log.back().used);
+}
+
+TEST_CASE("exposure_log: held up together means within three quarters of a period") {
+    for (const auto& [apart_us, prompt] : {std::pair{37'499, true}, {37'500, false}}) {
+        ExposureLog log(milliseconds(50));
+        Exposure late = exposure(1, 50);
+        late.recorded = HostTime{1'000'000'000};
+        log.add(late, false);
+        Exposure next = exposure(2, 100);
+        next.recorded = late.recorded + microseconds(apart_us);
+        log.add(next, true);
+        CHECK(log[0].prompt == prompt);
+    }
+}
+
+TEST_CASE("exposure_log: the first exposure that lies behind tells whether one is lost") {
+    ExposureLog log(milliseconds(50));
+    for (const std::uint64_t trigger : {5U, 6U, 8U})
+        log.add(exposure(trigger, static_cast<std::int64_t>(trigger) * 50));
+    CHECK(log.lost_near(Instant::start, 350'000'000, 4));
+    CHECK_FALSE(log.lost_near(Instant::start, 299'999'999, 4));
+    CHECK(log.lost_near(Instant::start, 300'000'000, 4));
+    CHECK_FALSE(log.lost_near(Instant::start, 400'000'000, 4));
+    CHECK(log.lost_near(Instant::start, 200'000'000, 3));
+    CHECK_FALSE(log.lost_near(Instant::start, 200'000'000, 4));
+    CHECK_FALSE(log.lost_near(Instant::start, 200'000'000, 0));
+}
