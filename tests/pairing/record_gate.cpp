@@ -108,3 +108,103 @@ TEST_CASE("record_gate: records that come late are good, but not prompt") {
     gate.take(record(7, 7));
     CHECK(gate.prompt());
 }
+
+TEST_CASE("record_gate: how far a start may lie off its grid point, by distance") {
+    // 0.6 periods, and 2 ms for each second since the record before.
+    for (const std::uint64_t steps : {1U, 20U}) {
+        const Duration limit = milliseconds(30) + microseconds(100) * static_cast<int>(steps);
+        for (const int side : {-1, 1}) {
+            const RecordGate gate{Limits{}};
+            const auto fits = [&](Duration off) {
+                return gate.in_order(record(1, 1), shifted(record(2, 1 + steps), off * side));
+            };
+            CHECK(fits(limit - nanoseconds(1)));
+            CHECK_FALSE(fits(limit + nanoseconds(1)));
+        }
+    }
+    const RecordGate gate = gate_after(5);
+    CHECK(gate.in_order(record(5, 5), record(6, 6)));
+    CHECK_FALSE(gate.in_order(record(5, 5), record(7, 6)));
+    CHECK_FALSE(gate.in_order(record(5, 5), record(5, 5)));
+}
+
+TEST_CASE("record_gate: once four records agree, one much sooner than they is too early") {
+    for (const std::uint64_t records : {3U, 4U})
+        for (const auto& [sooner, good] : {std::pair{microseconds(1'000), true},
+                                           {microseconds(5'499), true},
+                                           {microseconds(5'501), false}}) {
+            const RecordGate gate = gate_after(records);
+            Exposure next = record(records + 1, records + 1);
+            next.recorded = next.recorded - sooner;
+            CHECK(gate.accepts(next) == good);  // 5 ms before its end is the limit in any case
+        }
+    Limits limits;
+    limits.earliest_arrival = -seconds(1);
+    for (const std::uint64_t records : {3U, 4U})
+        for (const auto& [sooner, good] :
+             {std::pair{microseconds(12'490), true}, {microseconds(12'510), false}}) {
+            RecordGate gate(limits);
+            for (std::uint64_t i = 1; i <= records; ++i) gate.take(record(i, i));
+            Exposure next = record(records + 1, records + 1);
+            next.recorded = next.recorded - sooner;
+            CHECK(gate.accepts(next) == (good || records == 3));
+        }
+}
+
+TEST_CASE("record_gate: a record that does not say when it came is never too early, nor late") {
+    RecordGate gate = gate_after(5);
+    for (std::uint64_t i = 6; i < 12; ++i) {
+        Exposure unknown = record(i, i);
+        unknown.recorded = {};
+        CHECK(gate.accepts(unknown));
+        gate.take(unknown);
+        CHECK(gate.prompt());
+    }
+}
+
+TEST_CASE(
+    "record_gate: prompt is a quarter of a period after the quickest, and within the limits") {
+    for (const auto& [late, prompt] :
+         {std::pair{microseconds(12'490), true}, {microseconds(12'560), false}}) {
+        RecordGate gate = gate_after(5);
+        Exposure next = record(6, 6);
+        next.recorded = next.recorded + late;
+        gate.take(next);
+        CHECK(gate.prompt() == prompt);
+    }
+    Limits limits;
+    limits.exposure_wait = milliseconds(3);
+    for (const auto& [delay, prompt] :
+         {std::pair{milliseconds(3), true}, {milliseconds(3) + nanoseconds(1), false}}) {
+        RecordGate gate(limits);
+        for (std::uint64_t i = 1; i < 6; ++i) gate.take(record(i, i));
+        Exposure next = record(6, 6);
+        next.recorded = next.earliest_on_host + delay;
+        gate.take(next);
+        CHECK(gate.prompt() == prompt);
+    }
+}
+
+TEST_CASE("record_gate: how soon records come is learned anew when that is asked") {
+    RecordGate gate = gate_after(8);
+    Exposure early = record(9, 9);
+    early.recorded = early.earliest_on_host - milliseconds(4);
+    Exposure slow = record(9, 9);
+    slow.recorded = slow.recorded + milliseconds(40);
+    CHECK(gate.accepts(slow));
+    gate.forget_delay();
+    CHECK(gate.accepts(early));  // by the limits alone
+    gate.take(slow);
+    CHECK(gate.prompt());  // nobody knows of quicker ones
+}
+
+TEST_CASE("record_gate: the first record of all is prompt, but the link may have stalled") {
+    RecordGate gate{Limits{}};
+    CHECK(gate.live());
+    CHECK(gate.prompt());
+    gate.take(record(1, 1));
+    CHECK(gate.prompt());
+    CHECK_FALSE(gate.live());
+    gate.take(record(2, 2));
+    CHECK(gate.live());
+}
