@@ -58,11 +58,14 @@ class Area:
     program: str
     # A file of test cases that takes long, and the only modules for which it runs.
     only_for: dict = dataclasses.field(default_factory=dict)
+    # Its named constants are none of ours: ./dev sensitivity halves and doubles them, and tells what
+    # that costs.
+    is_tuned: bool = False
 
 
 AREAS = [
     Area("firmware/core", "firmware_tests", {"011-no-drift": {"grid"}}),
-    Area("libversavis/engine/pairing", "pairing_tests"),
+    Area("libversavis/engine/pairing", "pairing_tests", is_tuned=True),
     Area("libversavis/engine/ring", "ring_tests"),
     Area("libversavis/client", "ring_tests"),
     Area("libversavis/include/versavis/ring", "ring_tests"),
@@ -851,8 +854,14 @@ class Tool:
             if not any(named(file, [name]) for those in files.values() for file in those):
                 raise WrongUse(f"no source in {' or '.join(area.folder for area in self.areas)} "
                                f"is named {name}")
-        return {area: [mutant for file in those for mutant in self.find(file)]
+        return {area: [mutant for file in those for mutant in self.find(file)
+                       if not (area.is_tuned and self.is_constant(mutant))]
                 for area, those in files.items() if those}
+
+    def is_constant(self, mutant):
+        """Of a named one of its file."""
+        line = self.texts[mutant.file].splitlines()[mutant.line - 1]
+        return mutant.kind == "constant" and line.startswith(("constexpr ", "inline constexpr "))
 
     def only_changed(self, chosen):
         """None: there is nothing to compare with."""

@@ -257,6 +257,17 @@ class Project(unittest.TestCase):
         self.assertEqual(self.results[4, "constant: 0 -> 1"]["by"], "tests/gate.cpp:9")
         self.assertEqual(self.status(4, "statement: dropped"), "killed")
 
+    def test_named_constants_that_are_tuned_are_left_alone(self):
+        (self.root / "core/gate.hpp").write_text(
+            "constexpr int limit = 3;\nint f() {\n    constexpr int at = 5;\n}\n")
+
+        def lines(is_tuned):
+            area = mutants.Area("core", "core_tests", is_tuned=is_tuned)
+            chosen = mutants.Tool(self.root, [area], mutants.parse(["gate.hpp"])).chosen()
+            return {mutant.line for mutant in chosen[area]}
+        self.assertEqual(lines(False), {1, 3})
+        self.assertEqual(lines(True), {3})
+
     def test_what_does_not_end_is_killed(self):
         self.assertIn("no end", self.results[4, "constant: 1 -> 0"]["by"])
 
