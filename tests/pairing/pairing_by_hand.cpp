@@ -484,3 +484,35 @@ TEST_CASE(
         CHECK(bench.told.frames[i].reason == EventReason::unproved);
     CHECK(bench.told.frames.back().reason == EventReason::mismatch);
 }
+
+TEST_CASE("pairing_by_hand: what was given up explains the trigger whose record comes at last") {
+    Bench bench;
+    bench.lock();
+    bench.told = {};
+    const Exposure late = bench.next();
+    const Arrival frame = Bench::frame(bench.next_id++, late);
+    bench.pairing.add(frame);
+    bench.pairing.advance(frame.arrived + usual_exposure_wait + nanoseconds(1));
+    REQUIRE(bench.told.frames.size() == 1);
+    bench.pairing.add(late);
+    bench.take();
+    CHECK(bench.told.pulses ==
+          std::vector<Told::Pulse>{{late.trigger, EventReason::exposure_missing}});
+}
+
+TEST_CASE("pairing_by_hand: a start is wanted once five frames came that prove nothing") {
+    Bench bench;
+    const auto frames_until_wanted = [&] {
+        for (std::uint64_t i = 1; i < 100; ++i) {
+            CHECK_FALSE(bench.pairing.wanted_start(HostTime{} + seconds(10'000)));
+            bench.pairing.add(Bench::frame(i, Bench::exposure(i, i)));
+            if (bench.pairing.wanted_start(HostTime{} + seconds(10'000))) return i;
+        }
+        return std::uint64_t{0};
+    };
+    CHECK(frames_until_wanted() == 5);
+    bench.pairing.reset();
+    CHECK(frames_until_wanted() == 5);
+    bench.pairing.start_requested(Start::pattern, HostTime{});
+    CHECK(frames_until_wanted() == 5);
+}

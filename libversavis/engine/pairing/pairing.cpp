@@ -684,9 +684,7 @@ void Pairing::reset() {
     state_ = State::searching;
     exposures_ = ExposureLog(limits_.period);
     gate_ = RecordGate(limits_);
-    clock_.forget();
     shortfalls_.clear();
-    proved_.reset();
     waits_for_witness_ = false;
     fruitless_starts_ = 0;
     frames_since_start_ = 0;
