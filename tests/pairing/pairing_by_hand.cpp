@@ -1,121 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pairing fed by hand, piece by piece: what comes back, when, and for which reason.
+// What comes back of frames and triggers, when, and for which reason.
 #include <catch2/catch.hpp>
+#include <string>
 #include <vector>
 
-#include "engine/pairing/pairing.hpp"
+#include "pairing_bench.hpp"
 
 using namespace versavis;
-using namespace versavis::pairing;
-
-namespace {
-
-/// All that pairing decided, in order.
-class Told final : public Outcome {
- public:
-    struct Frame {
-        std::uint64_t id;
-        EventReason reason;
-        std::uint64_t guess;  ///< trigger; 0: none
-    };
-    struct Pulse {
-        std::uint64_t trigger;
-        EventReason reason;
-    };
-
-    void paired(const Arrival& arrival, const Exposure& exposure) override {
-        pairs.emplace_back(arrival.block_id, exposure.trigger);
-    }
-    void frame_unpaired(const Arrival& arrival, EventReason reason,
-                        const Exposure* guess) override {
-        frames.push_back({arrival.block_id, reason, guess == nullptr ? 0 : guess->trigger});
-    }
-    void exposure_unpaired(const Exposure& exposure, EventReason reason) override {
-        pulses.push_back({exposure.trigger, reason});
-    }
-    void locked(const Exposure& first) override { locks.push_back(first.trigger); }
-    void slipped(const Arrival& at) override { slips.push_back(at.block_id); }
-
-    std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;  ///< ids and triggers
-    std::vector<Frame> frames;
-    std::vector<Pulse> pulses;
-    std::vector<std::uint64_t> locks;
-    std::vector<std::uint64_t> slips;
-};
-
-bool operator==(const Told::Pulse& a, const Told::Pulse& b) {
-    return a.trigger == b.trigger && a.reason == b.reason;
-}
-std::ostream& operator<<(std::ostream& out, const Told::Pulse& pulse) {
-    return out << pulse.trigger << ": " << to_string(pulse.reason);
-}
-
-constexpr Duration period = milliseconds(50);
-constexpr Duration exposed_for = milliseconds(5);
-constexpr Duration record_after = milliseconds(2);  ///< the end of the exposure
-constexpr Duration frame_after = milliseconds(20);
-constexpr Duration host_ahead = seconds(1000);  ///< of the board
-constexpr Duration camera_ahead = seconds(7);
-/// Grid points of a start: no other alignment of them has the same gaps.
-constexpr std::uint64_t pattern[] = {1, 2, 4, 5, 8, 9, 11, 12, 15, 17, 18, 20};
-
-/// One camera that takes each trigger, its board, and pairing.
-struct Bench {
-    explicit Bench(const Limits& limits = made(), std::uint64_t first_id = 1)
-        : pairing(limits, told), next_id(first_id) {}
-
-    static Limits made() {
-        Limits limits;
-        limits.period = period;
-        limits.stamped = Instant::start;
-        return limits;
-    }
-
-    static Exposure exposure(std::uint64_t trigger, std::uint64_t tick) {
-        Exposure made;
-        made.trigger = trigger;
-        made.tick = tick;
-        made.start = BoardTime{} + seconds(5) + period * static_cast<std::int64_t>(tick);
-        made.end = made.start + exposed_for;
-        made.end_on_host = made.earliest_on_host = HostTime{made.end.ns} + host_ahead;
-        made.recorded = made.end_on_host + record_after;
-        return made;
-    }
-
-    static Arrival frame(std::uint64_t id, const Exposure& of) {
-        Arrival made;
-        made.block_id = id;
-        made.camera_time = CameraTime{of.start.ns} + camera_ahead;
-        made.arrived = of.end_on_host + frame_after;
-        return made;
-    }
-
-    Exposure next(std::uint64_t steps = 1) { return exposure(next_trigger++, tick += steps); }
-
-    /// A trigger, its record and its frame.
-    void take(std::uint64_t steps = 1) {
-        const Exposure one = next(steps);
-        pairing.add(one);
-        pairing.add(frame(next_id++, one));
-        now = one.end_on_host + frame_after;
-    }
-
-    void lock() {
-        const std::uint64_t base = tick;
-        for (const std::uint64_t at : pattern) take(base + at - tick);
-        REQUIRE(pairing.state() == State::locked);
-        for (int i = 0; i < 10; ++i) take();
-    }
-
-    Told told;
-    Pairing pairing;
-    std::uint64_t next_trigger = 1;
-    std::uint64_t next_id;
-    std::uint64_t tick = 0;
-    HostTime now;
-};
-
-}  // namespace
+using namespace versavis::test;
 
 TEST_CASE("pairing_by_hand: each state has its name") {
     CHECK(std::string(to_string(State::searching)) == "searching");
@@ -145,7 +37,7 @@ TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the li
     const Exposure waits = bench.next();
     bench.pairing.add(waits);
     const Exposure late = bench.next();
-    bench.pairing.add(Bench::frame(24, late));  // its record has not come
+    bench.pairing.add(bench.frame(24, late));  // its record has not come
     Exposure odd = bench.next();
     odd.start = odd.start + period * 7;
     bench.pairing.add(odd);
@@ -163,6 +55,7 @@ TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the li
     bench.tick = 0;
     bench.next_trigger = 1;
     bench.next_id = 1'000;
+    bench.camera_ahead = seconds(90);
     bench.lock();
     CHECK(bench.told.pairs.size() == 22);
     CHECK(bench.told.frames.empty());
@@ -242,7 +135,7 @@ TEST_CASE("pairing_by_hand: frames that wait are bounded, and the oldest goes fi
     std::vector<Exposure> held_up;
     for (std::uint64_t i = 0; i < 9; ++i) {
         held_up.push_back(bench.next());
-        bench.pairing.add(Bench::frame(bench.next_id++, held_up.back()));
+        bench.pairing.add(bench.frame(bench.next_id++, held_up.back()));
         CHECK(bench.told.frames.size() == (i < 8 ? 0 : 1));
     }
     CHECK(bench.told.frames[0].id == 23);
@@ -250,8 +143,7 @@ TEST_CASE("pairing_by_hand: frames that wait are bounded, and the oldest goes fi
     CHECK(bench.pairing.state() == State::locked);
     // While nothing is known, it is unproved.
     Bench other;
-    for (std::uint64_t i = 1; i <= 9; ++i)
-        other.pairing.add(Bench::frame(i, Bench::exposure(i, i)));
+    for (std::uint64_t i = 1; i <= 9; ++i) other.pairing.add(other.frame(i, Bench::exposure(i, i)));
     REQUIRE(other.told.frames.size() == 1);
     CHECK(other.told.frames[0].reason == EventReason::unproved);
     CHECK(other.told.frames[0].guess == 0);
@@ -261,7 +153,7 @@ TEST_CASE("pairing_by_hand: a frame waits for its record as long as the limits s
     Bench bench;
     bench.lock();
     bench.told = {};
-    const Arrival waits = Bench::frame(bench.next_id++, bench.next());
+    const Arrival waits = bench.frame(bench.next_id++, bench.next());
     bench.pairing.add(waits);
     const HostTime until = waits.arrived + usual_exposure_wait;
     CHECK_FALSE(bench.pairing.due(until));
@@ -275,7 +167,7 @@ TEST_CASE("pairing_by_hand: a frame waits for its record as long as the limits s
 
 TEST_CASE("pairing_by_hand: while it searches, frames wait for ten seconds and ten periods") {
     Bench bench;
-    const Arrival waits = Bench::frame(1, Bench::exposure(1, 1));
+    const Arrival waits = bench.frame(1, Bench::exposure(1, 1));
     bench.pairing.add(waits);
     const HostTime until = waits.arrived + seconds(10) + period * 10;
     CHECK_FALSE(bench.pairing.due(until));
@@ -303,7 +195,7 @@ TEST_CASE(
               std::vector<Told::Pulse>{{waits.trigger, EventReason::camera_silent}});
     }
     SECTION("a frame came, of another exposure") {
-        Arrival other = Bench::frame(bench.next_id + 1, bench.next());
+        Arrival other = bench.frame(bench.next_id + 1, bench.next());
         other.arrived = until - patience + milliseconds(1);
         bench.pairing.add(other);
         bench.pairing.advance(until + nanoseconds(1));
@@ -388,7 +280,7 @@ TEST_CASE(
             Arrival arrival;
             arrival.block_id = id++;
             arrival.arrived = now;
-            arrival.camera_time = CameraTime{now.ns} + camera_ahead;
+            arrival.camera_time = CameraTime{now.ns} + bench.camera_ahead;
             bench.pairing.add(arrival);
             if (bench.pairing.wanted_start(now)) break;
             now = now + milliseconds(10);
@@ -432,9 +324,9 @@ TEST_CASE(
     const Exposure second = bench.next();
     bench.pairing.add(first);
     bench.pairing.add(second);
-    bench.pairing.add(Bench::frame(bench.next_id + 1, second));
-    bench.pairing.add(Bench::frame(bench.next_id + 1, second));
-    bench.pairing.add(Bench::frame(bench.next_id, first));
+    bench.pairing.add(bench.frame(bench.next_id + 1, second));
+    bench.pairing.add(bench.frame(bench.next_id + 1, second));
+    bench.pairing.add(bench.frame(bench.next_id, first));
     CHECK(bench.told.pairs.size() == 1);
     REQUIRE(bench.told.frames.size() == 2);
     for (const auto& frame : bench.told.frames) CHECK(frame.reason == EventReason::out_of_order);
@@ -470,7 +362,7 @@ TEST_CASE(
     for (int i = 0; i < 30 && bench.pairing.state() != State::searching; ++i) {
         const Exposure one = bench.next();
         bench.pairing.add(one);
-        Arrival arrival = Bench::frame(bench.next_id, one);
+        Arrival arrival = bench.frame(bench.next_id, one);
         bench.next_id += 3;
         arrival.camera_time = arrival.camera_time + milliseconds(120) * (i + 1);
         bench.pairing.add(arrival);
@@ -490,7 +382,7 @@ TEST_CASE("pairing_by_hand: what was given up explains the trigger whose record 
     bench.lock();
     bench.told = {};
     const Exposure late = bench.next();
-    const Arrival frame = Bench::frame(bench.next_id++, late);
+    const Arrival frame = bench.frame(bench.next_id++, late);
     bench.pairing.add(frame);
     bench.pairing.advance(frame.arrived + usual_exposure_wait + nanoseconds(1));
     REQUIRE(bench.told.frames.size() == 1);
@@ -505,7 +397,7 @@ TEST_CASE("pairing_by_hand: a start is wanted once five frames came that prove n
     const auto frames_until_wanted = [&] {
         for (std::uint64_t i = 1; i < 100; ++i) {
             CHECK_FALSE(bench.pairing.wanted_start(HostTime{} + seconds(10'000)));
-            bench.pairing.add(Bench::frame(i, Bench::exposure(i, i)));
+            bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
             if (bench.pairing.wanted_start(HostTime{} + seconds(10'000))) return i;
         }
         return std::uint64_t{0};
