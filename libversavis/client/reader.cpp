@@ -149,8 +149,7 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     item.slot = static_cast<std::uint32_t>(length_and_slot);
     item.payload_size = static_cast<std::uint32_t>(length_and_slot >> 32U);
     if (item.slot != no_slot) {
-        if (item.slot >= header.slot_count || item.payload_size > header.slot_size || !intact(item))
-            return item;
+        if (item.payload_size > header.slot_size || !intact(item)) return item;
         item.payload = segment_->mapping.slot(item.slot);
     }
     item.found = Found::item;
