@@ -3,18 +3,17 @@
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <thread>
 #include <vector>
 
+#include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
@@ -22,6 +21,7 @@
 
 using namespace versavis;
 using namespace versavis::ring;
+using test::in_process;
 
 namespace {
 
@@ -278,14 +278,6 @@ TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
 }
 
 namespace {
-
-/// Runs `body` in a process of its own, which ends as if it were killed; true: it returned true.
-bool in_process(const std::function<bool()>& body) {
-    const pid_t child = ::fork();
-    if (child == 0) ::_exit(body() ? 0 : 1);
-    int status = 0;
-    return ::waitpid(child, &status, 0) == child && status == 0;
-}
 
 bool write_line(const char* path, const std::string& line) {
     return static_cast<bool>(std::ofstream(path) << line << std::flush);

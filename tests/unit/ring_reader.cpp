@@ -3,7 +3,6 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -16,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
@@ -23,6 +23,7 @@
 
 using namespace versavis;
 using namespace versavis::ring;
+using test::in_process;
 
 namespace {
 
@@ -54,14 +55,6 @@ void publish(Writer& writer, std::uint32_t length, std::uint8_t fill = 1) {
     REQUIRE(slot);
     std::memset(writer.slot_data(*slot), fill, length);
     writer.publish(*slot, length, OutputTime{}, {});
-}
-
-int in_process(const std::function<int()>& body) {
-    const pid_t child = ::fork();
-    if (child == 0) ::_exit(body());
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 std::int64_t processor_time_ns() {
@@ -258,13 +251,11 @@ TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read is told so, and wha
     if (::geteuid() != 0) return;  // only root can become somebody else
     CHECK(::chmod(directory.path().c_str(), 0700) == 0);
     CHECK(in_process([&] {
-              if (::setegid(12345) != 0 || ::seteuid(12345) != 0) return 2;
-              const std::string text = refusal("events");
-              return text.find("permission denied") != std::string::npos &&
-                             text.find("join the group") != std::string::npos
-                         ? 0
-                         : 1;
-          }) == 0);
+        if (::setegid(12345) != 0 || ::seteuid(12345) != 0) return false;
+        const std::string text = refusal("events");
+        return text.find("permission denied") != std::string::npos &&
+               text.find("join the group") != std::string::npos;
+    }));
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {

@@ -8,14 +8,15 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <fstream>
-#include <functional>
 
+#include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/time.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
+using test::in_process;
 
 namespace {
 
@@ -49,15 +50,6 @@ struct Copies {
 
 /// Bytes of the ring above: 16 descriptors behind the header, two generations, two slots.
 constexpr std::uint64_t total = 4 * page_size;
-
-/// What `body` returns in a process of its own.
-int in_process(const std::function<int()>& body) {
-    const pid_t child = ::fork();
-    if (child == 0) ::_exit(body());
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
 
 }  // namespace
 
@@ -147,14 +139,11 @@ TEST_CASE_METHOD(Copies, "segment: what cannot be mapped says why, and what to d
     CHECK_THAT(missing.error().message(),
                Catch::Contains("cannot be mapped") && Catch::Contains("is the service running?"));
     if (::geteuid() != 0) return;  // only root can become somebody else
-    const int result = in_process([&] {
-        if (::setegid(12345) != 0 || ::seteuid(12345) != 0) return 2;
+    CHECK(in_process([&] {
+        if (::setegid(12345) != 0 || ::seteuid(12345) != 0) return false;
         const auto mapping = Mapping::open(directory.path() / "frames", Mapping::Access::read_only);
-        return !mapping && mapping.error().message().find("join the group") != std::string::npos
-                   ? 0
-                   : 1;
-    });
-    CHECK(result == 0);
+        return !mapping && mapping.error().message().find("join the group") != std::string::npos;
+    }));
 }
 
 TEST_CASE_METHOD(Copies, "segment: of another process, or of an earlier one with its number") {
@@ -177,10 +166,10 @@ TEST_CASE("segment: the start of a process, whatever its name") {
     for (const char* name : {"plain", "two words", "a) R 1 2 (b", ")) Z (", ""}) {
         const std::uint64_t before = start_ticks_of_this_process();
         CHECK(in_process([&] {
-                  ::prctl(PR_SET_NAME, name);
-                  const std::uint64_t ticks = start_ticks_of_this_process();
-                  return ticks >= before && ticks < before + 100'000'000 ? 0 : 1;
-              }) == 0);
+            ::prctl(PR_SET_NAME, name);
+            const std::uint64_t ticks = start_ticks_of_this_process();
+            return ticks >= before && ticks < before + 100'000'000;
+        }));
     }
     CHECK(start_ticks_of_this_process() == own);
 }
