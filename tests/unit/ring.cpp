@@ -283,11 +283,13 @@ bool write_line(const char* path, const std::string& line) {
     return static_cast<bool>(std::ofstream(path) << line << std::flush);
 }
 
-/// As one that has no room left among its addresses.
+/// Where there is room among the addresses for all but such a ring.
 bool cannot_be_mapped(const std::filesystem::path& directory) {
-    const rlimit little{1, 1};
+    std::uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const rlimit little{pages * page_size + (16 << 20), RLIM_INFINITY};
     ::setrlimit(RLIMIT_AS, &little);
-    const auto writer = Writer::create(directory, {"frames", StreamKind::frames, 8, 4, 1 << 20});
+    const auto writer = Writer::create(directory, {"frames", StreamKind::frames, 8, 64, 1 << 20});
     return !writer && writer.error().message().find("cannot be mapped") != std::string::npos &&
            std::filesystem::is_empty(directory);
 }
