@@ -268,14 +268,15 @@ void ImuBusPort::set_alarm(Nanoseconds at) {
     alarm_at_ = at;
     // Far ones come in steps: an alarm knows but 32 bits.
     constexpr Nanoseconds furthest = 1'000'000'000;
-    const Nanoseconds ahead = at - clock_.now();
+    const std::uint32_t now_us = timer().low;
+    const Nanoseconds ahead = at - clock_.at(now_us);
     std::uint32_t steps = alarm_margin_us;
     alarm_is_step_ = ahead > furthest;
     if (alarm_is_step_)
         steps = furthest / 1000;
     else if (ahead > alarm_margin_us * 1000)
         steps = (static_cast<std::uint32_t>(ahead) + 999) / 1000;
-    timer().alarms[1] = timer().low + steps;
+    timer().alarms[1] = now_us + steps;
     timer().raw_interrupts = alarm_bit;
 }
 

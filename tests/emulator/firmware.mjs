@@ -100,7 +100,8 @@ function urgent_times(machine) {
         begin(exception);
     };
     interrupts.end = () => {
-        if (interrupts.priority_of(interrupts.active.at(-1)) === 0)
+        const is_urgent = interrupts.priority_of(interrupts.active.at(-1)) === 0;
+        if (is_urgent && begun !== undefined)
             times.push((machine.now - begun + entry_and_exit) * cycle_ns * 1e-3);
         end();
     };
