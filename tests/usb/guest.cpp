@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -25,8 +26,8 @@ namespace {
 
 using namespace versavis;
 
-/// A board that says nothing for so long says nothing more; the machine is an emulated one.
-constexpr int silence_ms = 5'000;
+/// What the board has not said by then it never says; the machine is an emulated one.
+constexpr std::chrono::seconds patience(20);
 
 [[noreturn]] void fail(const std::string& what) {
     throw std::runtime_error(what + ": " + std::strerror(errno));
@@ -66,12 +67,17 @@ class Port {
         }
     }
 
-    /// Calls on_packet with each that comes, until it returns true. False: silence.
+    /// Calls on_packet with each that comes, until it returns true. False: it was in vain.
     template <class OnPacket>
     bool read_until(OnPacket&& on_packet) {
+        const auto until = std::chrono::steady_clock::now() + patience;
         for (bool done = false; !done;) {
+            using std::chrono::milliseconds;
+            const auto left =
+                std::chrono::duration_cast<milliseconds>(until - std::chrono::steady_clock::now());
             pollfd wait{file_, POLLIN, 0};
-            if (::poll(&wait, 1, silence_ms) <= 0) return false;
+            if (left.count() <= 0 || ::poll(&wait, 1, static_cast<int>(left.count())) <= 0)
+                return false;
             std::uint8_t bytes[4096];
             const ssize_t size = ::read(file_, bytes, sizeof bytes);
             if (size <= 0) fail("read");
