@@ -85,7 +85,7 @@ class UsbRedirect {
         this.host = machine.usb;
         this.socket = socket;
         this.received = Buffer.alloc(0);
-        this.waiting = []; // messages that came before the device was set up
+        this.waiting = []; // messages that came while the device was set up anew
         this.reads = []; // of the bulk endpoint: {id, header, wanted, got}
         this.writes = []; // {id, header, packets}
         this.connected = false;
@@ -117,9 +117,15 @@ class UsbRedirect {
             const id = this.received.readBigUInt64LE(8);
             const body = this.received.subarray(begin, begin + length);
             this.received = this.received.subarray(begin + length);
-            if (this.host.state === 'configured') this.handle(type, id, body);
-            else this.waiting.push([type, id, body]);
+            if (this.connected) this.waiting.push([type, id, body]);
         }
+        this.handle_waiting();
+    }
+
+    /// What the peer asked of a device that has left is for nobody; a reset lets it wait.
+    handle_waiting() {
+        while (this.host.state === 'configured' && this.waiting.length > 0)
+            this.handle(...this.waiting.shift());
     }
 
     /// Our own host has set the device up, for the first time or after a reset.
@@ -132,7 +138,7 @@ class UsbRedirect {
             this.connected = true;
             say('plugged');
         }
-        for (const one of this.waiting.splice(0)) this.handle(...one);
+        this.handle_waiting();
     }
 
     lose() {
@@ -229,6 +235,7 @@ class UsbRedirect {
     /// A packet of the device: what asked for it ends with a short one, or when it has all.
     take(bytes) {
         const [read] = this.reads;
+        if (read === undefined) return; // it was on its way when the last reader gave up
         read.got.push(...bytes);
         if (bytes.length < packet_max || read.got.length >= read.wanted)
             this.end_bulk(this.reads.shift(), status.success, read.got);
@@ -252,6 +259,7 @@ class UsbRedirect {
         for (const one of [...this.reads, ...this.writes]) this.end_bulk(one, result);
         this.reads = [];
         this.writes = [];
+        this.host.set_reading(false);
     }
 }
 

@@ -11,6 +11,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -60,12 +61,11 @@ class Port {
     void send(const T& message) {
         wire::Frame frame;
         wire::encode(message, nonce, sequence_++, frame);
-        for (std::size_t sent = 0; sent < frame.size;) {
-            const ssize_t size = ::write(file_, frame.bytes + sent, frame.size - sent);
-            if (size < 0) fail("write");
-            sent += static_cast<std::size_t>(size);
-        }
+        write(frame.bytes, frame.size);
     }
+
+    /// Ends what the terminal has echoed to the board before it was told not to.
+    void begin() { write(std::array<std::uint8_t, 1>{}.data(), 1); }
 
     /// Calls on_packet with each that comes, until it returns true. False: it was in vain.
     template <class OnPacket>
@@ -87,10 +87,21 @@ class Port {
         return true;
     }
 
-    std::uint32_t errors() const { return decoder_.errors(); }
+    /// Packets that came damaged after hello. Before it, the rest of one that was for the program
+    /// before this may come.
+    std::uint32_t errors() const { return decoder_.errors() - errors_before_; }
+    void count_errors_from_here() { errors_before_ = decoder_.errors(); }
 
  private:
     static constexpr std::uint32_t nonce = 0x5EA11E57;
+
+    void write(const std::uint8_t* bytes, std::size_t size) {
+        for (std::size_t sent = 0; sent < size;) {
+            const ssize_t written = ::write(file_, bytes + sent, size - sent);
+            if (written < 0) fail("write");
+            sent += static_cast<std::size_t>(written);
+        }
+    }
 
     void apply() {
         if (::tcsetattr(file_, TCSANOW, &settings_) != 0) fail("tcsetattr");
@@ -100,14 +111,17 @@ class Port {
     termios settings_{};
     std::uint32_t sequence_ = 0;
     wire::Decoder decoder_;
+    std::uint32_t errors_before_ = 0;
 };
 
 void greet(Port& port) {
+    port.begin();
     port.send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}});
     const bool greeted = port.read_until([](const wire::Packet& packet) {
         wire::BoardHello hello;
         return packet.read(hello) && hello.major == wire::protocol_major;
     });
+    port.count_errors_from_here();
     if (!greeted) throw std::runtime_error("no hello");
 }
 
