@@ -303,3 +303,57 @@ TEST_CASE("alignment: an exposure has one frame at most, and none that it had be
         CHECK(bench.align().empty());
     }
 }
+
+TEST_CASE("alignment: a trigger that goes back takes more faults than are borne") {
+    CHECK(step_faults(static_cast<std::uint64_t>(-3), recorded(5, 5), recorded(2, 2)) ==
+          faults_to_refute);
+    CHECK(step_faults(0, recorded(5, 5), recorded(5, 5)) == faults_to_refute);
+}
+
+TEST_CASE("alignment: one fault leaves it open") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11});
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 6, 7}) bench.frame(trigger);
+    CHECK(bench.align().size() == 6);
+    for (std::size_t i = 4; i < 6; ++i) --bench.frames[i].block_id;  // one that nobody counted
+    CHECK(bench.align().empty());
+}
+
+TEST_CASE("alignment: one that takes a fault keeps another from being the only one") {
+    // The same pattern twice; the first time without its fifth trigger.
+    Bench bench({0, 1, 3, 4, 9, 11, 20, 21, 23, 24, 27, 29, 31});
+    Limits limits;
+    limits.latest_arrival = seconds(3);
+    const auto align_to = [&](const std::vector<std::uint64_t>& triggers) {
+        bench.frames.clear();
+        for (const std::uint64_t trigger : triggers) bench.frame(trigger);
+        for (std::size_t i = 0; i < bench.frames.size(); ++i) bench.frames[i].block_id = 7 + i;
+        return align(bench.frames, bench.exposures, std::array{Instant::start}, limits);
+    };
+    CHECK(align_to({7, 8, 9, 10, 12, 13}).empty());
+}
+
+TEST_CASE("alignment: without two frames in a row no gap says anything") {
+    Bench bench({0, 1, 3, 4, 7, 9, 11, 12, 14, 17});
+    for (const std::uint64_t trigger : {1, 3, 5, 7, 9}) bench.frame(trigger);
+    CHECK(bench.align().empty());
+}
+
+TEST_CASE("alignment: by arrival, what precedes the first frame must be far away, too") {
+    Bench close({0, 2, 22, 42, 62});
+    Bench far({0, 20, 40, 60, 80});
+    for (const std::uint64_t trigger : {2, 3, 4, 5}) {
+        close.frame(trigger);
+        far.frame(trigger);
+    }
+    CHECK(close.align(Instant::arrival).empty());
+    CHECK(far.align(Instant::arrival) == Triggers{2, 3, 4, 5});
+}
+
+TEST_CASE("alignment: limits, unless they are said") {
+    const Limits limits;
+    CHECK(limits.period == milliseconds(50));
+    CHECK(limits.pattern_duration == seconds(1));
+    CHECK(limits.frames_held == 8);
+    CHECK(limits.camera_clock);
+    CHECK(limits.stamped == Instant::unknown);
+}

@@ -55,3 +55,12 @@ TEST_CASE("block_id: the first number may be any, and 65536 ends all wraps") {
     CHECK(ids.unwrap(3) == 3);
     CHECK(ids.unwrap(70'000) == 70'000);
 }
+
+TEST_CASE("block_id: less than half a lap back is late, more is the next lap") {
+    for (const auto& [id, expected] : {std::pair{13'000U, 13'000U}, {10'000U, 10'000U},
+                                       {7'300U, 7'300U}, {7'000U, 72'535U}}) {
+        BlockIdUnwrapper ids;
+        ids.unwrap(40'000);
+        CHECK(ids.unwrap(id) == expected);
+    }
+}

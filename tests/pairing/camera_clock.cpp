@@ -134,3 +134,118 @@ TEST_CASE("camera_clock: a clock that stepped is followed from there, one forgot
           next.instant_ns(Instant::start));
     CHECK(bench.clock.tolerance_ns(Instant::start, bench.stamp(next)) == 30'000);
 }
+
+TEST_CASE("camera_clock: an instant that was not seen begins a relation, and moves none") {
+    CameraClock clock(Instant::unknown);
+    ExposureLog log(milliseconds(50));
+    const auto track = [&](std::int64_t at_ms, std::int64_t off_ms) {
+        Exposure exposure;
+        exposure.trigger = static_cast<std::uint64_t>(at_ms);
+        exposure.start = BoardTime{at_ms * 1'000'000};
+        exposure.end = exposure.start + milliseconds(2);
+        exposure.kind = StampKind::trigger_edge;
+        log.add(exposure);
+        clock.track(CameraTime{(at_ms + off_ms) * 1'000'000}, log.back());
+    };
+    track(50, 1000);
+    const auto end_ns = [&] { return clock.expected_instant_ns(Instant::end, {2'000'000'000}); };
+    const auto start_ns = [&] {
+        return clock.expected_instant_ns(Instant::start, {2'000'000'000});
+    };
+    CHECK(end_ns() == 1'002'000'000);
+    CHECK(start_ns() == 1'000'000'000);
+    track(100, 1003);
+    CHECK(end_ns() == 1'002'000'000);
+    CHECK(start_ns() < 1'000'000'000);
+}
+
+namespace {
+
+/// Votes for the end, by changes of this size, one per frame.
+bool knows_after(CameraClock& clock, ExposureLog& log, int votes, Duration change,
+                 Duration apart, Duration jitter = {}) {
+    static constexpr std::int64_t base = 5'000'000;
+    const std::size_t begun = log.size();
+    for (int i = 0; i <= votes; ++i) {
+        Exposure exposure;
+        exposure.trigger = begun + static_cast<std::uint64_t>(i) + 1;
+        const BoardTime last = log.empty() ? BoardTime{} : log.back().exposure.start;
+        exposure.start = last + apart;
+        exposure.end = exposure.start + nanoseconds(base) + (i % 2 == 0 ? Duration{} : change);
+        log.add(exposure);
+        const Duration off = i % 2 == 0 ? jitter : -jitter;
+        clock.track(CameraTime{exposure.end.ns + off.ns}, log.back());
+    }
+    return clock.stamped() == Instant::end;
+}
+
+}  // namespace
+
+TEST_CASE("camera_clock: a change must stand out of jitter, and of the time that passed") {
+    const auto knows = [](Duration change, Duration apart) {
+        CameraClock clock(Instant::unknown);
+        ExposureLog log(apart);
+        return knows_after(clock, log, 20, change, apart);
+    };
+    CHECK(knows(microseconds(1100), milliseconds(50)));
+    CHECK_FALSE(knows(microseconds(1100), seconds(1)));
+    CHECK(knows(microseconds(4000), seconds(1)));
+    // Stamps that jitter by 30 us: a mean deviation that 20 times outdoes 400 us.
+    CameraClock clock(Instant::unknown);
+    ExposureLog log(milliseconds(50));
+    knows_after(clock, log, 60, {}, milliseconds(50), microseconds(30));
+    CHECK_FALSE(knows_after(clock, log, 20, microseconds(500), milliseconds(50)));
+}
+
+TEST_CASE("camera_clock: votes for different instants do not add up") {
+    CameraClock clock(Instant::unknown);
+    ExposureLog log(milliseconds(50));
+    for (int i = 0; i < 12; ++i) {
+        Exposure exposure;
+        exposure.trigger = static_cast<std::uint64_t>(i) + 1;
+        exposure.start = BoardTime{} + milliseconds(50) * (i + 1);
+        exposure.end = exposure.start + milliseconds(i % 2 == 0 ? 5 : 8);
+        log.add(exposure);
+        // It stamps the end of each long exposure and, half of the change on, that of the short.
+        const Duration off = (i % 4 < 2 ? milliseconds(0) : milliseconds(3));
+        clock.track(CameraTime{exposure.start.ns + off.ns}, log.back());
+    }
+    CHECK(clock.stamped() == Instant::unknown);
+}
+
+TEST_CASE("camera_clock: no vote compares with a frame from before a step of the clock") {
+    for (const bool forgets : {false, true}) {
+        CameraClock clock(Instant::unknown);
+        ExposureLog log(milliseconds(50));
+        knows_after(clock, log, 4, milliseconds(3), milliseconds(50));
+        CHECK(clock.stamped() == Instant::unknown);
+        if (forgets)
+            clock.forget();
+        else
+            clock.move(CameraTime{log.back().end.ns + 80'000'000'000}, log.back());
+        // A first frame far off, then one vote: the fifth.
+        Exposure exposure;
+        exposure.kind = StampKind::measured_middle;
+        for (const auto& [at_ms, length_ms] : {std::pair{1000, 5}, {1050, 8}}) {
+            exposure.trigger += 100;
+            exposure.start = BoardTime{at_ms * 1'000'000LL};
+            exposure.end = exposure.start + milliseconds(length_ms);
+            log.add(exposure);
+            clock.track(CameraTime{exposure.end.ns + 80'000'000'000}, log.back());
+        }
+        CHECK(clock.stamped() == Instant::end);
+    }
+}
+
+TEST_CASE("camera_clock: after all is forgotten, rates are learned again") {
+    Bench bench(Instant::start, Instant::start);
+    for (int i = 0; i < 10; ++i) bench.frame(milliseconds(5));
+    bench.clock.forget();
+    for (int i = 0; i < 600; ++i) bench.frame(milliseconds(5));
+    Record later = bench.expose(milliseconds(5));
+    for (int i = 0; i < 100; ++i) later = bench.expose(milliseconds(5));
+    const std::int64_t off =
+        bench.clock.expected_instant_ns(Instant::start, bench.stamp(later)) -
+        later.instant_ns(Instant::start);
+    CHECK(std::abs(off) < 20'000);
+}

@@ -172,3 +172,37 @@ TEST_CASE("exposure_log: the first exposure that lies behind tells whether one i
     CHECK_FALSE(log.lost_near(Instant::start, 200'000'000, 4));
     CHECK_FALSE(log.lost_near(Instant::start, 200'000'000, 0));
 }
+
+TEST_CASE("exposure_log: what was measured once stands in for an end that nobody saw, for no other") {
+    ExposureLog log(milliseconds(50));
+    Exposure one = exposure(1, 0);
+    one.kind = StampKind::predicted_middle;
+    one.end = one.start + milliseconds(9);
+    log.add(one);
+    CHECK(log.back().end == one.end);  // nothing was measured so far
+    log.add(exposure(2, 50));
+    Exposure edge = exposure(3, 100);
+    edge.kind = StampKind::trigger_edge;
+    edge.end = edge.start + milliseconds(9);
+    log.add(edge);
+    CHECK(log.back().end == edge.end);
+    one.trigger = 4;
+    log.add(one);
+    CHECK(log.back().end == one.start + milliseconds(2));
+    CHECK(log.back().prompt);
+}
+
+TEST_CASE("exposure_log: a close pair counts while both are here, and so does a long exposure") {
+    ExposureLog log(milliseconds(50));
+    Exposure length = exposure(1, 0);
+    length.end = length.start + milliseconds(30);
+    log.add(length);
+    log.add(exposure(2, 10));
+    log.add(exposure(3, 60));
+    CHECK(log.smallest_gap_ns() == 10'000'000);
+    const Record* found = log.near(Instant::end, 30'000'000, 1'000'000);
+    REQUIRE(found != nullptr);
+    CHECK(found->exposure.trigger == 1);
+    log.pop_front();
+    CHECK(log.smallest_gap_ns() == 50'000'000);
+}

@@ -108,6 +108,17 @@ struct Bench {
         for (int i = 0; i < 10; ++i) take();
     }
 
+    /// Three frames a second apart, and ten at the working rate.
+    void lock_slowly() {
+        pairing.start_requested(Start::slow, now);
+        for (int i = 0; i < 3; ++i) take(20);
+        REQUIRE(pairing.state() == State::locked);
+        pairing.start_requested(Start::steady, now);
+        for (int i = 0; i < 10; ++i) take();
+        REQUIRE(told.slips.empty());
+        told = {};
+    }
+
     Duration frame_after = milliseconds(20);  ///< the end of the exposure
     Duration camera_ahead = seconds(7);       ///< of the board
     Told told;

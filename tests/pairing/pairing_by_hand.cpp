@@ -33,7 +33,8 @@ TEST_CASE("pairing_by_hand: a camera that takes all is paired from its first fra
 TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the life before") {
     Bench bench;
     bench.lock();
-    bench.pairing.add(Shortfall{24, EventReason::frame_incomplete});
+    for (const std::uint64_t id : {23, 24, 25})
+        bench.pairing.add(Shortfall{id, EventReason::frame_incomplete});
     const Exposure waits = bench.next();
     bench.pairing.add(waits);
     const Exposure late = bench.next();
@@ -72,16 +73,119 @@ TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one"
     bench.pairing.set_limits(limits);
     CHECK(bench.pairing.first_start() == Start::slow);
     CHECK(bench.pairing.stamped() == Instant::end);
-    // A grid of half the period: by the one before, each record would be off.
+    // A grid of four times the period: by the one before, each record would be off, and frames
+    // that come 100 ms after their exposures would wait for more records. Two frames may wait.
     limits = Bench::made();
-    limits.period = period / 2;
+    limits.period = period * 4;
+    limits.frames_held = 5;
     bench.pairing.set_limits(limits);
-    for (std::uint64_t i = 1; i < 6; ++i) {
-        Exposure one = Bench::exposure(i, i);
-        one.start = BoardTime{} + seconds(5) + limits.period * static_cast<std::int64_t>(i);
+    bench.frame_after = milliseconds(100);
+    for (std::uint64_t i = 0; i < 5; ++i) {
+        Exposure one = Bench::exposure(i + 1, pattern[i] * 4);
+        one.tick = pattern[i];
         bench.pairing.add(one);
+        bench.pairing.add(bench.frame(i + 1, one));
     }
     CHECK(bench.told.pulses.empty());
+    CHECK(bench.told.frames.empty());
+    CHECK(bench.pairing.state() == State::locked);
+    bench.pairing.reset();
+    bench.told = {};
+    for (std::uint64_t i = 1; i <= 6; ++i)
+        bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
+    CHECK(bench.told.frames.size() == 1);
+}
+
+TEST_CASE("pairing_by_hand: after a reset the first record counts, and old losses explain nothing") {
+    Bench bench;
+    bench.lock();
+    for (int i = 0; i < 4; ++i) bench.pairing.start_requested(Start::pattern, bench.now);
+    for (std::uint64_t id = 1; id < 30; ++id)
+        bench.pairing.add(Shortfall{id, EventReason::no_buffer});
+    bench.pairing.reset();
+    bench.told = {};
+    bench.next_trigger = bench.next_id = 1;
+    bench.tick = 0;
+    SECTION("records") {
+        bench.pairing.add(Bench::exposure(1, 1));
+        Exposure lie = Bench::exposure(2, 2);
+        lie.start = lie.start + seconds(1);
+        bench.pairing.add(lie);
+        bench.pairing.add(Bench::exposure(3, 3));
+        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{2, EventReason::mismatch}});
+    }
+    SECTION("losses") {
+        bench.lock();
+        bench.pairing.add(bench.next());
+        ++bench.next_id;
+        bench.take();
+        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{23, EventReason::frame_missing}});
+    }
+    SECTION("pauses between starts") {
+        for (std::uint64_t i = 1; i <= 5; ++i)
+            bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
+        const Duration carried_out = seconds(1) + usual_latest_arrival;
+        CHECK_FALSE(bench.pairing.wanted_start(bench.now + carried_out));
+        CHECK(bench.pairing.wanted_start(bench.now + carried_out + nanoseconds(1)));
+    }
+}
+
+TEST_CASE("pairing_by_hand: a lock ends the pauses between starts") {
+    Bench bench;
+    for (int i = 0; i < 6; ++i) bench.pairing.start_requested(Start::pattern, bench.now);
+    const HostTime asked = bench.now;
+    bench.lock();
+    for (int i = 0; i < 3; ++i) {  // the board's time steps: all is searched anew
+        Exposure one = bench.next();
+        one.start = one.start + seconds(3);
+        bench.pairing.add(one);
+    }
+    REQUIRE(bench.pairing.state() == State::searching);
+    const Duration carried_out = seconds(1) + usual_latest_arrival;
+    CHECK(bench.pairing.wanted_start(asked + carried_out + nanoseconds(1)));
+}
+
+TEST_CASE("pairing_by_hand: a first frame that was late has no exposure to guess") {
+    Bench bench;
+    bench.camera_ahead = {};  // the camera's clock is the board's
+    bench.lock();
+    bench.pairing.reset();
+    bench.told = {};
+    const std::uint64_t base = bench.tick;
+    for (const std::uint64_t at : pattern) {
+        bench.frame_after = milliseconds(at == 1 ? 55 : 20);
+        bench.take(base + at - bench.tick);
+    }
+    REQUIRE(bench.pairing.state() == State::locked);
+    REQUIRE_FALSE(bench.told.frames.empty());
+    CHECK(bench.told.frames[0].id == 23);
+    CHECK(bench.told.frames[0].guess == 0);
+}
+
+TEST_CASE("pairing_by_hand: ids that leave out ignored triggers explain the lost ones as well") {
+    Bench bench;
+    bench.lock();
+    const auto ignore = [&] {
+        Exposure silent = bench.next();
+        silent.exposed = false;
+        bench.pairing.add(silent);
+        return silent.trigger;
+    };
+    const auto lose = [&](std::uint64_t id) {
+        bench.told = {};
+        const std::uint64_t ignored = ignore();
+        const Exposure lost = bench.next();
+        bench.pairing.add(lost);
+        ++bench.next_id;
+        bench.pairing.add(Shortfall{id, EventReason::no_buffer});
+        bench.take();
+        REQUIRE(bench.told.pulses.size() == 2);
+        CHECK(bench.told.pulses[0] == Told::Pulse{ignored, EventReason::trigger_ignored});
+        return bench.told.pulses[1].reason;
+    };
+    CHECK(lose(bench.next_id) == EventReason::no_buffer);
+    CHECK(lose(bench.next_id + 1) == EventReason::no_buffer);  // it may count them, too
+    CHECK(lose(bench.next_id - 1) == EventReason::frame_missing);
 }
 
 TEST_CASE("pairing_by_hand: a trigger without frame says what became of the frame") {

@@ -68,7 +68,7 @@ TEST_CASE("pairing_verdicts: three frames a second apart prove a slow start") {
     }
     Bench pattern_start;
     pattern_start.pairing.start_requested(Start::pattern, HostTime{});
-    for (int i = 0; i < 4; ++i) pattern_start.take(20);
+    for (int i = 0; i < 8; ++i) pattern_start.take(20);
     CHECK(pattern_start.pairing.state() == State::searching);
 }
 

@@ -208,3 +208,49 @@ TEST_CASE("record_gate: the first record of all is prompt, but the link may have
     gate.take(record(2, 2));
     CHECK(gate.live());
 }
+
+TEST_CASE("record_gate: a record that does not say when it came teaches nothing of others") {
+    RecordGate gate = gate_after(4);
+    Exposure silent = record(5, 5);
+    silent.recorded = {};
+    gate.take(silent);
+    Exposure soon = record(6, 6);
+    soon.recorded = soon.earliest_on_host - milliseconds(13);
+    CHECK_FALSE(gate.accepts(soon));
+}
+
+TEST_CASE("record_gate: one that comes much sooner is believed when four agree with it") {
+    const auto after = [](std::uint64_t quick) {
+        RecordGate gate{Limits{}};
+        for (std::uint64_t i = 1; i <= 3 + quick; ++i) {
+            Exposure one = record(i, i);
+            one.recorded = one.earliest_on_host + milliseconds(i <= 3 ? 45 : 15);
+            gate.take(one);
+        }
+        Exposure soon = record(9, 9);
+        soon.recorded = soon.earliest_on_host;
+        return gate.accepts(soon);
+    };
+    CHECK(after(4));
+    CHECK_FALSE(after(5));
+}
+
+TEST_CASE("record_gate: after what was learned is forgotten, four records have to agree again") {
+    RecordGate gate = gate_after(6);
+    gate.forget_delay();
+    const auto soon = [&](std::uint64_t i) {
+        Exposure one = record(i, i);
+        one.recorded = one.earliest_on_host - milliseconds(4);
+        return one;
+    };
+    for (std::uint64_t i = 7; i <= 9; ++i) {
+        Exposure one = record(i, i);
+        one.recorded = one.earliest_on_host + milliseconds(30);
+        gate.take(one);
+        CHECK(gate.accepts(soon(10)));
+    }
+    Exposure one = record(10, 10);
+    one.recorded = one.earliest_on_host + milliseconds(30);
+    gate.take(one);
+    CHECK_FALSE(gate.accepts(soon(11)));
+}

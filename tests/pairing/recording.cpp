@@ -3,6 +3,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "pairing_bench.hpp"
+
 using namespace versavis;
 using namespace versavis::pairing;
 
@@ -14,6 +16,12 @@ Item there_and_back(const Item& item) {
     REQUIRE(evidence);
     REQUIRE(std::holds_alternative<Item>(*evidence));
     return std::get<Item>(*evidence);
+}
+
+Evidence there(const Evidence& evidence) {
+    const auto read = from_metadata(to_metadata(evidence));
+    REQUIRE(read);
+    return *read;
 }
 
 }  // namespace
@@ -64,4 +72,32 @@ TEST_CASE("recording: layout by the document, and kinds that nobody knows") {
     EvidenceMetadata unknown = metadata;
     unknown.kind = GENERATE(0U, 8U, 0xFFFFFFFFU);
     CHECK_FALSE(from_metadata(unknown));
+}
+
+TEST_CASE("recording: what is recorded tells another pairing the same") {
+    test::Bench live;
+    test::Bench replayed;
+    const auto both = [&](const Evidence& evidence) {
+        pairing::apply(live.pairing, evidence);
+        pairing::apply(replayed.pairing, there(evidence));
+    };
+    both(StartRequest{Start::slow, HostTime{}});
+    for (int i = 0; i < 3; ++i) {
+        const Exposure one = live.next(20);
+        both(one);
+        both(live.frame(live.next_id++, one));
+    }
+    CHECK(replayed.pairing.state() == State::locked);
+    CHECK(replayed.pairing.wanted_start(HostTime{}) == Start::steady);
+    live.next_id += 1;
+    both(Shortfall{4, EventReason::no_buffer});
+    const Exposure lost = live.next(20);
+    both(lost);
+    both(Advance{lost.end_on_host + seconds(5)});
+    REQUIRE(replayed.told.pulses.size() == 1);
+    CHECK(replayed.told.pulses[0].reason == EventReason::no_buffer);
+    both(Reset{});
+    CHECK(replayed.pairing.state() == State::searching);
+    CHECK(replayed.told.pairs == live.told.pairs);
+    CHECK(replayed.told.pulses == live.told.pulses);
 }

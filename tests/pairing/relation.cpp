@@ -114,3 +114,24 @@ TEST_CASE("relation: a delay has no rate, and late frames count less than early 
     cut.track(900'000'000, 200'000'000);
     CHECK(cut.difference_ns() == 125'000 + 2'250'000 / 16);
 }
+
+TEST_CASE("relation: ten seconds count from its first pair, whenever that was") {
+    constexpr std::int64_t hour = 3'600'000'000'000;
+    Relation clock(true);
+    std::int64_t instant = hour;
+    for (; instant <= hour + 9'000'000'000; instant += period) clock.track(instant, instant);
+    const std::int64_t before = clock.tolerance_ns(instant + 1'000'000'000);
+    for (; instant <= hour + 11'000'000'000; instant += period) clock.track(instant, instant);
+    const std::int64_t after = clock.tolerance_ns(instant + 1'000'000'000);
+    CHECK(before > 250'000);
+    CHECK(after < 60'000);
+}
+
+TEST_CASE("relation: a steady rate leaves nothing to be surprised by") {
+    Relation clock(true);
+    std::int64_t instant = 0;
+    const auto frame = [&] { return instant + instant / 5'000; };  // 200 ppm
+    for (int i = 0; i < 400; ++i, instant += 1'000'000'000) clock.track(frame(), instant);
+    CHECK(std::abs(clock.expected_instant_ns(frame()) - instant) < 100);
+    CHECK(clock.deviation_ns() < 100);
+}

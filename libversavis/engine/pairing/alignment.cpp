@@ -99,9 +99,7 @@ class Search {
                 alignment.unknown = true;
                 continue;
             }
-            if (!possible(frame, *record) ||
-                (last != nullptr && record->exposure.trigger <= last->exposure.trigger))
-                return std::nullopt;
+            if (!possible(frame, *record)) return std::nullopt;
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
@@ -109,7 +107,6 @@ class Search {
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
         }
-        if (last == nullptr) return std::nullopt;
         return alignment;
     }
 
@@ -137,13 +134,12 @@ class Search {
     /// A frame of another exposure than these could not have arrived when it did.
     bool separated(const std::vector<std::uint64_t>& triggers) const {
         const Duration window = limits_.latest_arrival - limits_.earliest_arrival;
-        for (std::size_t i = 0; i < exposures_.size(); ++i) {
+        for (std::size_t i = 1; i < exposures_.size(); ++i) {
             const Exposure& exposure = exposures_[i].exposure;
             const bool inside =
                 exposure.trigger >= triggers.front() && exposure.trigger <= triggers.back();
-            if (i == 0 || (!inside && exposures_[i - 1].exposure.trigger != triggers.back()))
-                continue;
             const Exposure& before = exposures_[i - 1].exposure;
+            if (!inside && before.trigger != triggers.back()) continue;
             if (exposure.trigger != before.trigger + 1 || exposure.start - before.start <= window)
                 return false;
         }
@@ -232,8 +228,6 @@ std::size_t frames_for_proof(bool by_clock) {
 
 std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const ExposureLog& exposures,
                                  std::span<const Instant> instants, const Limits& limits) {
-    const bool by_clock = instants.front() != Instant::arrival;
-    if (frames.size() < frames_for_proof(by_clock) || exposures.size() < frames.size()) return {};
     std::optional<Alignment> found;
     for (const Instant instant : instants) {
         const Search search(frames, exposures, instant, limits);

@@ -218,7 +218,6 @@ void Pairing::set_aside(const Exposure& exposure) {
             accept(stepped);
         else  // the board is ahead of its clock's estimate: nothing can be proved by that
             outcome_.exposure_unpaired(stepped, EventReason::mismatch);
-    process();
 }
 
 void Pairing::refuse_odd(EventReason reason) {
@@ -427,7 +426,6 @@ void Pairing::slip(const Arrival& arrival) {
     state_ = State::checking;
     suspicions_ = {};
     undecided_ = 0;
-    waits_for_witness_ = false;
     slipped_ = arrival.arrived;
     outcome_.slipped(arrival);
 }
@@ -511,8 +509,7 @@ bool Pairing::suspect(Stepped kind, const Arrival& arrival, const Record* record
         return false;
     }
     const Pair now{arrival, *record};
-    suspicion.frames =
-        suspicion.frames > 0 && consistent(kind, suspicion.last, now) ? suspicion.frames + 1 : 1;
+    suspicion.frames = consistent(kind, suspicion.last, now) ? suspicion.frames + 1 : 1;
     suspicion.last = now;
     if (suspicion.frames < frames_to_relock) return false;
     if (kind == Stepped::clock) clock_.move(arrival.camera_time, *record);
@@ -552,7 +549,6 @@ void Pairing::give_up_front() {
 /// The start is wanted at once.
 void Pairing::search_anew() {
     state_ = State::searching;
-    waits_for_witness_ = false;
     gate_.forget_delay();
     frames_since_start_ = static_cast<int>(frames_for_proof(by_clock_));
 }
@@ -583,9 +579,15 @@ void Pairing::start_requested(Start start, HostTime now) {
     start_ends_ = now + (duration + limits_.latest_arrival) * patience;
 }
 
-void Pairing::pair_front(std::uint64_t trigger) {
+Arrival Pairing::take_front() {
     const Arrival arrival = arrivals_.front();
     arrivals_.pop_front();
+    waits_for_witness_ = false;
+    return arrival;
+}
+
+void Pairing::pair_front(std::uint64_t trigger) {
+    const Arrival arrival = take_front();
     forget_exposures_before(trigger);
     Record& record = *exposures_.find(trigger);
     record.used = true;
@@ -599,16 +601,12 @@ void Pairing::pair_front(std::uint64_t trigger) {
 
 /// It has waited too long.
 void Pairing::expire_front() {
-    if (state_ == State::locked && waits_for_witness_) {  // frames stay late
-        slip(arrivals_.front());
-        waits_for_witness_ = false;
-    }
+    if (state_ == State::locked && waits_for_witness_) slip(arrivals_.front());  // frames stay late
     drop_front(state_ == State::locked ? EventReason::exposure_missing : EventReason::unproved);
 }
 
 void Pairing::drop_front(EventReason reason) {
-    const Arrival arrival = arrivals_.front();
-    arrivals_.pop_front();
+    const Arrival arrival = take_front();
     if (reason != EventReason::out_of_order) note({arrival.block_id, reason});
     const Record* guess = nullptr;
     if (proved_ && state_ != State::searching) guess = read(arrival).record;
@@ -682,10 +680,8 @@ void Pairing::reset() {
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     refuse_odd(EventReason::reset);
     state_ = State::searching;
-    exposures_ = ExposureLog(limits_.period);
     gate_ = RecordGate(limits_);
     shortfalls_.clear();
-    waits_for_witness_ = false;
     fruitless_starts_ = 0;
     frames_since_start_ = 0;
     end_start_soon();

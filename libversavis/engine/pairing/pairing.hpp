@@ -159,6 +159,7 @@ class Pairing {
     bool consistent(Stepped kind, const Pair& before, const Pair& now) const;
     void give_up_front();
 
+    Arrival take_front();
     void pair_front(std::uint64_t trigger);
     void expire_front();
     void drop_front(EventReason reason);
@@ -183,7 +184,7 @@ class Pairing {
     Relation latency_{false};                ///< arrival against its end on the host
     std::optional<Pair> proved_;             ///< the newest that was published
     std::array<Suspicion, 3> suspicions_{};  ///< by Stepped
-    bool waits_for_witness_ = false;
+    bool waits_for_witness_ = false;  ///< the oldest frame does
     int undecided_ = 0;  ///< frames since the slip
     HostTime slipped_;
 

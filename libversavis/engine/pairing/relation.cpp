@@ -68,8 +68,6 @@ constexpr double drift_known = 20e-6;
 }  // namespace
 
 void Relation::begin(std::int64_t frame_ns, std::int64_t instant_ns) {
-    drift_ = 0;
-    deviation_ns_ = 0;
     known_ = true;
     begun_ns_ = instant_ns;
     move(frame_ns, instant_ns);

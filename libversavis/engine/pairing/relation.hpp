@@ -12,7 +12,6 @@ class Relation {
     /// `drifts`: the two clocks run at different rates, else the difference is a delay.
     explicit Relation(bool drifts) : drifts_(drifts) {}
 
-    void begin(std::int64_t frame_ns, std::int64_t instant_ns);
     void track(std::int64_t frame_ns, std::int64_t instant_ns);
 
     /// Another difference from here on: the frames' clock stepped. The rate stays.
@@ -33,6 +32,8 @@ class Relation {
     std::int64_t deviation_ns() const { return deviation_ns_; }
 
  private:
+    void begin(std::int64_t frame_ns, std::int64_t instant_ns);
+
     bool drifts_;
     bool known_ = false;
     std::int64_t difference_ns_ = 0;  ///< frame time - instant
