@@ -332,6 +332,17 @@ TEST_CASE("alignment: one that takes a fault keeps another from being the only o
     CHECK(align_to({7, 8, 9, 10, 12, 13}).empty());
 }
 
+TEST_CASE("alignment: two places that fit leave it open") {
+    Bench once({0, 1, 3, 4, 7, 9, 11});
+    Bench twice({0, 1, 3, 4, 7, 9, 11, 40, 41, 43, 44, 47, 49, 51});
+    Limits limits;
+    limits.latest_arrival = seconds(5);
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6}) once.frame(trigger);
+    for (const std::uint64_t trigger : {8, 9, 10, 11, 12, 13}) twice.frame(trigger);
+    CHECK(align(once.frames, once.exposures, std::array{Instant::start}, limits).size() == 6);
+    CHECK(align(twice.frames, twice.exposures, std::array{Instant::start}, limits).empty());
+}
+
 TEST_CASE("alignment: without two frames in a row no gap says anything") {
     Bench bench({0, 1, 3, 4, 7, 9, 11, 12, 14, 17});
     for (const std::uint64_t trigger : {1, 3, 5, 7, 9}) bench.frame(trigger);

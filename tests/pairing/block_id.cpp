@@ -57,10 +57,13 @@ TEST_CASE("block_id: the first number may be any, and 65536 ends all wraps") {
 }
 
 TEST_CASE("block_id: less than half a lap back is late, more is the next lap") {
-    for (const auto& [id, expected] : {std::pair{13'000U, 13'000U}, {10'000U, 10'000U},
-                                       {7'300U, 7'300U}, {7'000U, 72'535U}}) {
+    for (const auto& [id, expected] :
+         {std::pair{13'000U, 13'000U}, {10'000U, 10'000U}, {7'300U, 7'300U}, {7'000U, 72'535U}}) {
         BlockIdUnwrapper ids;
         ids.unwrap(40'000);
         CHECK(ids.unwrap(id) == expected);
     }
+    BlockIdUnwrapper ids;
+    ids.unwrap(5);
+    CHECK(ids.unwrap(65'535) == 0);  // the one before the first
 }

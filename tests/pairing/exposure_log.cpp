@@ -173,7 +173,8 @@ TEST_CASE("exposure_log: the first exposure that lies behind tells whether one i
     CHECK_FALSE(log.lost_near(Instant::start, 200'000'000, 0));
 }
 
-TEST_CASE("exposure_log: what was measured once stands in for an end that nobody saw, for no other") {
+TEST_CASE(
+    "exposure_log: what was measured once stands in for an end that nobody saw, for no other") {
     ExposureLog log(milliseconds(50));
     Exposure one = exposure(1, 0);
     one.kind = StampKind::predicted_middle;

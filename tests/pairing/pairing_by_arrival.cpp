@@ -69,7 +69,7 @@ TEST_CASE("pairing_by_arrival: when frames come too irregularly, none is publish
     Bench bench(without_clock());
     bench.lock_slowly();
     for (int i = 0; i < 200 && bench.told.slips.empty(); ++i) {
-        bench.frame_after = milliseconds(i % 2 == 0 ? 33 : 7);
+        bench.frame_after = milliseconds(i % 2 == 0 ? 30 : 10);
         bench.take();
     }
     CHECK(bench.told.slips.size() == 1);

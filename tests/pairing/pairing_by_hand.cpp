@@ -91,15 +91,15 @@ TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one"
     CHECK(bench.pairing.state() == State::locked);
     bench.pairing.reset();
     bench.told = {};
-    for (std::uint64_t i = 1; i <= 6; ++i)
-        bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
+    for (std::uint64_t i = 1; i <= 6; ++i) bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
     CHECK(bench.told.frames.size() == 1);
 }
 
-TEST_CASE("pairing_by_hand: after a reset the first record counts, and old losses explain nothing") {
+TEST_CASE(
+    "pairing_by_hand: after a reset the first record counts, and old losses explain nothing") {
     Bench bench;
     bench.lock();
-    for (int i = 0; i < 4; ++i) bench.pairing.start_requested(Start::pattern, bench.now);
+    for (int i = 0; i < 6; ++i) bench.pairing.start_requested(Start::pattern, bench.now);
     for (std::uint64_t id = 1; id < 30; ++id)
         bench.pairing.add(Shortfall{id, EventReason::no_buffer});
     bench.pairing.reset();

@@ -33,7 +33,8 @@ Arrival late_frame(Bench& bench, const Exposure& of) {
 
 }  // namespace
 
-TEST_CASE("pairing_slips: a late frame needs one on time behind it, where triggers may be ignored") {
+TEST_CASE(
+    "pairing_slips: a late frame needs one on time behind it, where triggers may be ignored") {
     Bench bench;
     bench.lock();
     bench.told = {};
@@ -182,16 +183,18 @@ TEST_CASE("pairing_slips: a clock that steps is followed over pauses, and from t
 }
 
 TEST_CASE("pairing_slips: a clock that steps is not followed while ids leave a choice") {
-    Bench bench;
-    bench.frame_after = milliseconds(60);
-    bench.lock();
-    bench.told = {};
-    bench.camera_ahead = bench.camera_ahead + seconds(11);
-    bench.next();  // without record; the camera may have taken it
-    ++bench.next_id;
-    for (int i = 0; i < 8; ++i) bench.take();
-    CHECK(bench.told.pairs.empty());
-    CHECK(bench.pairing.state() == State::searching);
+    for (const bool taken : {true, false}) {
+        Bench bench;
+        bench.frame_after = milliseconds(60);
+        bench.lock();
+        bench.told = {};
+        bench.camera_ahead = bench.camera_ahead + seconds(11);
+        bench.next();  // without record
+        if (taken) ++bench.next_id;
+        for (int i = 0; i < 8; ++i) bench.take();
+        CHECK(bench.told.pairs.empty());
+        CHECK(bench.pairing.state() == State::searching);
+    }
 }
 
 TEST_CASE("pairing_slips: while it checks, frames of before are out of order") {
@@ -218,25 +221,27 @@ TEST_CASE("pairing_slips: while it checks, frames of before are out of order") {
 
 TEST_CASE("pairing_slips: one record decides all frames that waited for it") {
     Bench bench;
+    bench.frame_after = milliseconds(60);
     bench.lock();
     take_stray(bench);
+    const Exposure one = bench.next();
+    bench.pairing.add(one);
     REQUIRE(bench.pairing.state() == State::checking);
     bench.told = {};
     SECTION("the first ends the check") {
-        const Exposure one = bench.next();
         const Exposure two = bench.next();
         for (const Exposure& of : {one, two}) bench.pairing.add(bench.frame(bench.next_id++, of));
-        bench.pairing.add(one);
+        CHECK(bench.told.pairs.empty());
         bench.pairing.add(two);
         CHECK(bench.told.pairs.size() == 2);
     }
     SECTION("the first is given up") {
-        const Exposure one = bench.next();
         Arrival stray = bench.frame(bench.next_id + 500, one);
         stray.camera_time = stray.camera_time + seconds(40);
         bench.pairing.add(stray);
         bench.pairing.add(bench.frame(bench.next_id++, one));
-        bench.pairing.add(one);
+        CHECK(bench.told.frames.empty());
+        bench.pairing.add(bench.next());
         CHECK(bench.told.frames.size() == 1);
         CHECK(bench.told.pairs.size() == 1);
     }
@@ -325,9 +330,8 @@ TEST_CASE("pairing_slips: a search learns anew how soon records come") {
     bench.told = {};
     // The estimate of the board's clock has moved: none of these is odd.
     for (int i = 0; i < 2; ++i) take(milliseconds(2));
-    bench.pairing.reset();
+    take(milliseconds(45));
     for (const auto& pulse : bench.told.pulses) CHECK(pulse.reason != EventReason::mismatch);
-    REQUIRE(bench.told.pulses.size() >= 2);
 }
 
 TEST_CASE("pairing_slips: a step of the board's time is followed by its records, if they can be") {
@@ -344,8 +348,7 @@ TEST_CASE("pairing_slips: a step of the board's time is followed by its records,
             if (ahead)  // they seem to come before they are
                 one.earliest_on_host = one.end_on_host = one.end_on_host + seconds(3);
             bench.pairing.add(one);
-            expected.push_back(
-                {one.trigger, ahead ? EventReason::mismatch : EventReason::reset});
+            expected.push_back({one.trigger, ahead ? EventReason::mismatch : EventReason::reset});
         }
         CHECK(bench.pairing.state() == State::searching);
         // The start is wanted without frames, once the one before is over.

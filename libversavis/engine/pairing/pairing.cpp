@@ -290,7 +290,6 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
     state_ = State::locked;
     clock_.forget();
     latency_ = Relation(false);
-    proved_.reset();
     shortest_delay_ns_ = INT64_MAX;
     fruitless_starts_ = 0;
     end_start_soon();

@@ -184,8 +184,8 @@ class Pairing {
     Relation latency_{false};                ///< arrival against its end on the host
     std::optional<Pair> proved_;             ///< the newest that was published
     std::array<Suspicion, 3> suspicions_{};  ///< by Stepped
-    bool waits_for_witness_ = false;  ///< the oldest frame does
-    int undecided_ = 0;  ///< frames since the slip
+    bool waits_for_witness_ = false;         ///< the oldest frame does
+    int undecided_ = 0;                      ///< frames since the slip
     HostTime slipped_;
 
     std::optional<Start> start_;  ///< asked for
