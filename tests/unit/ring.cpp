@@ -287,8 +287,10 @@ bool write_line(const char* path, const std::string& line) {
 bool cannot_be_mapped(const std::filesystem::path& directory) {
     std::uint64_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages;
-    const rlimit little{pages * page_size + (16 << 20), RLIM_INFINITY};
-    ::setrlimit(RLIMIT_AS, &little);
+    rlimit little{};
+    ::getrlimit(RLIMIT_AS, &little);
+    little.rlim_cur = pages * page_size + (16 << 20);
+    if (::setrlimit(RLIMIT_AS, &little) != 0) return false;
     const auto writer = Writer::create(directory, {"frames", StreamKind::frames, 8, 64, 1 << 20});
     return !writer && writer.error().message().find("cannot be mapped") != std::string::npos &&
            std::filesystem::is_empty(directory);
