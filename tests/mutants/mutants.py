@@ -44,7 +44,7 @@ USAGE, BROKEN_TOOL, INTERRUPTED = 64, 70, 130
 PATIENCE, SLACK_S = 3, 2
 COMPILE_LIMIT_S = 120
 MEMORY_LIMIT = 1 << 30
-OUTPUT_LIMIT = 16 << 20
+OUTPUT_LIMIT = 128 << 20
 # Tests that are done soonest run first, as many at once as take so long.
 AT_ONCE_S = 0.25
 # When tests are to be compiled too: so many files at a time.
