@@ -91,25 +91,25 @@ Reader::Reader(Reader&&) noexcept = default;
 Reader& Reader::operator=(Reader&&) noexcept = default;
 Reader::~Reader() = default;
 
-StreamKind Reader::kind() const { return segment_->mapping.header().kind; }
-const char* Reader::name() const { return segment_->mapping.header().name; }
+StreamKind Reader::kind() const { return segment_->mapping.constants().kind; }
+const char* Reader::name() const { return segment_->mapping.constants().name.data(); }
 std::uint64_t Reader::head() const {
     // SYNC 1: acquire here, release in Writer::write_descriptor(): all items below `head` are
     // complete in memory. Without it a new head could show an old descriptor, and an item that has
     // just been published would be taken for lost.
     return segment_->mapping.header().head.load(std::memory_order_acquire);
 }
-std::uint32_t Reader::writer_pid() const { return segment_->mapping.header().writer_pid; }
+std::uint32_t Reader::writer_pid() const { return segment_->mapping.constants().writer_pid; }
 
 bool Reader::writer_found() const {
-    const Header& header = segment_->mapping.header();
-    return start_ticks_of(header.writer_pid) == header.writer_start_ticks;
+    const Constants& constants = segment_->mapping.constants();
+    return start_ticks_of(constants.writer_pid) == constants.writer_start_ticks;
 }
 
 std::uint64_t Reader::retained() const {
-    const Header& header = segment_->mapping.header();
-    return header.slot_count == 0 ? header.descriptor_count
-                                  : std::min(header.slot_count, header.descriptor_count);
+    const Constants& constants = segment_->mapping.constants();
+    return constants.slot_count == 0 ? constants.descriptor_count
+                                     : std::min(constants.slot_count, constants.descriptor_count);
 }
 
 HostTime Reader::last_heartbeat() const {
@@ -121,11 +121,10 @@ bool Reader::writer_alive() const {
     // last item when it looks at `head` again. Without it that item could go unread.
     const auto state = segment_->mapping.header().state.load(std::memory_order_acquire);
     return state == static_cast<std::uint32_t>(WriterState::live) &&
-           (host_now() - last_heartbeat()).ns < heartbeat_limit_ns;
+           last_heartbeat().ns > host_now().ns - heartbeat_limit_ns;  // of a liar it may be any
 }
 
 Item Reader::read_descriptor(std::uint64_t number) const {
-    const Header& header = segment_->mapping.header();
     const Descriptor& descriptor = segment_->mapping.descriptor(number);
     Item item;
     item.number = number;
@@ -149,7 +148,8 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     item.slot = static_cast<std::uint32_t>(length_and_slot);
     item.payload_size = static_cast<std::uint32_t>(length_and_slot >> 32U);
     if (item.slot != no_slot) {
-        if (item.payload_size > header.slot_size || !intact(item)) return item;
+        if (item.payload_size > segment_->mapping.constants().slot_size || !intact(item))
+            return item;
         item.payload = segment_->mapping.slot(item.slot);
     }
     item.found = Found::item;
@@ -176,14 +176,17 @@ Item Reader::next() {
 
 Item Reader::idle() {
     Item item;
-    const Header& header = segment_->mapping.header();
     // A writer that was killed never marked its segment: its silence counts as well.
     if (writer_alive()) return item;
     if (next_ < head()) return item;  // published since the last look: the next look finds it
     item.found = Found::gone;
     if (file_id(path_) == segment_->file) return item;
     auto successor = map(path_);
-    if (!successor || (*successor)->mapping.header().generation == header.generation) return item;
+    if (!successor) return item;
+    const Constants& now = (*successor)->mapping.constants();
+    const Constants& before = segment_->mapping.constants();
+    // Of another kind it is another stream: its items would be read as what they are not.
+    if (now.generation == before.generation || now.kind != before.kind) return item;
     segment_ = std::move(*successor);
     next_ = 0;
     item.found = Found::restarted;
@@ -211,7 +214,7 @@ Item Reader::wait(Duration timeout) {
 
 bool Reader::intact(const Item& item) const {
     if (item.slot == no_slot) return true;
-    if (item.slot >= segment_->mapping.header().slot_count)
+    if (item.slot >= segment_->mapping.constants().slot_count)
         return false;  // the item is from an earlier segment
     // SYNC 4: acquire fence here, release fence in Writer::acquire(): if anything that was read of
     // the payload came from a newer item, the generation has changed. Without it a mixture of two

@@ -8,6 +8,7 @@
 
 #include <boost/interprocess/exceptions.hpp>
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <string>
@@ -22,7 +23,7 @@ bool inside(std::uint64_t at, std::uint64_t count, std::uint64_t size, std::uint
     return at <= total && (size == 0 || count <= (total - at) / size);
 }
 
-bool well_formed(const Header& header, std::size_t size) {
+bool well_formed(const Constants& header, std::size_t size) {
     const std::uint64_t descriptors = header.descriptor_count;
     return header.total_size == size && descriptors != 0 &&
            (descriptors & (descriptors - 1)) == 0 &&
@@ -33,7 +34,7 @@ bool well_formed(const Header& header, std::size_t size) {
            inside(header.generations_at, header.slot_count, generation_stride, size) &&
            header.slot_size % page_size == 0 &&
            inside(header.slots_at, header.slot_count, header.slot_size, size) &&
-           header.name[sizeof header.name - 1] == '\0';
+           header.name.back() == '\0';
 }
 
 }  // namespace
@@ -67,9 +68,26 @@ Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access
                        "has layout version " + std::to_string(header.abi_major) +
                            ", this program reads version " + std::to_string(abi_major),
                        "install service and clients of the same release");
-    if (!well_formed(header, mapping->size()))
+    mapping->read_constants();
+    if (!well_formed(mapping->constants(), mapping->size()))
         return failure(path.string(), "has a damaged header");
     return mapping;
+}
+
+void Mapping::read_constants() {
+    const Header& from = header();
+    constants_.total_size = from.total_size;
+    constants_.generation = from.generation;
+    constants_.writer_pid = from.writer_pid;
+    constants_.kind = from.kind;
+    constants_.writer_start_ticks = from.writer_start_ticks;
+    constants_.descriptor_count = from.descriptor_count;
+    constants_.slot_count = from.slot_count;
+    constants_.slot_size = from.slot_size;
+    constants_.descriptors_at = from.descriptors_at;
+    constants_.generations_at = from.generations_at;
+    constants_.slots_at = from.slots_at;
+    std::memcpy(constants_.name.data(), from.name, sizeof from.name);
 }
 
 std::uint64_t start_ticks_of(std::uint32_t pid) {

@@ -2,6 +2,7 @@
 // A mapped ring: typed views of its parts, for writer and reader.
 #pragma once
 
+#include <array>
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 #include <filesystem>
@@ -11,6 +12,23 @@
 
 namespace versavis::ring {
 
+/// What a header says once and for all. It is read once: what the writer, or somebody in its place,
+/// changes there later leads nobody astray.
+struct Constants {
+    std::uint64_t total_size = 0;
+    std::uint64_t generation = 0;
+    std::uint32_t writer_pid = 0;
+    StreamKind kind{};
+    std::uint64_t writer_start_ticks = 0;
+    std::uint32_t descriptor_count = 0;
+    std::uint32_t slot_count = 0;
+    std::uint64_t slot_size = 0;
+    std::uint64_t descriptors_at = 0;
+    std::uint64_t generations_at = 0;
+    std::uint64_t slots_at = 0;
+    std::array<char, sizeof Header::name> name{};
+};
+
 /// Owns a mapping of a complete segment. The views stay valid as long as it lives.
 class Mapping {
  public:
@@ -19,27 +37,32 @@ class Mapping {
     /// Maps and checks `path`; every offset is checked to lie inside the file.
     static Expected<Mapping> open(const std::filesystem::path& path, Access access);
 
-    /// Maps a file that is still being filled in: nothing is checked.
+    /// Maps a file that is still being filled in: nothing is checked. Say read_constants() when its
+    /// header is complete.
     static Expected<Mapping> open_unchecked(const std::filesystem::path& path, Access access);
 
     Header& header() const { return *static_cast<Header*>(region_.get_address()); }
+    const Constants& constants() const { return constants_; }
     Descriptor& descriptor(std::uint64_t number) const {
         return reinterpret_cast<Descriptor*>(
-            bytes() + header().descriptors_at)[number & (header().descriptor_count - 1)];
+            bytes() + constants_.descriptors_at)[number & (constants_.descriptor_count - 1)];
     }
     std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
-        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + header().generations_at +
+        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + constants_.generations_at +
                                                               slot * generation_stride);
     }
     std::byte* slot(std::uint32_t slot) const {
-        return bytes() + header().slots_at + slot * header().slot_size;
+        return bytes() + constants_.slots_at + slot * constants_.slot_size;
     }
     std::size_t size() const { return region_.get_size(); }
+
+    void read_constants();
 
  private:
     std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
 
     boost::interprocess::mapped_region region_;
+    Constants constants_;
 };
 
 /// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process

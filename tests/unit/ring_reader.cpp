@@ -238,10 +238,53 @@ TEST_CASE_METHOD(Streams,
     CHECK(reader.next().found == Found::item);
     const Mapping mapping = map("events");
     mapping.header().writer_start_ticks += 1;
-    CHECK_FALSE(reader.writer_found());
+    CHECK_FALSE(open("events").writer_found());
     mapping.header().writer_start_ticks -= 1;
     mapping.header().writer_pid = 0x7FFFFFFF;
-    CHECK_FALSE(reader.writer_found());
+    CHECK_FALSE(open("events").writer_found());
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader reads on") {
+    Writer writer = frames(4);
+    Reader reader = open("frames");
+    const Mapping mapping = map("frames");
+    const auto read = [&] {
+        publish(writer, 100, 7);
+        const Item item = reader.next();
+        REQUIRE(item.found == Found::item);
+        std::vector<std::byte> bytes(item.payload_size);
+        CHECK(reader.copy(item, bytes.data()));
+        CHECK(bytes == std::vector<std::byte>(100, std::byte{7}));
+    };
+    read();
+    Header& header = mapping.header();
+    std::memset(header.name, 'x', sizeof header.name);
+    header.kind = StreamKind::imu;
+    header.total_size = header.slot_size = header.writer_start_ticks = UINT64_MAX;
+    header.descriptors_at = header.generations_at = header.slots_at = UINT64_MAX;
+    header.descriptor_count = header.slot_count = header.writer_pid = UINT32_MAX;
+    for (int i = 0; i < 20; ++i) read();
+    CHECK(std::string(reader.name()) == "frames");
+    CHECK(reader.kind() == StreamKind::frames);
+    CHECK(reader.retained() == 4);
+    CHECK(reader.writer_found());
+    for (const std::int64_t heartbeat : {INT64_MIN, INT64_MIN + 1}) {
+        header.heartbeat_ns = heartbeat;
+        CHECK_FALSE(reader.writer_alive());
+    }
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a successor of another kind is another stream") {
+    auto first = std::make_unique<Writer>(
+        *Writer::create(directory.path(), {"data", StreamKind::events, 8}));
+    Reader reader = open("data");
+    Writer second = *Writer::create(directory.path(), {"data", StreamKind::imu, 8});
+    first.reset();
+    second.publish(OutputTime{}, {});
+    CHECK(reader.next().found == Found::gone);
+    CHECK(reader.kind() == StreamKind::events);
+    Writer third = *Writer::create(directory.path(), {"data", StreamKind::events, 8});
+    CHECK(reader.next().found == Found::restarted);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read is told so, and what to do") {

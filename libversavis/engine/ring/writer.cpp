@@ -31,7 +31,7 @@ struct Writer::Segment {
             retire(mapping.header(), WriterState::closed);
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
         auto current = Mapping::open(path, Mapping::Access::read_only);
-        if (current && current->header().generation == mapping.header().generation)
+        if (current && current->constants().generation == mapping.constants().generation)
             ::unlink(path.c_str());
     }
 };
@@ -71,15 +71,15 @@ Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
 /// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
 /// its slot taken back, then the successor.
 void release(const std::filesystem::path& path, const Mapping& dead) {
-    const Header& header = dead.header();
-    for (std::uint32_t slot = 0; slot < header.slot_count; ++slot)
+    const Constants& constants = dead.constants();
+    for (std::uint32_t slot = 0; slot < constants.slot_count; ++slot)
         dead.generation(slot).fetch_add(2, std::memory_order_relaxed);
     // SYNC 4: release fence here, acquire fence in Reader::intact(), as in Writer::acquire().
     std::atomic_thread_fence(std::memory_order_release);
     const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-    const auto begin = static_cast<off_t>(header.slots_at);
+    const auto begin = static_cast<off_t>(constants.slots_at);
     ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
-                static_cast<off_t>(header.total_size) - begin);
+                static_cast<off_t>(constants.total_size) - begin);
     ::close(file);
 }
 
@@ -140,6 +140,7 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
         return Unexpected(mapping.error());
     }
     fill_header(mapping->header(), shape, size);
+    mapping->read_constants();
     // The name points to the new segment before readers of the old one wake up and look for it.
     if (::rename(temporary.c_str(), path.c_str()) != 0) {
         const int error = errno;
@@ -159,8 +160,8 @@ Writer& Writer::operator=(Writer&&) noexcept = default;
 Writer::~Writer() = default;
 
 std::byte* Writer::slot_data(std::uint32_t slot) const { return segment_->mapping.slot(slot); }
-std::uint64_t Writer::slot_size() const { return segment_->mapping.header().slot_size; }
-std::uint32_t Writer::slot_count() const { return segment_->mapping.header().slot_count; }
+std::uint64_t Writer::slot_size() const { return segment_->mapping.constants().slot_size; }
+std::uint32_t Writer::slot_count() const { return segment_->mapping.constants().slot_count; }
 std::uint64_t Writer::head() const { return segment_->head; }
 
 void Writer::heartbeat(HostTime now) {
