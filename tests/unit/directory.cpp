@@ -3,10 +3,14 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <csignal>
+#include <filesystem>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "../support/temporary_directory.hpp"
@@ -29,6 +33,34 @@ TEST_CASE("directory: one owner at a time, readable for its group only") {
                    Catch::Contains("another versavisd"));
     }
     CHECK(OwnedDirectory::claim(path));
+}
+
+TEST_CASE("directory: another service is found by its rings, too, and named") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    int ready[2];
+    REQUIRE(::pipe(ready) == 0);
+    const pid_t service = ::fork();
+    if (service == 0) {
+        const auto directory = OwnedDirectory::claim(path);
+        const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+        const char ok = directory && writer ? 1 : 0;
+        if (::write(ready[1], &ok, 1) != 1) ::_exit(1);
+        ::pause();
+        ::_exit(0);
+    }
+    char ok = 0;
+    REQUIRE(::read(ready[0], &ok, 1) == 1);
+    REQUIRE(ok == 1);
+    const std::string name = "serves this instance (process " + std::to_string(service) + ")";
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains(name));
+    std::filesystem::remove(path / ".lock");
+    CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains(name));
+    CHECK(std::filesystem::exists(path / "events"));
+    ::kill(service, SIGKILL);
+    ::waitpid(service, nullptr, 0);
+    CHECK(OwnedDirectory::claim(path));
+    for (const int end : ready) ::close(end);
 }
 
 namespace {

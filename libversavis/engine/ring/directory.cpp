@@ -44,6 +44,26 @@ Expected<> check_trust(const std::filesystem::path& path) {
     return {};
 }
 
+/// Another process that writes a ring there; 0: none. It is found even when somebody has removed
+/// the file that it locked.
+std::uint32_t living_writer(const std::filesystem::path& directory) {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
+        const auto segment = Mapping::open(entry.path(), Mapping::Access::read_only);
+        if (!segment || is_own(segment->header())) continue;
+        const Constants& constants = segment->constants();
+        if (start_ticks_of(constants.writer_pid) == constants.writer_start_ticks)
+            return constants.writer_pid;
+    }
+    return 0;
+}
+
+Unexpected<Error> served(const std::filesystem::path& path, std::uint32_t process) {
+    const std::string name = process == 0 ? "" : fmt::format(" (process {})", process);
+    return failure(path.string(), "another versavisd serves this instance" + name,
+                   "stop it, or choose another name for 'instance'");
+}
+
 }  // namespace
 
 Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path) {
@@ -63,10 +83,12 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
                        "run the service as the user that owns it");
     if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
         ::close(lock);
-        return failure(path.string(), "another versavisd serves this instance",
-                       "stop it, or choose another name for 'instance'");
+        return served(path, living_writer(path));
     }
-    return OwnedDirectory(path, lock);
+    OwnedDirectory owned(path, lock);
+    if (const std::uint32_t process = living_writer(path); process != 0)
+        return served(path, process);
+    return owned;
 }
 
 OwnedDirectory::OwnedDirectory(OwnedDirectory&& other) noexcept
