@@ -36,6 +36,12 @@ configure_file(cmake/versavis.pc.in versavis.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
+# The Python client, where Debian's Python looks if the prefix is /usr.
+set(VERSAVIS_PYTHON_DIR lib/python3/dist-packages CACHE STRING
+    "Where the Python package goes; if relative, below the prefix")
+install(DIRECTORY clients/python/versavis DESTINATION ${VERSAVIS_PYTHON_DIR}
+    FILES_MATCHING PATTERN *.py PATTERN __pycache__ EXCLUDE)
+
 # The documents keep their folders, so that the links between them hold.
 install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR})

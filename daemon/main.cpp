@@ -14,6 +14,7 @@
 #include "configuration/problem_report.hpp"
 #include "library_log.hpp"
 #include "log.hpp"
+#include "memory_lock.hpp"
 #include "service.hpp"
 
 namespace {
@@ -78,6 +79,12 @@ int run(const std::string& path) {
     }
     set_log_level(configuration->log_level);
     route_library_log();
+    if (configuration->memory.lock) {
+        if (const auto locked = lock_memory(); !locked) {
+            log(LogLevel::error, "service", "{}", locked.error().message());
+            return EX_UNAVAILABLE;
+        }
+    }
     auto service = Service::create(*configuration);
     if (!service) {
         log(LogLevel::error, "service", "{}", service.error().message());

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "service.hpp"
 
+#include <bit>
+#include <cmath>
+
 #include "board/board_event.hpp"
 #include "camera/line_delays.hpp"
 #include "configuration/board_configuration.hpp"
@@ -14,9 +17,9 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Items that rings keep for readers that sleep. IMU: 16 s at 1 kHz, 2 MiB. Events: 0.5 MiB. Clock:
-/// a minute with an IMU at 1 kHz, 8 MiB. At half, a reader may sleep half as long; at twice, each
-/// takes twice the memory.
+/// Items that rings keep for readers that sleep. IMU, unless `history_s` says more or less: 16 s at
+/// 1 kHz, 2 MiB. Events: 0.5 MiB. Clock: a minute with an IMU at 1 kHz, 8 MiB. At half, a reader
+/// may sleep half as long; at twice, each takes twice the memory.
 constexpr std::uint32_t imu_items = 16384;
 constexpr std::uint32_t event_items = 4096;
 constexpr std::uint32_t clock_items = 65536;
@@ -24,6 +27,14 @@ constexpr std::uint32_t clock_items = 65536;
 /// For cameras that are mute when the service is to end. At half, one that is busy stays under
 /// control for some seconds; at twice, the end takes longer than the two seconds it may.
 constexpr Duration stop_patience = seconds(1);
+
+ring::Shape ring_of(const ImuConfiguration& imu) {
+    ring::Shape shape{imu.name, ring::StreamKind::imu, imu_items};
+    const auto samples = static_cast<std::uint32_t>(std::ceil(imu.rate_hz * imu.history_s));
+    // The oldest items are about to be overwritten: the history is what lies before them.
+    if (samples > 0) shape.descriptor_count = std::bit_ceil(samples + 1);
+    return shape;
+}
 
 /// Of all rings: readers of these are handed over.
 std::vector<std::string> ring_names(const Configuration& configuration) {
@@ -60,7 +71,7 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
                  clock::OutputClock output, StatusPublisher status)
     : configuration_(configuration),
       directory_(std::move(directory)),
-      translator_(std::move(output), configuration.clock.pps),
+      translator_(std::move(output), configuration.clock.pps, directory_.epochs().first()),
       status_(std::move(status)),
       asymmetry_(configuration.state_directory, translator_),
       alignment_(configuration.clock, board_configuration(configuration)),
@@ -76,8 +87,7 @@ Expected<> Service::make_rings() {
     if (!clock_ring) return Unexpected(clock_ring.error());
     clock_recorder_ = std::make_unique<ClockRecorder>(std::move(*clock_ring), translator_);
     for (const ImuConfiguration& imu : configuration_.imus) {
-        auto ring =
-            ring::Writer::create(directory_.path(), {imu.name, ring::StreamKind::imu, imu_items});
+        auto ring = ring::Writer::create(directory_.path(), ring_of(imu));
         if (!ring) return Unexpected(ring.error());
         imus_.push_back(
             std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_, *events_));
@@ -203,6 +213,7 @@ void Service::tick() {
     for (auto& imu : imus_) imu->heartbeat(now);
     events_->heartbeat(now);
     clock_recorder_->tick(now);
+    directory_.epochs().keep(translator_.output_now().epoch);
     status_.heartbeat(now);
     if (status_.due(now)) status_.publish(collect_status(now), translator_);
 }
@@ -219,6 +230,7 @@ Status Service::collect_status(HostTime now) {
     Status status;
     status.instance = configuration_.instance;
     status.release = VERSAVIS_VERSION;
+    status.configuration = std::filesystem::absolute(configuration_.entry.place.path).string();
     status.started = started_;
     status.now = now;
     status.board_needed = board_needed();

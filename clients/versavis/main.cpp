@@ -12,7 +12,11 @@
 
 #include "board/board_commands.hpp"
 #include "clock/clock.hpp"
+#include "evaluate/evaluate_commands.hpp"
 #include "pairing/pair_replay.hpp"
+#include "process/process_command.hpp"
+#include "record/record_command.hpp"
+#include "recording/file_commands.hpp"
 #include "status/status_document.hpp"
 #include "status/status_view.hpp"
 #include "stream/list.hpp"
@@ -79,7 +83,8 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.set_version_flag("--version", VERSAVIS_VERSION);
     std::string instance = default_instance();
-    app.add_option("--instance", instance, "Instance of the service")->capture_default_str();
+    auto* instance_option =
+        app.add_option("--instance", instance, "Instance of the service")->capture_default_str();
     app.fallthrough();
     bool json = false;
 
@@ -118,7 +123,15 @@ int main(int argc, char** argv) {
 
     client::ClockCommands clock(app, [] { return stop_requested != 0; });
 
+    client::EvaluateCommands evaluate(app, [] { return stop_requested != 0; });
+
     client::BoardCommands board(app, [] { return stop_requested != 0; });
+
+    client::ProcessCommand process(app, [] { return stop_requested != 0; });
+
+    client::FileCommands files(app, [] { return stop_requested != 0; });
+
+    client::RecordCommand recorder(app, [] { return stop_requested != 0; });
 
     std::string stream;
     std::string output;
@@ -137,8 +150,10 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     // Commands that run until they are stopped end tidily; all others end at once.
-    if (watch || *tail_command || clock.records() || board.chosen())
+    if (watch || *tail_command || clock.records() || board.chosen() || evaluate.chosen() ||
+        process.chosen() || files.chosen() || recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
+    signal(SIGXFSZ, SIG_IGN);  // a limit on files is told like a full disk
     if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
     if (*list) {
         const auto text = client::list_streams(instance, json);
@@ -155,6 +170,10 @@ int main(int argc, char** argv) {
     }
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
+    if (recorder.chosen()) return recorder.run(instance);
+    if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
+    if (evaluate.chosen()) return evaluate.run();
+    if (process.chosen()) return process.run();
     if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});

@@ -30,6 +30,10 @@ constexpr unsigned spare_slots = 8;
 /// buffers then; at twice, they take twice the memory for it.
 constexpr double longest_wait_s = 0.12;
 
+/// Longest history of a ring: an hour. Half: recordings after the event must begin sooner. Twice:
+/// no machine has the memory.
+constexpr double longest_history_s = 3600;
+
 /// Trigger pulses, where the period leaves room for them: half of what it may be.
 constexpr double usual_part_of_period = 0.25;
 
@@ -159,6 +163,7 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     read_trigger(reader, camera);
     reader.read("buffers", camera.buffers, 2, 64);
     reader.read("slots", camera.slots, camera.buffers + spare_slots, 1024);
+    reader.read("history_s", camera.history_s, 0, longest_history_s);
     reader.read("packet_size", camera.packet_size, 576, 16000);
     reader.choose<ReceiveMode>("receive", camera.receive,
                                {{"socket", ReceiveMode::socket}, {"packet", ReceiveMode::packet}});
@@ -198,6 +203,7 @@ ImuConfiguration read_imu(TableReader& reader) {
     reader.read("accel_ready", imu.accel_ready);
     reader.read("rate_hz", imu.rate_hz, 1, 8000);
     reader.read("filter", imu.filter, 0, 7);
+    reader.read("history_s", imu.history_s, 0, longest_history_s);
     if (reader.has("filter_delay_us"))
         reader.read("filter_delay_us", imu.filter_delay_us.emplace(), 0, longest_filter_us);
     return imu;
@@ -237,8 +243,11 @@ void complete(CameraConfiguration& camera) {
     if (open("latest_arrival_ms"))
         camera.latest_arrival_ms = std::min(camera.latest_arrival_ms, longest_arrival_ms(camera));
     if (open("slots")) {
-        const auto waiting = static_cast<unsigned>(std::ceil(camera.rate_hz * longest_wait_s));
-        camera.slots = std::min(camera.buffers + spare_slots + waiting, 1024U);
+        const auto frames = [&](double seconds) {
+            return static_cast<unsigned>(std::ceil(camera.rate_hz * seconds));
+        };
+        camera.slots = std::min(camera.buffers + spare_slots + frames(longest_wait_s), 1024U) +
+                       frames(camera.history_s);
     }
     AutoExposureConfiguration& control = camera.auto_exposure;
     if (!control.entry.has("max_us")) control.max_us = camera.max_exposure_us;
@@ -329,6 +338,9 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
     read_parts(file, top, "imu", configuration.imus, read_imu);
     read_part(file, top, "illumination", configuration.illumination, read_illumination);
     read_part(file, top, "ports", configuration.ports, read_ports);
+    read_part(
+        file, top, "memory", configuration.memory,
+        [](TableReader& reader, MemoryConfiguration& memory) { reader.read("lock", memory.lock); });
     top.finish();
     configuration.entry = top.entry();
     complete(configuration);
@@ -380,7 +392,8 @@ double test_pulse_rate_hz(const Configuration& configuration) {
 }
 
 imu::FilterDelay ImuConfiguration::filter_delay() const {
-    if (filter_delay_us) return {from_us(*filter_delay_us), {}, imu::DelaySource::configuration};
+    if (filter_delay_us)
+        return imu::measured_delay(*model, rate_hz, data_ready, from_us(*filter_delay_us));
     return imu::filter_delay(*model, filter, rate_hz, data_ready);
 }
 

@@ -97,6 +97,7 @@ struct CameraConfiguration {
     double max_temperature_c = 75;
     double link_mbps = 0;  ///< of the network link; 0: as the interface says
     unsigned slots = 17;
+    double history_s = 0;  ///< frames so old can still be read: part of `slots`
     unsigned buffers = 6;
     unsigned packet_size = 0;  ///< 0: the largest that passes
     ReceiveMode receive = ReceiveMode::socket;
@@ -128,6 +129,7 @@ struct ImuConfiguration {
     unsigned i2c_address = first_i2c_address;
     double rate_hz = 200;
     unsigned filter = 0;
+    double history_s = 0;  ///< samples so old can still be read; 0: as many as usual
     bool data_ready = false;
     bool accel_ready = false;               ///< so is the data-ready line of its accelerometer
     std::optional<double> filter_delay_us;  ///< none: as the model has it
@@ -179,6 +181,11 @@ struct PortConfiguration {
     double pulse_us = 100;
 };
 
+struct MemoryConfiguration {
+    TomlEntry entry;
+    bool lock = false;  ///< all of the service's memory, rings included, stays in RAM
+};
+
 struct Configuration {
     TomlEntry entry;
     std::string instance = "default";
@@ -191,6 +198,7 @@ struct Configuration {
     std::vector<ImuConfiguration> imus;
     IlluminationConfiguration illumination;
     PortConfiguration ports;
+    MemoryConfiguration memory;
 };
 
 /// Errors: all that is wrong in the file, as far as it can be known without devices, in the order

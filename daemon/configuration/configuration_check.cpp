@@ -217,6 +217,14 @@ void check_outputs(const Configuration& configuration, Findings& findings) {
         });
 }
 
+void check_history(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.entry.has("slots") && camera.entry.has("history_s"))
+            findings.add(camera.entry, "history_s",
+                         "'slots' and 'history_s' both say how many frames the ring holds",
+                         "keep one of them");
+}
+
 bool can_be_master(const CameraConfiguration& camera) {
     return camera.trigger == TriggerSource::board && camera.master.empty() &&
            camera.strobe != Strobe::none;
@@ -520,11 +528,11 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
 }
 
 constexpr void (*rules[])(const Configuration&, Findings&){
-    check_that_it_serves, check_instance,     check_link,          check_pps,
-    check_names,          check_devices,      check_outputs,       check_masters,
-    check_camera_times,   check_glitch,       check_auto_exposure, check_presets,
-    check_imus,           check_illumination, check_inputs,        check_uart_and_imu_output,
-    check_test_rate,      check_pulse_outputs};
+    check_that_it_serves, check_instance,      check_link,          check_pps,
+    check_names,          check_devices,       check_outputs,       check_masters,
+    check_camera_times,   check_glitch,        check_auto_exposure, check_presets,
+    check_imus,           check_illumination,  check_inputs,        check_uart_and_imu_output,
+    check_test_rate,      check_pulse_outputs, check_history};
 
 }  // namespace
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/frame_publisher.hpp"
 
+#include <algorithm>
+#include <bit>
+
 #include "stream/exposure_completion.hpp"
 #include "stream/total_sigma.hpp"
 
@@ -12,16 +15,10 @@ namespace {
 /// it would learn of 32; at twice each ring takes 8 KiB more.
 constexpr std::uint32_t descriptor_floor = 64;
 
-std::uint32_t power_of_two(std::uint32_t at_least) {
-    std::uint32_t value = descriptor_floor;
-    while (value < at_least) value *= 2;
-    return value;
-}
-
 FrameMetadata describe(const pairing::Exposure& exposure) {
     FrameMetadata metadata{};
     metadata.trigger = exposure.trigger;
-    metadata.tick = static_cast<std::uint32_t>(exposure.tick);
+    metadata.set_tick(exposure.tick);
     metadata.board_time = middle(exposure.start, exposure.end);
     if (exposure.kind == StampKind::measured_middle)
         metadata.exposure = exposure.end - exposure.start;
@@ -43,7 +40,7 @@ Expected<std::optional<ring::Writer>> FramePublisher::make_ring(
     shape.kind = ring::StreamKind::frames;
     shape.slot_count = slots_;
     shape.slot_size = payload_size;
-    shape.descriptor_count = power_of_two(2 * slots_);
+    shape.descriptor_count = std::bit_ceil(std::max(2 * slots_, descriptor_floor));
     auto ring = ring::Writer::create(directory, shape);
     if (!ring) return Unexpected(ring.error());
     return std::move(*ring);

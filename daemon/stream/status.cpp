@@ -211,6 +211,7 @@ std::string to_json(const Status& status) {
         {"schema", schema},
         {"instance", status.instance},
         {"release", status.release},
+        {"configuration", status.configuration},
         {"pid", ::getpid()},
         {"started_ns", status.started.ns},
         {"host_time_ns", status.now.ns},

@@ -44,7 +44,8 @@ struct StreamStatus {
 
 struct Status {
     std::string instance;
-    std::string release;  ///< of the service
+    std::string release;        ///< of the service
+    std::string configuration;  ///< its file
     HostTime started;
     HostTime now;
     bool board_needed = true;

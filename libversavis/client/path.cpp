@@ -14,6 +14,10 @@ std::filesystem::path instance_directory(const std::string& instance) {
     return std::filesystem::path("/dev/shm/versavis") / instance;
 }
 
+bool is_stream_name(const std::string& name) {
+    return !name.empty() && name.front() != '.' && name.find('/') == std::string::npos;
+}
+
 std::filesystem::path stream_path(const std::string& instance, const std::string& stream) {
     return instance_directory(instance) / stream;
 }

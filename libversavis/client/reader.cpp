@@ -1,139 +1,135 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "versavis/ring/reader.hpp"
 
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
+#include <ctime>
 
+#include "client/deadline.hpp"
+#include "client/futex.hpp"
+#include "client/process.hpp"
 #include "client/segment.hpp"
+#include "client/trust.hpp"
+#include "client/watch.hpp"
 
 namespace versavis::ring {
 
 namespace {
 
-// A process with a read-only mapping can still move waiters to another futex word: no wait may be
-// unbounded.
-constexpr std::int64_t longest_wait_ns = 20'000'000;
-constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
+// How often a reader looks whether the writer lives. Half: a reader that polls spends more on it.
+// Twice: it is told of a death 20 ms later than it could be.
+constexpr std::int64_t look_period_ns = 10'000'000;
 
-/// Copies a payload that the writer may be overwriting. The writer fills slots with plain stores
-/// (memcpy, or a camera's driver), so to the language such a copy is a data race even with the
-/// atomic loads here. It does no harm in practice: the loads are whole words that the compiler
-/// neither repeats nor leaves out, racing loads do not trap, and no word is interpreted while it is
-/// copied. The copy may still mix two items: only intact() afterwards (SYNC 4) decides whether it
-/// is good.
-void copy_words(const std::byte* source, std::byte* destination, std::size_t size) {
-    const auto* words =
-        reinterpret_cast<const std::atomic<std::uint64_t>*>(source);  // slots are page-aligned
-    std::size_t i = 0;
-    for (; i + 8 <= size; i += 8) {
-        const std::uint64_t word = words[i / 8].load(std::memory_order_relaxed);
-        std::memcpy(destination + i, &word, 8);
-    }
-    if (i < size) {
-        const std::uint64_t word = words[i / 8].load(std::memory_order_relaxed);
-        std::memcpy(destination + i, &word, size - i);
-    }
+/// A few ns to read, and some ms coarse.
+std::int64_t coarse_now_ns() {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
-/// Tells a segment from its successor of the same name, without mapping it.
-using FileId = std::pair<dev_t, ino_t>;
-
-FileId file_id(const std::filesystem::path& path) {
-    struct stat file {};
-    return ::stat(path.c_str(), &file) == 0 ? FileId{file.st_dev, file.st_ino} : FileId{};
+Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
+                                             const Options& options) {
+    auto file = open_trusted(path, options.owner);
+    if (!file) return Unexpected(file.error());
+    auto mapping = Mapping::open(file->descriptor(), path, Mapping::Access::read_only);
+    if (!mapping) return Unexpected(mapping.error());
+    return std::make_shared<const Mapping>(std::move(*mapping));
 }
 
-Expected<> check_owner(const std::filesystem::path& path) {
-    struct stat file {};
-    struct stat directory {};
-    const auto parent = path.parent_path();
-    if (::stat(path.c_str(), &file) != 0 || ::stat(parent.c_str(), &directory) != 0)
-        return failure(path.string(), errno == EACCES ? "permission denied" : "no such stream",
-                       errno == EACCES
-                           ? "join the group that may read streams (usually 'versavis')"
-                           : "is the service running? 'versavis list' shows the streams");
-    if (file.st_uid != directory.st_uid || (directory.st_mode & S_IWOTH) != 0)
-        return failure(path.string(), "does not belong to the owner of its directory",
-                       "somebody else may have put it there: remove it");
-    return {};
+Unexpected<NoItem> pause(Pause why, std::uint64_t lost = 0) {
+    return Unexpected<NoItem>(NoItem{why, lost});
 }
 
 }  // namespace
 
-struct Reader::Segment {
-    Mapping mapping;
-    FileId file;
-};
-
-Expected<std::unique_ptr<Reader::Segment>> Reader::map(const std::filesystem::path& path) {
-    if (auto owner = check_owner(path); !owner) return Unexpected(owner.error());
-    const FileId file = file_id(path);  // before mapping: a successor made in between is noticed
-    auto mapping = Mapping::open(path, Mapping::Access::read_only);
-    if (!mapping) return Unexpected(mapping.error());
-    return std::make_unique<Segment>(Segment{std::move(*mapping), file});
+std::string NoItem::message() const {
+    switch (why) {
+        case Pause::nothing: return "nothing new in the time given";
+        case Pause::lost:
+            return std::to_string(lost) + " items were overwritten before they were read";
+        case Pause::restarted: return "the service was restarted";
+        case Pause::gone: return "the service is gone; waiting for it";
+    }
+    return "unknown";
 }
 
-Expected<Reader> Reader::open(const std::filesystem::path& path, From from) {
-    auto segment = map(path);
-    if (!segment) return Unexpected(segment.error());
-    Reader reader(path, std::move(*segment));
-    const std::uint64_t head = reader.head();
-    reader.next_ = from == From::newest ? head : head - std::min(head, reader.retained() / 2);
+/// What a reader remembers of its writer.
+struct Reader::Contact {
+    Pulse pulse;
+    std::int64_t looked_ns = 0;  ///< coarse clock
+    bool alive = true;
+    bool told_gone = false;
+    std::uint64_t read = 0;        ///< number behind that of the item that was handed out last
+    FileId refused{};              ///< a file of this name that could not be followed
+    std::unique_ptr<Watch> watch;  ///< once fd() was asked for
+};
+
+Expected<Reader> Reader::open(const std::filesystem::path& path, const Options& options) {
+    auto mapping = map(path, options);
+    if (!mapping) return Unexpected(mapping.error());
+    Reader reader(path, options, std::move(*mapping));
+    reader.seek(options.start);
+    reader.writer_alive();
     return reader;
 }
 
-Reader::Reader(std::filesystem::path path, std::unique_ptr<Segment> segment)
-    : path_(std::move(path)), segment_(std::move(segment)) {}
+Reader::Reader(std::filesystem::path path, const Options& options,
+               std::shared_ptr<const Mapping> mapping)
+    : path_(std::move(path)),
+      options_(options),
+      mapping_(std::move(mapping)),
+      contact_(std::make_unique<Contact>()) {}
 Reader::Reader(Reader&&) noexcept = default;
 Reader& Reader::operator=(Reader&&) noexcept = default;
 Reader::~Reader() = default;
 
-StreamKind Reader::kind() const { return segment_->mapping.constants().kind; }
-const char* Reader::name() const { return segment_->mapping.constants().name.data(); }
+StreamKind Reader::kind() const { return mapping_->constants().kind; }
+const char* Reader::name() const { return mapping_->constants().name.data(); }
+std::uint64_t Reader::life() const { return mapping_->constants().life; }
+std::uint32_t Reader::writer_pid() const { return mapping_->constants().writer_pid; }
+
 std::uint64_t Reader::head() const {
     // SYNC 1: acquire here, release in Writer::write_descriptor(): all items below `head` are
-    // complete in memory. Without it a new head could show an old descriptor, and an item that has
-    // just been published would be taken for lost.
-    return segment_->mapping.header().head.load(std::memory_order_acquire);
-}
-std::uint32_t Reader::writer_pid() const { return segment_->mapping.constants().writer_pid; }
-
-bool Reader::writer_found() const {
-    const Constants& constants = segment_->mapping.constants();
-    return start_ticks_of(constants.writer_pid) == constants.writer_start_ticks;
+    // complete in memory, for readers that begin by it.
+    return mapping_->header().head.load(std::memory_order_acquire);
 }
 
 std::uint64_t Reader::retained() const {
-    const Constants& constants = segment_->mapping.constants();
+    const Constants& constants = mapping_->constants();
     return constants.slot_count == 0 ? constants.descriptor_count
                                      : std::min(constants.slot_count, constants.descriptor_count);
 }
 
 HostTime Reader::last_heartbeat() const {
-    return {segment_->mapping.header().heartbeat_ns.load(std::memory_order_relaxed)};
+    return {mapping_->header().heartbeat_ns.load(std::memory_order_relaxed)};
 }
 
-bool Reader::writer_alive() const {
-    // SYNC 6: acquire here, release in retire(): whoever sees the segment closed also sees its
-    // last item when it looks at `head` again. Without it that item could go unread.
-    const auto state = segment_->mapping.header().state.load(std::memory_order_acquire);
-    return state == static_cast<std::uint32_t>(WriterState::live) &&
-           last_heartbeat().ns > host_now().ns - heartbeat_limit_ns;  // of a liar it may be any
+bool Reader::writer_alive() {
+    contact_->looked_ns = coarse_now_ns();
+    contact_->alive = writer_lives(*mapping_, contact_->pulse);
+    return contact_->alive;
 }
 
-Item Reader::read_descriptor(std::uint64_t number) const {
-    const Descriptor& descriptor = segment_->mapping.descriptor(number);
-    Item item;
-    item.number = number;
+/// As last seen; looked at anew when that is some time ago, or it was dead.
+bool Reader::writer_seen() {
+    const auto live = static_cast<std::uint32_t>(WriterState::live);
+    const bool ended = mapping_->header().state.load(std::memory_order_relaxed) != live;
+    const bool due = coarse_now_ns() - contact_->looked_ns >= look_period_ns;
+    return ended || due ? writer_alive() : contact_->alive;
+}
+
+Reader::Look Reader::read(std::uint64_t number, Item& item) const {
+    const Descriptor& descriptor = mapping_->descriptor(number);
     const std::uint64_t complete = 2 * number + 2;
+    // The item's second cache line comes along with the first, not after it.
+    __builtin_prefetch(&descriptor.metadata[metadata_words - 1]);
     // SYNC 2: acquire here, release in Writer::write_descriptor(): the descriptor's words, the
     // payload and the slot's generation are at least as new as this item. Without it the words of
     // the item that lay here before could be taken for this one's.
-    if (descriptor.sequence.load(std::memory_order_acquire) != complete) return item;
-    item.slot_generation = descriptor.slot_generation.load(std::memory_order_relaxed);
+    const std::uint64_t sequence = descriptor.sequence.load(std::memory_order_acquire);
+    if (sequence != complete)
+        return static_cast<std::int64_t>(sequence - complete) < 0 ? Look::not_yet
+                                                                  : Look::overwritten;
+    const std::uint64_t generation = descriptor.slot_generation.load(std::memory_order_relaxed);
     const std::uint64_t length_and_slot =
         descriptor.length_and_slot.load(std::memory_order_relaxed);
     item.time.ns = descriptor.output_time_ns.load(std::memory_order_relaxed);
@@ -143,91 +139,201 @@ Item Reader::read_descriptor(std::uint64_t number) const {
     // came from the next item, the sequence below is no longer this item's. Without it a mixture of
     // two descriptors would pass.
     std::atomic_thread_fence(std::memory_order_acquire);
-    if (descriptor.sequence.load(std::memory_order_relaxed) != complete) return item;
+    if (descriptor.sequence.load(std::memory_order_relaxed) != complete) return Look::overwritten;
 
-    item.slot = static_cast<std::uint32_t>(length_and_slot);
-    item.payload_size = static_cast<std::uint32_t>(length_and_slot >> 32U);
-    if (item.slot != no_slot) {
-        if (item.payload_size > segment_->mapping.constants().slot_size || !intact(item))
-            return item;
-        item.payload = segment_->mapping.slot(item.slot);
+    item.number = number;
+    item.life = mapping_->constants().life;
+    const auto slot = static_cast<std::uint32_t>(length_and_slot);
+    if (slot == no_slot) return Look::ready;
+    const auto size = static_cast<std::uint32_t>(length_and_slot >> 32U);
+    const Constants& constants = mapping_->constants();
+    if (slot >= constants.slot_count || size > constants.slot_size) return Look::overwritten;
+    item.payload = Payload(mapping_, slot, generation, size);
+    return item.payload.valid() ? Look::ready : Look::overwritten;
+}
+
+bool Reader::readable(std::uint64_t number) const {
+    Item item;
+    return read(number, item) == Look::ready;
+}
+
+/// Items are lost in the order in which they came, but for a few whose slots were given back.
+std::uint64_t Reader::oldest() const {
+    const std::uint64_t end = head();
+    std::uint64_t lost = end - std::min(end, retained());
+    std::uint64_t there = end;
+    while (lost < there) {
+        const std::uint64_t middle = lost + (there - lost) / 2;
+        if (readable(middle))
+            there = middle;
+        else
+            lost = middle + 1;
     }
-    item.found = Found::item;
-    return item;
+    return there;
 }
 
-Item Reader::lapped() {
-    const std::uint64_t half_way = head() - std::min(head(), retained() / 2);
+std::uint64_t Reader::place(Position position) const {
+    const std::uint64_t end = head();
+    if (position == Position::next) return end;
+    if (position == Position::latest) return end - std::min<std::uint64_t>(end, 1);
+    const std::uint64_t there = end - std::min(end, oldest());
+    const bool full = there < end;  // the oldest is about to be overwritten
+    if (position == Position::oldest) return end - (there - (full ? there / 8 : 0));
+    return end - std::min(retained() / 2, there - (full ? there / 4 : 0));
+}
+
+void Reader::seek(Position position) { next_ = place(position); }
+
+void Reader::seek(OutputTime time) {
+    const std::uint64_t first = oldest();
+    next_ = head();
+    for (Item item; next_ > first; --next_)
+        if (read(next_ - 1, item) != Look::ready || item.time < time) return;
+}
+
+Received Reader::lapped() {
+    const std::uint64_t to = std::max(next_ + 1, place(options_.after_loss));
+    const std::uint64_t lost = to - next_;
+    next_ = to;
+    return pause(Pause::lost, lost);
+}
+
+Received Reader::take() {
     Item item;
-    item.found = Found::lost;
-    item.number = std::max(next_ + 1, half_way);
-    item.lost = item.number - next_;
-    next_ = item.number;
+    switch (read(next_, item)) {
+        case Look::not_yet: return pause(Pause::nothing);
+        case Look::overwritten: return lapped();
+        case Look::ready: break;
+    }
+    contact_->read = ++next_;
+    contact_->told_gone = false;
+    item.stale = !writer_seen();
     return item;
 }
 
-Item Reader::next() {
-    if (next_ >= head()) return idle();
-    Item item = read_descriptor(next_);
-    if (item.found != Found::item) return lapped();
-    ++next_;
-    return item;
+Received Reader::look() {
+    auto received = take();
+    if (received || received.error().why != Pause::nothing || writer_seen()) return received;
+    received = take();  // published since the last look
+    if (received || received.error().why != Pause::nothing) return received;
+    return hand_over();
 }
 
-Item Reader::idle() {
-    Item item;
-    // A writer that was killed never marked its segment: its silence counts as well.
-    if (writer_alive()) return item;
-    if (next_ < head()) return item;  // published since the last look: the next look finds it
-    item.found = Found::gone;
-    if (file_id(path_) == segment_->file) return item;
-    auto successor = map(path_);
-    if (!successor) return item;
-    const Constants& now = (*successor)->mapping.constants();
-    const Constants& before = segment_->mapping.constants();
+Received Reader::hand_over() {
+    if (!has_successor(path_, mapping_->file(), {})) return pause(Pause::gone);
+    contact_->refused = file_id(path_);
+    auto successor = map(path_, options_);
+    if (!successor) return pause(Pause::gone);
+    const Constants& now = (*successor)->constants();
+    const Constants& before = mapping_->constants();
     // Of another kind it is another stream: its items would be read as what they are not.
-    if (now.generation == before.generation || now.kind != before.kind) return item;
-    segment_ = std::move(*successor);
+    if (now.generation == before.generation || now.kind != before.kind) return pause(Pause::gone);
+    // A writer that was taken for dead may have published once more before it was replaced.
+    auto last = take();
+    if (last || last.error().why != Pause::nothing) return last;
+    mapping_ = std::move(*successor);
     next_ = 0;
-    item.found = Found::restarted;
-    return item;
+    contact_->read = 0;
+    contact_->pulse = {};
+    contact_->told_gone = false;
+    writer_alive();
+    return pause(Pause::restarted);
 }
 
-Item Reader::wait(Duration timeout) {
-    const HostTime deadline = host_now() + timeout;
+Received Reader::next() {
+    auto received = look();
+    if (received) return received;
+    const Pause why = received.error().why;
+    if (contact_->watch && (why == Pause::nothing || why == Pause::gone)) received = settle();
+    if (!received && received.error().why == Pause::gone) contact_->told_gone = true;
+    return received;
+}
+
+/// Nothing is there: the descriptor is made to wait for what comes from here on.
+Received Reader::settle() {
+    contact_->watch->calm();
+    const std::uint32_t seen = wake_word().value;
+    auto received = look();
+    const bool found =
+        received || received.error().why == Pause::lost || received.error().why == Pause::restarted;
+    if (found) {
+        contact_->watch->signal();
+        return received;
+    }
+    contact_->told_gone = received.error().why == Pause::gone;
+    contact_->watch->arm({target(seen)}, std::nullopt);
+    return received;
+}
+
+FutexWord Reader::wake_word() const {
+    const auto& wake = mapping_->header().wake;
+    // SYNC 5: acquire here, release in Writer::write_descriptor() and wake_readers(): whatever
+    // moved `wake` to the value seen is visible to the look that follows; whatever comes later
+    // changes it, and the kernel does not go to sleep. Without it a reader could sleep over an
+    // item.
+    return {&wake, wake.load(std::memory_order_acquire)};
+}
+
+WatchTarget Reader::target(std::uint32_t seen) const {
+    return {mapping_, path_, seen, contact_->told_gone, contact_->refused};
+}
+
+/// True when next() has something new to tell.
+bool Reader::ready() {
+    const auto not_there = [this] {
+        const Descriptor& descriptor = mapping_->descriptor(next_);
+        const std::uint64_t sequence = descriptor.sequence.load(std::memory_order_acquire);
+        return static_cast<std::int64_t>(sequence - (2 * next_ + 2)) < 0;
+    };
+    if (!not_there()) return true;
+    if (writer_seen()) return false;
+    if (!contact_->told_gone || !not_there()) return true;
+    return has_successor(path_, mapping_->file(), contact_->refused);
+}
+
+Expected<int> Reader::fd() {
+    if (!contact_->watch) {
+        auto watch = Watch::start();
+        if (!watch) return Unexpected(watch.error());
+        contact_->watch = std::move(*watch);
+    }
+    return contact_->watch->fd();
+}
+
+Received Reader::next(Duration timeout) {
+    const HostTime deadline = deadline_after(timeout);
     for (;;) {
-        const auto& wake = segment_->mapping.header().wake;
-        // SYNC 5: acquire here, release in Writer::write_descriptor() and retire(): whatever moved
-        // `wake` to the value seen is visible to next(); whatever comes later changes it, and the
-        // kernel does not go to sleep. Without it a reader could sleep over an item.
-        const std::uint32_t seen = wake.load(std::memory_order_acquire);
-        Item item = next();
-        const bool final_result = item.found != Found::nothing && item.found != Found::gone;
+        const auto mapping = mapping_;  // a successor may take its place
+        const FutexWord word = wake_word();
+        const bool told = contact_->told_gone;
+        auto received = next();
+        if (received) return received;
+        const Pause why = received.error().why;
+        if (why == Pause::lost || why == Pause::restarted || (why == Pause::gone && !told))
+            return received;
         const std::int64_t left_ns = (deadline - host_now()).ns;
-        if (final_result) return item;
-        if (left_ns <= 0) {
-            return item;
-        }
-        futex_wait(wake, seen, std::min(left_ns, longest_wait_ns));
+        if (left_ns <= 0) return received;
+        futex_wait(*word.word, word.value, std::min(left_ns, longest_sleep_ns));
     }
 }
 
-bool Reader::intact(const Item& item) const {
-    if (item.slot == no_slot) return true;
-    if (item.slot >= segment_->mapping.constants().slot_count)
-        return false;  // the item is from an earlier segment
-    // SYNC 4: acquire fence here, release fence in Writer::acquire(): if anything that was read of
-    // the payload came from a newer item, the generation has changed. Without it a mixture of two
-    // payloads would pass for a good one.
-    std::atomic_thread_fence(std::memory_order_acquire);
-    return segment_->mapping.generation(item.slot).load(std::memory_order_relaxed) ==
-           item.slot_generation;
+void Reader::wait(Duration timeout) {
+    const HostTime deadline = deadline_after(timeout);
+    for (;;) {
+        const FutexWord word = wake_word();
+        const std::int64_t left_ns = (deadline - host_now()).ns;
+        if (ready() || left_ns <= 0) return;
+        futex_wait(*word.word, word.value, std::min(left_ns, longest_sleep_ns));
+    }
 }
 
-bool Reader::copy(const Item& item, std::byte* destination) const {
-    if (item.payload == nullptr) return item.payload_size == 0;
-    copy_words(item.payload, destination, item.payload_size);
-    return intact(item);
+Received Reader::latest(Duration timeout) {
+    for (;;) {
+        const std::uint64_t end = head();
+        if (end > contact_->read) next_ = end - 1;
+        auto received = next(timeout);
+        if (received || received.error().why != Pause::lost || head() == end) return received;
+    }
 }
 
 }  // namespace versavis::ring

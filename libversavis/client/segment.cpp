@@ -1,23 +1,34 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/segment.hpp"
 
-#include <linux/futex.h>
+#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/syscall.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <boost/interprocess/exceptions.hpp>
-#include <cstdlib>
+#include <cerrno>
 #include <cstring>
-#include <ctime>
-#include <fstream>
 #include <string>
+#include <system_error>
 
 namespace versavis::ring {
 
 namespace ipc = boost::interprocess;
 
 namespace {
+
+/// What Boost maps: a file that is open already, and checked.
+struct OpenFile {
+    int file;
+    ipc::mode_t mode;
+
+    ipc::mapping_handle_t get_mapping_handle() const { return {file, false}; }
+    ipc::mode_t get_mode() const { return mode; }
+};
+
+/// Older segments have nothing there.
+constexpr std::uint32_t minor_with_life = 5;
 
 bool inside(std::uint64_t at, std::uint64_t count, std::uint64_t size, std::uint64_t total) {
     return at <= total && (size == 0 || count <= (total - at) / size);
@@ -39,23 +50,37 @@ bool well_formed(const Constants& header, std::size_t size) {
 
 }  // namespace
 
-Expected<Mapping> Mapping::open_unchecked(const std::filesystem::path& path, Access access) {
+Expected<Mapping> Mapping::open_unchecked(int file, const std::filesystem::path& path,
+                                          Access access) {
+    struct stat status {};
+    if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode))
+        return failure(path.string(), "is not a VersaVIS ring");
     try {
         const auto mode = access == Access::read_only ? ipc::read_only : ipc::read_write;
-        const ipc::file_mapping file(path.c_str(), mode);
         Mapping mapping;
-        mapping.region_ = ipc::mapped_region(file, mode, 0, 0, nullptr, MAP_POPULATE);
+        mapping.region_ =
+            ipc::mapped_region(OpenFile{file, mode}, mode, 0, 0, nullptr, MAP_POPULATE);
+        mapping.file_ = {status.st_dev, status.st_ino};
         return mapping;
     } catch (const ipc::interprocess_exception& exception) {
-        const bool forbidden = exception.get_error_code() == ipc::security_error;
         return failure(path.string(), std::string("cannot be mapped: ") + exception.what(),
-                       forbidden ? "join the group that may read streams (usually 'versavis')"
-                                 : "is the service running?");
+                       "is the service running?");
     }
 }
 
 Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access) {
-    auto mapping = open_unchecked(path, access);
+    const int mode = access == Access::read_only ? O_RDONLY : O_RDWR;
+    const File file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (!file)
+        return failure(
+            path.string(),
+            "cannot be opened: " + std::error_code(errno, std::generic_category()).message(),
+            "is the service running?");
+    return open(file.descriptor(), path, access);
+}
+
+Expected<Mapping> Mapping::open(int file, const std::filesystem::path& path, Access access) {
+    auto mapping = open_unchecked(file, path, access);
     if (!mapping) return mapping;
     // SYNC 7: acquire here, release at the end of the writer's fill_header(): with the magic, the
     // rest of the header is complete. Without it a header could be checked and used half filled.
@@ -88,45 +113,17 @@ void Mapping::read_constants() {
     constants_.generations_at = from.generations_at;
     constants_.slots_at = from.slots_at;
     std::memcpy(constants_.name.data(), from.name, sizeof from.name);
+    constants_.life = from.abi_minor >= minor_with_life ? from.life : 0;
+    constants_.pid_namespace = from.abi_minor >= minor_with_life ? from.pid_namespace : 0;
 }
 
-std::uint64_t start_ticks_of(std::uint32_t pid) {
-    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-    std::string line;
-    std::getline(stat, line);
-    std::size_t at = line.rfind(')');  // the command may contain spaces
-    if (at != std::string::npos && line[at + 2] == 'Z') return 0;
-    for (int field = 3; field <= 22 && at != std::string::npos; ++field)
-        at = line.find(' ', at + 1);
-    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
+File::~File() {
+    if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-std::uint64_t start_ticks_of_this_process() {
-    return start_ticks_of(static_cast<std::uint32_t>(::getpid()));
-}
-
-bool is_own(const Header& header) {
-    return header.writer_pid == static_cast<std::uint32_t>(::getpid()) &&
-           header.writer_start_ticks == start_ticks_of_this_process();
-}
-
-void retire(Header& header, WriterState state) {
-    // SYNC 6: release here, acquire in Reader::writer_alive(): the last item, and the name of the
-    // successor, precede the new state.
-    header.state.store(static_cast<std::uint32_t>(state), std::memory_order_release);
-    // SYNC 5: release here, acquire in Reader::wait(): a reader that wakes up sees the new state.
-    header.wake.fetch_add(1, std::memory_order_release);
-    futex_wake(header.wake);
-}
-
-void futex_wake(const std::atomic<std::uint32_t>& word) {
-    syscall(SYS_futex, &word, FUTEX_WAKE, INT32_MAX, nullptr, nullptr, 0);
-}
-
-void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
-                std::int64_t timeout_ns) {
-    const timespec timeout{timeout_ns / 1'000'000'000, timeout_ns % 1'000'000'000};
-    syscall(SYS_futex, &word, FUTEX_WAIT, value, &timeout, nullptr, 0);
+FileId file_id(const std::filesystem::path& path) {
+    struct stat file {};
+    return ::lstat(path.c_str(), &file) == 0 ? FileId{file.st_dev, file.st_ino} : FileId{};
 }
 
 }  // namespace versavis::ring

@@ -6,6 +6,8 @@
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 #include "versavis/error.hpp"
 #include "versavis/ring/layout.hpp"
@@ -27,19 +29,31 @@ struct Constants {
     std::uint64_t generations_at = 0;
     std::uint64_t slots_at = 0;
     std::array<char, sizeof Header::name> name{};
+    std::uint64_t life = 0;
+    std::uint64_t pid_namespace = 0;
 };
+
+/// Device and inode: tells a segment from its successor of the same name.
+using FileId = std::pair<std::uint64_t, std::uint64_t>;
+
+/// Of the file that has this name now; zeros: none has.
+FileId file_id(const std::filesystem::path& path);
 
 /// Owns a mapping of a complete segment. The views stay valid as long as it lives.
 class Mapping {
  public:
     enum class Access { read_only, read_write };
 
-    /// Maps and checks `path`; every offset is checked to lie inside the file.
+    /// Maps and checks `path`; every offset is checked to lie inside the file. Whose it is, is not.
     static Expected<Mapping> open(const std::filesystem::path& path, Access access);
+
+    /// The same of a file that is open; `path` is for messages.
+    static Expected<Mapping> open(int file, const std::filesystem::path& path, Access access);
 
     /// Maps a file that is still being filled in: nothing is checked. Say read_constants() when its
     /// header is complete.
-    static Expected<Mapping> open_unchecked(const std::filesystem::path& path, Access access);
+    static Expected<Mapping> open_unchecked(int file, const std::filesystem::path& path,
+                                            Access access);
 
     Header& header() const { return *static_cast<Header*>(region_.get_address()); }
     const Constants& constants() const { return constants_; }
@@ -55,6 +69,7 @@ class Mapping {
         return bytes() + constants_.slots_at + slot * constants_.slot_size;
     }
     std::size_t size() const { return region_.get_size(); }
+    FileId file() const { return file_; }
 
     void read_constants();
 
@@ -63,25 +78,25 @@ class Mapping {
 
     boost::interprocess::mapped_region region_;
     Constants constants_;
+    FileId file_;
 };
 
-/// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process
-/// id it identifies a process until reboot.
-std::uint64_t start_ticks_of(std::uint32_t pid);
-std::uint64_t start_ticks_of_this_process();
+/// A file descriptor that closes itself.
+class File {
+ public:
+    explicit File(int descriptor) : descriptor_(descriptor) {}
+    File(File&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    File& operator=(File&& other) noexcept {
+        std::swap(descriptor_, other.descriptor_);
+        return *this;
+    }
+    ~File();
 
-/// True when this process made the segment.
-bool is_own(const Header& header);
+    int descriptor() const { return descriptor_; }
+    explicit operator bool() const { return descriptor_ >= 0; }
 
-/// Ends a segment: marks it as `state` and wakes its readers.
-void retire(Header& header, WriterState state);
-
-/// Wakes every process that waits on the futex `word`. std::atomic::notify would reach this process
-/// only.
-void futex_wake(const std::atomic<std::uint32_t>& word);
-
-/// Waits until `word` is no longer `value`, or `timeout_ns` has passed; may also return early.
-void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
-                std::int64_t timeout_ns);
+ private:
+    int descriptor_;
+};
 
 }  // namespace versavis::ring

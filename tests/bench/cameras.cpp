@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "../support/look.hpp"
 #include "../support/stack.hpp"
 #include "cpu_time.hpp"
 #include "judge.hpp"
@@ -96,9 +97,10 @@ Arrivals by_reader(test::Stack& stack) {
     auto stream = test::wait_for_stream<FrameStream>("cam0", stack.instance());
     const HostTime end = host_now() + latency_time;
     while (host_now() < end) {
-        const auto item = stream.wait(seconds(1));
-        if (item.found == Found::item)
-            arrivals[rig::FrameMark::serial_in(item.payload, item.payload_size)] = host_now();
+        const auto item = test::look(stream.next(seconds(1)));
+        if (item.found == test::Found::item)
+            arrivals[rig::FrameMark::serial_in(item.payload.data(), item.payload.size())] =
+                host_now();
     }
     return arrivals;
 }

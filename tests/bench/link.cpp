@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "../support/look.hpp"
 #include "../support/stack.hpp"
 #include "board/board_link.hpp"
 #include "engine/clock/recording.hpp"
@@ -166,7 +167,8 @@ std::vector<double> delays_us(const test::Stack& stack, bool own_thread) {
     auto reader = ring::Reader::open(directory.path() / "clock");
     pause(turn_time);
     std::vector<double> delays;
-    for (auto item = reader->next(); item.found == ring::Found::item; item = reader->next()) {
+    for (auto item = test::look(reader->next()); item.found == test::Found::item;
+         item = test::look(reader->next())) {
         const auto told = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
         if (!told || !std::holds_alternative<clock::RecordedMessage>(*told)) continue;
         const auto& message = std::get<clock::RecordedMessage>(*told);

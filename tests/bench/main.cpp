@@ -26,6 +26,7 @@ Benches all_benches(const double& seconds, const bool& profile) {
             {"firmware", [&] { return versavis::bench::bench_firmware(profile); }},
             {"link", versavis::bench::bench_link},
             {"output_clock", versavis::bench::bench_output_clock},
+            {"record", [&] { return versavis::bench::bench_record(seconds); }},
             {"recovery", versavis::bench::bench_recovery}};
 }
 

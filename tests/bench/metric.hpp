@@ -17,7 +17,8 @@ struct Metric {
     bool met() const { return !goal || value <= *goal; }
 };
 
-/// Publication and reading of rings, within this process.
+/// Publication and reading of rings, against bare shared memory and other transports; each in
+/// processes of its own.
 std::vector<Metric> bench_ring();
 
 /// Translation of host time to the output clock.
@@ -36,6 +37,10 @@ std::vector<Metric> bench_cameras(double seconds);
 
 /// How late a board's bytes are stamped under load, against one thread that reads and works.
 std::vector<Metric> bench_link();
+
+/// Three cameras and a fast IMU recorded for `seconds`: losses, processor time against bare
+/// writing, PNG, a recorder that is stopped or killed.
+std::vector<Metric> bench_record(double seconds);
 
 /// How soon a camera delivers verified frames again after it, or the board, rebooted.
 std::vector<Metric> bench_recovery();

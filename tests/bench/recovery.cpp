@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "../support/look.hpp"
 #include "../support/stack.hpp"
 #include "metric.hpp"
 #include "scene.hpp"
@@ -41,10 +42,11 @@ TimesBySerial read_frames(const test::Stack& stack) {
     auto stream = test::wait_for_stream<FrameStream>("cam0", stack.instance());
     TimesBySerial arrivals;
     while (arrivals.empty() || arrivals.rbegin()->first <= exposure_of(reboots - 1)) {
-        const auto item = stream.wait(seconds(20));
-        if (item.found == Found::nothing) throw std::runtime_error("cam0 did not come back");
-        if (item.found == Found::item)
-            arrivals[rig::FrameMark::serial_in(item.payload, item.payload_size)] = host_now();
+        const auto item = test::look(stream.next(seconds(20)));
+        if (item.found == test::Found::nothing) throw std::runtime_error("cam0 did not come back");
+        if (item.found == test::Found::item)
+            arrivals[rig::FrameMark::serial_in(item.payload.data(), item.payload.size())] =
+                host_now();
     }
     return arrivals;
 }

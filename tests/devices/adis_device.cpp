@@ -82,8 +82,10 @@ unsigned AdisDevice::averaged() const {
     return map_.octaves ? 1U << (rate >> 8U) : rate + 1;
 }
 
-Nanoseconds AdisDevice::filter_delay() const {
-    return std::llround((taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz * 1e9);
+Nanoseconds AdisDevice::motion_shown(Nanoseconds at) const {
+    const UpdateTimes times = updates();
+    const double delay = (taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz;
+    return times.time(times.index_at(at)) - std::llround(delay * 1e9);
 }
 
 /// Of the newest sample and those before it: the mean over the taps, over these means again, and

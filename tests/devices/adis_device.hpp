@@ -22,9 +22,9 @@ class AdisDevice final : public SpiImuDevice {
     bool signals(Nanoseconds at) const override;
     void brown_out(Nanoseconds at) override { reset(at + map_.reset); }
 
-    /// How much later than the motion its data is, as it is set up: averages that follow each
-    /// other.
-    Nanoseconds filter_delay() const;
+    /// When the motion was that it shows at `at`: its newest sample then, less the delay of
+    /// averages that follow each other.
+    Nanoseconds motion_shown(Nanoseconds at) const;
 
     /// The next `bursts` have a flipped bit.
     void corrupt(unsigned bursts) { corrupted_ = bursts; }

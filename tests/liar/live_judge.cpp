@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "live_judge.hpp"
+#include "../support/look.hpp"
 
 #include <fmt/format.h>
 
@@ -59,17 +60,19 @@ std::vector<Wrong> LiveJudge::poll() {
     const auto open = [&](const std::string& name, auto& stream) {
         using S = typename std::remove_reference_t<decltype(stream)>::value_type;
         if (!stream)
-            if (auto opened = S::open(name, system_.instance)) stream.emplace(std::move(*opened));
+            if (auto opened = S::open(name, {{}, system_.instance}))
+                stream.emplace(std::move(*opened));
         return stream.has_value();
     };
     const auto read_all = [](auto& stream, auto take_item) {
-        for (auto item = stream.next(); item.found != Found::nothing && item.found != Found::gone;
-             item = stream.next())
-            if (item.found == Found::item) take_item(item);
+        for (auto item = test::look(stream.next());
+             item.found != test::Found::nothing && item.found != test::Found::gone;
+             item = test::look(stream.next()))
+            if (item.found == test::Found::item) take_item(item);
     };
     for (unsigned i = 0; i < frames_.size(); ++i)
         if (open(system_.scenario.cameras[i].name, frames_[i]))
-            read_all(*frames_[i], [&](const auto& item) { take(i, *frames_[i], item); });
+            read_all(*frames_[i], [&](const auto& item) { take(i, item); });
     const auto take_any = [&](const auto& item) { take(item); };
     if (open(system_.scenario.imu, imu_)) read_all(*imu_, take_any);
     if (open("events", events_)) read_all(*events_, take_any);
@@ -127,12 +130,12 @@ bool LiveJudge::compare(const std::string& name, Judged& judged, TrueItem& truth
     return true;
 }
 
-void LiveJudge::take(unsigned camera, const FrameStream& stream,
-                     const Received<FrameMetadata>& item) {
+void LiveJudge::take(unsigned camera, const Frame& item) {
     const std::string& name = system_.scenario.cameras[camera].name;
-    const std::uint64_t serial = rig::FrameMark::serial_in(item.payload, item.payload_size);
-    if (!stream.intact(item)) return;  // this reader was too slow
-    read_truth();                      // it was written before this frame left
+    const std::uint64_t serial =
+        rig::FrameMark::serial_in(item.payload.data(), item.payload.size());
+    if (!item.valid()) return;  // this reader was too slow
+    read_truth();               // it was written before this frame left
     const auto found = cameras_[camera].truth.find(serial);
     if (found == cameras_[camera].truth.end()) {
         wrongs_.push_back({camera, 0, false, name + ": not a frame of the rig"});
@@ -155,17 +158,17 @@ void LiveJudge::take(unsigned camera, const FrameStream& stream,
                  wrong))
         return;
     const auto tick = liar_.true_tick(camera, truth.number);
-    if (tick && item.data.tick != static_cast<std::uint32_t>(*tick)) {
+    if (tick && item.data.tick() != *tick) {
         wrong.is_stamp = false;
-        wrong.what =
-            fmt::format("{} {}: tick {} instead of {}", name, truth.number, item.data.tick, *tick);
+        wrong.what = fmt::format("{} {}: tick {} instead of {}", name, truth.number,
+                                 item.data.tick(), *tick);
         wrongs_.push_back(wrong);
         return;
     }
     truth.fate = Fate::good;
 }
 
-void LiveJudge::take(const Received<ImuMetadata>& item) {
+void LiveJudge::take(const ImuSample& item) {
     const std::uint32_t key =
         true_number(item.data.magnetic[0], item.data.magnetic[1], system_.magnetic_lsb);
     read_truth();  // it was written before this sample left
@@ -191,7 +194,7 @@ void LiveJudge::take(const Received<ImuMetadata>& item) {
 }
 
 /// The rig's receiver marks whole seconds of UTC.
-void LiveJudge::take(const Received<EventMetadata>& item) {
+void LiveJudge::take(const Event& item) {
     if (item.data.kind != EventKind::pps || (item.data.flags & flag_suspect) != 0 ||
         item.data.sigma_ns == sigma_unknown)
         return;

@@ -76,9 +76,9 @@ class LiveJudge {
     };
 
     void read_truth();
-    void take(unsigned camera, const FrameStream& stream, const Received<FrameMetadata>& item);
-    void take(const Received<ImuMetadata>& item);
-    void take(const Received<EventMetadata>& item);
+    void take(unsigned camera, const Frame& item);
+    void take(const ImuSample& item);
+    void take(const Event& item);
     bool compare(const std::string& name, Judged& judged, TrueItem& truth, OutputTime stamp,
                  std::uint32_t sigma_ns, std::uint32_t epoch, Wrong wrong);
     bool honest(Duration error, std::uint32_t sigma_ns) const;

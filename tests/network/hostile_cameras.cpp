@@ -5,6 +5,7 @@
 #include <csignal>
 #include <fstream>
 
+#include "../support/look.hpp"
 #include "../support/process.hpp"
 #include "../support/stack.hpp"
 
@@ -174,7 +175,7 @@ TEST_CASE(
     stack.start_service();
     const HostTime started = host_now();
     auto frames = wait_for_stream<FrameStream>("cam0", stack.instance());
-    REQUIRE(frames.wait(seconds(5)).found == Found::item);
+    REQUIRE(test::look(frames.next(seconds(5))).found == test::Found::item);
     CHECK(host_now() - started < milliseconds(1500));
     const HostTime gone = since(stack, "has restarted");
     stack.wait_for_status([](const auto& s) {

@@ -28,10 +28,12 @@ constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is not
 
 devices::Inertial felt(const Motion& motion, HostTime at) {
     constexpr double degrees = 180 / 3.14159265358979;
-    const double pitch = motion.pitch_rad(at);
+    constexpr double standard_gravity = 9.80665;
+    const Eigen::Vector3d rate = motion.rate_rad_s(at) * degrees;
+    const Eigen::Vector3d force = motion.specific_force_m_s2(at) / standard_gravity;
     devices::Inertial felt;
-    felt.gyro_deg_s = {motion.pitch_rate_rad_s(at) * degrees, 0, 0};
-    felt.accel_g = {0, std::sin(pitch), std::cos(pitch)};
+    felt.gyro_deg_s = {rate.x(), rate.y(), rate.z()};
+    felt.accel_g = {force.x(), force.y(), force.z()};
     felt.magnetic_gauss = {0.2, 0, 0.4};
     felt.temperature_c = 36;
     return felt;
@@ -39,6 +41,10 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
 
 constexpr Duration lateness = milliseconds(600);
 constexpr Duration marked_ahead = milliseconds(500);
+/// Edges of the IMU's data-ready line are scheduled so long before they are due. At half, a busy
+/// host makes more of them late; at twice, more of them have the old rate after a new one was set.
+constexpr Duration signalled_ahead = milliseconds(2);
+constexpr Duration ready_width = microseconds(100);
 constexpr Duration sentence_after = milliseconds(150);
 constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
 
@@ -59,7 +65,7 @@ std::string rmc(std::int64_t utc_s) {
 
 Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                                                        const std::string& socket_path,
-                                                       HostTime zero, const Motion& motion,
+                                                       HostTime zero, Surroundings& surroundings,
                                                        GroundTruth& truth,
                                                        std::vector<TriggeredCamera*> cameras) {
     std::unique_ptr<EmulatedChip> chip;
@@ -84,8 +90,8 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                        "choose another with --socket");
     }
     try {
-        return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, motion, truth,
-                                                        std::move(cameras), std::move(chip),
+        return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, surroundings,
+                                                        truth, std::move(cameras), std::move(chip),
                                                         listener));
     } catch (const std::exception& error) {
         ::close(listener);
@@ -95,7 +101,7 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
 }
 
 BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
-                     const Motion& motion, GroundTruth& truth,
+                     Surroundings& surroundings, GroundTruth& truth,
                      std::vector<TriggeredCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
                      int listener)
     : serial_(scenario.board.serial),
@@ -104,7 +110,10 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
       imu_name_(scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
-           [&motion](firmware::Nanoseconds at) { return felt(motion, HostTime{at}); }),
+           [&motion = surroundings.motion](firmware::Nanoseconds at) {
+               return felt(motion, HostTime{at});
+           }),
+      leds_(surroundings.leds.get()),
       truth_(truth),
       cameras_(std::move(cameras)),
       listener_(listener),
@@ -117,6 +126,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
 BoardHost::~BoardHost() {
     stop_ = true;
     thread_.join();
+    if (leds_ != nullptr) leds_->settle(HostTime{INT64_MAX});  // nobody waits for the rest
     drop_host();
     ::close(listener_);
     ::unlink(socket_path_.c_str());
@@ -130,6 +140,7 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
     pins_ = 0;
     imu_samples_ = 0;
     next_utc_s_ = 0;
+    signalled_ = host_now();
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
     firmware::Environment environment;
     environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
@@ -170,13 +181,14 @@ void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransf
     const bool sample = transfer.word_gap_ns == 0 && transfer.size > 2;
     if (sample)
         truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++,
-                                 instant - nanoseconds(imu_.filter_delay())});
+                                 HostTime{imu_.motion_shown(instant.ns)}});
 }
 
 void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
     const std::uint32_t changed = pins ^ pins_;
     pins_ = pins;
     const HostTime instant = clock_->host(at);
+    if (leds_ != nullptr && (changed & pins) >> leds_->output() & 1U) leds_->pulse(instant);
     for (TriggeredCamera* camera : cameras_) {
         const unsigned output = camera->settings().output;
         if ((changed >> output & 1U) == 0) continue;
@@ -206,13 +218,16 @@ void BoardHost::live() {
     while (!stop_) {
         if (reset_pending_.exchange(false)) restart();
         if (utc_) hear_gnss();
+        const HostTime next_sample = signal_samples();
         board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
-        board_->run_until(board_now());
+        const firmware::Nanoseconds now = board_now();
+        board_->run_until(now);
+        if (leds_ != nullptr) leds_->settle(clock_->host(now));
         plug(!suffers(FaultKind::board_gone));
         if (!suffers(FaultKind::board_mute)) exchange_bytes();
         const HostTime wake =
             clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
-        wait(std::min(wake, host_now() + longest_wait));
+        wait(std::min({wake, next_sample, host_now() + longest_wait}));
     }
 }
 
@@ -232,6 +247,24 @@ void BoardHost::hear_gnss() {
         pulse + sentence_after + byte_at_9600_baud * static_cast<std::int64_t>(text.size());
     board_->uart_receive({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
                          clock_->device_ns(complete));
+}
+
+/// Edges of the data-ready line, where the part was told to use it. Returns when to come again.
+HostTime BoardHost::signal_samples() {
+    const HostTime now = host_now();
+    if (!imu_.signals(now.ns) || suffers(FaultKind::imu_missing)) {
+        signalled_ = now;
+        return now + longest_wait;
+    }
+    const devices::UpdateTimes times = imu_.updates();
+    for (auto index = times.index_at(signalled_.ns) + 1;; ++index) {
+        const HostTime sample{times.time(index)};
+        if (sample - now > signalled_ahead) return sample - signalled_ahead;
+        board_->schedule_edge({clock_->device_ns(sample), firmware::input_imu_ready, true});
+        board_->schedule_edge(
+            {clock_->device_ns(sample + ready_width), firmware::input_imu_ready, false});
+        signalled_ = sample;
+    }
 }
 
 void BoardHost::wait(HostTime until) const {

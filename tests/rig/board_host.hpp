@@ -14,10 +14,10 @@
 
 #include "adis_device.hpp"
 #include "board.hpp"
+#include "camera_view.hpp"
 #include "emulated_board.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "ground_truth.hpp"
-#include "scene.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
 #include "virtual_board.hpp"
@@ -29,7 +29,7 @@ class BoardHost {
     /// Error: the socket cannot be created.
     static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
                                                        const std::string& socket_path,
-                                                       HostTime zero, const Motion& motion,
+                                                       HostTime zero, Surroundings& surroundings,
                                                        GroundTruth& truth,
                                                        std::vector<TriggeredCamera*> cameras);
     ~BoardHost();
@@ -41,7 +41,7 @@ class BoardHost {
 
  private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
-              const Motion& motion, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
+              Surroundings& surroundings, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
               std::unique_ptr<EmulatedChip> chip, int listener);
 
     void run();
@@ -51,6 +51,7 @@ class BoardHost {
     void wait(HostTime until) const;
     void exchange_bytes();
     void hear_gnss();
+    HostTime signal_samples();
     void accept_host();
     void drop_host();
     void reset() { reset_pending_ = true; }
@@ -69,6 +70,7 @@ class BoardHost {
     std::string imu_name_;
     std::string socket_path_;
     devices::AdisDevice imu_;
+    TimingBoard* leds_;  ///< nullptr: there is none
     GroundTruth& truth_;
     std::vector<TriggeredCamera*> cameras_;
     int listener_;
@@ -81,6 +83,7 @@ class BoardHost {
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
+    HostTime signalled_{};  ///< until here edges of the data-ready line are scheduled
     std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
     std::deque<std::pair<HostTime, std::vector<std::uint8_t>>> late_;  ///< on its way to the host
     bool plugged_ = true;

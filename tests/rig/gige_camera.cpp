@@ -91,7 +91,8 @@ std::vector<Fault> faults_of(const Scenario& scenario, const std::string& camera
 
 Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenario,
                                                          const CameraScenario& settings,
-                                                         HostTime zero, const Motion& motion,
+                                                         HostTime zero,
+                                                         const Surroundings& surroundings,
                                                          GroundTruth& truth) {
     const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_in self{};
@@ -108,22 +109,22 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
             fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
             "is another rig running? use other addresses of 127.0.0.0/8");
     }
-    return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, motion, truth,
+    return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, surroundings, truth,
                                                       socket, open_broadcast_socket(self)));
 }
 
 GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
-                       const Motion& motion, GroundTruth& truth, int socket, int broadcast_socket)
+                       const Surroundings& surroundings, GroundTruth& truth, int socket,
+                       int broadcast_socket)
     : settings_(settings),
       faults_(faults_of(scenario, settings.name)),
       zero_(zero),
-      motion_(motion),
       truth_(truth),
       clock_(zero, settings.clock),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
                   settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c,
                   settings.hostility}),
-      wall_(settings.width, settings.height, scenario.seed),
+      view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
       broadcast_socket_(broadcast_socket) {
@@ -387,19 +388,6 @@ Missing GigeCamera::missing_part() const {
     return Missing::nothing;
 }
 
-/// The brightness of the scene follows the exposure time.
-void GigeCamera::light_up(StreamFrame& frame, Duration exposure) const {
-    const double gain = settings_.light * static_cast<double>(exposure.ns) * 1e-6;
-    std::array<std::uint8_t, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i)
-        table[i] = static_cast<std::uint8_t>(std::min(255.0, static_cast<double>(i) * gain));
-    auto lit =
-        std::make_shared<std::vector<std::uint8_t>>(frame.pixels.begin(), frame.pixels.end());
-    for (std::uint8_t& value : *lit) value = table[value];
-    frame.pixels = *lit;
-    frame.owned_pixels = std::move(lit);
-}
-
 /// Each chunk is followed by its id and length; those of the image come right after it.
 std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure) const {
     std::vector<std::uint8_t> out;
@@ -474,9 +462,15 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
     frame.camera_time_ns = camera_time_ns_;
     frame.width = registers_.value(reg_width);
     frame.height = registers_.value(reg_height);
-    frame.pixels = wall_.view(motion_.pitch_rad(middle(truth.start, truth.end)));
-    frame.pixels = frame.pixels.first(std::size_t{frame.width} * frame.height);
-    if (settings_.light > 0) light_up(frame, truth.end - truth.start);
+    if (view_.painted())
+        // Only when the exposure is over is it known what it saw, and no trigger waits for it.
+        frame.paint = [this, truth](std::span<std::uint8_t> out) {
+            view_.paint(truth.start, truth.end, truth.serial, out);
+        };
+    else
+        frame.pixels = view_.wall(middle(truth.start, truth.end))
+                           .first(std::size_t{frame.width} * frame.height);
+    frame.exposed = truth.end;
     if (registers_.value(reg_chunk_mode) != 0) frame.chunks = chunks(truth.end - truth.start);
     frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};
     frame.leader_due = settings_.early_leader ? truth.start : frame.due;

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "camera_view.hpp"
 #include "gige_registers.hpp"
 #include "ground_truth.hpp"
 #include "gvsp_transmitter.hpp"
 #include "scenario.hpp"
-#include "scene.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
 
@@ -26,7 +26,8 @@ class GigeCamera final : public TriggeredCamera {
     /// Binds the control port. Error: the address does not exist or is taken.
     static Expected<std::unique_ptr<GigeCamera>> create(const Scenario& scenario,
                                                         const CameraScenario& settings,
-                                                        HostTime zero, const Motion& motion,
+                                                        HostTime zero,
+                                                        const Surroundings& surroundings,
                                                         GroundTruth& truth);
     ~GigeCamera() override;
     GigeCamera(const GigeCamera&) = delete;
@@ -41,7 +42,8 @@ class GigeCamera final : public TriggeredCamera {
 
  private:
     GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
-               const Motion& motion, GroundTruth& truth, int socket, int broadcast_socket);
+               const Surroundings& surroundings, GroundTruth& truth, int socket,
+               int broadcast_socket);
 
     void serve();
     void receive(int socket);
@@ -65,18 +67,16 @@ class GigeCamera final : public TriggeredCamera {
     const Fault* active_fault(FaultKind kind) const;
     void next_block_id();
     Missing missing_part() const;
-    void light_up(StreamFrame& frame, Duration exposure) const;
     std::vector<std::uint8_t> chunks(Duration exposure) const;
     void apply_outages();
 
     CameraScenario settings_;
     std::vector<Fault> faults_;
     HostTime zero_;
-    const Motion& motion_;
     GroundTruth& truth_;
     SkewedClock clock_;
     GigeRegisters registers_;
-    Wall wall_;
+    CameraView view_;
     GvspTransmitter transmitter_;
 
     std::mutex mutex_;  ///< guards what follows, down to busy_until_

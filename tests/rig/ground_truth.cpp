@@ -5,6 +5,18 @@
 
 namespace versavis::rig {
 
+namespace {
+
+std::string json(const std::vector<Tone>& tones) {
+    std::string list;
+    for (const Tone& tone : tones)
+        list += fmt::format("{}[{:.17g},{:.17g},{:.17g}]", list.empty() ? "" : ",", tone.hz,
+                            tone.amplitude, tone.phase_rad);
+    return "[" + list + "]";
+}
+
+}  // namespace
+
 Expected<std::unique_ptr<GroundTruth>> GroundTruth::create(const std::string& path) {
     auto truth = std::make_unique<GroundTruth>();
     if (path.empty()) return truth;
@@ -36,6 +48,14 @@ void GroundTruth::add(const TrueDeparture& d) {
 void GroundTruth::add(const TrueImuSample& s) {
     write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})",
                       s.imu, s.board_life, s.number, s.at.ns));
+}
+
+void GroundTruth::add(const Motion& motion) {
+    write(
+        fmt::format(R"({{"type":"motion","zero_ns":{},"angles":[{},{},{}],"position":[{},{},{}]}})",
+                    motion.zero().ns, json(motion.angles()[0]), json(motion.angles()[1]),
+                    json(motion.angles()[2]), json(motion.position()[0]),
+                    json(motion.position()[1]), json(motion.position()[2])));
 }
 
 void GroundTruth::write(const std::string& line) {

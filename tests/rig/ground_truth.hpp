@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 
+#include "motion.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 
@@ -56,6 +57,7 @@ class GroundTruth {
     void add(const TrueExposure& exposure);
     void add(const TrueDeparture& departure);
     void add(const TrueImuSample& sample);
+    void add(const Motion& motion);
 
  private:
     void write(const std::string& line);

@@ -191,23 +191,40 @@ void GvspTransmitter::run() {
             wake_.wait_for(lock, left);
             continue;
         }
-        const StreamFrame frame = queue_.front();
+        StreamFrame frame = queue_.front();
         queue_.pop_front();
         const StreamSettings settings = settings_;
-        // A packet that is to be missing is also missing when it is requested again.
-        if (frame.missing == Missing::nothing) sent_.push_back(frame);
-        if (sent_.size() > most_resendable) sent_.pop_front();
         lock.unlock();
-        transmit(frame, settings);
+        transmit(std::move(frame), settings);
         lock.lock();
     }
 }
 
-void GvspTransmitter::transmit(const StreamFrame& frame, const StreamSettings& settings) {
+/// For requests to send it again. A packet that is to be missing is missing then, too.
+void GvspTransmitter::keep(const StreamFrame& frame) {
+    const std::lock_guard lock(mutex_);
+    if (frame.missing == Missing::nothing) sent_.push_back(frame);
+    if (sent_.size() > most_resendable) sent_.pop_front();
+}
+
+void GvspTransmitter::transmit(StreamFrame frame, const StreamSettings& settings) {
+    if (frame.paint) {
+        frame.painted =
+            std::make_shared<std::vector<std::uint8_t>>(std::size_t{frame.width} * frame.height);
+        frame.pixels = *frame.painted;
+    } else {
+        keep(frame);
+    }
     const bool possible = settings.destination.sin_port != 0 && !muted();
     frame.done(possible && frame.missing == Missing::nothing);
     if (!possible) return;
     if (frame.missing != Missing::leader) send_packets(frame, settings, 0, 0, true);
+    if (frame.paint) {
+        if (const auto left = until(frame.exposed); left.count() > 0)
+            std::this_thread::sleep_for(left);
+        frame.paint(*frame.painted);
+        keep(frame);
+    }
     if (const auto left = until(frame.due); left.count() > 0) std::this_thread::sleep_for(left);
     std::uint32_t end = data_packets(frame, settings) + 1;  // the trailer
     if (frame.missing == Missing::end) --end;

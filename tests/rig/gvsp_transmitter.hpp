@@ -32,8 +32,11 @@ struct StreamFrame {
     std::uint64_t serial = 0;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
-    std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter, or be owned
-    std::shared_ptr<const std::vector<std::uint8_t>> owned_pixels;
+    std::span<const std::uint8_t> pixels;  ///< must outlive the transmitter; not if it is painted
+    /// Paints the pixels, as many as width x height: called once, when the exposure is over.
+    std::function<void(std::span<std::uint8_t>)> paint;
+    HostTime exposed;                                    ///< the end of its exposure
+    std::shared_ptr<std::vector<std::uint8_t>> painted;  ///< filled by the transmitter
     std::vector<std::uint8_t> chunks;  ///< what follows the pixels; empty: no chunk data
     double loss = 0;                   ///< share of its packets that never leaves
     std::uint32_t largest_packet = 0;  ///< larger ones get lost; 0: none
@@ -79,7 +82,8 @@ class GvspTransmitter {
 
  private:
     void run();
-    void transmit(const StreamFrame& frame, const StreamSettings& settings);
+    void transmit(StreamFrame frame, const StreamSettings& settings);
+    void keep(const StreamFrame& frame);
     void send_packets(const StreamFrame& frame, const StreamSettings& settings, std::uint32_t first,
                       std::uint32_t last, bool lossy);
     static std::vector<std::uint8_t> special_body(const StreamFrame& frame,

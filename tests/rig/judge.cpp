@@ -55,14 +55,12 @@ class Recorder {
     void poll() {
         for (auto& [name, stream] : frames_) {
             if (!open(name, stream)) continue;
-            for (auto item = stream->next();
-                 item.found != Found::nothing && item.found != Found::gone; item = stream->next())
-                take(name, *stream, item);
+            const std::string& camera = name;
+            read_all(*stream, recordings_[camera],
+                     [&](const Frame& frame) { take(camera, frame); });
         }
         if (!open(imu_name_, imu_)) return;
-        for (auto item = imu_->next(); item.found != Found::nothing && item.found != Found::gone;
-             item = imu_->next())
-            take(item);
+        read_all(*imu_, recordings_[imu_name_], [&](const ImuSample& sample) { take(sample); });
     }
 
     bool complete() const {
@@ -85,33 +83,40 @@ class Recorder {
     template <class S>
     bool open(const std::string& name, std::optional<S>& stream) {
         if (stream) return true;
-        if (auto opened = S::open(name, instance_)) stream.emplace(std::move(*opened));
+        if (auto opened = S::open(name, {{}, instance_})) stream.emplace(std::move(*opened));
         return stream.has_value();
     }
 
     std::int64_t to_host_ns(OutputTime time) { return time.ns - clock_.offset().ns; }
 
-    void take(const std::string& name, const FrameStream& stream,
-              const Received<FrameMetadata>& item) {
+    template <class S, class Take>
+    static void read_all(S& stream, Recording& recording, Take take_item) {
+        for (;;) {
+            const auto item = stream.next();
+            if (item)
+                take_item(*item);
+            else if (item.error().why == Pause::lost)
+                recording.missed += item.error().lost;
+            else if (item.error().why != Pause::restarted)
+                return;
+        }
+    }
+
+    void take(const std::string& name, const Frame& item) {
         Recording& recording = recordings_[name];
-        if (item.found == Found::lost) recording.missed += item.lost;
-        if (item.found != Found::item) return;
-        const std::uint64_t serial = FrameMark::serial_in(item.payload, item.payload_size);
+        const std::uint64_t serial = FrameMark::serial_in(item.payload.data(), item.payload.size());
         if ((item.data.flags & flag_suspect) != 0)
             return;  // the service says itself that it may be wrong
-        if (!stream.intact(item))
+        if (!item.valid())
             ++recording.missed;
         else
             recording.items.push_back(
                 {serial, item.data.trigger, to_host_ns(item.time), item.data.sigma_ns});
     }
 
-    void take(const Received<ImuMetadata>& item) {
-        Recording& recording = recordings_[imu_name_];
-        if (item.found == Found::lost) recording.missed += item.lost;
-        if (item.found == Found::item)
-            recording.items.push_back(
-                {item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
+    void take(const ImuSample& item) {
+        recordings_[imu_name_].items.push_back(
+            {item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
     }
 
     std::string instance_;
@@ -242,15 +247,12 @@ StreamVerdict judge_imu(const Recording& recording, const Truth& truth, const In
 
 /// Counters of the status document that only the service knows.
 json read_status(const std::string& instance) {
-    auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
+    auto stream = StatusStream::open("status", {{}, instance});
     if (!stream) return {};
-    std::string text;
-    for (auto item = stream->next(); item.found == Found::item || item.found == Found::lost;
-         item = stream->next()) {
-        if (item.found != Found::item) continue;
-        std::string copy(item.payload_size, '\0');
-        if (stream->copy(item, reinterpret_cast<std::byte*>(copy.data()))) text = copy;
-    }
+    const auto item = stream->latest();
+    if (!item) return {};
+    std::string text(item->payload.size(), '\0');
+    if (!item->payload.copy_to(reinterpret_cast<std::byte*>(text.data()))) return {};
     return json::parse(text, nullptr, false);
 }
 

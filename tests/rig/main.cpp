@@ -53,27 +53,25 @@ volatile sig_atomic_t stop_requested = 0;
 
 /// The newest status in one line.
 std::string status_line(const std::string& instance) {
-    auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
+    auto stream = StatusStream::open("status", {{}, instance});
     if (!stream) return "waiting for the service";
-    std::string line = "waiting for the first status";
-    for (auto item = stream->next(); item.found == Found::item; item = stream->next()) {
-        std::string text(item.payload_size, '\0');
-        if (!stream->copy(item, reinterpret_cast<std::byte*>(text.data()))) continue;
-        const auto status = nlohmann::json::parse(text, nullptr, false);
-        if (!status.is_object()) continue;
-        const auto& sigma = status["clock"]["sigma_ns"];
-        line = fmt::format(
-            "{} | board {} | clock {} {} us", status["health"].get<std::string>(),
-            status["board"]["state"].get<std::string>(),
-            status["clock"]["state"].get<std::string>(),
-            sigma.is_number() ? std::to_string(sigma.get<std::int64_t>() / 1000) : "unknown");
-        for (const auto& stream_status : status["streams"])
-            if (stream_status["kind"] == "frames" || stream_status["kind"] == "imu")
-                line +=
-                    fmt::format(" | {} {} ({:.1f} Hz)", stream_status["name"].get<std::string>(),
+    const char* none = "waiting for the first status";
+    const auto item = stream->latest();
+    if (!item) return none;
+    std::string text(item->payload.size(), '\0');
+    if (!item->payload.copy_to(reinterpret_cast<std::byte*>(text.data()))) return none;
+    const auto status = nlohmann::json::parse(text, nullptr, false);
+    if (!status.is_object()) return none;
+    const auto& sigma = status["clock"]["sigma_ns"];
+    std::string line = fmt::format(
+        "{} | board {} | clock {} {} us", status["health"].get<std::string>(),
+        status["board"]["state"].get<std::string>(), status["clock"]["state"].get<std::string>(),
+        sigma.is_number() ? std::to_string(sigma.get<std::int64_t>() / 1000) : "unknown");
+    for (const auto& stream_status : status["streams"])
+        if (stream_status["kind"] == "frames" || stream_status["kind"] == "imu")
+            line += fmt::format(" | {} {} ({:.1f} Hz)", stream_status["name"].get<std::string>(),
                                 stream_status["items"].get<std::uint64_t>(),
                                 stream_status["rate_hz"].get<double>());
-    }
     return line;
 }
 

@@ -21,9 +21,9 @@ class Rig {
                                                 const std::string& truth_path);
 
  private:
-    explicit Rig(HostTime zero) : motion_(zero) {}
+    Rig(HostTime zero, const Scenario& scenario) : surroundings_(zero, scenario) {}
 
-    Motion motion_;
+    Surroundings surroundings_;
     std::unique_ptr<GroundTruth> truth_;
     std::vector<std::unique_ptr<GigeCamera>> cameras_;
     std::unique_ptr<BoardHost> board_;

@@ -2,6 +2,7 @@
 #include "scenario.hpp"
 
 #include "engine/toml/table_reader.hpp"
+#include "hal.hpp"
 
 namespace versavis::rig {
 
@@ -13,6 +14,34 @@ void read_clock(TableReader& reader, ClockErrors& clock) {
     reader.read("clock_skew_ppm", clock.skew_ppm, -1000, 1000);
     reader.read("clock_drift_ppm_per_s", clock.drift_ppm_per_s, -1, 1);
     clock.offset_ns = static_cast<std::int64_t>(offset_s * 1e9);
+}
+
+MotionScenario read_motion(TableReader& reader) {
+    MotionScenario motion;
+    motion.nods = false;
+    reader.read("rate_rad_s", motion.rate_rad_s, 3, 0, 20);
+    reader.read("acceleration_m_s2", motion.acceleration_m_s2, 3, 0, 100);
+    reader.read("lowest_hz", motion.lowest_hz, 0.001, 100);
+    reader.read("highest_hz", motion.highest_hz, 0.001, 100);
+    reader.read("tones", motion.tones, 1, 1000);
+    if (motion.highest_hz < motion.lowest_hz)
+        reader.fail("highest_hz", "'highest_hz' is below 'lowest_hz'");
+    return motion;
+}
+
+LedScenario read_leds(TableReader& reader) {
+    LedScenario leds;
+    leds.present = true;
+    reader.choose<unsigned>("output", leds.output,
+                            {{"test", firmware::output_test},
+                             {"sync", firmware::output_sync},
+                             {"trigger0", 0},
+                             {"trigger1", 1},
+                             {"trigger2", 2},
+                             {"trigger3", 3}});
+    reader.read("high_bit_first", leds.high_bit_first);
+    reader.read("backward", leds.backward);
+    return leds;
 }
 
 CameraScenario read_camera(TableReader& reader) {
@@ -43,6 +72,12 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("early_leader", camera.early_leader);
     reader.read("shortest_period_us", camera.shortest_period_us, 0, 1e7);
     reader.read("light", camera.light, 0, 1000);
+    reader.read("focal_px", camera.focal_px, 0, 1e5);
+    reader.read("blur_steps", camera.blur_steps, 1, 16);
+    reader.read("noise", camera.noise, 0, 100);
+    reader.read("imu_rotation_deg", camera.imu_rotation_deg, 3, -180, 180);
+    reader.read("leds", camera.leds, 4, -1e4, 2e4);
+    reader.read("led_level", camera.led_level, 0, 1000);
     reader.read("temperature_c", camera.temperature_c, -40, 150);
     reader.choose<Hostility>("hostile", camera.hostility,
                              {{"none", Hostility::none},
@@ -118,9 +153,21 @@ Expected<Scenario> load_scenario(const std::string& path) {
         read_clock(reader, scenario.board.clock);
         reader.finish();
     }
+    if (const toml::table* table = top.table("motion")) {
+        TableReader reader(file, *table);
+        scenario.motion = read_motion(reader);
+        reader.finish();
+    }
+    if (const toml::table* table = top.table("leds")) {
+        TableReader reader(file, *table);
+        scenario.leds = read_leds(reader);
+        reader.finish();
+    }
     for (const toml::table* table : top.tables("camera")) {
         TableReader reader(file, *table);
         scenario.cameras.push_back(read_camera(reader));
+        if (!scenario.leds.present && !scenario.cameras.back().leds.empty())
+            reader.fail("leds", "there is no LED board to be seen", "add a table [leds]");
         reader.finish();
     }
     for (const toml::table* table : top.tables("fault")) {

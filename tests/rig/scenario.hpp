@@ -2,6 +2,7 @@
 // What is in the rig and what fails when, from a TOML file (docs/user/rig.md).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -17,6 +18,24 @@ struct BoardScenario {
     std::string image;  ///< of the firmware, to run on the emulated chip; empty: as a host process
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
     bool gnss = false;  ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
+};
+
+/// How the rig moves: sums of sines that the seed draws. Without it, it nods.
+struct MotionScenario {
+    bool nods = true;
+    std::vector<double> rate_rad_s{0.4, 0.4, 0.4};   ///< RMS rate of roll, pitch and yaw
+    std::vector<double> acceleration_m_s2{0, 0, 0};  ///< RMS, along x, y and z of the world
+    double lowest_hz = 0.1;
+    double highest_hz = 2;
+    unsigned tones = 12;  ///< of each of the six
+};
+
+/// The LED timing board: it counts rising edges of an output of the board.
+struct LedScenario {
+    bool present = false;
+    unsigned output = 7;          ///< firmware::Output
+    bool high_bit_first = false;  ///< of the count of strides, seen from the striding LEDs
+    bool backward = false;        ///< the striding LEDs run towards the first LED
 };
 
 /// What a camera stamps: an instant of the exposure, or when its frame begins to leave.
@@ -47,6 +66,12 @@ struct CameraScenario {
     double shortest_period_us = 0;   ///< triggers that come sooner are ignored
     double light =
         0;  ///< brightness of the image per millisecond of exposure; 0: independent of it
+    double focal_px = 0;      ///< of the pinhole that sees the moving world; 0: 0.8 x width
+    unsigned blur_steps = 3;  ///< instants of the exposure whose mean the picture is
+    double noise = 0;         ///< standard deviation of its pixels
+    std::vector<double> imu_rotation_deg{0, 0, 0};  ///< rotation vector, from IMU to camera
+    std::vector<double> leds{};  ///< centres of the outermost LEDs, x and y each; none: not in view
+    double led_level = 160;      ///< brightness of an LED that is lit during the whole exposure
     double temperature_c = 45;
     Hostility hostility = Hostility::none;
     ClockErrors clock{1'000'000'000, -40.0, 0};
@@ -96,6 +121,8 @@ struct Scenario {
     std::uint64_t seed = 1;
     BoardScenario board;
     std::string imu = "imu0";
+    MotionScenario motion;
+    LedScenario leds;
     std::vector<CameraScenario> cameras;
     std::vector<Fault> faults;
 };

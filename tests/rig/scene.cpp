@@ -9,11 +9,6 @@ namespace versavis::rig {
 
 namespace {
 
-constexpr double amplitude_rad = 0.2;
-constexpr double nodding_rad_s = 2 * 3.14159265358979 * 0.5;
-
-double seconds(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
-
 /// A hash of two cell coordinates: brightness that looks random but is the same in each run.
 std::uint8_t cell_brightness(std::uint64_t x, std::uint64_t y, std::uint64_t seed) {
     std::uint64_t h =
@@ -29,14 +24,6 @@ std::uint64_t FrameMark::serial_in(const void* pixels, std::size_t size) {
     FrameMark mark{};
     if (size >= sizeof mark) std::memcpy(&mark, pixels, sizeof mark);
     return mark.magic == expected_magic ? mark.serial : 0;
-}
-
-double Motion::pitch_rad(HostTime at) const {
-    return amplitude_rad * std::sin(nodding_rad_s * seconds(at - zero_));
-}
-
-double Motion::pitch_rate_rad_s(HostTime at) const {
-    return amplitude_rad * nodding_rad_s * std::cos(nodding_rad_s * seconds(at - zero_));
 }
 
 Wall::Wall(std::uint32_t width, std::uint32_t height, std::uint64_t seed)

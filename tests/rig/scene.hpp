@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The one scene that cameras and IMU see: the rig nods, so that the image moves and the gyro turns.
+// What every frame bears, and the wall that cameras see while the rig nods.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "versavis/time.hpp"
 
 namespace versavis::rig {
 
@@ -19,17 +17,6 @@ struct FrameMark {
 
     /// Of the exposure that the frame shows; 0 if it has no mark.
     static std::uint64_t serial_in(const void* pixels, std::size_t size);
-};
-
-class Motion {
- public:
-    explicit Motion(HostTime zero) : zero_(zero) {}
-
-    double pitch_rad(HostTime at) const;
-    double pitch_rate_rad_s(HostTime at) const;
-
- private:
-    HostTime zero_;
 };
 
 /// A textured wall, rendered once at twice the height of the image: a view of it needs no copying.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stack.hpp"
+#include "look.hpp"
 
 #include <fmt/format.h>
 #include <signal.h>
@@ -90,10 +91,10 @@ nlohmann::json Stack::wait_for_status(const std::function<bool(const nlohmann::j
     auto stream = wait_for_stream<StatusStream>("status", settings_.name);
     nlohmann::json document;
     while (host_now() < deadline) {
-        const auto item = stream.wait(milliseconds(500));
-        if (item.found != Found::item) continue;
-        std::string text(item.payload_size, '\0');
-        if (!stream.copy(item, reinterpret_cast<std::byte*>(text.data()))) continue;
+        const auto item = test::look(stream.next(milliseconds(500)));
+        if (item.found != test::Found::item) continue;
+        std::string text(item.payload.size(), '\0');
+        if (!item.payload.copy_to(reinterpret_cast<std::byte*>(text.data()))) continue;
         document = nlohmann::json::parse(text);
         if (condition(document)) return document;
     }

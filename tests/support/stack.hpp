@@ -92,7 +92,7 @@ S wait_for_stream(const std::string& name, const std::string& instance,
                   Duration timeout = seconds(20)) {
     const HostTime deadline = host_now() + timeout;
     for (;;) {
-        auto stream = S::open(name, instance);
+        auto stream = S::open(name, {{}, instance});
         if (stream) return std::move(*stream);
         if (host_now() > deadline) throw std::runtime_error(stream.error().message());
         const timespec pause{0, 5'000'000};

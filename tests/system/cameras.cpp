@@ -11,6 +11,7 @@
 #include <set>
 
 #include "../support/judged.hpp"
+#include "../support/look.hpp"
 #include "../support/process.hpp"
 #include "../support/stack.hpp"
 #include "../support/temporary_directory.hpp"
@@ -50,9 +51,10 @@ Pairs pairs(std::istream& lines, const std::string& decision) {
 /// Reasons of all events about `camera` that are still in the ring.
 std::set<EventReason> reasons(const Stack& stack, const std::string& camera) {
     std::set<EventReason> reasons;
-    auto stream = EventStream::open("events", stack.instance(), ring::Reader::From::oldest);
+    auto stream = EventStream::open("events", {{Position::middle}, stack.instance()});
     REQUIRE(stream);
-    for (auto item = stream->next(); item.found == Found::item; item = stream->next())
+    for (auto item = test::look(stream->next()); item.found == test::Found::item;
+         item = test::look(stream->next()))
         if (camera == item.data.source_name) reasons.insert(item.data.reason);
     return reasons;
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "../support/look.hpp"
 #include "../support/stack.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "engine/clock/recording.hpp"
@@ -21,8 +22,8 @@ namespace {
 ClockItem next(ClockStream& stream) {
     const HostTime deadline = host_now() + seconds(20);
     while (host_now() < deadline) {
-        const auto item = stream.wait(milliseconds(200));
-        if (item.found != Found::item) continue;
+        const auto item = test::look(stream.next(milliseconds(200)));
+        if (item.found != test::Found::item) continue;
         const auto told = from_metadata(item.data);
         REQUIRE(told);
         return *told;
@@ -39,7 +40,7 @@ Item next_of(ClockStream& stream) {
 }
 
 ClockStream from_the_first(const Stack& stack) {
-    auto stream = ClockStream::open("clock", stack.instance(), ring::Reader::From::oldest);
+    auto stream = ClockStream::open("clock", {{Position::middle}, stack.instance()});
     if (!stream) throw std::runtime_error(stream.error().message());
     return std::move(*stream);
 }
@@ -206,8 +207,8 @@ TEST_CASE(
     CHECK(status["clock"]["host_max_error_ns"].is_number_integer());
     CHECK(status["clock"]["output_steps"] == 0);
     auto stream = wait_for_stream<FrameStream>("cam0", "tai");
-    auto frame = stream.wait(seconds(5));
-    while (frame.found != Found::item) frame = stream.wait(seconds(5));
+    auto frame = test::look(stream.next(seconds(5)));
+    while (frame.found != test::Found::item) frame = test::look(stream.next(seconds(5)));
     auto clock = OutputClock::create(OutputClockKind::tai, true);
     REQUIRE(clock);
     CHECK(absolute(Duration{frame.time.ns - frame.data.host_time.ns} - clock->offset()) <

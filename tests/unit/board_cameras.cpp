@@ -20,7 +20,7 @@ TEST_CASE(
     world.connect();
     CHECK((world.inbox().hellos[0].capabilities & wire::capability_host_grid) != 0);
     REQUIRE(world.configure());
-    const auto off = [&world](const wire::Exposure& record, Nanoseconds second_at) {
+    const auto off = [](const wire::Exposure& record, Nanoseconds second_at) {
         const Nanoseconds middle = record.start_ns + (record.end_ns - record.start_ns) / 2;
         const Nanoseconds past = (middle - second_at + 100 * second) % (50 * ms);  // 20 Hz
         return past > 25 * ms ? past - 50 * ms : past;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
+#include "../support/look.hpp"
 
 #include <atomic>
 #include <catch2/catch.hpp>
@@ -72,7 +73,8 @@ class Bench : public test::Pipelines {
     void pass(std::uint64_t tick) {
         trigger(tick);
         frame(tick);
-        for (auto item = reader_.next(); item.found == ring::Found::item; item = reader_.next())
+        for (auto item = test::look(reader_.next()); item.found == test::Found::item;
+             item = test::look(reader_.next()))
             published.push_back(unpack<FrameMetadata>(item.metadata));
     }
     void run(std::uint64_t from, std::uint64_t to) {
@@ -111,8 +113,8 @@ TEST_CASE(
         bench.trigger(tick);
         bench.frame(tick);
     }
-    const ring::Item item = reader.next();
-    REQUIRE(item.found == ring::Found::item);
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
     const auto frame = unpack<FrameMetadata>(item.metadata);
     CHECK(frame.stamp_kind() == StampKind::measured_middle);
     CHECK(frame.trigger == 1);
@@ -136,8 +138,9 @@ TEST_CASE(
         bench.frame(tick);
     }
     std::optional<FrameMetadata> predicted;
-    for (auto item = reader.next(); item.found == ring::Found::item; item = reader.next())
-        if (unpack<FrameMetadata>(item.metadata).tick == 9)
+    for (auto item = test::look(reader.next()); item.found == test::Found::item;
+         item = test::look(reader.next()))
+        if (unpack<FrameMetadata>(item.metadata).tick() == 9)
             predicted = unpack<FrameMetadata>(item.metadata);
     REQUIRE(predicted);
     CHECK(predicted->stamp_kind() == StampKind::predicted_middle);
@@ -179,7 +182,8 @@ TEST_CASE(
     CHECK(report.triggers_without_frame == (believed ? 0 : std::size(pattern)));
     auto events = bench.reader("events");
     std::size_t announced = 0;
-    for (auto item = events.next(); item.found == ring::Found::item; item = events.next()) {
+    for (auto item = test::look(events.next()); item.found == test::Found::item;
+         item = test::look(events.next())) {
         const auto event = unpack<EventMetadata>(item.metadata);
         if (event.kind == EventKind::trigger_without_frame) {
             CHECK(event.reason == EventReason::wrong_exposure);
@@ -188,7 +192,7 @@ TEST_CASE(
     }
     CHECK(announced == report.triggers_without_frame);
     if (report.suspect == 0) return;
-    const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+    const auto frame = unpack<FrameMetadata>(test::look(reader.next()).metadata);
     CHECK((frame.flags & flag_suspect) != 0);
     CHECK(frame.sigma_ns == sigma_unknown);
     CHECK(frame.trigger == 1);
@@ -213,7 +217,7 @@ TEST_CASE(
     Bench bench(configuration);
     auto reader = bench.reader("cam0");
     bench.frame(0);
-    const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+    const auto frame = unpack<FrameMetadata>(test::look(reader.next()).metadata);
     CHECK(frame.stamp_kind() == StampKind::arrival);
     CHECK(frame.sigma_ns == sigma_unknown);
     CHECK(frame.trigger == 0);
@@ -233,8 +237,8 @@ TEST_CASE("camera_pipeline: an exposure is translated once, when its record come
         bench.frame(tick);
     }
     for (const clock::Stamp& stamp : stamps) {
-        const ring::Item item = reader.next();
-        REQUIRE(item.found == ring::Found::item);
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
         CHECK(item.time == stamp.output);
         CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns == stamp.sigma_ns);
     }
@@ -323,7 +327,7 @@ TEST_CASE("camera_pipeline: a record that lies costs its own frame, and no other
     for (const FrameMetadata& frame : bench.published) {
         if ((frame.flags & flag_suspect) != 0) continue;
         ++good;
-        const HostTime middle = bench.begin + bench.period * frame.tick + microseconds(2020);
+        const HostTime middle = bench.begin + bench.period * frame.tick() + microseconds(2020);
         CHECK(absolute(frame.host_time - middle) <= microseconds(1));
     }
     CHECK(good == 7 + 28 + 19);
@@ -376,14 +380,14 @@ TEST_CASE("camera_pipeline: a doubled frame is suspect, with the exposure that i
         bench.trigger(tick);
         bench.frame(tick);
     }
-    for (std::size_t i = 0; i < std::size(pattern); ++i) reader.next();
+    for (std::size_t i = 0; i < std::size(pattern); ++i) test::look(reader.next());
     bench.frame(pattern[std::size(pattern) - 1]);
     for (const std::uint64_t tick : {12U, 13U}) {
         bench.trigger(tick);
         bench.frame(tick);
     }
-    const ring::Item item = reader.next();
-    REQUIRE(item.found == ring::Found::item);
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
     const auto frame = unpack<FrameMetadata>(item.metadata);
     CHECK((frame.flags & flag_suspect) != 0);
     CHECK(frame.trigger == std::size(pattern));
@@ -438,11 +442,11 @@ TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is
         bench.frame(tick);
     }
     for (std::size_t i = 0; i < std::size(pattern); ++i) {
-        const ring::Item item = reader.next();
-        REQUIRE(item.found == ring::Found::item);
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
         const auto frame = unpack<FrameMetadata>(item.metadata);
-        const HostTime seen =
-            bench.begin + bench.period * static_cast<std::int64_t>(frame.tick) + microseconds(2020);
+        const HostTime seen = bench.begin + bench.period * static_cast<std::int64_t>(frame.tick()) +
+                              microseconds(2020);
         CHECK(absolute(frame.host_time - (seen - microseconds(27))) <= microseconds(1));
         CHECK(item.time.ns == frame.host_time.ns);
         CHECK(frame.exposure == microseconds(4018));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/clock_recorder.hpp"
+#include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -25,8 +26,8 @@ struct Recording {
     void tick() { recorder.tick(now()); }
 
     std::optional<Recorded> next() {
-        const ring::Item item = reader.next();
-        if (item.found != ring::Found::item) return std::nullopt;
+        const auto item = test::look(reader.next());
+        if (item.found != test::Found::item) return std::nullopt;
         const auto read = from_metadata(unpack<ClockMetadata>(item.metadata));
         REQUIRE(read);
         return Recorded{*read, item.time};
@@ -47,7 +48,7 @@ struct Recording {
         return std::move(*made);
     }
     static ring::Reader open(const std::filesystem::path& directory) {
-        auto opened = ring::Reader::open(directory / "clock", ring::Reader::From::oldest);
+        auto opened = ring::Reader::open(directory / "clock", {Position::middle});
         if (!opened) throw std::runtime_error(opened.error().message());
         return std::move(*opened);
     }

@@ -75,6 +75,16 @@ TEST_CASE("configuration: defaults follow the rate, so that a fast camera needs 
     CHECK(fast.slots == 6 + 8 + 120);
 }
 
+TEST_CASE("configuration: a history in seconds becomes slots, beside those that are in use") {
+    const auto configuration = load(camera + "rate_hz = 30\nhistory_s = 10.01\n" +
+                                    "[[imu]]\nhistory_s = 60\n[memory]\nlock = true\n");
+    REQUIRE(configuration);
+    CHECK(configuration->cameras[0].slots == 6 + 8 + 4 + 301);
+    CHECK(configuration->imus[0].history_s == 60);
+    CHECK(configuration->memory.lock);
+    CHECK_FALSE(load(camera)->memory.lock);
+}
+
 TEST_CASE("configuration: a slave has rate, phase and longest exposure of its master") {
     const auto configuration =
         load("[[camera]]\nname = \"s\"\ndevice = \"s\"\noutput = 1\nmaster = \"cam0\"\n" + camera +
@@ -251,6 +261,12 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
     check("[ports]\ntest_output = \"trigger4\"\n",
           "must be one of test, sync, trigger0, trigger1, trigger2, trigger3, and is 'trigger4'; "
           "did you mean");
+    check(camera + "history_s = -1\n", "'history_s' must be a number from 0 to 3600 s, and is -1");
+    check(camera + "slots = 20\nhistory_s = 1\n",
+          "versavis.toml:5:13: 'slots' and 'history_s' both say how many frames the ring holds; "
+          "keep one of them");
+    check("[[imu]]\nhistory_s = 3601\n", "from 0 to 3600 s, and is 3601");
+    check("[memory]\nlocked = true\n", "unknown key 'locked'; did you mean 'lock'?");
     check(camera + "slots = 10\n", "'slots' must be a whole number from 14 to 1024, and is 10");
     check(camera + "[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
           "versavis.toml:6:16: 'largest_step' must be a number from 1.01 to 10, and is 1;");
@@ -341,7 +357,7 @@ TEST_CASE("configuration: delays of lines, of the board and of an IMU's filter")
     CHECK(configuration->cameras[0].strobe_falling_us == std::vector<double>{18.5, 4});
     CHECK(configuration->cameras[0].board_input_ns == 60);
     CHECK(board_configuration(*configuration).cameras[2].latency_ns == 10'030);
-    CHECK(configuration->imus[0].filter_delay().delay == nanoseconds(3'662'109));
+    CHECK(configuration->imus[0].filter_delay().delay == nanoseconds(4'272'461));
     CHECK(configuration->imus[1].filter_delay().delay == microseconds(2500));
     CHECK_THAT(errors_of(camera + "strobe_rising_us = [36, 9]\n"),
                Catch::Contains("both edges") && Catch::Contains("strobe_falling_us"));

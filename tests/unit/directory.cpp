@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/ring/directory.hpp"
+#include "../support/look.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -170,7 +171,7 @@ TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     CHECK(std::filesystem::exists(directory->path() / "kept"));
     CHECK(std::filesystem::exists(directory->path() / "own"));
     CHECK_FALSE(std::filesystem::exists(stranger));
-    CHECK(reader->next().found == Found::gone);
+    CHECK(test::look(reader->next()).found == test::Found::gone);
 }
 
 TEST_CASE("directory: one that others may write to is refused, with the cure") {

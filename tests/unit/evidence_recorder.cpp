@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/evidence_recorder.hpp"
+#include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -20,10 +21,11 @@ TEST_CASE("evidence_recorder: what was recorded is read back, in order, from its
     recorder.record(pairing::Advance{HostTime{7}});
     auto reader = bench.reader("cam0-evidence");
     const auto evidence = [&] {
-        return *pairing::from_metadata(unpack<pairing::EvidenceMetadata>(reader.next().metadata));
+        return *pairing::from_metadata(
+            unpack<pairing::EvidenceMetadata>(test::look(reader.next()).metadata));
     };
     CHECK(std::get<pairing::Shortfall>(evidence()).block_id == 42);
     CHECK(std::get<pairing::Advance>(evidence()).now.ns == 7);
-    CHECK(reader.next().found == ring::Found::nothing);
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
     CHECK(recorder.items() == 2);
 }

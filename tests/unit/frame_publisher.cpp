@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/frame_publisher.hpp"
+#include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -62,7 +63,7 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
     bench.frames->publish_proved(bench.arrival(), exposure(StampKind::measured_middle),
                                  middle_stamp);
     bench.frames->publish_proved(bench.arrival(), exposure(StampKind::trigger_edge), middle_stamp);
-    const auto first = reader.next();
+    const auto first = test::look(reader.next());
     const auto measured = unpack<FrameMetadata>(first.metadata);
     CHECK(first.time == middle_stamp.output);
     CHECK(measured.board_time.ns == 99'002'000'000);
@@ -72,9 +73,9 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
     CHECK(measured.delay_ns == 27'000);
     CHECK(measured.epoch == 8);
     CHECK(measured.trigger == 5);
-    CHECK(measured.tick == 6);
+    CHECK(measured.tick() == (std::uint64_t{1} << 32U) + 6);
     CHECK(measured.block_id == 12);
-    const auto by_edge = unpack<FrameMetadata>(reader.next().metadata);
+    const auto by_edge = unpack<FrameMetadata>(test::look(reader.next()).metadata);
     CHECK(by_edge.stamp_kind() == StampKind::trigger_edge);
     CHECK(by_edge.exposure.ns == 0);
     CHECK(by_edge.sigma_ns > 2'000'000);
@@ -88,7 +89,7 @@ TEST_CASE("frame_publisher: what is not proved has no sigma, and says so") {
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, true);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
     for (const std::uint32_t suspect : {flag_suspect, flag_suspect, ItemFlag{}}) {
-        const auto frame = unpack<FrameMetadata>(reader.next().metadata);
+        const auto frame = unpack<FrameMetadata>(test::look(reader.next()).metadata);
         CHECK(frame.sigma_ns == sigma_unknown);
         CHECK((frame.flags & flag_suspect) == suspect);
     }
@@ -99,8 +100,8 @@ TEST_CASE("frame_publisher: larger frames get a new ring, smaller ones do not") 
     auto reader = bench.reader("cam0");
     bench.make_room(100);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
-    CHECK(reader.next().found == ring::Found::item);
+    CHECK(test::look(reader.next()).found == test::Found::item);
     bench.make_room(5000);
-    CHECK(reader.next().found == ring::Found::restarted);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
     CHECK(bench.frames->items() == 0);
 }

@@ -60,10 +60,13 @@ double delay_ms(const char* name, unsigned filter, double rate_hz, bool data_rea
 }  // namespace
 
 TEST_CASE("imu_model: the filter's delay by part, strength and rate") {
-    // Read on the board's grid, the part runs as fast as it can.
-    CHECK(delay_ms("adis16448b", 0, 200, false) == 0);
-    CHECK(delay_ms("adis16448b", 2, 200, false) == Approx(3.662).margin(0.001));
-    CHECK(delay_ms("adis16448a", 4, 200, false) == Approx(18.311).margin(0.001));
+    // Read on the board's grid, the part runs as fast as it can, and half a period of that is the
+    // mean age of what is read.
+    CHECK(delay_ms("adis16448b", 0, 200, false) == Approx(0.610).margin(0.001));
+    CHECK(delay_ms("adis16448b", 2, 200, false) == Approx(3.662 + 0.610).margin(0.001));
+    CHECK(delay_ms("adis16448a", 4, 200, false) == Approx(18.311 + 0.610).margin(0.001));
+    CHECK(delay_ms("adis16448a", 0, 100, false) == Approx((0.5 + 1) / 0.8192).margin(0.001));
+    CHECK(delay_ms("adis16470", 0, 1000, false) == Approx(0.25).margin(0.001));
     // Paced by itself it also averages the four samples that make one of its output.
     CHECK(delay_ms("adis16448b", 0, 200, true) == Approx(1.5 / 0.8192).margin(0.001));
     CHECK(delay_ms("adis16445", 2, 819.2, true) == Approx(3.662).margin(0.001));
@@ -71,6 +74,33 @@ TEST_CASE("imu_model: the filter's delay by part, strength and rate") {
     CHECK(delay_ms("adis16460", 0, 512, true) == Approx(1.5 / 2.048).margin(0.001));
     CHECK(delay_ms("adis16470", 6, 2000, true) == Approx(63 / 2.0).margin(0.001));
     CHECK(delay_ms("adis16470", 1, 100, true) == Approx((1 + 9.5) / 2.0).margin(0.001));
+}
+
+TEST_CASE("imu_model: what the board reads on its own grid may be new or old, and sigma says so") {
+    const imu::ImuModel& adis = *imu::find_model("adis16448b");
+    const Duration paced = imu::filter_delay(adis, 2, 819.2, true).sigma;
+    const Duration unpaced = imu::filter_delay(adis, 2, 819.2, false).sigma;
+    CHECK(paced == microseconds(100));
+    CHECK(static_cast<double>(unpaced.ns) == Approx(std::hypot(100e3, 1e9 / 819.2 / std::sqrt(12))));
+    // That of a filter nobody states stays unknown; the age does not.
+    const imu::ImuModel& icm = *imu::find_model("icm42688p");
+    const double filter_ns = 0.3 / 400 * 1e9, period_ns = 1e9 / 800;
+    const auto delay = imu::filter_delay(icm, 0, 200, false);
+    CHECK(delay.source == imu::DelaySource::unknown);
+    CHECK(static_cast<double>(delay.delay.ns) == Approx(period_ns / 2));
+    CHECK(static_cast<double>(delay.sigma.ns) ==
+          Approx(std::hypot(filter_ns, period_ns / std::sqrt(12))));
+}
+
+TEST_CASE("imu_model: a delay that was measured is taken as it is") {
+    const imu::ImuModel& adis = *imu::find_model("adis16460");
+    const auto paced = imu::measured_delay(adis, 200, true, microseconds(2500));
+    CHECK(paced.delay == microseconds(2500));
+    CHECK(paced.sigma.ns == 0);
+    CHECK(paced.source == imu::DelaySource::configuration);
+    const auto unpaced = imu::measured_delay(adis, 200, false, microseconds(2500));
+    CHECK(unpaced.delay == microseconds(2500));
+    CHECK(static_cast<double>(unpaced.sigma.ns) == Approx(2 / 2048.0 / std::sqrt(12) * 1e9));
 }
 
 TEST_CASE("imu_model: a filter whose delay nobody states is not guessed, and sigma says so") {

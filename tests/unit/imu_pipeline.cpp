@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/imu_pipeline.hpp"
+#include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -45,7 +46,8 @@ struct Bench : test::Pipelines {
     }
     std::vector<ring::Item> published() {
         std::vector<ring::Item> items;
-        for (auto item = reader_.next(); item.found == ring::Found::item; item = reader_.next())
+        for (auto item = test::look(reader_.next()); item.found == test::Found::item;
+             item = test::look(reader_.next()))
             items.push_back(item);
         return items;
     }
@@ -100,7 +102,7 @@ TEST_CASE("imu_pipeline: a sample from the future is withheld, and those after i
     }
     CHECK(bench.pipeline.report().doubted == 1);
     CHECK(bench.pipeline.report().lost == 1);
-    const auto event = unpack<EventMetadata>(bench.reader("events").next().metadata);
+    const auto event = unpack<EventMetadata>(test::look(bench.reader("events").next()).metadata);
     CHECK(event.kind == EventKind::message_doubted);
     CHECK(event.value == (test::Pipelines::to_board(bench.instant(40)) + lie).ns);
 }
@@ -214,7 +216,7 @@ TEST_CASE(
         pipeline.add(sample(i, test::Pipelines::to_board(at)), at + milliseconds(1));
     }
     const HostTime newest = begin + milliseconds(30) + milliseconds(5) * neighbours;
-    const ring::Item item = reader.next();
+    const auto item = test::look(reader.next());
     const auto metadata = unpack<ImuMetadata>(item.metadata);
     CHECK(absolute(metadata.host_time - (newest - delay)) < microseconds(1));
     CHECK(item.time.ns == metadata.host_time.ns);
@@ -283,14 +285,14 @@ TEST_CASE("imu_pipeline: samples that repeat are counted, and only a wired line 
     CHECK(add(neighbours + 2, 0, 0));
     CHECK(pipeline.report().repeated == 1);
     CHECK(pipeline.report().doubted == (configuration.accel_ready ? 0 : 1));
-    const auto first = unpack<ImuMetadata>(reader.next().metadata);
+    const auto first = unpack<ImuMetadata>(test::look(reader.next()).metadata);
     CHECK(first.flags == flag_repeated);
     CHECK(first.accel_age_ns == 0);
-    const auto second = unpack<ImuMetadata>(reader.next().metadata);
+    const auto second = unpack<ImuMetadata>(test::look(reader.next()).metadata);
     CHECK(second.flags == (configuration.accel_ready ? flag_accel_age : 0U));
     CHECK(second.accel_age_ns == (configuration.accel_ready ? 320 : 0));
     if (configuration.accel_ready) return;
-    const auto event = unpack<EventMetadata>(bench.reader("events").next().metadata);
+    const auto event = unpack<EventMetadata>(test::look(bench.reader("events").next()).metadata);
     CHECK(event.kind == EventKind::message_doubted);
     CHECK(event.reason == EventReason::implausible_flags);
 }

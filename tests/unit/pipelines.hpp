@@ -40,7 +40,7 @@ class Pipelines {
     }
 
     ring::Reader reader(const std::string& name) const {
-        auto opened = ring::Reader::open(directory.path() / name, ring::Reader::From::oldest);
+        auto opened = ring::Reader::open(directory.path() / name, {ring::Position::middle});
         if (!opened) throw std::runtime_error(opened.error().message());
         return std::move(*opened);
     }

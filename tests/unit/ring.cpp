@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "../support/in_process.hpp"
+#include "../support/look.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
@@ -35,7 +36,7 @@ struct Fixture {
     Writer frame_writer(std::uint32_t slots = 4) {
         return *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, slots, 5000});
     }
-    Reader reader(const std::string& name, Reader::From from = Reader::From::newest) {
+    Reader reader(const std::string& name, const Options& from = {}) {
         auto opened = Reader::open(directory.path() / name, from);
         REQUIRE(opened);
         return std::move(*opened);
@@ -58,16 +59,16 @@ void publish_frame(Writer& writer, std::uint8_t fill) {
 TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
     Writer writer = inline_writer();
     Reader reader = this->reader("numbers");
-    CHECK(reader.next().found == Found::nothing);
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
     for (std::uint64_t i = 1; i <= 3; ++i) publish(writer, i);
     for (std::uint64_t i = 1; i <= 3; ++i) {
-        const Item item = reader.next();
-        REQUIRE(item.found == Found::item);
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
         CHECK(item.metadata[0] == i);
         CHECK(item.time.ns == static_cast<std::int64_t>(i));
         CHECK(item.number == i - 1);
     }
-    CHECK(reader.next().found == Found::nothing);
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
 }
 
 TEST_CASE_METHOD(Fixture,
@@ -77,24 +78,24 @@ TEST_CASE_METHOD(Fixture,
     Writer writer = inline_writer(start);
     Reader reader = this->reader("numbers");
     for (std::uint64_t i = 0; i < 20; ++i) publish(writer, i);
-    const Item lost = reader.next();
-    REQUIRE(lost.found == Found::lost);
+    const auto lost = test::look(reader.next());
+    REQUIRE(lost.found == test::Found::lost);
     CHECK(lost.lost == 16);
-    CHECK(reader.next().metadata[0] == 16);
-    CHECK(reader.next().metadata[0] == 17);
+    CHECK(test::look(reader.next()).metadata[0] == 16);
+    CHECK(test::look(reader.next()).metadata[0] == 17);
 }
 
 TEST_CASE_METHOD(Fixture, "ring: payloads are read in place and by copy") {
     Writer writer = frame_writer();
     Reader reader = this->reader("frames");
     publish_frame(writer, 7);
-    const Item item = reader.next();
-    REQUIRE(item.found == Found::item);
-    REQUIRE(item.payload_size == 5000);
-    CHECK(static_cast<int>(item.payload[4999]) == 7);
-    CHECK(reader.intact(item));
-    std::vector<std::byte> copy(item.payload_size);
-    CHECK(reader.copy(item, copy.data()));
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
+    REQUIRE(item.payload.size() == 5000);
+    CHECK(static_cast<int>(item.payload.data()[4999]) == 7);
+    CHECK(item.valid());
+    std::vector<std::byte> copy(item.payload.size());
+    CHECK(item.payload.copy_to(copy.data()));
     CHECK(std::all_of(copy.begin(), copy.end(), [](std::byte b) { return b == std::byte{7}; }));
 }
 
@@ -102,28 +103,28 @@ TEST_CASE_METHOD(Fixture, "ring: a payload that the writer took back is not inta
     Writer writer = frame_writer(2);
     Reader reader = this->reader("frames");
     publish_frame(writer, 1);
-    const Item item = reader.next();
-    REQUIRE(item.found == Found::item);
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
     publish_frame(writer, 2);
-    CHECK(reader.intact(item));  // the other slot
+    CHECK(item.valid());  // the other slot
     const auto slot = writer.acquire();
-    CHECK_FALSE(reader.intact(item));
-    std::vector<std::byte> copy(item.payload_size);
-    CHECK_FALSE(reader.copy(item, copy.data()));
+    CHECK_FALSE(item.valid());
+    std::vector<std::byte> copy(item.payload.size());
+    CHECK_FALSE(item.payload.copy_to(copy.data()));
     writer.abandon(*slot);
-    CHECK_FALSE(reader.intact(item));
+    CHECK_FALSE(item.valid());
 }
 
 TEST_CASE_METHOD(Fixture, "ring: items whose slot is gone count as lost") {
     Writer writer = frame_writer(2);
     Reader reader = this->reader("frames");
     for (std::uint8_t i = 1; i <= 4; ++i) publish_frame(writer, i);
-    const Item lost = reader.next();
-    REQUIRE(lost.found == Found::lost);
-    const Item item = reader.next();
-    REQUIRE(item.found == Found::item);
+    const auto lost = test::look(reader.next());
+    REQUIRE(lost.found == test::Found::lost);
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
     CHECK(item.number == lost.lost);
-    CHECK(static_cast<std::uint64_t>(item.payload[0]) == item.number + 1);
+    CHECK(static_cast<std::uint64_t>(item.payload.data()[0]) == item.number + 1);
 }
 
 TEST_CASE_METHOD(Fixture,
@@ -152,34 +153,34 @@ TEST_CASE_METHOD(Fixture,
         Writer second = inline_writer();
         publish(second, 100);
         first.reset();  // must not take the name away from its successor
-        CHECK(reader.next().metadata[0] == 1);
-        CHECK(reader.next().found == Found::restarted);
-        const Item item = reader.next();
-        REQUIRE(item.found == Found::item);
+        CHECK(test::look(reader.next()).metadata[0] == 1);
+        CHECK(test::look(reader.next()).found == test::Found::restarted);
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
         CHECK(item.metadata[0] == 100);
     }
-    CHECK(reader.next().found == Found::gone);
-    CHECK(reader.wait(milliseconds(1)).found == Found::gone);
+    CHECK(test::look(reader.next()).found == test::Found::gone);
+    CHECK(test::look(reader.next(milliseconds(1))).found == test::Found::gone);
     CHECK_FALSE(reader.writer_alive());
     Writer third = inline_writer();
     publish(third, 200);
-    CHECK(reader.next().found == Found::restarted);
-    CHECK(reader.next().metadata[0] == 200);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
+    CHECK(test::look(reader.next()).metadata[0] == 200);
 }
 
 TEST_CASE_METHOD(Fixture, "ring: a waiting reader is woken [threads]", "[threads]") {
     Writer writer = inline_writer();
     Reader reader = this->reader("numbers");
     std::atomic<bool> ready{false};
-    Item item;
+    test::Looked<Item> item;
     std::thread waiting([&] {
         ready = true;
-        item = reader.wait(seconds(20));
+        item = test::look(reader.next(seconds(20)));
     });
     while (!ready) std::this_thread::yield();
     publish(writer, 5);
     waiting.join();
-    CHECK(item.found == Found::item);
+    CHECK(item.found == test::Found::item);
     CHECK(item.metadata[0] == 5);
 }
 
@@ -205,13 +206,13 @@ TEST_CASE_METHOD(Fixture,
     std::uint64_t newest = 0;
     std::vector<std::uint64_t> copy(512);
     while (newest < last && !(done && reader.head() != last)) {
-        const Item item = reader.next();
-        if (item.found != Found::item) continue;
+        const auto item = test::look(reader.next());
+        if (item.found != test::Found::item) continue;
         for (const std::uint64_t word : item.metadata) REQUIRE(word == item.metadata[0]);
         REQUIRE(item.time.ns == static_cast<std::int64_t>(item.metadata[0]));
         REQUIRE(item.metadata[0] > newest);
         newest = item.metadata[0];
-        if (!reader.copy(item, reinterpret_cast<std::byte*>(copy.data()))) continue;
+        if (!item.payload.copy_to(reinterpret_cast<std::byte*>(copy.data()))) continue;
         ++good;
         for (const std::uint64_t word : copy) REQUIRE(word == newest);
     }
@@ -268,7 +269,7 @@ TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
         Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
     REQUIRE_FALSE(huge);
     CHECK_THAT(huge.error().message(),
-               Catch::Contains("cannot reserve 1073741824 MiB") && Catch::Contains("/dev/shm"));
+               Catch::Contains("/huge: takes 1073741825 MiB") && Catch::Contains("/dev/shm"));
     CHECK(std::filesystem::is_empty(directory.path()));
     std::filesystem::create_directory(directory.path() / "taken");
     CHECK_THAT(Writer::create(directory.path(), {"taken", StreamKind::events, 8}).error().message(),
@@ -326,24 +327,25 @@ bool made_anew_in_tight_memory() {
         ::_exit(0);  // without its destructor
     });
     const auto path = std::filesystem::path(memory) / "frames";
-    auto reader = Reader::open(path, Reader::From::oldest);
+    auto reader = Reader::open(path, {Position::middle});
     const auto dead = Mapping::open(path, Mapping::Access::read_only);
     if (!left || !reader || !dead) return false;
-    std::vector<Item> held;
-    for (int i = 0; i < 2; ++i) held.push_back(reader->next());
+    std::vector<test::Looked<Item>> held;
+    for (int i = 0; i < 2; ++i) held.push_back(test::look(reader->next()));
     std::vector<std::uint64_t> before;
     for (std::uint32_t slot = 0; slot < 4; ++slot) before.push_back(dead->generation(slot));
     const std::size_t files = open_files();
     auto writer = Writer::create(memory, shape);
     if (!writer || open_files() != files) return false;
-    for (const Item& item : held)
-        if (item.found != Found::item || reader->intact(item)) return false;
+    for (const auto& item : held)
+        if (item.found != test::Found::item || item.valid()) return false;
     for (std::uint32_t slot = 0; slot < 4; ++slot)
         if (dead->generation(slot) != before[slot] + 2) return false;
     writer->publish(*writer->acquire(), 1, {}, {});
-    Item item = reader->next();
-    while (item.found == Found::lost) item = reader->next();
-    return item.found == Found::restarted && reader->next().found == Found::item;
+    auto item = test::look(reader->next());
+    while (item.found == test::Found::lost) item = test::look(reader->next());
+    return item.found == test::Found::restarted &&
+           test::look(reader->next()).found == test::Found::item;
 }
 
 }  // namespace
@@ -393,10 +395,10 @@ TEST_CASE_METHOD(Fixture, "ring: no item is lost when one writer follows another
     });
     std::uint64_t expected = 0;
     while (expected < lives * items) {
-        const Item item = reader.next();
-        if (item.found == Found::restarted) ++followed;
-        if (item.found == Found::lost) expected += item.lost;
-        if (item.found != Found::item) continue;
+        const auto item = test::look(reader.next());
+        if (item.found == test::Found::restarted) ++followed;
+        if (item.found == test::Found::lost) expected += item.lost;
+        if (item.found != test::Found::item) continue;
         REQUIRE(item.metadata[0] == expected);
         ++expected;
     }

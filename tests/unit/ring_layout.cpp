@@ -82,7 +82,11 @@ TEST_CASE_METHOD(Ring, "ring_layout: the header of a ring with payloads") {
     const std::string file = bytes("frames");
     CHECK(file.substr(0, 8) == "VERSAVIS");
     CHECK(u32(file, 8) == 1);
-    CHECK(u32(file, 12) == 4);
+    CHECK(u32(file, 12) == 5);
+    CHECK(u64(file, 168) != 0);
+    struct stat space {};
+    REQUIRE(::stat("/proc/self/ns/pid", &space) == 0);
+    CHECK(u64(file, 176) == space.st_ino);
     CHECK(u64(file, 16) == file.size());
     CHECK(hexadecimal(file.substr(32, 16)) == boot_id());
     CHECK(u32(file, 48) == static_cast<std::uint32_t>(::getpid()));
@@ -162,9 +166,9 @@ TEST_CASE_METHOD(Ring, "ring_layout: an item without payload, in its descriptor"
     CHECK(u64(file, 256) == 10);
     CHECK(u32(file, 384) == 1);
     CHECK(writer.head() == 10);
-    // Its neighbours are untouched.
-    CHECK(u64(file, 4096) == 0);
-    CHECK(u64(file, 4096 + 2 * 128) == 0);
+    // Its neighbours are not complete: as before item 10, and before item 16.
+    CHECK(u64(file, 4096 + 2 * 128) == 2 * (10 - 8) + 1);
+    CHECK(u64(file, 4096) == 2 * (16 - 8) + 1);
 }
 
 TEST_CASE_METHOD(Ring, "ring_layout: a payload, its slot and its generation") {

@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "../support/in_process.hpp"
+#include "../support/look.hpp"
 #include "../support/temporary_directory.hpp"
+#include "client/futex.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring/reader.hpp"
@@ -36,7 +38,7 @@ struct Streams {
     Writer frames(std::uint32_t slots, std::uint64_t size = page_size) {
         return *Writer::create(directory.path(), {"frames", StreamKind::frames, 8, slots, size});
     }
-    Reader open(const std::string& name, Reader::From from = Reader::From::newest) {
+    Reader open(const std::string& name, const Options& from = {}) {
         auto opened = Reader::open(directory.path() / name, from);
         REQUIRE(opened);
         return std::move(*opened);
@@ -108,11 +110,11 @@ TEST_CASE_METHOD(Streams, "ring_reader: a copy has all of the payload, and nothi
         for (std::uint32_t i = 0; i < size; ++i)
             writer.slot_data(*slot)[i] = static_cast<std::byte>(i * 7 + size);
         writer.publish(*slot, size, OutputTime{}, {});
-        const Item item = reader.next();
-        REQUIRE(item.found == Found::item);
-        REQUIRE(item.payload_size == size);
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
+        REQUIRE(item.payload.size() == size);
         std::vector<std::byte> copy(size + 16, std::byte{0xA5});
-        REQUIRE(reader.copy(item, copy.data()));
+        REQUIRE(item.payload.copy_to(copy.data()));
         for (std::uint32_t i = 0; i < copy.size(); ++i)
             REQUIRE(copy[i] == (i < size ? static_cast<std::byte>(i * 7 + size) : std::byte{0xA5}));
     }
@@ -125,13 +127,14 @@ TEST_CASE_METHOD(Streams, "ring_reader: the last slot is read to its end, which 
     Reader reader = open("frames");
     for (int i = 0; i < 2; ++i) publish(writer, page_size, 9);
     std::vector<std::byte> copy(page_size);
-    Item item;
+    test::Looked<Item> item;
     for (int i = 0; i < 2; ++i) {
-        item = reader.next();
-        CHECK(reader.copy(item, copy.data()));
+        item = test::look(reader.next());
+        CHECK(item.payload.copy_to(copy.data()));
     }
     CHECK(copy.back() == std::byte{9});
-    if (item.payload + page_size != guard) WARN("not tested: something lies behind the mapping");
+    if (item.payload.data() + page_size != guard)
+        WARN("not tested: something lies behind the mapping");
     ::munmap(const_cast<void*>(guard), page_size);
 }
 
@@ -141,39 +144,35 @@ TEST_CASE_METHOD(Streams, "ring_reader: an item without payload is intact, and a
     for (int lap = 0; lap < 3; ++lap)
         for (std::uint64_t i = 0; i < 8; ++i) {
             writer.publish(OutputTime{}, {1, i});
-            const Item item = reader.next();
-            REQUIRE(item.found == Found::item);
-            CHECK(item.payload == nullptr);
-            CHECK(item.payload_size == 0);
-            CHECK(item.slot == no_slot);
-            CHECK(reader.intact(item));
-            CHECK(reader.copy(item, nullptr));
+            const auto item = test::look(reader.next());
+            REQUIRE(item.found == test::Found::item);
+            CHECK(item.payload.data() == nullptr);
+            CHECK(item.payload.size() == 0);
+            CHECK(item.valid());
+            CHECK(item.payload.copy_to(nullptr));
         }
-    CHECK_FALSE(reader.copy({Found::item, 0, 0, {}, {}, nullptr, 5}, nullptr));
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: where nothing is, the item says so") {
     Writer writer = events();
-    const Item item = open("events").next();
-    CHECK(item.found == Found::nothing);
+    const auto item = test::look(open("events").next());
+    CHECK(item.found == test::Found::nothing);
     CHECK(item.lost == 0);
     CHECK(item.number == 0);
     CHECK(item.time.ns == 0);
-    CHECK(item.payload == nullptr);
-    CHECK(item.payload_size == 0);
-    CHECK(item.slot == no_slot);
-    CHECK(item.slot_generation == 0);
+    CHECK(item.payload.data() == nullptr);
+    CHECK(item.payload.size() == 0);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ring back") {
     Writer writer = events();
     for (std::uint64_t i = 0; i < 3; ++i) writer.publish(OutputTime{}, {i});
-    CHECK(open("events", Reader::From::oldest).next().number == 0);
+    CHECK(test::look(open("events", {Position::middle}).next()).number == 0);
     for (std::uint64_t i = 3; i < 20; ++i) writer.publish(OutputTime{}, {i});
-    const Item item = open("events", Reader::From::oldest).next();
-    CHECK(item.found == Found::item);
+    const auto item = test::look(open("events", {Position::middle}).next());
+    CHECK(item.found == test::Found::item);
     CHECK(item.number == 16);
-    CHECK(open("events").next().found == Found::nothing);
+    CHECK(test::look(open("events").next()).found == test::Found::nothing);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one item is lost") {
@@ -181,13 +180,12 @@ TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one
     Reader reader = open("frames");
     publish(writer, 10);
     for (int i = 0; i < 4; ++i) CHECK(writer.acquire());
-    const Item lost = reader.next();
-    CHECK(lost.found == Found::lost);
+    const auto lost = test::look(reader.next());
+    CHECK(lost.found == test::Found::lost);
     CHECK(lost.lost == 1);
-    CHECK(lost.number == 1);
-    CHECK(reader.next().found == Found::nothing);
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
     writer.publish(2, 10, OutputTime{}, {});
-    CHECK(reader.next().number == 1);
+    CHECK(test::look(reader.next()).number == 1);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: a slot that is not there, or too small, is no item") {
@@ -200,26 +198,59 @@ TEST_CASE_METHOD(Streams, "ring_reader: a slot that is not there, or too small, 
         const std::uint64_t real = descriptor.length_and_slot;
         if (slot >= 2) descriptor.slot_generation = 0;  // as the words behind the last one
         descriptor.length_and_slot = length << 32U | (slot == 0 ? real & 0xFFFFFFFFU : slot);
-        return reader.next().found;
+        return test::look(reader.next()).found;
     };
-    CHECK(found_with(page_size, 0) == Found::item);
-    CHECK(found_with(page_size + 1, 0) == Found::lost);
-    CHECK(found_with(10, 2) == Found::lost);
-    CHECK(found_with(10, 0xFFFFFFFE) == Found::lost);
+    CHECK(found_with(page_size, 0) == test::Found::item);
+    CHECK(found_with(page_size + 1, 0) == test::Found::lost);
+    CHECK(found_with(10, 2) == test::Found::lost);
+    CHECK(found_with(10, 0xFFFFFFFE) == test::Found::lost);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: an item of a larger ring that was before is not intact") {
+TEST_CASE_METHOD(Streams, "ring_reader: an item outlives its ring, its reader and its file") {
     auto large = std::make_unique<Writer>(frames(4));
-    Reader reader = open("frames");
-    for (int i = 0; i < 3; ++i) publish(*large, 10);
-    Item item;
-    for (int i = 0; i < 3; ++i) item = reader.next();
-    REQUIRE(item.slot == 2);
+    auto reader = std::make_unique<Reader>(open("frames"));
+    for (std::uint8_t i = 0; i < 3; ++i) publish(*large, 10, i);
+    test::Looked<Item> item;
+    for (int i = 0; i < 3; ++i) item = test::look(reader->next());
     Writer small = frames(2);
     large.reset();
-    REQUIRE(reader.next().found == Found::restarted);
-    item.slot_generation = 0;
-    CHECK_FALSE(reader.intact(item));
+    REQUIRE(test::look(reader->next()).found == test::Found::restarted);
+    reader.reset();
+    std::filesystem::remove(directory.path() / "frames");
+    std::vector<std::byte> copy(item.payload.size());
+    CHECK(item.payload.copy_to(copy.data()));
+    CHECK(copy == std::vector<std::byte>(10, std::byte{2}));
+    CHECK(item.valid());
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies before it") {
+    Writer writer = events();
+    Reader reader = open("events");
+    CHECK(test::look(reader.latest()).found == test::Found::nothing);
+    for (std::uint64_t i = 0; i < 5; ++i) writer.publish(OutputTime{}, {i});
+    CHECK(test::look(reader.latest()).number == 4);
+    CHECK(test::look(reader.latest()).found == test::Found::nothing);
+    CHECK(test::look(open("events").latest()).number == 4);  // also what came before it opened
+    writer.publish(OutputTime{}, {5});
+    CHECK(test::look(reader.next()).number == 5);
+    CHECK(test::look(reader.latest(milliseconds(1))).found == test::Found::nothing);
+    for (std::uint64_t i = 6; i < 40; ++i) writer.publish(OutputTime{}, {i});
+    CHECK(test::look(reader.latest()).number == 39);
+}
+
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: what a writer taken for dead still published is not skipped") {
+    auto first = std::make_unique<Writer>(events());
+    Reader reader = open("events");
+    first->publish(OutputTime{}, {1});
+    first->heartbeat(HostTime{0});
+    Writer second = events();
+    second.publish(OutputTime{}, {2});
+    CHECK(test::look(reader.next()).metadata[0] == 1);
+    first->publish(OutputTime{}, {3});
+    CHECK(test::look(reader.next()).metadata[0] == 3);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
+    CHECK(test::look(reader.next()).metadata[0] == 2);
 }
 
 TEST_CASE_METHOD(Streams,
@@ -227,21 +258,26 @@ TEST_CASE_METHOD(Streams,
     Writer writer = events();
     Reader reader = open("events");
     CHECK(reader.writer_pid() == static_cast<std::uint32_t>(::getpid()));
-    CHECK(reader.writer_found());
     for (const auto& [age_s, alive] : {std::pair{0, true}, {2, true}, {4, false}, {60, false}}) {
         writer.heartbeat(host_now() - seconds(age_s));
         CHECK(reader.writer_alive() == alive);
-        CHECK(reader.next().found == (alive ? Found::nothing : Found::gone));
+        CHECK(test::look(reader.next()).found ==
+              (alive ? test::Found::nothing : test::Found::gone));
     }
     // What it published before it fell silent is read all the same.
     writer.publish(OutputTime{}, {});
-    CHECK(reader.next().found == Found::item);
+    CHECK(test::look(reader.next()).found == test::Found::item);
     const Mapping mapping = map("events");
     mapping.header().writer_start_ticks += 1;
-    CHECK_FALSE(open("events").writer_found());
+    writer.heartbeat(host_now() - milliseconds(200));  // from then on the start is looked at
+    CHECK_FALSE(open("events").writer_alive());
     mapping.header().writer_start_ticks -= 1;
+    CHECK(open("events").writer_alive());
     mapping.header().writer_pid = 0x7FFFFFFF;
-    CHECK_FALSE(open("events").writer_found());
+    writer.heartbeat(host_now());
+    CHECK_FALSE(open("events").writer_alive());
+    mapping.header().pid_namespace += 1;  // its processes have numbers of their own
+    CHECK(open("events").writer_alive());
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader reads on") {
@@ -250,10 +286,10 @@ TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader r
     const Mapping mapping = map("frames");
     const auto read = [&] {
         publish(writer, 100, 7);
-        const Item item = reader.next();
-        REQUIRE(item.found == Found::item);
-        std::vector<std::byte> bytes(item.payload_size);
-        CHECK(reader.copy(item, bytes.data()));
+        const auto item = test::look(reader.next());
+        REQUIRE(item.found == test::Found::item);
+        std::vector<std::byte> bytes(item.payload.size());
+        CHECK(item.payload.copy_to(bytes.data()));
         CHECK(bytes == std::vector<std::byte>(100, std::byte{7}));
     };
     read();
@@ -267,8 +303,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader r
     CHECK(std::string(reader.name()) == "frames");
     CHECK(reader.kind() == StreamKind::frames);
     CHECK(reader.retained() == 4);
-    CHECK(reader.writer_found());
-    for (const std::int64_t heartbeat : {INT64_MIN, INT64_MIN + 1}) {
+    for (const std::int64_t heartbeat : {INT64_MIN + 1, INT64_MIN}) {
         header.heartbeat_ns = heartbeat;
         CHECK_FALSE(reader.writer_alive());
     }
@@ -281,10 +316,10 @@ TEST_CASE_METHOD(Streams, "ring_reader: a successor of another kind is another s
     Writer second = *Writer::create(directory.path(), {"data", StreamKind::imu, 8});
     first.reset();
     second.publish(OutputTime{}, {});
-    CHECK(reader.next().found == Found::gone);
+    CHECK(test::look(reader.next()).found == test::Found::gone);
     CHECK(reader.kind() == StreamKind::events);
     Writer third = *Writer::create(directory.path(), {"data", StreamKind::events, 8});
-    CHECK(reader.next().found == Found::restarted);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read is told so, and what to do") {
@@ -307,13 +342,13 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {
     const HostTime begun = host_now();
     const std::int64_t used = processor_time_ns();
     const long wakes = wakes_of_this_thread();
-    CHECK(reader.wait(milliseconds(200)).found == Found::nothing);
+    CHECK(test::look(reader.next(milliseconds(200))).found == test::Found::nothing);
     CHECK(host_now() - begun >= milliseconds(200));
     CHECK(processor_time_ns() - used < milliseconds(100).ns);
     CHECK(wakes_of_this_thread() - wakes < 50);
     writer.publish(OutputTime{}, {});
-    CHECK(reader.wait(seconds(20)).found == Found::item);
-    CHECK(reader.wait({}).found == Found::nothing);
+    CHECK(test::look(reader.next(seconds(20))).found == test::Found::item);
+    CHECK(test::look(reader.next({})).found == test::Found::nothing);
 }
 
 TEST_CASE_METHOD(Streams,
@@ -354,8 +389,8 @@ TEST_CASE_METHOD(Streams,
         done = true;
     });
     while (!done) {
-        const Item item = reader.next();
-        if (item.found != Found::item) continue;
+        const auto item = test::look(reader.next());
+        if (item.found != test::Found::item) continue;
         for (const std::uint64_t word : item.metadata) REQUIRE(word == item.number);
         REQUIRE(item.time.ns == static_cast<std::int64_t>(item.number));
     }

@@ -136,10 +136,12 @@ TEST_CASE("status: what a board has is named, and of one that was never met noth
 TEST_CASE("status: firmware of an older release is told, and of a board never met nothing") {
     Status status = healthy();
     status.release = "0.2.0";
+    status.configuration = "/etc/versavis/versavis.toml";
     status.board.firmware = "versavis 0.1.9";
     const auto outdated = [&] {
         const auto document = nlohmann::json::parse(to_json(status));
         CHECK(document["release"] == "0.2.0");
+        CHECK(document["configuration"] == "/etc/versavis/versavis.toml");
         return document["board"]["firmware_outdated"];
     };
     CHECK(outdated().is_null());

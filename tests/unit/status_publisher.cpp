@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/status_publisher.hpp"
+#include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -12,10 +13,10 @@ using namespace versavis::daemon;
 namespace {
 
 nlohmann::json newest(ring::Reader& reader) {
-    const ring::Item item = reader.next();
-    REQUIRE(item.found == ring::Found::item);
-    const auto* text = reinterpret_cast<const char*>(item.payload);
-    return nlohmann::json::parse(text, text + item.payload_size);
+    const auto item = test::look(reader.next());
+    REQUIRE(item.found == test::Found::item);
+    const auto* text = reinterpret_cast<const char*>(item.payload.data());
+    return nlohmann::json::parse(text, text + item.payload.size());
 }
 
 }  // namespace
@@ -83,7 +84,7 @@ TEST_CASE("status_publisher: a large document is whole, in a larger ring") {
     status.now = HostTime{100'000'000'000};
     status.cameras.resize(200);
     publisher->publish(status, bench.translator);
-    CHECK(reader.next().found == ring::Found::restarted);
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
     CHECK(newest(reader)["cameras"].size() == 200);
     publisher->publish(status, bench.translator);
     CHECK(newest(reader)["cameras"].size() == 200);  // in the same ring

@@ -25,27 +25,28 @@ class UsbRig {
     explicit UsbRig(const Stack& stack)
         : testbed_(umockdev_testbed_new()),
           zero_(host_now()),
-          motion_(zero_),
+          surroundings_(zero_),
           truth_(std::move(*rig::GroundTruth::create(stack.truth_path()))),
-          camera(testbed_.get(), "1-2", stack.scenario().cameras[0], zero_, motion_, *truth_,
-                 stack.scenario().seed),
+          camera(testbed_.get(), "1-2", stack.scenario().cameras[0], zero_, surroundings_.motion,
+                 *truth_, stack.scenario().seed),
           board_(std::move(*rig::BoardHost::create(stack.scenario(), stack.socket_path(), zero_,
-                                                   motion_, *truth_, {&camera}))),
+                                                   surroundings_, *truth_, {&camera}))),
           bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
 
     /// Another camera on the bus, which takes commands and never answers.
     void add_mute(const Stack& stack) {
         rig::CameraScenario settings = stack.scenario().cameras[0];
         settings.serial = "MUTE";
-        mute_ = std::make_unique<RigU3vCamera>(testbed_.get(), "1-3", settings, zero_, motion_,
-                                               *truth_, stack.scenario().seed);
+        mute_ =
+            std::make_unique<RigU3vCamera>(testbed_.get(), "1-3", settings, zero_,
+                                           surroundings_.motion, *truth_, stack.scenario().seed);
         mute_->camera().mute(true);
     }
 
  private:
     GObjectPtr<UMockdevTestbed> testbed_;
     HostTime zero_;
-    rig::Motion motion_;
+    rig::Surroundings surroundings_;
     std::unique_ptr<rig::GroundTruth> truth_;
 
  public:

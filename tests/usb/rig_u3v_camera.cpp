@@ -28,7 +28,7 @@ std::optional<RigU3vCamera::Interval> RigU3vCamera::expose(const rig::TriggerPul
         clock_.device_ns(rig::stamped(settings_, exposure.start, exposure.end)));
     const HostTime due = exposure.end + Duration{std::llround(settings_.readout_us * 1e3)};
     shot.until_sent = std::chrono::nanoseconds{(due - host_now()).ns};
-    shot.pixels = wall_.view(motion_.pitch_rad(middle(exposure.start, exposure.end)));
+    shot.pixels = wall_.view(motion_.roll_rad(middle(exposure.start, exposure.end)));
     const rig::FrameMark mark{rig::FrameMark::expected_magic, exposure.serial};
     shot.mark.resize(sizeof mark);
     std::memcpy(shot.mark.data(), &mark, sizeof mark);

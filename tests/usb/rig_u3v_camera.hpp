@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "ground_truth.hpp"
+#include "motion.hpp"
 #include "scene.hpp"
 #include "simulated_device.hpp"
 #include "skewed_clock.hpp"

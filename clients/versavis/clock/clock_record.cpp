@@ -96,13 +96,14 @@ class Recording {
 };
 
 /// False: the board restarted.
-bool take(const Received<clock::ClockMetadata>& item, Recording& recording) {
-    if (item.found == Found::lost)
-        fmt::print(stderr, "versavis: {} items were overwritten before they were read\n",
-                   item.lost);
-    if (item.found == Found::restarted) recording.service_restarted();
-    if (item.found != Found::item) return true;
-    const auto told = clock::from_metadata(item.data);
+bool take(const clock::ClockStream::Result& item, Recording& recording) {
+    if (!item) {
+        if (item.error().why == Pause::lost)
+            fmt::print(stderr, "versavis: {}\n", item.error().message());
+        if (item.error().why == Pause::restarted) recording.service_restarted();
+        return true;
+    }
+    const auto told = clock::from_metadata(item->data);
     return !told || recording.add(*told);
 }
 
@@ -113,15 +114,16 @@ bool run(clock::ClockStream& stream, Recording& recording, const ClockRecordSett
     while (!settings.stop() && !(limited && host_now() >= end)) {
         const Duration left = end - host_now();
         const bool short_wait = limited && left < longest_wait;
-        if (!take(stream.wait(short_wait ? std::max(left, Duration{}) : longest_wait), recording))
+        if (!take(stream.next(short_wait ? std::max(left, Duration{}) : longest_wait), recording))
             return false;
     }
     // What had been published by then belongs to the recording.
     const std::uint64_t head = stream.reader().head();
-    for (auto item = stream.next(); item.found == Found::item || item.found == Found::lost;
-         item = stream.next()) {
+    for (;;) {
+        const auto item = stream.next();
+        if (!item && item.error().why != Pause::lost) break;
         if (!take(item, recording)) return false;
-        if (item.found == Found::item && item.number + 1 >= head) break;
+        if (item && item->number + 1 >= head) break;
     }
     return true;
 }
@@ -134,7 +136,7 @@ int fail(const Error& error) {
 }  // namespace
 
 int record_clock(const ClockRecordSettings& settings) {
-    auto stream = clock::ClockStream::open("clock", settings.instance);
+    auto stream = clock::ClockStream::open("clock", {{}, settings.instance});
     if (!stream) return fail(stream.error());
     Recording recording;
     if (const auto opened = recording.open(settings); !opened) return fail(opened.error());

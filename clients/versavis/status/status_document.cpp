@@ -5,32 +5,20 @@
 
 namespace versavis::client {
 
-namespace {
-
-/// The service's heart beats every 50 ms. A process that cannot be found, but whose heart beats, is
-/// of another container. At half, one that was just held up is called dead; at twice, a dead one
-/// is named a quarter of a second later.
-constexpr Duration heart_stopped = milliseconds(250);
-
-bool has_died(const ring::Reader& reader) {
-    return !reader.writer_found() && host_now() - reader.last_heartbeat() > heart_stopped;
-}
-
-}  // namespace
-
 Expected<nlohmann::json> read_status(const std::string& instance) {
-    auto stream = StatusStream::open("status", instance, ring::Reader::From::oldest);
+    StreamOptions options;
+    options.instance = instance;
+    auto stream = StatusStream::open("status", options);
     if (!stream) return Unexpected(stream.error());
     std::optional<std::string> newest;
-    for (auto item = stream->wait(seconds(1));
-         item.found == Found::item || item.found == Found::lost;
-         item = newest ? stream->next() : stream->wait(seconds(1))) {
-        std::string text(item.payload_size, '\0');
-        if (item.found == Found::item &&
-            stream->copy(item, reinterpret_cast<std::byte*>(text.data())))
+    for (int attempts = 0; attempts < 3 && !newest; ++attempts) {
+        const auto item = stream->latest(seconds(1));
+        if (!item) continue;
+        std::string text(item->payload.size(), '\0');
+        if (item->payload.copy_to(reinterpret_cast<std::byte*>(text.data())))
             newest = std::move(text);
     }
-    if (!stream->reader().writer_alive() || has_died(stream->reader()))
+    if (!stream->reader().writer_alive())
         return failure(fmt::format("instance {}", instance), "the service has died or is hanging",
                        "see its log ('journalctl -u versavisd'), then restart it");
     if (!newest)

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "stream/kind_name.hpp"
 #include "versavis/ring/path.hpp"
 #include "versavis/ring/reader.hpp"
 
@@ -14,16 +15,9 @@ namespace versavis::client {
 
 namespace {
 
-const char* kind_name(ring::StreamKind kind) {
-    switch (kind) {
-        case ring::StreamKind::frames: return "frames";
-        case ring::StreamKind::imu: return "imu";
-        case ring::StreamKind::events: return "events";
-        case ring::StreamKind::status: return "status";
-        case ring::StreamKind::evidence: return "evidence";
-        case ring::StreamKind::clock: return "clock";
-    }
-    return "unknown";
+/// Whatever bytes a name has.
+std::string as_text(const nlohmann::json& document) {
+    return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -42,7 +36,12 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
     std::string text;
     for (const auto& path : paths) {
         auto reader = ring::Reader::open(path);
-        if (!reader) return Unexpected(reader.error());
+        if (!reader) {  // it may just have ended, or not be one: the others are listed all the same
+            document.push_back(
+                {{"name", path.filename().string()}, {"error", reader.error().message()}});
+            text += fmt::format("{:<12} {}\n", path.filename().string(), reader.error().message());
+            continue;
+        }
         const bool alive = reader->writer_alive();
         document.push_back({{"name", reader->name()},
                             {"kind", kind_name(reader->kind())},
@@ -53,7 +52,7 @@ Expected<std::string> list_streams(const std::string& instance, bool as_json) {
                             kind_name(reader->kind()), reader->head(), reader->retained(),
                             alive ? "" : ", writer gone");
     }
-    return as_json ? document.dump() + "\n" : text;
+    return as_json ? as_text(document) + "\n" : text;
 }
 
 }  // namespace versavis::client

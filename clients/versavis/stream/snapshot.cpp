@@ -15,42 +15,31 @@ namespace versavis::client {
 
 namespace {
 
-struct PixelLayout {
-    png_uint_32 format;
-    std::uint32_t bytes_per_pixel;
-};
-
-/// Codes of the Pixel Format Naming Convention. The upper byte but one is the number of bits a
-/// pixel takes.
-std::optional<PixelLayout> layout_of(std::uint32_t pixel_format) {
+/// As libpng writes it; none: packed, or colours that it does not know.
+std::optional<png_uint_32> png_format(std::uint32_t pixel_format) {
     constexpr std::uint32_t rgb8 = 0x02180014;
     constexpr std::uint32_t bgr8 = 0x02180015;
-    const std::uint32_t bits = pixel_format >> 16U & 0xFFU;
-    const bool one_channel = pixel_format >> 24U == 0x01;
-    if (pixel_format == rgb8) return PixelLayout{PNG_FORMAT_RGB, 3};
-    if (pixel_format == bgr8) return PixelLayout{PNG_FORMAT_BGR, 3};
-    if (one_channel && bits == 8) return PixelLayout{PNG_FORMAT_GRAY, 1};
-    if (one_channel && bits == 16) return PixelLayout{PNG_FORMAT_LINEAR_Y, 2};
-    return std::nullopt;
+    if (pixel_format == rgb8) return PNG_FORMAT_RGB;
+    if (pixel_format == bgr8) return PNG_FORMAT_BGR;
+    const PixelLayout layout = pixel_layout(pixel_format);
+    if (layout.channels != 1) return std::nullopt;
+    return layout.bytes_per_channel == 1 ? PNG_FORMAT_GRAY : PNG_FORMAT_LINEAR_Y;
 }
 
-Expected<> write_png(const std::string& path, const FrameMetadata& frame,
+Expected<> write_png(const std::string& path, const ImageView& view,
                      const std::vector<std::byte>& pixels) {
-    const auto layout = layout_of(frame.pixel_format);
-    if (!layout)
+    const auto format = png_format(view.pixel_format);
+    if (!format)
         return failure(path,
-                       fmt::format("pixel format {:#010x} is not supported", frame.pixel_format),
+                       fmt::format("pixel format {} ({:#010x}) is not supported",
+                                   pixel_format_name(view.pixel_format), view.pixel_format),
                        "choose an unpacked format of 8 or 16 bits in the camera's [features]");
-    if (std::uint64_t{frame.stride} * frame.height > pixels.size() ||
-        frame.stride < frame.width * layout->bytes_per_pixel)
-        return failure(path, "the frame holds fewer bytes than its width and height require");
     png_image image{};
     image.version = PNG_IMAGE_VERSION;
-    image.width = frame.width;
-    image.height = frame.height;
-    image.format = layout->format;
-    const bool wide = layout->bytes_per_pixel == 2;
-    const auto stride = static_cast<png_int_32>(wide ? frame.stride / 2 : frame.stride);
+    image.width = view.width;
+    image.height = view.height;
+    image.format = *format;
+    const auto stride = static_cast<png_int_32>(view.stride / view.layout.bytes_per_channel);
     if (png_image_write_to_file(&image, path.c_str(), 0, pixels.data(), stride, nullptr) == 0)
         return failure(path, image.message, "is its directory writable?");
     return {};
@@ -60,18 +49,24 @@ Expected<> write_png(const std::string& path, const FrameMetadata& frame,
 
 Expected<std::string> snapshot(const std::string& instance, const std::string& stream_name,
                                const std::string& path, Duration timeout) {
-    auto stream = FrameStream::open(stream_name, instance);
+    StreamOptions options;
+    options.instance = instance;
+    auto stream = FrameStream::open(stream_name, options);
     if (!stream) return Unexpected(explain(stream.error(), instance, stream_name));
     const HostTime deadline = host_now() + timeout;
     while (host_now() < deadline) {
-        const auto item = stream->wait(deadline - host_now());
-        if (item.found != Found::item) continue;
-        std::vector<std::byte> pixels(item.payload_size);
-        if (!stream->copy(item, pixels.data())) continue;
-        if (auto written = write_png(path, item.data, pixels); !written)
+        const auto frame = stream->next(deadline - host_now());
+        if (!frame) continue;
+        const auto view = frame->image();
+        if (!view)
+            return failure(path, "the frame holds fewer bytes than its width and height require");
+        std::vector<std::byte> pixels(frame->payload.size());
+        if (!frame->payload.copy_to(pixels.data())) continue;
+        if (auto written = write_png(path, *view, pixels); !written)
             return Unexpected(written.error());
-        return fmt::format("{}: {} x {}, {} stamp {} ns", path, item.data.width, item.data.height,
-                           to_string(item.data.stamp_kind()), item.time.ns);
+        return fmt::format("{}: {} x {} {}, {} stamp {} ns", path, view->width, view->height,
+                           pixel_format_name(view->pixel_format),
+                           to_string(frame->data.stamp_kind()), frame->time.ns);
     }
     const Error late{stream_name, "no frame arrived in time", "see 'versavis status'"};
     return Unexpected(explain(late, instance, stream_name));

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "clock/clock_json.hpp"
@@ -20,13 +21,15 @@ namespace {
 using nlohmann::json;
 
 json describe(const ring::Item& item) {
-    return {{"number", item.number}, {"time_ns", item.time.ns}};
+    json line{{"number", item.number}, {"time_ns", item.time.ns}};
+    if (item.stale) line["stale"] = true;
+    return line;
 }
 
 /// JSON numbers have no NaN: what a part does not measure is null.
 json vector(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 
-json describe(const Received<FrameMetadata>& item) {
+json describe(const Frame& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const FrameMetadata& d = item.data;
     line.update({{"kind", to_string(d.stamp_kind())},
@@ -39,17 +42,18 @@ json describe(const Received<FrameMetadata>& item) {
                  {"arrival_ns", d.arrival.ns},
                  {"camera_time_ns", d.camera_time.ns},
                  {"delay_ns", d.delay_ns},
-                 {"tick", d.tick},
+                 {"tick", d.tick()},
                  {"width", d.width},
                  {"height", d.height},
                  {"pixel_format", d.pixel_format},
+                 {"format", pixel_format_name(d.pixel_format)},
                  {"epoch", d.epoch},
                  {"flags", d.flags},
-                 {"bytes", item.payload_size}});
+                 {"bytes", item.payload.size()}});
     return line;
 }
 
-json describe(const Received<ImuMetadata>& item) {
+json describe(const ImuSample& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const ImuMetadata& d = item.data;
     line.update(
@@ -69,28 +73,29 @@ json describe(const Received<ImuMetadata>& item) {
     return line;
 }
 
-json describe(const Received<EventMetadata>& item) {
+json describe(const Event& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const EventMetadata& d = item.data;
-    line.update({{"event", to_string(d.kind)},
-                 {"source", d.source_name},
-                 {"reason", to_string(d.reason)},
-                 {"value", d.value},
-                 {"count", d.count},
-                 {"board_time_ns", d.board_time.ns},
-                 {"host_time_ns", d.host_time.ns},
-                 {"epoch", d.epoch}});
+    line.update(
+        {{"event", to_string(d.kind)},
+         {"source", std::string(d.source_name, ::strnlen(d.source_name, sizeof d.source_name))},
+         {"reason", to_string(d.reason)},
+         {"value", d.value},
+         {"count", d.count},
+         {"board_time_ns", d.board_time.ns},
+         {"host_time_ns", d.host_time.ns},
+         {"epoch", d.epoch}});
     return line;
 }
 
-json describe(const Received<pairing::EvidenceMetadata>& item) {
+json describe(const pairing::EvidenceItem& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const auto evidence = pairing::from_metadata(item.data);
     line.update(evidence ? to_json(*evidence) : json{{"evidence", "unknown"}});
     return line;
 }
 
-json describe(const Received<clock::ClockMetadata>& item) {
+json describe(const clock::StampItem& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const auto told = clock::from_metadata(item.data);
     line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
@@ -98,56 +103,46 @@ json describe(const Received<clock::ClockMetadata>& item) {
 }
 
 /// The document itself, so that a script sees what the status command sees.
-json describe(const StatusStream& stream, const Received<ring::Metadata>& item) {
-    std::string text(item.payload_size, '\0');
+json describe(const StatusDocument& item) {
+    std::string text(item.payload.size(), '\0');
     json line = describe(static_cast<const ring::Item&>(item));
-    if (stream.copy(item, reinterpret_cast<std::byte*>(text.data())))
+    if (item.payload.copy_to(reinterpret_cast<std::byte*>(text.data())))
         line["status"] = json::parse(text, nullptr, false);
     return line;
 }
 
-template <class S, class D>
-json describe(const S& /*stream*/, const D& item) {
-    return describe(item);
-}
-
 std::string one_line(const json& line, bool as_json) {
-    if (as_json) return line.dump();
+    // Whatever bytes a name has.
+    constexpr auto replace = json::error_handler_t::replace;
+    if (as_json) return line.dump(-1, ' ', false, replace);
     std::string text;
     for (const auto& [key, value] : line.items())
-        text += fmt::format("{}{}={}", text.empty() ? "" : " ", key, value.dump());
+        text += fmt::format("{}{}={}", text.empty() ? "" : " ", key,
+                            value.dump(-1, ' ', false, replace));
     return text;
-}
-
-const char* remark(Found found) {
-    switch (found) {
-        case Found::restarted: return "the service was restarted";
-        case Found::gone: return "the service is gone; waiting for it";
-        default: return "";
-    }
 }
 
 template <class S>
 Expected<> print_stream(const TailSettings& settings) {
-    auto stream =
-        S::open(settings.stream, settings.instance,
-                settings.oldest ? ring::Reader::From::oldest : ring::Reader::From::newest);
+    StreamOptions options;
+    options.instance = settings.instance;
+    if (settings.oldest) options.start = Position::oldest;
+    auto stream = S::open(settings.stream, options);
     if (!stream) return Unexpected(stream.error());
-    Found last = Found::item;
+    bool gone = false;
     for (std::uint64_t printed = 0;
          (settings.count == 0 || printed < settings.count) && !settings.stop();) {
-        const auto item = stream->wait(milliseconds(200));
-        if (item.found == Found::item) {
-            fmt::print("{}\n", one_line(describe(*stream, item), settings.json));
+        const auto item = stream->next(settings.wait);
+        if (item) {
+            fmt::print("{}\n", one_line(describe(*item), settings.json));
             std::fflush(stdout);
             ++printed;
-        } else if (item.found == Found::lost) {
-            fmt::print(stderr, "versavis: {} items were overwritten before they were read\n",
-                       item.lost);
-        } else if (item.found != last && item.found != Found::nothing) {
-            fmt::print(stderr, "versavis: {}\n", remark(item.found));
+            gone = false;
+        } else if (item.error().why != Pause::nothing &&
+                   !(gone && item.error().why == Pause::gone)) {
+            fmt::print(stderr, "versavis: {}\n", item.error().message());
+            gone = item.error().why == Pause::gone;
         }
-        if (item.found != Found::nothing) last = item.found;
     }
     return {};
 }

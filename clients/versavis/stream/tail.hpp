@@ -7,6 +7,7 @@
 #include <string>
 
 #include "versavis/error.hpp"
+#include "versavis/time.hpp"
 
 namespace versavis::client {
 
@@ -17,6 +18,7 @@ struct TailSettings {
     bool json = false;
     bool oldest = false;  ///< begin with the oldest item that the ring still holds
     std::function<bool()> stop;
+    Duration wait = milliseconds(200);  ///< between looks at `stop`
 };
 
 /// Error: no such stream.

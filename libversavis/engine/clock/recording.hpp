@@ -56,7 +56,8 @@ struct ClockMetadata {
 };
 static_assert(sizeof(ClockMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 
-using ClockStream = Stream<ClockMetadata, ring::StreamKind::clock>;
+using StampItem = Typed<ClockMetadata>;
+using ClockStream = Stream<StampItem, ring::StreamKind::clock>;
 
 ClockMetadata to_metadata(const ClockItem& item);
 

@@ -84,8 +84,10 @@ struct OutputRelation {
 /// Thread-safe.
 class Translator {
  public:
-    explicit Translator(OutputClock output, PpsLabels labels = PpsLabels::off)
-        : output_(std::move(output)), pps_(labels) {}
+    /// `first_epoch`: the number of the first one, before the board was met.
+    explicit Translator(OutputClock output, PpsLabels labels = PpsLabels::off,
+                        std::uint32_t first_epoch = 0)
+        : first_epoch_(first_epoch), output_(std::move(output)), pps_(labels) {}
 
     /// The board began a new life: what was known of its clock is void, and a new epoch begins.
     void board_restarted();
@@ -127,7 +129,7 @@ class Translator {
  private:
     /// Epoch of stamps that are made by `output`.
     std::uint32_t epoch(const OutputReading& output) const {
-        return clock_life() + jumps_ + output.steps;
+        return first_epoch_ + clock_life() + jumps_ + output.steps;
     }
     std::uint32_t clock_life() const {
         return board_lives_ + static_cast<std::uint32_t>(filter_.restarts());
@@ -135,6 +137,7 @@ class Translator {
     void correct_link();
     std::optional<OutputEstimate> by_pps(BoardTime board, OutputTime by_link);
 
+    std::uint32_t first_epoch_;
     mutable std::mutex mutex_;
     EnvelopeFilter filter_;
     OutputClock output_;

@@ -53,14 +53,21 @@ constexpr Duration vn100_window = milliseconds(2);
 /// rate at which it is read.
 double part_rate(double rate_hz, bool data_ready) { return data_ready ? rate_hz : 4 * rate_hz; }
 
-/// ADIS16445, ADIS16448, ADIS16460, ADIS16470, by their data sheets: two averages in a row over
-/// 2^filter samples (a Bartlett window), then one over the samples that make one of the output.
-Duration adis_delay(double base_hz, bool octaves, unsigned filter, double rate_hz) {
-    const auto parts = std::llround(base_hz * 1e3) / std::llround(rate_hz * 1e3);
-    const double whole = static_cast<double>(std::clamp(parts, 1LL, octaves ? 1024LL : 2000LL));
-    const double averaged = octaves ? std::exp2(std::floor(std::log2(whole))) : whole;
-    const double taps = std::exp2(filter);
-    return {std::llround((taps - 1 + (averaged - 1) / 2) / base_hz * 1e9)};
+bool is_adis(const ImuModel& model) {
+    using wire::ImuKind;
+    constexpr std::array kinds{ImuKind::adis16445, ImuKind::adis16448a, ImuKind::adis16448b,
+                               ImuKind::adis16460, ImuKind::adis16470};
+    return std::find(kinds.begin(), kinds.end(), model.kind) != kinds.end();
+}
+
+/// How many samples of its own an ADIS averages for one of its output: any number, or for the
+/// older ones a power of two.
+double adis_averaged(const ImuModel& model, double rate_hz) {
+    using wire::ImuKind;
+    const bool any = model.kind == ImuKind::adis16460 || model.kind == ImuKind::adis16470;
+    const auto parts = std::llround(model.fastest_hz * 1e3) / std::llround(rate_hz * 1e3);
+    const double whole = static_cast<double>(std::clamp(parts, 1LL, any ? 2000LL : 1024LL));
+    return any ? whole : std::exp2(std::floor(std::log2(whole)));
 }
 
 /// ICM-42688-P, GYRO_ACCEL_CONFIG0: a half of the rate, or a part of the larger of it and 400 Hz.
@@ -78,11 +85,38 @@ double bmi088_bandwidth_hz(double rate_hz) {
     return 131;
 }
 
-FilterDelay known(Duration delay) { return {delay, adis_rest, DelaySource::model}; }
+Duration from_s(double seconds) { return {std::llround(seconds * 1e9)}; }
+
+/// By their data sheets: two averages in a row over 2^filter samples (a Bartlett window), then one
+/// over the samples that make one of the output.
+FilterDelay adis_delay(const ImuModel& model, unsigned filter, double rate_hz) {
+    const double samples = std::exp2(filter) - 1 + (adis_averaged(model, rate_hz) - 1) / 2;
+    return {from_s(samples / model.fastest_hz), adis_rest, DelaySource::model};
+}
 
 FilterDelay unknown(double bandwidth_hz) {
-    return {{}, {std::llround(periods_of_bandwidth / bandwidth_hz * 1e9)}, DelaySource::unknown};
+    return {{}, from_s(periods_of_bandwidth / bandwidth_hz), DelaySource::unknown};
 }
+
+/// Without the age of what the board reads.
+FilterDelay of_filters(const ImuModel& model, unsigned filter, double rate_hz) {
+    if (is_adis(model)) return adis_delay(model, filter, rate_hz);
+    if (model.kind == wire::ImuKind::icm42688p)
+        return unknown(icm42688p_bandwidth_hz(filter, rate_hz));
+    if (model.kind == wire::ImuKind::bmi088) return unknown(bmi088_bandwidth_hz(rate_hz));
+    return {{}, vn100_window, DelaySource::unknown};
+}
+
+/// What the board reads on its own grid is as old as anything up to this, a period of the part. A
+/// VN-100 sends by itself.
+double oldest_s(const ImuModel& model, double rate_hz, bool data_ready) {
+    if (data_ready || model.kind == wire::ImuKind::vn100) return 0;
+    const double rate = part_rate(rate_hz, data_ready);
+    return is_adis(model) ? adis_averaged(model, rate) / model.fastest_hz : 1 / rate;
+}
+
+/// Standard deviation of an age that is as likely to be new as `oldest_s`.
+double age_sigma_s(double oldest_s) { return oldest_s / std::sqrt(12); }
 
 }  // namespace
 
@@ -96,19 +130,18 @@ const char* to_string(DelaySource source) {
 }
 
 FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready) {
-    const double rate = part_rate(rate_hz, data_ready);
-    switch (model.kind) {
-        case wire::ImuKind::adis16445:
-        case wire::ImuKind::adis16448a:
-        case wire::ImuKind::adis16448b: return known(adis_delay(819.2, true, filter, rate));
-        case wire::ImuKind::adis16460: return known(adis_delay(2048, false, filter, rate));
-        case wire::ImuKind::adis16470: return known(adis_delay(2000, false, filter, rate));
-        case wire::ImuKind::icm42688p: return unknown(icm42688p_bandwidth_hz(filter, rate));
-        case wire::ImuKind::bmi088: return unknown(bmi088_bandwidth_hz(rate));
-        case wire::ImuKind::vn100:
-        case wire::ImuKind::none: break;
-    }
-    return {{}, vn100_window, DelaySource::unknown};
+    FilterDelay delay = of_filters(model, filter, part_rate(rate_hz, data_ready));
+    const double oldest = oldest_s(model, rate_hz, data_ready);
+    delay.delay = delay.delay + from_s(oldest / 2);
+    delay.sigma = from_s(std::hypot(static_cast<double>(delay.sigma.ns) * 1e-9,
+                                    age_sigma_s(oldest)));
+    return delay;
+}
+
+FilterDelay measured_delay(const ImuModel& model, double rate_hz, bool data_ready,
+                           Duration measured) {
+    return {measured, from_s(age_sigma_s(oldest_s(model, rate_hz, data_ready))),
+            DelaySource::configuration};
 }
 
 std::vector<std::string> model_names() {

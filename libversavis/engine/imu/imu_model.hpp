@@ -32,16 +32,20 @@ const ImuModel* find_model(const std::string& name);
 enum class DelaySource { unknown, model, configuration };
 const char* to_string(DelaySource source);
 
-/// How much later than the motion its sample is, by the filters that the part is set up with.
+/// How much later than the motion its sample is: by the filters that the part is set up with, and,
+/// without its data-ready line, by the age of what the board reads.
 struct FilterDelay {
     Duration delay;
     Duration sigma;  ///< one standard deviation
     DelaySource source = DelaySource::unknown;
 };
 
-/// Of a part set up for this strength and rate. Not in it: the age of a sample that the board reads
-/// without the part's data-ready line.
+/// Of a part set up for this strength and rate.
 FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz, bool data_ready);
+
+/// The same where the mean has been measured: what is left is the spread of the age.
+FilterDelay measured_delay(const ImuModel& model, double rate_hz, bool data_ready,
+                           Duration measured);
 
 /// Fills the physical quantities of `sample` and the age of its acceleration; times, number and
 /// epoch are the caller's.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstddef>
 #include <cstring>
 #include <type_traits>
@@ -23,6 +24,14 @@ static_assert(offsetof(Arrival, block_id) == 8 && offsetof(Arrival, arrived) == 
               offsetof(Arrival, size) == 56);
 static_assert(offsetof(Shortfall, reason) == 8 && offsetof(StartRequest, now) == 8);
 
+/// A bool is 0 or 1, whatever byte somebody stored.
+template <class Item, std::size_t size>
+void make_bools(std::array<unsigned char, size>& bytes) {
+    const auto make = [&](std::size_t at) { bytes[at] = bytes[at] != 0 ? 1 : 0; };
+    if constexpr (std::is_same_v<Item, Exposure>) make(offsetof(Exposure, exposed));
+    if constexpr (std::is_same_v<Item, Limits>) make(offsetof(Limits, camera_clock));
+}
+
 template <std::size_t index = 0>
 Expected<Evidence> read(const EvidenceMetadata& metadata) {
     if constexpr (index == std::variant_size_v<Evidence>) {
@@ -32,7 +41,12 @@ Expected<Evidence> read(const EvidenceMetadata& metadata) {
         if (metadata.kind != index + 1) return read<index + 1>(metadata);
         using Item = std::variant_alternative_t<index, Evidence>;
         Item item;
-        if constexpr (!std::is_empty_v<Item>) std::memcpy(&item, metadata.words, sizeof item);
+        if constexpr (!std::is_empty_v<Item>) {
+            std::array<unsigned char, sizeof item> bytes{};
+            std::memcpy(bytes.data(), metadata.words, sizeof item);
+            make_bools<Item>(bytes);
+            std::memcpy(&item, bytes.data(), sizeof item);
+        }
         return Evidence(item);
     }
 }

@@ -36,7 +36,8 @@ struct EvidenceMetadata {
 };
 static_assert(sizeof(EvidenceMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 
-using EvidenceStream = Stream<EvidenceMetadata, ring::StreamKind::evidence>;
+using EvidenceItem = Typed<EvidenceMetadata>;
+using EvidenceStream = Stream<EvidenceItem, ring::StreamKind::evidence>;
 
 EvidenceMetadata to_metadata(const Evidence& evidence);
 

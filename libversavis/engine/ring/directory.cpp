@@ -12,7 +12,9 @@
 #include <system_error>
 #include <utility>
 
+#include "client/process.hpp"
 #include "client/segment.hpp"
+#include "engine/ring/ending.hpp"
 
 namespace versavis::ring {
 
@@ -50,7 +52,7 @@ std::uint32_t living_writer(const std::filesystem::path& directory) {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
         const auto segment = Mapping::open(entry.path(), Mapping::Access::read_only);
-        if (!segment || is_own(segment->header())) continue;
+        if (!segment || is_own(segment->constants())) continue;
         const Constants& constants = segment->constants();
         if (start_ticks_of(constants.writer_pid) == constants.writer_start_ticks)
             return constants.writer_pid;
@@ -92,7 +94,9 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
 }
 
 OwnedDirectory::OwnedDirectory(OwnedDirectory&& other) noexcept
-    : path_(std::move(other.path_)), lock_(std::exchange(other.lock_, -1)) {}
+    : path_(std::move(other.path_)),
+      lock_(std::exchange(other.lock_, -1)),
+      epochs_(other.epochs_) {}
 
 OwnedDirectory::~OwnedDirectory() {
     if (lock_ >= 0) ::close(lock_);
@@ -104,9 +108,9 @@ void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {
         const std::string name = entry.path().filename();
         if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
         auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
-        if (segment && is_own(segment->header())) continue;
+        if (segment && is_own(segment->constants())) continue;
         std::filesystem::remove(entry.path(), error);
-        if (segment) retire(segment->header(), WriterState::closed);
+        if (segment) end(segment->header());
     }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/ring/epoch_block.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::ring {
@@ -27,11 +28,16 @@ class OwnedDirectory {
 
     const std::filesystem::path& path() const { return path_; }
 
+    /// Numbers of epochs, unique over all runs that used this directory.
+    EpochBlock& epochs() { return epochs_; }
+
  private:
-    OwnedDirectory(std::filesystem::path path, int lock) : path_(std::move(path)), lock_(lock) {}
+    OwnedDirectory(std::filesystem::path path, int lock)
+        : path_(std::move(path)), lock_(lock), epochs_(lock) {}
 
     std::filesystem::path path_;
     int lock_;
+    EpochBlock epochs_;  ///< in the file that is locked
 };
 
 }  // namespace versavis::ring

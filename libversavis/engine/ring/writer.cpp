@@ -13,7 +13,11 @@
 #include <random>
 #include <system_error>
 
+#include "client/process.hpp"
 #include "client/segment.hpp"
+#include "engine/ring/crowd.hpp"
+#include "engine/ring/ending.hpp"
+#include "engine/ring/room.hpp"
 
 namespace versavis::ring {
 
@@ -21,14 +25,14 @@ struct Writer::Segment {
     std::filesystem::path path;
     Mapping mapping;
     std::uint64_t head;
+    Crowd crowd;  ///< before the mapping goes, its thread ends
 
     Segment(std::filesystem::path file, Mapping mapped, std::uint64_t first)
         : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
     ~Segment() {
         const auto live = static_cast<std::uint32_t>(WriterState::live);
-        // Relaxed: a successor may be retiring this segment right now. Retired twice does no harm.
-        if (mapping.header().state.load(std::memory_order_relaxed) == live)
-            retire(mapping.header(), WriterState::closed);
+        // Relaxed: a successor may be retiring this segment right now. Ended twice does no harm.
+        if (mapping.header().state.load(std::memory_order_relaxed) == live) end(mapping.header());
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
         auto current = Mapping::open(path, Mapping::Access::read_only);
         if (current && current->constants().generation == mapping.constants().generation)
@@ -55,17 +59,20 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
             static_cast<std::uint8_t>(std::strtoul(text.substr(2 * i, 2).c_str(), nullptr, 16));
 }
 
-Expected<> allocate(const std::filesystem::path& path, std::uint64_t size) {
-    const int file = ::open(path.c_str(), O_CREAT | O_TRUNC | O_RDWR | O_CLOEXEC, 0640);
-    if (file < 0)
-        return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
-    const int error = ::posix_fallocate(file, 0, static_cast<off_t>(size));
-    ::close(file);
-    if (error == 0) return {};
+/// A file of its own, whatever lay there under this name. None of it is ever shared with somebody
+/// else's: a link left there is removed, not followed.
+Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) {
+    ::unlink(path.c_str());
+    File file(::open(path.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_RDWR | O_CLOEXEC, 0640));
+    if (!file || ::fchmod(file.descriptor(), 0640) != 0)  // whatever umask says
+        return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)),
+                       "does its directory belong to the service's user?");
+    const int error = ::posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
+    if (error == 0) return file;
     ::unlink(path.c_str());
     return failure(path.string(),
                    fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
-                   "configure fewer slots or enlarge /dev/shm");
+                   "lower 'slots' or 'history_s', or enlarge /dev/shm");
 }
 
 /// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
@@ -74,13 +81,30 @@ void release(const std::filesystem::path& path, const Mapping& dead) {
     const Constants& constants = dead.constants();
     for (std::uint32_t slot = 0; slot < constants.slot_count; ++slot)
         dead.generation(slot).fetch_add(2, std::memory_order_relaxed);
-    // SYNC 4: release fence here, acquire fence in Reader::intact(), as in Writer::acquire().
+    // SYNC 4: release fence here, acquire fence in Payload::valid(), as in Writer::acquire().
     std::atomic_thread_fence(std::memory_order_release);
     const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
     const auto begin = static_cast<off_t>(constants.slots_at);
     ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
                 static_cast<off_t>(constants.total_size) - begin);
     ::close(file);
+}
+
+/// Of the process that fills the header: no other one of this machine, ever, has the same.
+std::uint64_t life_of(const Header& header) {
+    std::uint64_t life = 0;
+    // Source of the mixing: the finalizer of SplitMix64, by S. Vigna.
+    const auto mix = [&life](std::uint64_t value) {
+        life += value + 0x9E3779B97F4A7C15U;
+        life = (life ^ life >> 30U) * 0xBF58476D1CE4E5B9U;
+        life = (life ^ life >> 27U) * 0x94D049BB133111EBU;
+        life ^= life >> 31U;
+    };
+    for (const std::uint8_t byte : header.boot_id) mix(byte);
+    mix(header.pid_namespace);
+    mix(header.writer_pid);
+    mix(header.writer_start_ticks);
+    return std::max<std::uint64_t>(life, 1);  // 0 is of segments that do not tell
 }
 
 void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
@@ -101,12 +125,23 @@ void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
     header.slots_at =
         round_up(header.generations_at + shape.slot_count * generation_stride, page_size);
     shape.name.copy(header.name, sizeof header.name);
+    header.pid_namespace = own_pid_namespace();
+    header.life = shape.life != 0 ? shape.life : life_of(header);
     header.head.store(shape.first_item, std::memory_order_relaxed);
     header.state.store(static_cast<std::uint32_t>(WriterState::live), std::memory_order_relaxed);
     header.heartbeat_ns.store(host_now().ns, std::memory_order_relaxed);
     // SYNC 7: release here, acquire in Mapping::open(): the magic says that all of the above is in
     // memory.
     header.magic.store(magic, std::memory_order_release);
+}
+
+/// In a ring that does not begin at 0, no descriptor may look as if it were ahead of its first
+/// item.
+void number_descriptors(const Mapping& mapping, std::uint64_t first) {
+    const std::uint64_t count = mapping.constants().descriptor_count;
+    for (std::uint64_t number = first; first != 0 && number < first + count; ++number)
+        mapping.descriptor(number).sequence.store(2 * (number - count) + 1,
+                                                  std::memory_order_relaxed);
 }
 
 std::uint64_t total_size(const Shape& shape) {
@@ -128,27 +163,36 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
     const auto temporary = directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
     auto old = Mapping::open(path, Mapping::Access::read_write);
-    auto allocated = allocate(temporary, size);
-    if (!allocated && old && !is_own(old->header())) {
+    const auto make = [&]() -> Expected<File> {
+        if (auto fits = check_room(path, size); !fits) return Unexpected(fits.error());
+        return make_file(temporary, size);
+    };
+    auto file = make();
+    if (!file && old && !is_own(old->constants())) {
         release(path, *old);
-        allocated = allocate(temporary, size);
+        file = make();
     }
-    if (!allocated) return Unexpected(allocated.error());
-    auto mapping = Mapping::open_unchecked(temporary, Mapping::Access::read_write);
+    if (!file) return Unexpected(file.error());
+    auto mapping =
+        Mapping::open_unchecked(file->descriptor(), temporary, Mapping::Access::read_write);
     if (!mapping) {
         ::unlink(temporary.c_str());
         return Unexpected(mapping.error());
     }
     fill_header(mapping->header(), shape, size);
     mapping->read_constants();
-    // The name points to the new segment before readers of the old one wake up and look for it.
+    number_descriptors(*mapping, shape.first_item);
+    // Superseded before the name changes: when this process dies in between, readers know at once
+    // that nothing more comes from the old one. They are woken when there is something to find.
+    if (old) supersede(old->header());
     if (::rename(temporary.c_str(), path.c_str()) != 0) {
         const int error = errno;
         ::unlink(temporary.c_str());
+        if (old && is_own(old->constants())) reinstate(old->header());
         return failure(path.string(),
                        fmt::format("cannot be renamed into place: {}", reason(error)));
     }
-    if (old) retire(old->header(), WriterState::superseded);
+    if (old) wake_readers(old->header());
     return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
 }
 
@@ -172,7 +216,7 @@ std::optional<std::uint32_t> Writer::acquire() {
     if (free_.empty()) return std::nullopt;
     const std::uint32_t slot = free_.front();
     free_.pop_front();
-    // SYNC 4: release fence here, acquire fence in Reader::intact(): the generation is odd before
+    // SYNC 4: release fence here, acquire fence in Payload::valid(): the generation is odd before
     // the first byte of the new payload is stored.
     segment_->mapping.generation(slot).fetch_add(1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
@@ -205,7 +249,7 @@ void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t lengt
     const std::uint64_t number = segment_->head++;
     Descriptor& descriptor = segment_->mapping.descriptor(number);
     descriptor.sequence.store(2 * number + 1, std::memory_order_relaxed);
-    // SYNC 3: release fence here, acquire fence in Reader::read_descriptor(): the sequence is odd
+    // SYNC 3: release fence here, acquire fence in Reader::read(): the sequence is odd
     // before the first word of the new item is stored.
     std::atomic_thread_fence(std::memory_order_release);
     descriptor.slot_generation.store(slot_generation, std::memory_order_relaxed);
@@ -213,14 +257,14 @@ void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t lengt
     descriptor.output_time_ns.store(time.ns, std::memory_order_relaxed);
     for (std::size_t i = 0; i < metadata_words; ++i)
         descriptor.metadata[i].store(metadata[i], std::memory_order_relaxed);
-    // SYNC 2: release here, acquire in Reader::read_descriptor(): words, payload and the slot's
+    // SYNC 2: release here, acquire in Reader::read(): words, payload and the slot's
     // generation are in memory before the sequence says so.
     descriptor.sequence.store(2 * number + 2, std::memory_order_release);
     // SYNC 1: release here, acquire in Reader::head(): the descriptor is complete before it counts.
     header.head.store(number + 1, std::memory_order_release);
-    // SYNC 5: release here, acquire in Reader::wait(): a reader that sees this sees the new head.
+    // SYNC 5: release here, acquire in Reader::next(): a reader that sees this sees the new head.
     header.wake.fetch_add(1, std::memory_order_release);
-    futex_wake(header.wake);
+    segment_->crowd.wake(header.wake);
 }
 
 }  // namespace versavis::ring

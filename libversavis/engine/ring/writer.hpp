@@ -23,6 +23,7 @@ struct Shape {
     std::uint32_t slot_count = 0;
     std::uint64_t slot_size = 0;   ///< bytes of payload that one slot holds; rounded up to pages
     std::uint64_t first_item = 0;  ///< number of the first item; tests start it near a wrap
+    std::uint64_t life = 0;        ///< 0: that of this process
 };
 
 /// Not thread-safe: one thread at a time may call it. Readers never block it.

@@ -110,12 +110,16 @@ Expected<> TomlFile::result() const {
 Expected<toml::table, TomlProblem> parse_toml(const std::string& path) {
     const auto text = read_file(path);
     if (!text) return Unexpected(text.error());
-    if (const auto deep = too_deep(path, *text))
+    return parse_toml(*text, path);
+}
+
+Expected<toml::table, TomlProblem> parse_toml(const std::string& text, const std::string& path) {
+    if (const auto deep = too_deep(path, text))
         return Unexpected(TomlProblem{*deep, "", "",
                                       fmt::format("more than {} dots on one line", most_dots),
                                       "no key is nested so deeply"});
     try {
-        return toml::parse(*text, path);
+        return toml::parse(text, path);
     } catch (const toml::parse_error& error) {
         return Unexpected(TomlProblem{place(path, error.source()), "", "",
                                       std::string(error.description()),

@@ -27,6 +27,9 @@ struct TomlFile {
 /// Parses `path`. Errors: it is no regular file, too large, too deep, or not valid TOML.
 Expected<toml::table, TomlProblem> parse_toml(const std::string& path);
 
+/// The same of a text that was read before; `path` is what problems call it.
+Expected<toml::table, TomlProblem> parse_toml(const std::string& text, const std::string& path);
+
 /// A key that is absent leaves its value as it is. finish() refuses keys that nobody asked for.
 class TableReader {
  public:

@@ -50,12 +50,18 @@ struct FrameMetadata {
     std::uint32_t pixel_format;  ///< PFNC code
     std::uint32_t epoch;         ///< trigger numbers and clocks are continuous within one
     std::uint32_t flags;         ///< ItemFlag
-    std::uint32_t
-        tick;  ///< grid point, modulo 2^32: equal for cameras of equal rate exposed together
-    std::int32_t delay_ns;  ///< of camera's and board's lines, already taken off all times
-    std::uint32_t reserved;
+    std::uint32_t tick_low;      ///< of tick()
+    std::int32_t delay_ns;       ///< of camera's and board's lines, already taken off all times
+    std::uint32_t tick_high;     ///< of tick()
 
     StampKind stamp_kind() const { return static_cast<StampKind>(flags & stamp_kind_mask); }
+
+    /// Grid point: equal for cameras that exposed together.
+    std::uint64_t tick() const { return std::uint64_t{tick_high} << 32U | tick_low; }
+    void set_tick(std::uint64_t tick) {
+        tick_low = static_cast<std::uint32_t>(tick);
+        tick_high = static_cast<std::uint32_t>(tick >> 32U);
+    }
 };
 
 struct ImuMetadata {

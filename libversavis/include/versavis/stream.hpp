@@ -2,73 +2,91 @@
 // Reading a stream by its name: frames, IMU samples, events or the status document.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "versavis/metadata.hpp"
+#include "versavis/pixel_format.hpp"
 #include "versavis/ring/path.hpp"
 #include "versavis/ring/reader.hpp"
 
 namespace versavis {
 
-using ring::Found;
+using ring::NoItem;
+using ring::Options;
+using ring::Pause;
+using ring::Position;
 
-/// What a stream gave: an item when `found` is Found::item, else why there is none.
+/// An item with its metadata by name.
 template <class Data>
-struct Received : ring::Item {
-    Data data{};
+struct Typed : ring::Item {
+    explicit Typed(ring::Item item)
+        : ring::Item(std::move(item)), data(unpack<Data>(this->metadata)) {}
+
+    Data data;
+};
+
+/// None: the payload holds fewer bytes than the metadata claim.
+VERSAVIS_API std::optional<ImageView> image_of(const FrameMetadata& frame,
+                                               const ring::Payload& payload);
+
+struct Frame : Typed<FrameMetadata> {
+    using Typed::Typed;
+
+    /// The pixels in place: what was read of them is good if valid() is true afterwards. None: the
+    /// payload holds fewer bytes than the metadata claim.
+    std::optional<ImageView> image() const { return image_of(data, payload); }
+};
+
+using ImuSample = Typed<ImuMetadata>;
+using Event = Typed<EventMetadata>;
+using StatusDocument = Typed<ring::Metadata>;  ///< the payload is the document
+
+/// Where a stream is found, and how it is read.
+struct StreamOptions : Options {
+    std::string instance = default_instance();
 };
 
 /// A typed reader of one stream. Not thread-safe; open one per thread.
-template <class Data, ring::StreamKind kind>
+template <class T, ring::StreamKind kind>
 class Stream {
  public:
-    /// Errors: no such stream, no permission, a stream of another kind.
-    static Expected<Stream> open(const std::string& name,
-                                 const std::string& instance = default_instance(),
-                                 ring::Reader::From from = ring::Reader::From::newest) {
-        auto reader = ring::Reader::open(stream_path(instance, name), from);
+    using Result = Expected<T, NoItem>;
+
+    /// Errors: no such stream, no permission, a stream of another kind, and those of Reader::open.
+    static Expected<Stream> open(const std::string& name, const StreamOptions& options = {}) {
+        if (!is_stream_name(name))
+            return failure(name, "is not a name of a stream", "see 'versavis list'");
+        auto reader = ring::Reader::open(stream_path(options.instance, name), options);
         if (!reader) return Unexpected(reader.error());
         if (reader->kind() != kind)
             return failure(name, "is a stream of another kind", "see 'versavis list'");
         return Stream(std::move(*reader));
     }
 
-    /// The next item, without waiting.
-    Received<Data> next() { return typed(reader_.next()); }
-
-    /// The next item, waiting for it up to `timeout`.
-    Received<Data> wait(Duration timeout) { return typed(reader_.wait(timeout)); }
-
-    /// True while the payload of `item` is untouched: what was read of it in place before this call
-    /// is good.
-    bool intact(const ring::Item& item) const { return reader_.intact(item); }
-
-    /// Copies the payload to `destination` of item.payload_size bytes; false when the writer
-    /// overtook the copy.
-    bool copy(const ring::Item& item, std::byte* destination) const {
-        return reader_.copy(item, destination);
-    }
+    /// See ring::Reader.
+    Result next() { return typed(reader_.next()); }
+    Result next(Duration timeout) { return typed(reader_.next(timeout)); }
+    Result latest(Duration timeout = {}) { return typed(reader_.latest(timeout)); }
 
     const ring::Reader& reader() const { return reader_; }
+    ring::Reader& reader() { return reader_; }
 
  private:
     explicit Stream(ring::Reader reader) : reader_(std::move(reader)) {}
 
-    static Received<Data> typed(const ring::Item& item) {
-        Received<Data> received;
-        static_cast<ring::Item&>(received) = item;
-        received.data = unpack<Data>(item.metadata);
-        return received;
+    static Result typed(ring::Received received) {
+        if (!received) return Unexpected<NoItem>(received.error());
+        return T(std::move(*received));
     }
 
     ring::Reader reader_;
 };
 
-using FrameStream = Stream<FrameMetadata, ring::StreamKind::frames>;
-using ImuStream = Stream<ImuMetadata, ring::StreamKind::imu>;
-using EventStream = Stream<EventMetadata, ring::StreamKind::events>;
-using StatusStream =
-    Stream<ring::Metadata, ring::StreamKind::status>;  ///< the payload is the document
+using FrameStream = Stream<Frame, ring::StreamKind::frames>;
+using ImuStream = Stream<ImuSample, ring::StreamKind::imu>;
+using EventStream = Stream<Event, ring::StreamKind::events>;
+using StatusStream = Stream<StatusDocument, ring::StreamKind::status>;
 
 }  // namespace versavis

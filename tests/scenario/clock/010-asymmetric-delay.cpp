@@ -10,7 +10,7 @@ using namespace versavis::clock_world;
 
 TEST_CASE(
     "clock 010: what stamps cannot show is within the bound, and what was measured is taken off") {
-    constexpr Duration longer = microseconds(120);
+    static constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
     settings.link = [](Random& random) {

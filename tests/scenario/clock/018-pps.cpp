@@ -10,7 +10,7 @@ using namespace versavis;
 using namespace versavis::clock_world;
 
 TEST_CASE("clock 018: PPS measures what the link does unequally, and stamps better than it") {
-    constexpr Duration longer = microseconds(120);
+    static constexpr Duration longer = microseconds(120);
     Settings settings;
     settings.length = seconds(200);
     settings.link = [](Random& random) {

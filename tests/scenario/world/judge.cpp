@@ -150,7 +150,8 @@ void World::judge_imu(unsigned port, std::string& out) {
     };
     const wire::ImuConfiguration& asked = configuration.imus[port];
     const Duration filtered_for =
-        imu::filter_delay(model, asked.filter, asked.rate_millihertz * 1e-3, paced).delay;
+        imu::filter_delay(model, asked.filter, (paced ? 1 : 4) * asked.rate_millihertz * 1e-3, true)
+            .delay;
     const double gyro_lsb =
         filtered_for.ns == 0 ? 0.6 : 0.7;  // an average also flattens the motion
     std::ptrdiff_t last_index = -1;
@@ -280,8 +281,8 @@ void World::judge_light(std::string& out) {
         if ((light.cameras >> output & 1U) == 0) continue;
         for (const TruePulse& pulse : model->pulses()) {
             if (!pulse.taken || pulse.end == 0 || pulse.fault == Fault::no_strobe) continue;
-            const bool lit =
-                std::any_of(lights_.begin(), lights_.end(), [&](const Interval& interval) {
+            const bool lit = std::any_of(
+                lights_.begin(), lights_.end(), [&, &model = model](const Interval& interval) {
                     const Nanoseconds latest =
                         pulse.start - light.lead_ns + model->settings().jitter + rounding();
                     return interval.on <= latest && interval.off >= pulse.end - rounding();

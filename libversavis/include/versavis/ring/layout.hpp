@@ -7,11 +7,11 @@
 // | pair   | word        | writer                      | reader                                  |
 // |--------|-------------|-----------------------------|-----------------------------------------|
 // | SYNC 1 | head        | release, write_descriptor() | acquire, Reader::head()                 |
-// | SYNC 2 | sequence    | release, 2n + 2 stored last | acquire, first load, read_descriptor()  |
+// | SYNC 2 | sequence    | release, 2n + 2 stored last | acquire, first load, Reader::read()     |
 // | SYNC 3 | sequence    | release fence after 2n + 1  | acquire fence before the second load    |
-// | SYNC 4 | generation  | release fence after odd     | acquire fence in intact()               |
-// | SYNC 5 | wake        | release, add                | acquire, Reader::wait() before next()   |
-// | SYNC 6 | state       | release, retire()           | acquire, Reader::writer_alive()         |
+// | SYNC 4 | generation  | release fence after odd     | acquire fence in Payload::valid()       |
+// | SYNC 5 | wake        | release, add                | acquire, Reader::next(timeout)          |
+// | SYNC 6 | state       | release, supersede()/end()  | acquire, writer_lives()                 |
 // | SYNC 7 | magic       | release, stored last        | acquire, Mapping::open()                |
 //
 // 1 and 2 publish: a reader that sees the number sees all that was written before it. 3 and 4
@@ -29,7 +29,7 @@ namespace versavis::ring {
 
 inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
 inline constexpr std::uint32_t abi_major = 1;
-inline constexpr std::uint32_t abi_minor = 4;
+inline constexpr std::uint32_t abi_minor = 5;
 inline constexpr std::size_t page_size = 4096;
 inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's generation
 inline constexpr std::size_t metadata_words = 12;
@@ -66,7 +66,9 @@ struct Header {
     std::uint64_t descriptors_at;
     std::uint64_t generations_at;
     std::uint64_t slots_at;
-    char name[64];  ///< zero-terminated
+    char name[64];                ///< zero-terminated
+    std::uint64_t life;           ///< random: equal in all segments that one run of a service made
+    std::uint64_t pid_namespace;  ///< inode of the writer's /proc/self/ns/pid; 0: unknown
 
     alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation (SYNC 1)
     alignas(128) std::atomic<std::uint32_t> wake;   ///< futex word: bumped by each publication and
@@ -92,6 +94,7 @@ static_assert(offsetof(Header, writer_start_ticks) == 56 &&
               offsetof(Header, descriptor_count) == 64);
 static_assert(offsetof(Header, slot_size) == 72 && offsetof(Header, descriptors_at) == 80);
 static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104);
+static_assert(offsetof(Header, life) == 168 && offsetof(Header, pid_namespace) == 176);
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
 static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
 static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128 &&

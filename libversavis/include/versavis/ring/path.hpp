@@ -15,6 +15,9 @@ VERSAVIS_API std::string default_instance();
 /// /dev/shm/versavis/<instance>
 VERSAVIS_API std::filesystem::path instance_directory(const std::string& instance);
 
+/// True when a stream can have this name: not empty, no '/', no '.' at its beginning.
+VERSAVIS_API bool is_stream_name(const std::string& name);
+
 /// /dev/shm/versavis/<instance>/<stream>
 VERSAVIS_API std::filesystem::path stream_path(const std::string& instance,
                                                const std::string& stream);

@@ -6,83 +6,139 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "versavis/error.hpp"
 #include "versavis/export.hpp"
 #include "versavis/ring/layout.hpp"
+#include "versavis/ring/payload.hpp"
 #include "versavis/time.hpp"
+
+namespace versavis {
+class WaitSet;
+}
 
 namespace versavis::ring {
 
-/// What a look at the ring found.
-enum class Found {
-    item,       ///< an item, the next in order
-    nothing,    ///< nothing new (in the time given)
-    lost,       ///< items were overwritten before they were read; reading continues with newer ones
-    restarted,  ///< the service was restarted; reading continues with its first item
-    gone,       ///< the writer has closed or died, and there is no new one yet; look again later
+struct FutexWord;
+struct WatchTarget;
+
+/// Why there is no item.
+enum class Pause : std::uint32_t {
+    nothing = 1,    ///< nothing new (in the time given)
+    lost = 2,       ///< items were overwritten before they were read
+    restarted = 3,  ///< the service was restarted: what comes next is its first item
+    gone = 4,       ///< the service has stopped or died, and there is no new one yet
+};
+
+/// There is no item. Whatever the reason, just call again: the reader goes on by itself.
+struct NoItem {
+    Pause why = Pause::nothing;
+    std::uint64_t lost = 0;  ///< with Pause::lost: how many
+
+    VERSAVIS_API std::string message() const;
 };
 
 struct Item {
-    Found found = Found::nothing;
-    std::uint64_t lost = 0;    ///< with Found::lost: how many
-    std::uint64_t number = 0;  ///< item number since the segment was made
+    std::uint64_t number = 0;  ///< since the segment was made
+    std::uint64_t life = 0;    ///< of the service that published it; 0: older than ABI 1.5
     OutputTime time;
     Metadata metadata{};
-    const std::byte* payload =
-        nullptr;  ///< in the ring, until the next call; check intact() after reading
-    std::uint32_t payload_size = 0;
-    std::uint32_t slot = no_slot;
-    std::uint64_t slot_generation = 0;
+    bool stale = false;  ///< its writer was dead, or had closed the stream, when this was read
+    Payload payload;
+
+    /// True while the payload has not been touched by the writer; always, without payload.
+    bool valid() const { return payload.valid(); }
+};
+
+using Received = Expected<Item, NoItem>;
+
+/// A place in the stream.
+enum class Position {
+    next,    ///< the item that will be published next
+    latest,  ///< the newest item that there is
+    middle,  ///< half a ring back, or less when it holds less
+    oldest,  ///< the oldest item that is not about to be overwritten
+};
+
+struct Options {
+    Position start = Position::next;
+    Position after_loss = Position::middle;  ///< where to go on when items were lost
+    /// User id that the stream must belong to. None: root, this process's user, that of the name in
+    /// $VERSAVIS_OWNER, or `versavis`.
+    std::optional<std::uint32_t> owner{};
 };
 
 /// Not thread-safe: one thread at a time may call it; any number of readers may exist.
 class VERSAVIS_API Reader {
  public:
-    enum class From { newest, oldest };
-
-    /// Maps `directory / name`. Errors: not there, not owned by the directory's owner, not a ring,
+    /// Maps `path`. Errors: not there, no permission, not owned by whom it should be, not a ring,
     /// unknown layout.
-    static Expected<Reader> open(const std::filesystem::path& path, From from = From::newest);
+    static Expected<Reader> open(const std::filesystem::path& path, const Options& options = {});
 
     Reader(Reader&&) noexcept;
     Reader& operator=(Reader&&) noexcept;
     ~Reader();
 
     /// The next item, without waiting.
-    Item next();
+    Received next();
 
-    /// The next item, waiting for it up to `timeout` in the kernel.
-    Item wait(Duration timeout);
+    /// The next item, waiting for it up to `timeout` in the kernel. That the service is gone is
+    /// told at once the first time, and from then on after `timeout`.
+    Received next(Duration timeout);
 
-    /// True while the payload of `item` has not been touched by the writer: what was read of it
-    /// before is good.
-    bool intact(const Item& item) const;
+    /// The newest item, passing over older ones without calling them lost; if it has been read
+    /// already, waits up to `timeout` for the next.
+    Received latest(Duration timeout = {});
 
-    /// Copies the payload (item.payload_size bytes) to `destination`; false when the writer
-    /// overtook the copy.
-    bool copy(const Item& item, std::byte* destination) const;
+    /// Sleeps until next() may have something to tell, for `timeout` at most.
+    void wait(Duration timeout);
+
+    /// Goes to a place among the items that there are.
+    void seek(Position position);
+
+    /// Goes to the oldest item from which on no output time is before `time`.
+    void seek(OutputTime time);
+
+    /// A file descriptor for poll or epoll, the reader's own: readable when a call of next() may
+    /// find something, until one finds nothing. Errors: no descriptor or thread to be had.
+    Expected<int> fd();
 
     StreamKind kind() const;
     const char* name() const;
+    std::uint64_t life() const;
     std::uint64_t head() const;      ///< items published so far
-    std::uint64_t retained() const;  ///< how many items can be read at any one time
+    std::uint64_t retained() const;  ///< how many items can be read at any one time, at most
     HostTime last_heartbeat() const;
     std::uint32_t writer_pid() const;
-    bool writer_found() const;  ///< its process runs, as far as this one can see
-    bool writer_alive()
-        const;  ///< its state is live and its heartbeat is younger than three seconds
+    bool writer_alive();  ///< its stream is open, its process there, and its heart beats
 
  private:
-    struct Segment;
-    Reader(std::filesystem::path path, std::unique_ptr<Segment> segment);
-    static Expected<std::unique_ptr<Segment>> map(const std::filesystem::path& path);
-    Item read_descriptor(std::uint64_t number) const;
-    Item lapped();
-    Item idle();
+    friend class versavis::WaitSet;
+    enum class Look { ready, not_yet, overwritten };
+    struct Contact;
+
+    Reader(std::filesystem::path path, const Options& options,
+           std::shared_ptr<const Mapping> mapping);
+    Look read(std::uint64_t number, Item& item) const;
+    bool readable(std::uint64_t number) const;
+    std::uint64_t oldest() const;
+    std::uint64_t place(Position position) const;
+    Received take();
+    Received look();
+    Received lapped();
+    Received hand_over();
+    Received settle();
+    bool writer_seen();
+    bool ready();
+    FutexWord wake_word() const;
+    WatchTarget target(std::uint32_t seen) const;
 
     std::filesystem::path path_;
-    std::unique_ptr<Segment> segment_;
+    Options options_;
+    std::shared_ptr<const Mapping> mapping_;
+    std::unique_ptr<Contact> contact_;
     std::uint64_t next_ = 0;
 };
 

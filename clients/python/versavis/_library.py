@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The C interface as it is: the structures and functions of versavis.h."""
+import ctypes
+import os
+from ctypes import POINTER, c_char_p, c_float, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import c_void_p
+from pathlib import Path
+
+NAME = "libversavis.so.0"
+
+OK, NOTHING, LOST, RESTARTED, GONE, OVERTAKEN = range(6)
+FRAMES, IMU, EVENTS, STATUS = range(1, 5)
+POSITIONS = {None: 0, "next": 1, "latest": 2, "middle": 3, "oldest": 4}
+SIGMA_UNKNOWN = 0xFFFFFFFF
+ANY_OWNER = -1
+MOST_CAMERAS = 16
+
+
+class ErrorText(ctypes.Structure):
+    _fields_ = [("message", ctypes.c_char * 512)]
+
+    def text(self):
+        return self.message.decode("utf-8", "replace")
+
+
+class Options(ctypes.Structure):
+    _fields_ = [("start", c_uint32), ("after_loss", c_uint32), ("owner", c_int64)]
+
+
+class FrameData(ctypes.Structure):
+    _fields_ = [
+        ("trigger", c_uint64), ("block_id", c_uint64), ("board_time", c_int64),
+        ("host_time", c_int64), ("arrival", c_int64), ("exposure", c_int64),
+        ("camera_time", c_int64), ("sigma", c_uint32), ("width", c_uint32), ("height", c_uint32),
+        ("stride", c_uint32), ("pixel_format", c_uint32), ("epoch", c_uint32),
+        ("flags", c_uint32), ("tick_low", c_uint32), ("delay", c_int32), ("tick_high", c_uint32),
+    ]
+
+
+class ImuData(ctypes.Structure):
+    _fields_ = [
+        ("board_time", c_int64), ("host_time", c_int64), ("number", c_uint64),
+        ("gyro", c_float * 3), ("accel", c_float * 3), ("magnetic", c_float * 3),
+        ("temperature", c_float), ("pressure", c_float), ("sigma", c_uint32),
+        ("epoch", c_uint32), ("flags", c_uint32), ("filter_delay", c_int64),
+        ("accel_age", c_int32), ("reserved", c_uint32),
+    ]
+
+
+class EventData(ctypes.Structure):
+    _fields_ = [
+        ("kind", c_uint32), ("source", c_uint32), ("reason", c_uint32), ("flags", c_uint32),
+        ("value", c_int64), ("board_time", c_int64), ("host_time", c_int64), ("sigma", c_uint32),
+        ("epoch", c_uint32), ("source_name", ctypes.c_char * 32), ("expected", c_int64),
+        ("count", c_uint32), ("reserved", c_uint32),
+    ]
+
+
+class ItemData(ctypes.Union):
+    _fields_ = [("frame", FrameData), ("imu", ImuData), ("event", EventData),
+                ("words", c_uint64 * 12)]
+
+
+class Item(ctypes.Structure):
+    _fields_ = [
+        ("number", c_uint64), ("life", c_uint64), ("lost", c_uint64), ("time", c_int64),
+        ("stale", c_uint32), ("kind", c_uint32), ("data", ItemData), ("payload", c_void_p),
+        ("payload_size", c_size_t), ("held", c_uint64 * 6),
+    ]
+
+
+class Image(ctypes.Structure):
+    _fields_ = [
+        ("data", c_void_p), ("width", c_uint32), ("height", c_uint32), ("stride", c_uint32),
+        ("pixel_format", c_uint32), ("channels", c_uint32), ("bytes_per_channel", c_uint32),
+    ]
+
+
+class SetsOptions(ctypes.Structure):
+    _fields_ = [("imu", c_char_p), ("patience", c_int64), ("partial", c_int32),
+                ("suspect", c_int32), ("streams", Options)]
+
+
+class ImuSample(ctypes.Structure):
+    _fields_ = [("time", c_int64), ("data", ImuData)]
+
+
+class Set(ctypes.Structure):
+    _fields_ = [
+        ("life", c_uint64), ("tick", c_uint64), ("epoch", c_uint32), ("present", c_uint32),
+        ("time", c_int64), ("spread", c_int64), ("frames", Item * MOST_CAMERAS),
+        ("imu", c_void_p), ("imu_count", c_size_t), ("imu_lost", c_uint64),
+        ("imu_covered", c_int32), ("reserved", c_uint32),
+    ]
+
+
+SIGNATURES = {
+    "version": (c_char_p, []),
+    "result_text": (c_char_p, [c_int]),
+    "open": (c_int, [c_char_p, c_char_p, POINTER(Options), POINTER(c_void_p),
+                     POINTER(ErrorText)]),
+    "close": (None, [c_void_p]),
+    "stream_kind": (c_int, [c_void_p]),
+    "next": (c_int, [c_void_p, POINTER(Item), c_int64]),
+    "latest": (c_int, [c_void_p, POINTER(Item), c_int64]),
+    "seek": (c_int, [c_void_p, c_uint32]),
+    "seek_time": (c_int, [c_void_p, c_int64]),
+    "fd": (c_int, [c_void_p, POINTER(ErrorText)]),
+    "valid": (c_int, [POINTER(Item)]),
+    "copy": (c_int, [POINTER(Item), c_void_p, c_size_t]),
+    "release": (None, [POINTER(Item)]),
+    "view": (c_int, [POINTER(Item), POINTER(Image)]),
+    "pixel_format_name": (c_char_p, [c_uint32]),
+    "event_name": (c_char_p, [c_uint32]),
+    "reason_name": (c_char_p, [c_uint32]),
+    "wait_set_new": (c_void_p, []),
+    "wait_set_free": (None, [c_void_p]),
+    "wait_set_add": (c_int, [c_void_p, c_void_p, POINTER(ErrorText)]),
+    "wait_set_wait": (c_int, [c_void_p, c_int64]),
+    "sets_open": (c_int, [c_char_p, POINTER(c_char_p), c_size_t, POINTER(SetsOptions),
+                          POINTER(c_void_p), POINTER(ErrorText)]),
+    "sets_close": (None, [c_void_p]),
+    "sets_next": (c_int, [c_void_p, POINTER(Set), c_int64]),
+    "sets_fd": (c_int, [c_void_p, POINTER(ErrorText)]),
+}
+
+
+class Functions:
+    """The functions of the library, by their names without the prefix versavis_."""
+
+    def __init__(self, library):
+        for name, (result, arguments) in SIGNATURES.items():
+            function = getattr(library, "versavis_" + name)
+            function.restype, function.argtypes = result, arguments
+            setattr(self, name, function)
+
+
+def candidates():
+    """Where the library may be: as named, or installed beside this package, or in the system."""
+    named = os.environ.get("VERSAVIS_LIBRARY")
+    if named:
+        return [named]
+    folders = Path(__file__).resolve().parents
+    near = []
+    if len(folders) > 3 and folders[2].name.startswith("python3"):
+        near = [*folders[3].glob(NAME), *folders[3].glob("*/" + NAME)]
+    return [*map(str, near), NAME]
+
+
+def load():
+    problem = None
+    for path in candidates():
+        try:
+            return Functions(ctypes.CDLL(path))
+        except (OSError, AttributeError) as error:
+            problem = error
+    raise ImportError(
+        f"{NAME} cannot be used ({problem}): install VersaVIS on this machine, its version as new "
+        "as this package's, or name the library's path in VERSAVIS_LIBRARY")
+
+
+functions = load()
+
+
+def library_version():
+    """The version of the library, as text."""
+    return functions.version().decode()
+
+
+def result_text(result):
+    """One sentence about a result."""
+    return functions.result_text(result).decode()

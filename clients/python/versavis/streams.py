@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Streams: waiting for items, going on after pauses, and waiting for several."""
+import contextlib
+import ctypes
+import os
+import pwd
+import threading
+import time
+
+from . import _library as library
+from .errors import Error, Gone, Lost, Nothing, Released, Restarted
+from .items import Held, typed
+
+# Of one sleep in the library, in seconds: Python handles signals in between. Half: twice as many
+# wake-ups in silence. Twice: Ctrl-C takes twice as long.
+SLICE = 0.1
+
+
+class Handle:
+    """What the library opened. It is closed when the last reference is gone, so never while a call
+    with it is under way; and only by the process that opened it: closing waits for a thread of the
+    library, which a forked child does not have."""
+
+    def __init__(self, pointer, close):
+        self.pointer = pointer
+        self._close = close
+        self._process = os.getpid()
+
+    def forked(self):
+        return self._process != os.getpid()
+
+    def __del__(self):
+        if not self.forked():
+            self._close(self.pointer)
+
+
+class Source:
+    """What gives one thing after the other: a stream, or sets of frames."""
+
+    def __init__(self, handle, name):
+        self.name = name
+        self.lost = 0  # items, so far
+        self.restarts = 0  # of the service, so far
+        self._handle = handle
+        self._lock = threading.RLock()  # the library takes one thread at a time
+        self._gone = False  # that was told
+        self._callback = None
+
+    def close(self):
+        """Ends it. Items that were read stay good."""
+        self._handle = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        """Waits for the next one, over all pauses."""
+        while True:
+            try:
+                return self.next()
+            except (Lost, Restarted, Gone) as pause:
+                if self._callback is not None:
+                    # Whoever keeps it keeps no frames by way of its traceback.
+                    self._callback(pause.with_traceback(None))
+
+    def next(self, timeout=None):
+        """The next one. Raises Nothing, Lost, Restarted or Gone."""
+        raise NotImplementedError
+
+    def on_pause(self, callback):
+        """Iteration then calls callback(pause) with each Lost, Restarted and Gone."""
+        self._callback = callback
+
+    @contextlib.contextmanager
+    def _opened(self):
+        """The library's pointer, for this thread alone."""
+        handle = self._handle
+        if handle is not None and handle.forked():
+            raise Error(f"{self.name} was opened before this process was forked: open it again")
+        with self._lock:
+            handle = self._handle
+            if handle is None:
+                raise Released(f"{self.name} is closed: open it again")
+            yield handle.pointer
+
+    def _wait(self, call, timeout):
+        """Calls call(pointer, ns) in slices until it gives something, or time is over. Returns
+        what it said last."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while True:
+            left = remaining(deadline)
+            with self._opened() as pointer:
+                result = call(pointer, nanoseconds(left))
+            told = self._gone
+            if result != library.NOTHING:
+                self._gone = result == library.GONE
+            waiting = result == library.NOTHING or (result == library.GONE and told)
+            if not waiting or left < SLICE:
+                return result
+
+    def _pause(self, result):
+        """What to raise instead of giving something."""
+        if result == library.RESTARTED:
+            self.restarts += 1
+        kinds = {library.NOTHING: Nothing, library.RESTARTED: Restarted, library.GONE: Gone}
+        return kinds.get(result, Error)(f"{self.name}: {library.result_text(result)}")
+
+    def _descriptor(self, function):
+        error = library.ErrorText()
+        with self._opened() as pointer:
+            descriptor = function(pointer, error)
+        if descriptor < 0:
+            raise Error(error.text())
+        return descriptor
+
+
+def remaining(deadline):
+    """Seconds to sleep at once."""
+    return SLICE if deadline is None else min(SLICE, max(0.0, deadline - time.monotonic()))
+
+
+def nanoseconds(seconds):
+    return int(seconds * 1e9)
+
+
+class Stream(Source):
+    """A stream of items. One thread waits at a time; others that call then wait for it."""
+
+    def __init__(self, handle, name):
+        super().__init__(handle, name)
+        self.kind = library.functions.stream_kind(handle.pointer)
+
+    def next(self, timeout=None):
+        """The next item, waiting up to timeout seconds (None: without end; 0: not at all).
+
+        Raises Nothing, Lost, Restarted or Gone: call again, and the stream goes on."""
+        return self._item(library.functions.next, timeout)
+
+    def latest(self, timeout=None):
+        """The newest item, passing over older ones; if it has been read, the next."""
+        return self._item(library.functions.latest, timeout)
+
+    def seek(self, position):
+        """To "next", "latest", "middle" or "oldest"."""
+        place = position_number(position)
+        with self._opened() as pointer:
+            library.functions.seek(pointer, place)
+
+    def seek_time(self, time_ns):
+        """To the oldest item from which on no output time is before time_ns."""
+        with self._opened() as pointer:
+            library.functions.seek_time(pointer, time_ns)
+
+    def fileno(self):
+        """For select, selectors and asyncio: readable when next(0) may find something, until it
+        raises Nothing or Gone. It belongs to the stream."""
+        return self._descriptor(library.functions.fd)
+
+    def _item(self, function, timeout):
+        held = Held(library.Item())
+        item = held.item
+        result = self._wait(lambda pointer, ns: function(pointer, item, ns), timeout)
+        if result == library.OK:
+            return typed(held)
+        if result == library.LOST:
+            self.lost += item.lost
+            text = f"{self.name}: {item.lost} items were overwritten before they were read"
+            raise Lost(text, item.lost)
+        raise self._pause(result)
+
+
+def position_number(position):
+    if position not in library.POSITIONS:
+        raise ValueError(f"'{position}' is no position: use next, latest, middle or oldest")
+    return library.POSITIONS[position]
+
+
+def owner_number(owner):
+    if owner is None:
+        return library.ANY_OWNER
+    if isinstance(owner, str):
+        try:
+            return pwd.getpwnam(owner).pw_uid
+        except KeyError:
+            raise Error(f"there is no user '{owner}' who could own the streams") from None
+    return int(owner)
+
+
+def encoded(text):
+    return None if text is None else os.fsencode(text)
+
+
+def stream_options(start, after_loss, owner):
+    return library.Options(position_number(start), position_number(after_loss),
+                           owner_number(owner))
+
+
+def open(name, instance=None, start="next", after_loss=None, owner=None):
+    """Opens a stream, as "cam0", "imu0", "events" or "status".
+
+    instance: of the service; None: that of $VERSAVIS_INSTANCE, or "default".
+    start, after_loss: "next", "latest", "middle" or "oldest": where to begin, and where to go on
+    when items were lost (None: "middle").
+    owner: user, by name or number, to whom the streams must belong; None: root, oneself, or
+    "versavis", or whom $VERSAVIS_OWNER names.
+
+    Raises Error with what to do."""
+    options = stream_options(start, after_loss, owner)
+    pointer, error = ctypes.c_void_p(), library.ErrorText()
+    result = library.functions.open(encoded(instance), encoded(name), options, pointer, error)
+    if result != library.OK:
+        raise Error(error.text())
+    return Stream(Handle(pointer, library.functions.close), name)
+
+
+def wait(streams, timeout=None):
+    """Sleeps until next() of one of the streams has something to tell, up to timeout seconds.
+
+    Returns the list of those that have; empty: nothing in time."""
+    streams = list(streams)
+    if not streams:
+        raise ValueError("wait() needs streams to wait for")
+    deadline = None if timeout is None else time.monotonic() + timeout
+    while True:
+        left = remaining(deadline)
+        found = wait_once(streams, left)
+        if found or left < SLICE:
+            return [stream for i, stream in enumerate(streams) if i in found]
+
+
+def wait_once(streams, seconds):
+    """The numbers of those that have something; one sleep."""
+    with contextlib.ExitStack() as stack:
+        pointers = {}
+        for i, stream in sorted(enumerate(streams), key=lambda pair: id(pair[1])):
+            pointers[i] = stack.enter_context(stream._opened())
+        waiting = library.functions.wait_set_new()
+        if not waiting:
+            raise MemoryError("no memory to wait for several streams")
+        stack.callback(library.functions.wait_set_free, waiting)
+        for i in range(len(streams)):
+            error = library.ErrorText()
+            if library.functions.wait_set_add(waiting, pointers[i], error) != library.OK:
+                raise Error(error.text())
+        return all_ready(waiting, nanoseconds(seconds))
+
+
+def all_ready(waiting, nanoseconds_left):
+    """Streams take turns: when one comes again, all that have something were named."""
+    found = set()
+    which = library.functions.wait_set_wait(waiting, nanoseconds_left)
+    while which >= 0 and which not in found:
+        found.add(which)
+        which = library.functions.wait_set_wait(waiting, 0)
+    return found

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a camera turned between consecutive frames, from features that are tracked in them.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "evaluate/camera_model.hpp"
+#include "evaluate/grey_image.hpp"
+#include "evaluate/rotation_offset.hpp"
+#include "versavis/error.hpp"
+
+namespace versavis::client {
+
+class FeatureRotation {
+ public:
+    /// Error: built without OpenCV.
+    static Expected<FeatureRotation> create(const CameraModel& camera);
+
+    FeatureRotation(FeatureRotation&&) noexcept;
+    FeatureRotation& operator=(FeatureRotation&&) noexcept;
+    ~FeatureRotation();
+
+    /// The rotation since the frame before. None: of the first frame, or where too few features
+    /// agree. Error: the frame's size changed.
+    Expected<std::optional<FrameRotation>> add(GreyImage image, OutputTime time);
+
+ private:
+    struct Tracker;
+    explicit FeatureRotation(std::unique_ptr<Tracker> tracker);
+
+    std::unique_ptr<Tracker> tracker_;
+};
+
+}  // namespace versavis::client

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A frame as grey of 8 bits, for programs that look for corners.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "evaluate/grey_picture.hpp"
+
+namespace versavis::client {
+
+struct GreyImage {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    std::vector<std::uint8_t> pixels;  ///< row by row
+};
+
+/// Of a Bayer mosaic (`pixel_format`) each pixel is the mean of itself and its neighbours to the
+/// right and below: the image then lies half a pixel further left and up.
+GreyImage grey_image(const GreyPicture& picture, std::uint32_t pixel_format);
+
+}  // namespace versavis::client

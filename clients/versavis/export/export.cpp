@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "export/export.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "export/bag_export.hpp"
+#include "export/csv_export.hpp"
+#include "export/euroc_export.hpp"
+#include "export/export_directory.hpp"
+#include "export/text_file.hpp"
+#include "versavis/pixel_format.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+constexpr auto camchain_attachment = "calibration/camchain.yaml";
+constexpr auto imu_attachment = "calibration/imu.yaml";
+
+struct NamedText {
+    std::string where;
+    std::string text;
+};
+
+/// The file that the user named, else the attachment; none: there is neither.
+Expected<std::optional<NamedText>> find_yaml(const Recording& recording, const std::string& file,
+                                             const char* attachment) {
+    if (file.empty()) {
+        const Attachment* found = recording.attachment(attachment);
+        if (found == nullptr) return std::optional<NamedText>();
+        return std::optional(NamedText{fmt::format("attachment {}", attachment), found->content});
+    }
+    std::ifstream in(file, std::ios::binary);
+    if (!in) return failure(file, "cannot be read", "check its name and permissions");
+    return std::optional(NamedText{file, std::string(std::istreambuf_iterator<char>(in), {})});
+}
+
+/// By their topics where all of them name a camera, else by their order.
+void assign_cameras(std::vector<CalibratedCamera> known, const Selection& selection,
+                    ExportReport& report, ExportCalibration& calibration) {
+    const auto place_of = [&](const CalibratedCamera& camera) {
+        std::size_t i = 0;
+        while (i < selection.cameras.size() &&
+               camera.topic != image_topic(selection.cameras[i].name))
+            ++i;
+        return i;
+    };
+    const bool by_topic = std::all_of(known.begin(), known.end(), [&](const auto& camera) {
+        return place_of(camera) < selection.cameras.size();
+    });
+    if (!by_topic && known.size() != selection.cameras.size()) {
+        report.notes.push_back(fmt::format(
+            "the camchain has {} cameras, and their topics do not name the {} of the recording: it "
+            "is not used",
+            known.size(), selection.cameras.size()));
+        return;
+    }
+    for (std::size_t i = 0; i < known.size(); ++i)
+        calibration.cameras[by_topic ? place_of(known[i]) : i] = known[i];
+    if (!by_topic) report.notes.emplace_back("cameras of the camchain are taken in their order");
+    for (std::size_t i = 0; i < selection.cameras.size(); ++i) {
+        auto& camera = calibration.cameras[i];
+        if (!camera) continue;
+        const auto& selected = selection.cameras[i];
+        if (camera->width == selected.width && camera->height == selected.height) continue;
+        report.notes.push_back(fmt::format(
+            "{} was calibrated with {} x {} pixels and recorded with {} x {}: its "
+            "calibration is not used",
+            selected.name, camera->width, camera->height, selected.width, selected.height));
+        camera.reset();
+    }
+}
+
+Expected<ExportCalibration> find_calibration(const Recording& recording,
+                                             const ExportSettings& settings, ExportReport& report) {
+    ExportCalibration calibration;
+    calibration.cameras.resize(report.selection.cameras.size());
+    const auto chain = find_yaml(recording, settings.camchain, camchain_attachment);
+    const auto noise = find_yaml(recording, settings.imu_yaml, imu_attachment);
+    if (!chain) return Unexpected(chain.error());
+    if (!noise) return Unexpected(noise.error());
+    if (*chain) {
+        auto cameras = parse_camchain((*chain)->text, (*chain)->where);
+        if (!cameras) return Unexpected(cameras.error());
+        assign_cameras(std::move(*cameras), report.selection, report, calibration);
+    }
+    if (*noise) {
+        const auto parsed = parse_imu_noise((*noise)->text, (*noise)->where);
+        if (!parsed) return Unexpected(parsed.error());
+        calibration.noise = *parsed;
+    } else if (!report.selection.imus.empty()) {
+        report.notes.emplace_back(
+            "the IMU's noise is not known, so there is no imu.yaml: give a file with --imu");
+    }
+    return calibration;
+}
+
+Expected<> write_kalibr(const Selection& selection, const ExportCalibration& calibration,
+                        const std::filesystem::path& directory) {
+    std::vector<CalibratedCamera> cameras;
+    for (std::size_t i = 0; i < selection.cameras.size(); ++i) {
+        if (!calibration.cameras[i]) break;  // a chain has no holes
+        cameras.push_back(*calibration.cameras[i]);
+        cameras.back().key = fmt::format("cam{}", i);
+        cameras.back().topic = image_topic(selection.cameras[i].name);
+    }
+    if (!cameras.empty())
+        if (auto written = write_text(directory / "camchain.yaml", camchain_text(cameras));
+            !written)
+            return written;
+    for (std::size_t i = 0; i < selection.imus.size() && calibration.noise; ++i) {
+        const auto& imu = selection.imus[i];
+        const std::string name = i == 0 ? "imu.yaml" : fmt::format("imu{}.yaml", i);
+        if (auto written = write_text(
+                directory / name, imu_text(*calibration.noise, imu_topic(imu.name), imu.rate_hz));
+            !written)
+            return written;
+    }
+    return {};
+}
+
+Expected<> write_left_out(const Selection& selection, const std::filesystem::path& directory) {
+    std::string text = "stream,time_ns,number,tick,reason\n";
+    for (const auto& item : selection.left_out)
+        text += fmt::format("{},{},{},{},{}\n", selection.stream(item.stream), item.time.ns,
+                            item.number, item.tick, to_string(item.reason));
+    return write_text(directory / "left_out.csv", text);
+}
+
+void note_peculiarities(const std::vector<ExportFormat>& formats, ExportReport& report) {
+    const Selection& selection = report.selection;
+    for (std::size_t i = 0; i < formats.size(); ++i) {
+        const auto& camera = selection.cameras[i];
+        if (formats[i].shift != 0)
+            report.notes.push_back(
+                fmt::format("{}: words of {} are shifted left by {} bits, to the scale of 16 bits",
+                            camera.name, pixel_format_name(camera.pixel_format), formats[i].shift));
+        if (formats[i].encoding.starts_with("bayer"))
+            report.notes.push_back(
+                fmt::format("{}: images are the sensor's mosaic ({}), not colours", camera.name,
+                            formats[i].encoding));
+    }
+    for (const auto& imu : selection.imus) {
+        if (imu.samples == 0)
+            report.notes.push_back(fmt::format("{}: has no sample to export", imu.name));
+        if (imu.accel_age_ns != 0)
+            report.notes.push_back(fmt::format(
+                "{}: accelerations are up to {:.3f} ms older than the angular rates in their row; "
+                "the column accel_age_ns of its metadata says by how much",
+                imu.name, imu.accel_age_ns / 1e6));
+    }
+}
+
+void note_recording(const Recording& recording, ExportReport& report) {
+    if (!recording.facts().defect.empty())
+        report.notes.push_back(fmt::format("the recording: {}; exported is what can be read",
+                                           recording.facts().defect));
+    const auto gaps = recording.gaps();
+    if (!gaps) return;
+    std::map<std::string, std::uint64_t> lost;
+    for (const auto& gap : *gaps)
+        if (gap.reason == "lost") lost[gap.stream] += gap.items;
+    for (const auto& [stream, items] : lost)
+        report.notes.push_back(
+            fmt::format("{}: {} items were lost while recording", stream, items));
+}
+
+Expected<> export_selected(const Recording& recording, const ExportSettings& settings,
+                           const std::filesystem::path& directory, ExportReport& report) {
+    auto selection = select_items(recording, settings.choice, settings.watch);
+    if (!selection) return Unexpected(selection.error());
+    report.selection = std::move(*selection);
+    std::vector<ExportFormat> formats;
+    for (const auto& camera : report.selection.cameras) {
+        if (camera.width == 0) {  // no frame at all
+            formats.emplace_back();
+            continue;
+        }
+        auto format = export_format(camera.name, camera.pixel_format);
+        if (!format) return Unexpected(format.error());
+        formats.push_back(*format);
+    }
+    const auto calibration = find_calibration(recording, settings, report);
+    if (!calibration) return Unexpected(calibration.error());
+    note_peculiarities(formats, report);
+    const auto stem = std::filesystem::path(settings.recording).stem().string();
+    auto written =
+        settings.kind == ExportKind::euroc
+            ? export_euroc(recording, report.selection, formats, *calibration, directory,
+                           settings.watch)
+            : export_bag(recording, report.selection, formats, directory / (stem + ".bag"),
+                         settings.compression, settings.watch);
+    if (!written) return written;
+    if (auto kalibr = write_kalibr(report.selection, *calibration, directory); !kalibr)
+        return kalibr;
+    return write_left_out(report.selection, directory);
+}
+
+using Counts = std::map<std::string, std::map<std::string, std::uint64_t>>;
+
+Counts count_left_out(const Selection& selection) {
+    Counts counts;
+    for (const auto& item : selection.left_out)
+        ++counts[selection.stream(item.stream)][to_string(item.reason)];
+    return counts;
+}
+
+std::string left_out_text(const Counts& counts, const std::string& stream) {
+    const auto found = counts.find(stream);
+    if (found == counts.end()) return "";
+    std::string text;
+    for (const auto& [reason, count] : found->second)
+        text += fmt::format("{}{} {}", text.empty() ? "; left out: " : ", ", count, reason);
+    return text;
+}
+
+nlohmann::json as_json(const ExportReport& report) {
+    const Counts counts = count_left_out(report.selection);
+    nlohmann::json streams = nlohmann::json::array();
+    const auto add = [&](const std::string& name, std::uint64_t items, double rate) {
+        const auto found = counts.find(name);
+        streams.push_back({{"name", name},
+                           {"exported", items},
+                           {"rate_hz", rate},
+                           {"left_out", found == counts.end() ? nlohmann::json::object()
+                                                              : nlohmann::json(found->second)}});
+    };
+    for (const auto& one : report.selection.cameras) add(one.name, one.frames, one.rate_hz);
+    for (const auto& one : report.selection.imus) add(one.name, one.samples, one.rate_hz);
+    return {{"directory", report.directory},
+            {"sets", report.selection.sets},
+            {"streams", streams},
+            {"files", report.written},
+            {"notes", report.notes}};
+}
+
+}  // namespace
+
+std::string image_topic(const std::string& camera) { return "/" + camera + "/image_raw"; }
+std::string imu_topic(const std::string& imu) { return "/" + imu; }
+
+Expected<ExportReport> export_recording(const ExportSettings& settings) {
+    const auto recording = Recording::open(settings.recording);
+    if (!recording) return Unexpected(recording.error());
+    auto directory = ExportDirectory::create(settings.directory);
+    if (!directory) return Unexpected(directory.error());
+    ExportReport report;
+    report.directory = settings.directory;
+    if (settings.kind == ExportKind::csv) {
+        auto written =
+            export_csv(*recording, settings.choice.streams, directory->part(), settings.watch);
+        if (!written) return Unexpected(written.error());
+        report.written = std::move(*written);
+    } else if (auto written = export_selected(*recording, settings, directory->part(), report);
+               !written) {
+        return Unexpected(written.error());
+    }
+    note_recording(*recording, report);
+    if (auto finished = directory->finish(); !finished) return Unexpected(finished.error());
+    return report;
+}
+
+std::string to_text(const ExportReport& report, bool json) {
+    if (json)
+        return as_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
+               "\n";
+    const Counts counts = count_left_out(report.selection);
+    std::string text = report.directory + ":\n";
+    if (report.selection.cameras.size() > 1)
+        text += fmt::format("  {} sets of {} cameras\n", report.selection.sets,
+                            report.selection.cameras.size());
+    for (const auto& one : report.selection.cameras)
+        text += fmt::format("  {}: {} frames, {:.2f} Hz{}\n", one.name, one.frames, one.rate_hz,
+                            left_out_text(counts, one.name));
+    for (const auto& one : report.selection.imus)
+        text += fmt::format("  {}: {} samples, {:.2f} Hz, longest gap {:.1f} ms{}\n", one.name,
+                            one.samples, one.rate_hz, static_cast<double>(one.longest_gap.ns) / 1e6,
+                            left_out_text(counts, one.name));
+    for (const auto& file : report.written) text += "  " + file + "\n";
+    if (!report.selection.left_out.empty())
+        text += "  what was left out is listed in left_out.csv\n";
+    for (const auto& note : report.notes) text += "  note: " + note + "\n";
+    return text;
+}
+
+}  // namespace versavis::client

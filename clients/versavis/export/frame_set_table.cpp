@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "export/frame_set_table.hpp"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+namespace versavis::client {
+
+namespace {
+
+using Key = std::tuple<std::uint64_t, std::uint32_t, std::uint64_t>;
+
+std::optional<Key> key_of(const TableFrame& frame) {
+    if (!frame.tick) return std::nullopt;
+    return Key{frame.life, frame.epoch, *frame.tick};
+}
+
+using Index = std::map<Key, std::size_t>;
+
+/// Of two frames with one key the first counts.
+Index index_of(const std::vector<TableFrame>& frames) {
+    Index index;
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        if (const auto key = key_of(frames[i]); key && frames[i].left_out == LeftOut::no)
+            index.emplace(*key, i);
+    return index;
+}
+
+/// Empty: one is missing.
+std::vector<std::size_t> partners(const std::vector<Index>& others, const TableFrame& frame) {
+    std::vector<std::size_t> found;
+    const auto key = key_of(frame);
+    for (const Index& index : others) {
+        const auto partner = key ? index.find(*key) : index.end();
+        if (partner == index.end()) return {};
+        found.push_back(partner->second);
+    }
+    return found;
+}
+
+}  // namespace
+
+const char* to_string(LeftOut reason) {
+    switch (reason) {
+        case LeftOut::no: return "exported";
+        case LeftOut::suspect: return "suspect";
+        case LeftOut::arrival: return "arrival_only";
+        case LeftOut::incomplete: return "incomplete_set";
+        case LeftOut::outside_imu: return "outside_imu";
+        case LeftOut::not_later: return "not_later";
+        case LeftOut::repeated: return "repeated";
+        case LeftOut::no_pixels: return "no_pixels";
+        case LeftOut::another_size: return "another_size";
+    }
+    return "unknown";
+}
+
+bool FrameSetTable::inside(const FrameSet& set, OutputTime after, OutputTime before) const {
+    for (std::size_t camera = 0; camera < frames_.size(); ++camera) {
+        const OutputTime time = frames_[camera][set.frames[camera]].time;
+        if (time <= after || time >= before) return false;
+    }
+    return true;
+}
+
+void FrameSetTable::mark(const FrameSet& set, LeftOut reason) {
+    for (std::size_t camera = 0; camera < frames_.size(); ++camera)
+        frames_[camera][set.frames[camera]].left_out = reason;
+}
+
+std::vector<FrameSet> FrameSetTable::pair(OutputTime after, OutputTime before) {
+    std::vector<FrameSet> sets;
+    if (frames_.empty()) return sets;
+    std::vector<Index> others;
+    for (std::size_t camera = 1; camera < frames_.size(); ++camera)
+        others.push_back(index_of(frames_[camera]));
+    std::vector<std::vector<bool>> paired;
+    for (const auto& frames : frames_) paired.emplace_back(frames.size(), false);
+    for (std::size_t i = 0; i < frames_[0].size(); ++i) {
+        const TableFrame& first = frames_[0][i];
+        if (first.left_out != LeftOut::no) continue;
+        FrameSet set{first.time, partners(others, first)};
+        if (set.frames.size() != others.size()) continue;
+        set.frames.insert(set.frames.begin(), i);
+        // A second frame of the first camera with the same tick finds its partners taken.
+        if (frames_.size() > 1 && paired[1][set.frames[1]]) continue;
+        for (std::size_t camera = 0; camera < frames_.size(); ++camera)
+            paired[camera][set.frames[camera]] = true;
+        if (!inside(set, after, before))
+            mark(set, LeftOut::outside_imu);
+        else if (!sets.empty() && set.name <= sets.back().name)
+            mark(set, LeftOut::not_later);
+        else
+            sets.push_back(std::move(set));
+    }
+    for (std::size_t camera = 0; camera < frames_.size(); ++camera)
+        for (std::size_t i = 0; i < frames_[camera].size(); ++i)
+            if (frames_[camera][i].left_out == LeftOut::no && !paired[camera][i])
+                frames_[camera][i].left_out = LeftOut::incomplete;
+    return sets;
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Frames of several cameras as sets, and for each frame that is in none why it is not.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "recording/recording.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::client {
+
+/// Why something is not exported.
+enum class LeftOut : std::uint8_t {
+    no,
+    suspect,       ///< its pairing is not proved, or the sensor reported a fault
+    arrival,       ///< its stamp is only that of its arrival
+    incomplete,    ///< another camera has no frame of the same tick
+    outside_imu,   ///< there is no IMU sample before it, or none after it
+    not_later,     ///< its stamp is not later than the one before: another epoch
+    repeated,      ///< an IMU sample with the data of the one before
+    no_pixels,     ///< the file has no image for it
+    another_size,  ///< its size or format is not that of the camera's first frame
+};
+const char* to_string(LeftOut reason);
+
+struct TableFrame {
+    OutputTime time;
+    std::uint64_t number;  ///< in its ring
+    std::uint64_t life;
+    std::uint32_t epoch;
+    std::optional<std::uint64_t> tick;  ///< none: not triggered
+    ItemPlace place;
+    LeftOut left_out = LeftOut::no;
+};
+
+/// Frames that belong together: one of each camera, as indices.
+struct FrameSet {
+    OutputTime name;  ///< stamp of the first camera's frame
+    std::vector<std::size_t> frames;
+};
+
+class FrameSetTable {
+ public:
+    explicit FrameSetTable(std::size_t cameras) : frames_(cameras) {}
+
+    void add(std::size_t camera, const TableFrame& frame) { frames_[camera].push_back(frame); }
+
+    /// Sets that have a frame of each camera, equal in life, epoch and tick; all stamps lie after
+    /// `after` and before `before`, and names increase. Marks the frames that are in none.
+    std::vector<FrameSet> pair(OutputTime after, OutputTime before);
+
+    const std::vector<TableFrame>& frames(std::size_t camera) const { return frames_[camera]; }
+
+ private:
+    bool inside(const FrameSet& set, OutputTime after, OutputTime before) const;
+    void mark(const FrameSet& set, LeftOut reason);
+
+    std::vector<std::vector<TableFrame>> frames_;
+};
+
+}  // namespace versavis::client

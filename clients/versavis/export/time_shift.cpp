@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "export/time_shift.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace versavis::client {
+
+namespace {
+
+double filter_s(const TimeShift& shift) { return static_cast<double>(shift.taken_off.ns) / 1e9; }
+
+nlohmann::json as_json(const TimeShift& shift) {
+    nlohmann::json cameras = nlohmann::json::array();
+    for (const auto& one : shift.cameras)
+        cameras.push_back({{"camera", one.camera}, {"timeshift_cam_imu_s", one.shift_s}});
+    nlohmann::json json{
+        {"cameras", cameras}, {"filter_delay_taken_off_us", nullptr}, {"filter_delay_us", nullptr}};
+    if (shift.known) {
+        json["filter_delay_taken_off_us"] = filter_s(shift) * 1e6;
+        if (shift.total_s >= 0) json["filter_delay_us"] = shift.total_s * 1e6;
+    }
+    return json;
+}
+
+std::string advice(const TimeShift& shift) {
+    if (!shift.known)
+        return "name the recording with --recording: its stamps are already without the delay of "
+               "the IMU's filter, and the configured value is the sum\n";
+    std::string text = fmt::format(
+        "the recorded stamps are without {:.3f} ms of filter delay; with that the IMU is {:.3f} ms "
+        "behind {}",
+        filter_s(shift) * 1e3, shift.total_s * 1e3, shift.cameras.front().camera);
+    if (shift.total_s > 0 && shift.taken_off.ns > 0)
+        text += fmt::format(", {:.1f} % of which its filter explains",
+                            100 * filter_s(shift) / shift.total_s);
+    if (shift.total_s < 0)
+        return text +
+               "\nno delay of the IMU explains that: the camera's stamps are late, see its "
+               "line delays\n";
+    return text +
+           fmt::format("\nin the IMU's table of the configuration:\nfilter_delay_us = {:.1f}\n",
+                       shift.total_s * 1e6);
+}
+
+}  // namespace
+
+Expected<TimeShift> time_shift(const std::vector<CalibratedCamera>& cameras,
+                               const std::optional<Duration>& taken_off, const std::string& where) {
+    TimeShift shift;
+    for (const auto& camera : cameras)
+        if (camera.time_shift_s) shift.cameras.push_back({camera.key, *camera.time_shift_s});
+    if (shift.cameras.empty())
+        return failure(where, "has no 'timeshift_cam_imu'",
+                       "give the file camchain-imucam.yaml, calibrated with --time-calibration");
+    shift.known = taken_off.has_value();
+    shift.taken_off = taken_off.value_or(Duration{});
+    shift.total_s = shift.cameras.front().shift_s + filter_s(shift);
+    return shift;
+}
+
+std::string to_text(const TimeShift& shift, bool json) {
+    if (json) return as_json(shift).dump() + "\n";
+    std::string text;
+    for (const auto& one : shift.cameras)
+        text += fmt::format("{}: the IMU's stamps are {:.3f} ms {} (timeshift_cam_imu {:+.6f} s)\n",
+                            one.camera, std::abs(one.shift_s) * 1e3,
+                            one.shift_s >= 0 ? "late" : "early", one.shift_s);
+    return text + advice(shift);
+}
+
+}  // namespace versavis::client

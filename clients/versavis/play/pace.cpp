@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "play/pace.hpp"
+
+#include <algorithm>
+
+namespace versavis::client {
+
+namespace {
+
+/// Streams lie in the file within a second of one another, and pauses of a service that restarts
+/// last some seconds. At half such a pause would be skipped, at twice a jump back is waited for.
+constexpr Duration longest_step = seconds(10);
+
+}  // namespace
+
+HostTime Pace::due(OutputTime stamp, HostTime now) {
+    if (!anchor_ || absolute(stamp - newest_) > longest_step) {
+        anchor_ = stamp;
+        anchored_ = now;
+        newest_ = stamp;
+    }
+    newest_ = std::max(newest_, stamp);
+    const auto since = static_cast<double>((stamp - *anchor_).ns) / rate_;
+    return anchored_ + Duration{static_cast<std::int64_t>(since)};
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// When an item of a recording is due to be published again.
+#pragma once
+
+#include <optional>
+
+#include "versavis/time.hpp"
+
+namespace versavis::client {
+
+class Pace {
+ public:
+    explicit Pace(double rate) : rate_(rate) {}
+
+    /// When the item of this stamp is due, asked at `now`. Stamps that jump, since the output clock
+    /// was set or the recorder's machine slept, are no reason to wait: the next item comes at once.
+    HostTime due(OutputTime stamp, HostTime now);
+
+ private:
+    double rate_;
+    std::optional<OutputTime> anchor_;
+    HostTime anchored_;
+    OutputTime newest_;
+};
+
+}  // namespace versavis::client

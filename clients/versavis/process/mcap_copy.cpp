@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "process/mcap_copy.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "recording/byte_cursor.hpp"
+#include "recording/file_descriptor.hpp"
+#include "recording/mcap_summary.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+template <class T>
+void put(std::string& text, T value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void put_text(std::string& text, const std::string& value) {
+    put(text, static_cast<std::uint32_t>(value.size()));
+    text += value;
+}
+
+void put_record(std::string& text, McapOpcode opcode, std::string_view content) {
+    put(text, static_cast<std::uint8_t>(opcode));
+    put(text, static_cast<std::uint64_t>(content.size()));
+    text += content;
+}
+
+std::string_view as_text(std::span<const std::byte> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::uint32_t crc_of(std::string_view text) {
+    return static_cast<std::uint32_t>(
+        crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size()));
+}
+
+std::string attachment_record(const McapAttachment& attachment) {
+    std::string content;
+    put(content, std::uint64_t{0});
+    put(content, std::uint64_t{0});
+    put_text(content, attachment.name);
+    put_text(content, attachment.media_type);
+    put(content, static_cast<std::uint64_t>(attachment.content.size()));
+    content += attachment.content;
+    put(content, crc_of(content));
+    std::string record;
+    put_record(record, McapOpcode::attachment, content);
+    return record;
+}
+
+class Copy {
+ public:
+    Copy(const McapReader& from, FileDescriptor to, std::string path,
+         const McapCopySettings& settings)
+        : from_(from), to_(std::move(to)), path_(std::move(path)), settings_(settings) {}
+
+    Expected<> run() {
+        static constexpr char magic[] = "\x89MCAP0\r\n";
+        if (auto put = append({magic, 8}); !put) return put;
+        auto copied = from_.top_level([this](const McapRecord& record) { return take(record); });
+        if (!copied) return copied;
+        if (auto added = add_attachment(); !added) return added;
+        if (auto ended = append(mcap_end(summary_, at_)); !ended) return ended;
+        if (::fsync(to_.number()) != 0) return failed();
+        return {};
+    }
+
+ private:
+    Expected<bool> take(const McapRecord& record) {
+        if (!settings_.go_on(static_cast<double>(record.offset) /
+                             static_cast<double>(from_.size())))
+            return failure(path_, "stopped before the end of the recording");
+        Expected<> done;
+        switch (record.opcode) {
+            case McapOpcode::data_end: return false;  // the summary is made anew
+            case McapOpcode::message_index: return true;
+            case McapOpcode::chunk: done = chunk_at(record.offset); break;
+            case McapOpcode::attachment:
+            case McapOpcode::metadata: note(record); [[fallthrough]];
+            default: done = whole(record); break;
+        }
+        if (!done) return Unexpected(done.error());
+        return true;
+    }
+
+    /// A record as it is, block by block.
+    Expected<> whole(const McapRecord& record) {
+        std::vector<std::byte> block(1 << 20U);
+        for (std::uint64_t at = record.offset; at < record.end();) {
+            const auto part =
+                std::span(block).first(std::min<std::uint64_t>(block.size(), record.end() - at));
+            if (auto got = from_.read(at, part); !got) return got;
+            if (auto put = append(as_text(part)); !put) return put;
+            at += part.size();
+        }
+        return {};
+    }
+
+    void note(const McapRecord& record) {
+        ByteCursor cursor(record.content);
+        const std::uint64_t length = record.end() - record.offset;
+        if (record.opcode == McapOpcode::metadata) {
+            summary_.metadata.push_back({at_, length, std::string(cursor.text())});
+            return;
+        }
+        const auto log = cursor.number<std::uint64_t>();
+        const auto created = cursor.number<std::uint64_t>();
+        const std::string name(cursor.text());
+        const std::string type(cursor.text());
+        summary_.attachments.push_back(
+            {at_, length, log, created, cursor.number<std::uint64_t>(), name, type});
+    }
+
+    Expected<> add_attachment() {
+        const McapAttachment& added = settings_.added;
+        if (added.name.empty()) return {};
+        const std::string record = attachment_record(added);
+        summary_.attachments.push_back(
+            {at_, record.size(), 0, 0, added.content.size(), added.name, added.media_type});
+        return append(record);
+    }
+
+    Expected<> chunk_at(std::uint64_t offset) {
+        for (const McapChunk& chunk : from_.chunks())
+            if (chunk.offset == offset) return copy_chunk(chunk);
+        return {};  // one that is not whole
+    }
+
+    Expected<> copy_chunk(const McapChunk& chunk) {
+        const auto records = from_.load(chunk, buffer_);
+        if (!records) return Unexpected(records.error());
+        records_.clear();
+        places_.clear();
+        SummaryChunk one{};
+        auto read = from_.for_each(
+            chunk, *records, [&](const McapRecord& record) { return take_record(record, one); });
+        if (!read) return read;
+        one.offset = at_;
+        one.records_size = records_.size();
+        if (auto written = write_chunk(one); !written) return written;
+        summary_.chunks.push_back(std::move(one));
+        return {};
+    }
+
+    Expected<> write_chunk(SummaryChunk& one) {
+        std::string head;
+        put(head, one.start_time);
+        put(head, one.end_time);
+        put(head, static_cast<std::uint64_t>(records_.size()));
+        put(head, crc_of(records_));
+        put_text(head, "");
+        put(head, static_cast<std::uint64_t>(records_.size()));
+        std::string opening;
+        put(opening, static_cast<std::uint8_t>(McapOpcode::chunk));
+        put(opening, static_cast<std::uint64_t>(head.size() + records_.size()));
+        one.length = opening.size() + head.size() + records_.size();
+        for (const std::string* part : {&opening, &head, &records_})
+            if (auto put = append(*part); !put) return put;
+        const std::uint64_t begin = at_;
+        for (const auto& [channel, messages] : places_) {
+            one.indexes[channel] = at_;
+            if (auto put = append(message_index(channel, messages)); !put) return put;
+        }
+        one.indexes_length = at_ - begin;
+        return {};
+    }
+
+    Expected<bool> take_record(const McapRecord& record, SummaryChunk& one) {
+        const std::string_view content = as_text(record.content);
+        ByteCursor cursor(record.content);
+        const auto id = cursor.number<std::uint16_t>();
+        if (!cursor.good()) return from_.damaged(record.offset, "a record is too short");
+        if (record.opcode == McapOpcode::schema) summary_.schemas.insert_or_assign(id, content);
+        if (record.opcode == McapOpcode::channel) {
+            const auto channel = parse_channel(record.content);
+            if (!channel) return from_.damaged(record.offset, "a damaged channel");
+            summary_.channels.insert_or_assign(id, content);
+            channels_.insert_or_assign(id, *channel);
+        }
+        if (record.opcode == McapOpcode::message) return take_message(record, one);
+        put_record(records_, record.opcode, content);
+        return true;
+    }
+
+    Expected<bool> take_message(const McapRecord& record, SummaryChunk& one) {
+        const auto message = parse_message(record.content);
+        if (!message) return from_.damaged(record.offset, "a message is too short");
+        const auto channel = channels_.find(message->channel);
+        if (channel == channels_.end())
+            return from_.damaged(record.offset, "a message of a channel that was not told");
+        const std::uint64_t place = records_.size();
+        const auto changed = settings_.change(channel->second, *message);
+        const std::uint64_t log_time = changed ? changed->log_time : message->log_time;
+        if (changed) {
+            std::string content;
+            put(content, message->channel);
+            put(content, message->sequence);
+            put(content, changed->log_time);
+            put(content, changed->publish_time);
+            content += changed->data;
+            put_record(records_, McapOpcode::message, content);
+        } else {
+            put_record(records_, McapOpcode::message, as_text(record.content));
+        }
+        if (places_.empty()) one.start_time = log_time;
+        one.start_time = std::min(one.start_time, log_time);
+        one.end_time = std::max(one.end_time, log_time);
+        if (summary_.messages.empty()) summary_.start_time = log_time;
+        summary_.start_time = std::min(summary_.start_time, log_time);
+        summary_.end_time = std::max(summary_.end_time, log_time);
+        ++summary_.messages[message->channel];
+        places_[message->channel].push_back({log_time, place});
+        return true;
+    }
+
+    Expected<> append(std::string_view text) {
+        while (!text.empty()) {
+            const ssize_t written = ::write(to_.number(), text.data(), text.size());
+            if (written < 0 && errno == EINTR) continue;
+            if (written < 0) return failed();
+            text.remove_prefix(static_cast<std::size_t>(written));
+            at_ += static_cast<std::uint64_t>(written);
+        }
+        return {};
+    }
+
+    Unexpected<Error> failed() const {
+        return failure(path_, "cannot be written: " + std::generic_category().message(errno),
+                       "is the disk full?");
+    }
+
+    const McapReader& from_;
+    FileDescriptor to_;
+    std::string path_;
+    const McapCopySettings& settings_;
+    McapBuffer buffer_;
+    std::uint64_t at_ = 0;
+    std::string records_;
+    std::map<std::uint16_t, McapChannel> channels_;
+    std::map<std::uint16_t, std::vector<MessagePlace>> places_;
+    McapSummary summary_;
+};
+
+}  // namespace
+
+Expected<> copy_mcap(const McapReader& from, const std::string& path,
+                     const McapCopySettings& settings) {
+    std::error_code error;
+    if (std::filesystem::exists(path, error))
+        return failure(path, "is there already", "move it away first");
+    const std::string temporary = fmt::format("{}.{}.part", path, ::getpid());
+    FileDescriptor file(::open(temporary.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644));
+    if (!file)
+        return failure(path, "cannot be created: " + std::generic_category().message(errno),
+                       "check its directory and permissions");
+    auto copied = Copy(from, std::move(file), path, settings).run();
+    if (copied) std::filesystem::rename(temporary, path, error);
+    if (copied && error) copied = failure(path, "cannot be created: " + error.message());
+    if (!copied) std::filesystem::remove(temporary, error);
+    return copied;
+}
+
+}  // namespace versavis::client

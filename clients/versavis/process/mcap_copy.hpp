@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Writes an MCAP file anew, with some of its messages changed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "recording/mcap_reader.hpp"
+#include "versavis/error.hpp"
+
+namespace versavis::client {
+
+/// A message with other times or data; none: it stays as it is.
+struct ChangedMessage {
+    std::uint64_t log_time;
+    std::uint64_t publish_time;
+    std::string data;
+};
+
+struct McapCopySettings {
+    std::function<std::optional<ChangedMessage>(const McapChannel&, const McapMessage&)> change;
+    McapAttachment added;                     ///< besides those that are there
+    std::function<bool(double share)> go_on;  ///< how far it is; false: stop
+};
+
+/// `path` appears complete or not at all. Errors: it is there already, the disk is full, the old
+/// file is damaged or compressed, stopped.
+Expected<> copy_mcap(const McapReader& from, const std::string& path,
+                     const McapCopySettings& settings);
+
+}  // namespace versavis::client

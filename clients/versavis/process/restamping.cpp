@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "process/restamping.hpp"
+
+#include <cstdlib>
+
+namespace versavis::client {
+
+namespace {
+
+// Lives of the board overlap in board time, not in host time. Half: a guess of a suspect frame that
+// is off by seconds is not taken. Twice: restarts within seconds could be mixed up.
+constexpr Duration same_life = seconds(2);
+
+/// Differences of stamps beyond this overflow.
+constexpr std::int64_t plausible = std::int64_t{1} << 61;
+
+}  // namespace
+
+Restamping::Restamping(const RecordedClocks& clocks, Duration asymmetry)
+    : outputs_(clocks.outputs), asymmetry_(asymmetry) {
+    for (const BoardLife& life : clocks.lives) {
+        if (life.exchanges < 2) continue;
+        std::vector<clock::Message> messages;
+        messages.reserve(life.stamps.messages.size());
+        for (const TimedMessage& message : life.stamps.messages)
+            messages.push_back(message.message);
+        smoothers_.emplace_back(messages);
+    }
+}
+
+std::optional<Restamping::Stamp> Restamping::stamp(BoardTime board, HostTime about) const {
+    if (std::abs(board.ns) > plausible || std::abs(about.ns) > plausible) return std::nullopt;
+    for (const clock::Smoother& smoother : smoothers_) {
+        const clock::HostEstimate estimate = smoother.translate(board);
+        if (estimate.state != clock::ClockState::locked) continue;
+        const HostTime host = estimate.time - asymmetry_;
+        if (absolute(host - about) > same_life) continue;
+        const auto shown = output(host);
+        if (!shown) return std::nullopt;
+        return Stamp{host, *shown, estimate.sigma};
+    }
+    return std::nullopt;
+}
+
+std::optional<OutputTime> Restamping::output(HostTime host) const {
+    const auto difference = output_minus_host(outputs_, host);
+    if (!difference) return std::nullopt;
+    return OutputTime{(host + *difference).ns};
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,517 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "record/recorder.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <ctime>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "record/frame_packer.hpp"
+#include "record/item_writer.hpp"
+#include "record/write_back.hpp"
+#include "status/status_document.hpp"
+#include "versavis/ring/path.hpp"
+#include "versavis/ring/reader.hpp"
+#include "versavis/wait_set.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// A chunk ends when it is so large, or so old. Half: twice as many indexes. Twice: twice as much
+/// is not there after a crash.
+constexpr std::uint64_t chunk_size = 4 << 20U;
+constexpr Duration chunk_age = milliseconds(500);
+
+/// Between looks at streams that came, and reports of progress. Half: twice the work. Twice: the
+/// first two seconds of a new stream must still be in its ring.
+constexpr Duration round = seconds(1);
+
+/// Between looks at `stop`. Half: twice as many wake-ups where nothing comes. Twice: Ctrl-C feels
+/// slow.
+constexpr Duration longest_wait = milliseconds(100);
+
+/// Items of one stream in a row, while others wait. Half: a long backlog takes longer. Twice: a
+/// frame waits behind so many more samples, some 20 us each.
+constexpr int in_a_row = 64;
+
+constexpr std::uint32_t slipped = static_cast<std::uint32_t>(EventKind::pairing_slipped);
+
+std::uint32_t epoch_of(ring::StreamKind kind, const ring::Metadata& metadata) {
+    switch (kind) {
+        case ring::StreamKind::frames: return unpack<FrameMetadata>(metadata).epoch;
+        case ring::StreamKind::imu: return unpack<ImuMetadata>(metadata).epoch;
+        default: return 0;
+    }
+}
+
+/// Evidence and clock are of the service's whole run.
+bool has_stamps(ring::StreamKind kind) {
+    return kind != ring::StreamKind::evidence && kind != ring::StreamKind::clock;
+}
+
+struct Source {
+    std::string name;
+    ring::Reader reader;
+    std::uint32_t epoch = 0;
+    bool gone = false;   ///< and that was told
+    bool begun = false;  ///< an item of it was taken
+    OutputTime last{};   ///< stamp of the newest that was
+    /// What is older is not wanted, and what was overwritten before the first item not missed.
+    std::optional<OutputTime> from{};
+    /// Gaps before the first item: they have no time until it comes.
+    std::vector<std::pair<GapReason, std::uint64_t>> untold{};
+
+    ring::StreamKind kind() const { return reader.kind(); }
+};
+
+std::string default_name() {
+    return fmt::format("versavis-{:%Y%m%d-%H%M%S}.mcap", fmt::localtime(std::time(nullptr)));
+}
+
+/// `NAME.mcap`, `NAME-0001.mcap`, ...
+std::string part_name(const std::string& first, unsigned part) {
+    if (part == 0) return first;
+    const std::filesystem::path path(first);
+    const std::string name =
+        fmt::format("{}-{:04}{}", path.stem().string(), part, path.extension().string());
+    return (path.parent_path() / name).string();
+}
+
+std::uint64_t room_on_disk(const std::string& file) {
+    struct statvfs system {};
+    if (::statvfs(file.c_str(), &system) != 0) return 0;
+    return std::uint64_t{system.f_bavail} * system.f_frsize;
+}
+
+/// Whatever the document is: it may be played, from any file.
+std::string text_at(const nlohmann::json& document, const char* place) {
+    const nlohmann::json::json_pointer at(place);
+    return document.contains(at) && document[at].is_string() ? document[at].get<std::string>() : "";
+}
+
+struct Content {
+    std::string name;
+    std::string media_type;
+    std::string bytes;
+};
+
+class Recorder {
+ public:
+    explicit Recorder(const RecordSettings& settings) : settings_(settings) {}
+
+    Expected<RecordReport> run();
+
+ private:
+    Expected<> open_streams();
+    Expected<> open_stream(const std::string& name, ring::Position start);
+    Expected<> read_calibration();
+    void go_back();
+    void look_for_streams();
+    void wait_for_streams();
+    void keep_configuration(const nlohmann::json& status);
+    Expected<> begin_file();
+    Expected<> end_file();
+    Expected<> attach_all();
+    Expected<> take(Source& source);
+    void take_pause(Source& source, const ring::NoItem& none);
+    Expected<> take_item(Source& source, ring::Item item);
+    Expected<> take_frame(Source& source, ring::Item item);
+    Expected<> write_packed(bool all);
+    void lose(Source& source, std::uint64_t items);
+    void tell_gap(Source& source, GapReason reason, std::uint64_t items);
+    void begin(Source& source, const ring::Item& item);
+    void count(const std::string& stream, OutputTime time);
+    void stop_early(const Error& why);
+    Expected<> take_all();
+    Expected<> end_chunk_if_due(HostTime now);
+    void end_each_round(HostTime now);
+    bool over(HostTime now) const;
+
+    const RecordSettings& settings_;
+    RecordReport report_;
+    std::vector<std::unique_ptr<Source>> sources_;
+    WaitSet waiting_;
+    std::optional<ItemWriter> writer_;
+    bool file_open_ = false;
+    WriteBack write_back_;
+    std::optional<FramePacker> packer_;
+    std::vector<Content> attachments_;
+    std::map<std::string, std::uint64_t> in_chunk_;  ///< items in the chunk that is open
+    HostTime begun_;
+    HostTime file_begun_;
+    HostTime chunk_begun_;
+    HostTime round_begun_;
+    std::uint64_t closed_bytes_ = 0;  ///< of files before this one
+};
+
+/// Those that are there, in alphabetical order.
+std::vector<std::string> streams_of(const std::string& instance) {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (const auto& entry :
+         std::filesystem::directory_iterator(instance_directory(instance), error))
+        if (is_stream_name(entry.path().filename().string()))
+            names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+Expected<> Recorder::open_stream(const std::string& name, ring::Position start) {
+    ring::Options options;
+    options.start = start;
+    auto reader = ring::Reader::open(stream_path(settings_.instance, name), options);
+    if (!reader) return Unexpected(reader.error());
+    // Pairing and clock can only be done again from what they were told before, too.
+    const bool whole = !has_stamps(reader->kind());
+    if (whole) reader->seek(ring::Position::oldest);
+    sources_.push_back(std::make_unique<Source>(Source{name, std::move(*reader)}));
+    if (whole) sources_.back()->from = OutputTime{std::numeric_limits<std::int64_t>::min()};
+    report_.streams[name].kind = sources_.back()->kind();
+    return {};
+}
+
+/// So far before the newest item of all: of a stream with nothing new for long, nothing is wanted.
+void Recorder::go_back() {
+    std::optional<OutputTime> newest;
+    for (const auto& source : sources_) {
+        if (!has_stamps(source->kind())) continue;
+        const auto item = source->reader.latest();
+        if (item) newest = newest ? std::max(*newest, item->time) : item->time;
+    }
+    if (!newest) return;
+    for (const auto& source : sources_) {
+        if (!has_stamps(source->kind())) continue;
+        source->reader.seek(ring::Position::oldest);
+        source->from = *newest - *settings_.before;
+    }
+}
+
+Expected<> Recorder::open_streams() {
+    const bool all = settings_.streams.empty();
+    for (const std::string& name : all ? streams_of(settings_.instance) : settings_.streams) {
+        auto opened = is_stream_name(name)
+                          ? open_stream(name, ring::Position::next)
+                          : failure(name, "is not a name of a stream", "see 'versavis list'");
+        if (!opened && !all) return Unexpected(explain(opened.error(), settings_.instance, name));
+        if (!opened) report_.left_out.push_back(opened.error().message());
+    }
+    if (sources_.empty())
+        return failure(instance_directory(settings_.instance).string(), "has no streams to record",
+                       "is versavisd running? --instance selects another instance");
+    if (settings_.before) go_back();
+    wait_for_streams();
+    return {};
+}
+
+void Recorder::wait_for_streams() {
+    waiting_ = WaitSet();
+    for (const auto& source : sources_) {
+        auto added = waiting_.add(source->reader);
+        if (!added) report_.left_out.push_back(added.error().message());
+    }
+}
+
+/// A stream that has just come is recorded from its first item on.
+void Recorder::look_for_streams() {
+    if (!settings_.streams.empty()) return;
+    bool found = false;
+    for (const std::string& name : streams_of(settings_.instance)) {
+        const bool known = std::any_of(sources_.begin(), sources_.end(),
+                                       [&](const auto& source) { return source->name == name; });
+        if (!known && open_stream(name, ring::Position::oldest)) found = true;
+    }
+    if (found) wait_for_streams();
+}
+
+Expected<> Recorder::read_calibration() {
+    for (const std::string& path : settings_.calibration) {
+        std::ifstream file(path, std::ios::binary);
+        if (!file || std::filesystem::is_directory(path))
+            return failure(path, "cannot be read", "name calibration files, as Kalibr writes them");
+        std::string bytes{std::istreambuf_iterator<char>(file), {}};
+        const bool imu = bytes.find("rostopic") != std::string::npos &&
+                         bytes.find("gyroscope_noise_density") != std::string::npos;
+        attachments_.push_back({imu ? "calibration/imu.yaml" : "calibration/camchain.yaml",
+                                "application/yaml", std::move(bytes)});
+    }
+    return {};
+}
+
+/// Who records may be somebody who may not read it; then the recording does without.
+void Recorder::keep_configuration(const nlohmann::json& status) {
+    const std::string name = "configuration.toml";
+    const bool known = std::any_of(attachments_.begin(), attachments_.end(),
+                                   [&](const Content& one) { return one.name == name; });
+    std::ifstream file(text_at(status, "/configuration"), std::ios::binary);
+    if (known || !file) return;
+    attachments_.push_back(
+        {name, "application/toml", std::string(std::istreambuf_iterator<char>(file), {})});
+}
+
+Expected<> Recorder::begin_file() {
+    const std::string first = settings_.output.empty() ? default_name() : settings_.output;
+    if (report_.files.empty()) report_.files.push_back(first);
+    const auto part = static_cast<unsigned>(writer_ ? report_.files.size() : 0);
+    const std::string path = part_name(report_.files.front(), part);
+    auto file = McapWriter::create(path, "versavis " VERSAVIS_VERSION);
+    if (!file) return Unexpected(file.error());
+    if (part > 0) report_.files.push_back(path);
+    writer_.emplace(std::move(*file));
+    file_open_ = true;
+    file_begun_ = host_now();
+    const auto status = read_status(settings_.instance);
+    std::map<std::string, std::string> facts{{"version", "1"},
+                                             {"instance", settings_.instance},
+                                             {"part", std::to_string(part)},
+                                             {"recorder", VERSAVIS_VERSION}};
+    std::ifstream("/proc/sys/kernel/random/boot_id") >> facts["boot_id"];
+    if (status) keep_configuration(*status);
+    if (status) facts["output_clock"] = text_at(*status, "/clock/output");
+    if (auto told = writer_->file().add_metadata("versavis", facts); !told) return told;
+    if (status) {
+        auto attached = writer_->file().attach("status.json", "application/json", status->dump(),
+                                               std::int64_t{0});
+        if (!attached) return attached;
+    }
+    return attach_all();
+}
+
+Expected<> Recorder::attach_all() {
+    for (const Content& one : attachments_)
+        if (auto done = writer_->file().attach(one.name, one.media_type, one.bytes, 0); !done)
+            return done;
+    return {};
+}
+
+Expected<> Recorder::end_file() {
+    write_back_.finish();
+    if (auto closed = writer_->file().close(); !closed) return closed;
+    file_open_ = false;
+    in_chunk_.clear();
+    closed_bytes_ += writer_->file().size();
+    return {};
+}
+
+void Recorder::lose(Source& source, std::uint64_t items) {
+    if (source.from) return;
+    report_.streams[source.name].lost += items;
+    tell_gap(source, GapReason::lost, items);
+}
+
+void Recorder::tell_gap(Source& source, GapReason reason, std::uint64_t items) {
+    const OutputTime last = source.last;
+    if (source.begun)
+        writer_->write_gap(source.name, reason, items, last, last, source.epoch);
+    else
+        source.untold.emplace_back(reason, items);
+}
+
+void Recorder::take_pause(Source& source, const ring::NoItem& none) {
+    if (none.why == ring::Pause::lost) lose(source, none.lost);
+    if (none.why == ring::Pause::restarted) {
+        ++report_.streams[source.name].restarts;
+        tell_gap(source, GapReason::restarted, 0);
+    }
+    if (none.why == ring::Pause::gone) tell_gap(source, GapReason::gone, 0);
+}
+
+/// The first item of a stream, and each of another epoch.
+void Recorder::begin(Source& source, const ring::Item& item) {
+    source.from.reset();
+    const std::uint32_t epoch = epoch_of(source.kind(), item.metadata);
+    if (source.begun && epoch != source.epoch) {
+        ++report_.streams[source.name].epochs;
+        writer_->write_gap(source.name, GapReason::epoch, 0, source.last, source.last, epoch);
+    }
+    for (const auto& [reason, items] : std::exchange(source.untold, {}))
+        writer_->write_gap(source.name, reason, items, {}, item.time, epoch);
+    source.epoch = epoch;
+}
+
+void Recorder::count(const std::string& stream, OutputTime time) {
+    StreamReport& report = report_.streams[stream];
+    if (report.items++ == 0) report.first = time;
+    report.last = time;
+    ++in_chunk_[stream];
+}
+
+Expected<> Recorder::take_item(Source& source, ring::Item item) {
+    begin(source, item);
+    if (source.kind() == ring::StreamKind::frames) return take_frame(source, std::move(item));
+    if (writer_->write(source.name, source.kind(), item) == ItemWriter::Outcome::overtaken) {
+        lose(source, 1);
+        return {};
+    }
+    if (source.kind() == ring::StreamKind::events &&
+        static_cast<std::uint32_t>(unpack<EventMetadata>(item.metadata).kind) == slipped)
+        ++report_.slips;
+    count(source.name, item.time);
+    source.last = item.time;
+    source.begun = true;
+    return {};
+}
+
+Expected<> Recorder::take_frame(Source& source, ring::Item item) {
+    const OutputTime time = item.time;
+    if (packer_ && can_be_png(unpack<FrameMetadata>(item.metadata), item.payload.size())) {
+        if (packer_->full())
+            if (auto written = write_packed(false); !written) return written;
+        if (!packer_->push(source.name, std::move(item))) {
+            lose(source, 1);
+            return {};
+        }
+    } else {
+        const auto outcome = writer_->write_frame(source.name, item);
+        if (!outcome) {
+            ++report_.streams[source.name].lost;
+            return Unexpected(outcome.error());
+        }
+        if (*outcome == ItemWriter::Outcome::overtaken) {
+            lose(source, 1);
+            return {};
+        }
+        count(source.name, time);
+    }
+    source.last = time;
+    source.begun = true;
+    return {};
+}
+
+/// Those that are ready, in the order of their arrival; at least one if the packer is full; `all`:
+/// waits for each.
+Expected<> Recorder::write_packed(bool all) {
+    while (packer_) {
+        auto packed = packer_->take(all || packer_->full());
+        if (!packed) break;
+        auto written = writer_->write_png(packed->stream, packed->item, packed->png);
+        if (!written) {
+            ++report_.streams[packed->stream].lost;
+            return written;
+        }
+        count(packed->stream, packed->item.time);
+    }
+    return {};
+}
+
+Expected<> Recorder::take(Source& source) {
+    for (int i = 0; i < in_a_row;) {
+        auto item = source.reader.next();
+        if (item) {
+            source.gone = false;
+            if (source.from && item->time < *source.from) continue;
+            ++i;
+            if (auto taken = take_item(source, std::move(*item)); !taken) return taken;
+            continue;
+        }
+        if (item.error().why == ring::Pause::nothing) break;
+        const bool gone = item.error().why == ring::Pause::gone;
+        // That it is gone is told once; the reader tells it whenever it is asked.
+        if (gone && std::exchange(source.gone, true)) break;
+        take_pause(source, item.error());
+        if (gone) break;
+    }
+    return {};
+}
+
+Expected<> Recorder::end_chunk_if_due(HostTime now) {
+    McapWriter& file = writer_->file();
+    if (file.chunk_size() == 0) chunk_begun_ = now;
+    if (file.chunk_size() < chunk_size && now - chunk_begun_ < chunk_age) return {};
+    if (auto ended = file.end_chunk(); !ended) return ended;
+    in_chunk_.clear();
+    write_back_.push(file.descriptor(), file.size());
+    report_.bytes = closed_bytes_ + file.size();
+    const bool large = settings_.split_bytes > 0 && file.size() >= settings_.split_bytes;
+    const bool old = settings_.split_length && now - file_begun_ >= *settings_.split_length;
+    if (!large && !old) return {};
+    if (auto ended = end_file(); !ended) return ended;
+    return begin_file();
+}
+
+void Recorder::end_each_round(HostTime now) {
+    if (now - round_begun_ < round) return;
+    round_begun_ = now;
+    look_for_streams();
+    report_.duration = now - begun_;
+    settings_.progress(report_, room_on_disk(writer_->file().path()));
+}
+
+bool Recorder::over(HostTime now) const {
+    return settings_.stop() || (settings_.length && now - begun_ >= *settings_.length);
+}
+
+Expected<> Recorder::take_all() {
+    for (const auto& source : sources_) {
+        if (auto taken = take(*source); !taken) return taken;
+        if (auto ended = end_chunk_if_due(host_now()); !ended) return ended;
+    }
+    return write_packed(false);
+}
+
+/// The file ends before the chunk that is open. What was in that, or on its way there, is lost.
+void Recorder::stop_early(const Error& why) {
+    report_.stopped_early = why;
+    write_back_.finish();
+    for (const auto& [stream, items] : in_chunk_) {
+        report_.streams[stream].items -= items;
+        report_.streams[stream].lost += items;
+    }
+    while (packer_) {
+        const auto packed = packer_->take(true);
+        if (!packed) break;
+        ++report_.streams[packed->stream].lost;
+    }
+    if (!file_open_) return;
+    if (!writer_->file().close_before_chunk())
+        report_.stopped_early->cure += "; then run 'versavis repair' on the file";
+    closed_bytes_ += writer_->file().size();
+}
+
+Expected<RecordReport> Recorder::run() {
+    if (auto read = read_calibration(); !read) return Unexpected(read.error());
+    if (auto opened = open_streams(); !opened) return Unexpected(opened.error());
+    if (settings_.png) packer_.emplace();
+    if (auto made = begin_file(); !made) return Unexpected(made.error());
+    begun_ = round_begun_ = chunk_begun_ = host_now();
+    Expected<> done;
+    while (done && !over(host_now())) {
+        waiting_.wait(longest_wait);
+        done = take_all();
+        end_each_round(host_now());
+    }
+    if (done) done = write_packed(true);
+    if (done) done = end_file();
+    if (!done) stop_early(done.error());
+    report_.duration = host_now() - begun_;
+    report_.bytes = closed_bytes_;
+    return std::move(report_);
+}
+
+}  // namespace
+
+std::uint64_t RecordReport::items() const {
+    std::uint64_t all = 0;
+    for (const auto& [name, stream] : streams) all += stream.items;
+    return all;
+}
+
+std::uint64_t RecordReport::lost() const {
+    std::uint64_t all = 0;
+    for (const auto& [name, stream] : streams) all += stream.lost;
+    return all;
+}
+
+Expected<RecordReport> record(const RecordSettings& settings) { return Recorder(settings).run(); }
+
+}  // namespace versavis::client

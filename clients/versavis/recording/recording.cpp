@@ -1,0 +1,499 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <list>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "recording/byte_cursor.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording/ros_image.hpp"
+#include "versavis/ring/path.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+constexpr std::uint64_t item_size = 128;  ///< before its payload
+constexpr std::string_view item_encoding = "versavis_item";
+
+/// Chunks that at() keeps. Streams are written within some chunks of one another; at half, a
+/// recording with many cameras may be read twice, at twice it takes twice the memory.
+constexpr std::size_t kept_chunks = 8;
+
+enum class Role { other, item, image, compressed, gap };
+
+/// What the messages of a channel are.
+struct Part {
+    Role role = Role::other;
+    std::string stream;
+    ring::StreamKind kind{};
+};
+
+std::optional<ring::StreamKind> kind_of(const std::string& text) {
+    if (text.size() != 1 || text[0] < '1' || text[0] > '6') return std::nullopt;
+    return static_cast<ring::StreamKind>(text[0] - '0');
+}
+
+/// Between `begin` and `end` of a topic; empty: it is another.
+std::string inside(const std::string& topic, std::string_view begin, std::string_view end) {
+    if (topic.size() <= begin.size() + end.size() || !topic.starts_with(begin) ||
+        !topic.ends_with(end))
+        return {};
+    const auto name = topic.substr(begin.size(), topic.size() - begin.size() - end.size());
+    return is_stream_name(name) ? name : std::string();
+}
+
+Part part_of(const McapChannel& channel) {
+    if (auto name = inside(channel.topic, "/versavis/", "/item");
+        !name.empty() && channel.encoding == item_encoding) {
+        const auto found = channel.metadata.find("kind");
+        const auto kind = found == channel.metadata.end() ? std::nullopt : kind_of(found->second);
+        if (kind) return {Role::item, name, *kind};
+    }
+    if (auto name = inside(channel.topic, "/versavis/", "/gap");
+        !name.empty() && channel.encoding == "json")
+        return {Role::gap, name, {}};
+    if (channel.encoding != "cdr") return {};
+    if (auto name = inside(channel.topic, "/", "/image_raw/compressed"); !name.empty())
+        return {Role::compressed, name, {}};
+    if (auto name = inside(channel.topic, "/", "/image_raw"); !name.empty())
+        return {Role::image, name, {}};
+    return {};
+}
+
+struct Envelope {
+    std::uint64_t number;
+    std::uint64_t life;
+    OutputTime time;
+    std::uint32_t length;
+    ring::Metadata metadata;
+};
+
+std::optional<Envelope> parse_envelope(std::span<const std::byte> data) {
+    ByteCursor cursor(data);
+    Envelope envelope{};
+    envelope.number = cursor.number<std::uint64_t>();
+    envelope.life = cursor.number<std::uint64_t>();
+    envelope.time = {cursor.number<std::int64_t>()};
+    envelope.length = cursor.number<std::uint32_t>();
+    cursor.number<std::uint32_t>();
+    for (auto& word : envelope.metadata) word = cursor.number<std::uint64_t>();
+    if (!cursor.good()) return std::nullopt;
+    return envelope;
+}
+
+/// The image that was met last, of one camera.
+struct Image {
+    std::uint32_t sequence;
+    std::uint32_t place;
+    std::span<const std::byte> message;
+    bool compressed;
+};
+
+/// What one way through chunks knows; channels may be told on the way.
+struct Walk {
+    std::map<std::uint16_t, Part> parts;
+    std::set<std::string, std::less<>> wanted;  ///< empty: all
+    std::map<std::string, Image, std::less<>> images;
+    std::vector<std::byte> pixels;
+
+    bool wants(const std::string& stream) const {
+        return wanted.empty() || wanted.count(stream) != 0;
+    }
+};
+
+/// The pixels that the image has for an item, if it has.
+void add_pixels(const Image& image, const FrameMetadata& frame, std::vector<std::byte>& unpacked,
+                RecordedItem& item) {
+    if (image.compressed) {
+        const auto message = parse_compressed_image(image.message);
+        if (!message) return;
+        item.png = message->data;
+        if (unpack_png(message->data, frame, unpacked)) item.payload = unpacked;
+        return;
+    }
+    const auto message = parse_image(image.message);
+    if (message && message->width == frame.width && message->height == frame.height)
+        item.payload = message->data;
+}
+
+std::string told(const RecordingFacts& facts, const std::string& key) {
+    const auto found = facts.told.find(key);
+    return found == facts.told.end() ? std::string() : found->second;
+}
+
+}  // namespace
+
+struct Recording::File {
+    struct Kept {
+        std::uint32_t chunk;
+        McapBuffer buffer;
+        std::span<const std::byte> records;
+    };
+
+    McapReader reader;
+    std::map<std::uint16_t, Part> parts;
+    std::vector<RecordedStream> streams;
+    std::vector<Attachment> attachments;
+    RecordingFacts facts;
+    std::list<Kept> kept;     ///< the one used last in front
+    Walk places;              ///< of at()
+    std::uint32_t index = 0;  ///< among the recording's files
+
+    explicit File(McapReader opened) : reader(std::move(opened)) {}
+
+    Expected<> take_stock();
+    Expected<> count_items();
+    void count(const Part& part, std::uint64_t items);
+    Walk walk(const std::vector<std::string>& wanted) const;
+    Expected<bool> visit(Walk& walk, std::uint32_t chunk, const McapRecord& record,
+                         const Take& take, bool with_pixels) const;
+    Expected<bool> take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+                             const McapRecord& record, const Take& take, bool with_pixels) const;
+    Expected<bool> for_each(const std::vector<std::string>& wanted, const Take& take,
+                            bool with_pixels) const;
+    Expected<std::span<const std::byte>> keep(std::uint32_t chunk);
+    Expected<> add_gaps(std::vector<RecordedGap>& gaps) const;
+};
+
+Recording::Recording() = default;
+Recording::Recording(Recording&&) noexcept = default;
+Recording& Recording::operator=(Recording&&) noexcept = default;
+Recording::~Recording() = default;
+
+Expected<Recording> Recording::open(const std::string& path) {
+    auto recording = open_file(path);
+    if (recording && told(recording->facts_, "part") == "0") recording->follow(path);
+    return recording;
+}
+
+Expected<Recording> Recording::open_file(const std::string& path) {
+    auto reader = McapReader::open(path);
+    if (!reader) return Unexpected(reader.error());
+    auto file = std::make_unique<File>(std::move(*reader));
+    if (auto taken = file->take_stock(); !taken) return Unexpected(taken.error());
+    Recording recording;
+    recording.add(std::move(file));
+    return recording;
+}
+
+/// NAME.mcap is followed by NAME-0001.mcap and so on, of the same run of the same instance.
+void Recording::follow(const std::string& path) {
+    const std::filesystem::path first(path);
+    for (std::uint32_t part = 1;; ++part) {
+        auto next = first;
+        next.replace_filename(
+            fmt::format("{}-{:04}{}", first.stem().string(), part, first.extension().string()));
+        std::error_code error;
+        if (!std::filesystem::exists(next, error)) return;
+        auto opened = open_file(next.string());
+        const bool belongs = opened && told(opened->facts_, "part") == std::to_string(part) &&
+                             told(opened->facts_, "boot_id") == told(facts_, "boot_id") &&
+                             told(opened->facts_, "instance") == told(facts_, "instance");
+        if (!belongs) {
+            const std::string why = opened ? "it is of another recording" : opened.error().what;
+            facts_.defect += fmt::format("{}{} is not used: {}", facts_.defect.empty() ? "" : "; ",
+                                         next.filename().string(), why);
+            return;
+        }
+        add(std::move(opened->files_.front()));
+    }
+}
+
+void Recording::add(std::unique_ptr<File> file) {
+    const RecordingFacts& its = file->facts;
+    if (files_.empty()) {
+        facts_ = its;
+    } else {
+        facts_.bytes += its.bytes;
+        facts_.good_end += its.good_end;
+        facts_.chunks += its.chunks;
+        if (!its.defect.empty())
+            facts_.defect += fmt::format("{}file {}: {}", facts_.defect.empty() ? "" : "; ",
+                                         files_.size() + 1, its.defect);
+    }
+    for (const RecordedStream& stream : file->streams) {
+        const auto found = std::find_if(streams_.begin(), streams_.end(),
+                                        [&](const auto& one) { return one.name == stream.name; });
+        if (found == streams_.end())
+            streams_.push_back(stream);
+        else
+            found->items += stream.items;
+    }
+    file->index = static_cast<std::uint32_t>(files_.size());
+    files_.push_back(std::move(file));
+    facts_.files = files_.size();
+}
+
+const std::vector<RecordedStream>& Recording::streams() const { return streams_; }
+const std::vector<Attachment>& Recording::attachments() const {
+    return files_.front()->attachments;
+}
+const RecordingFacts& Recording::facts() const { return facts_; }
+
+const Attachment* Recording::attachment(const std::string& name) const {
+    const auto& all = attachments();
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
+    return found == all.end() ? nullptr : &*found;
+}
+
+void Recording::File::count(const Part& part, std::uint64_t items) {
+    if (part.role != Role::item) return;
+    const auto found = std::find_if(streams.begin(), streams.end(),
+                                    [&](const auto& one) { return one.name == part.stream; });
+    if (found == streams.end())
+        streams.push_back({part.stream, part.kind, items});
+    else
+        found->items += items;
+}
+
+Expected<> Recording::File::take_stock() {
+    for (const auto& one : reader.attachments())
+        attachments.push_back({one.name, one.media_type, one.content});
+    facts = {1,
+             reader.size(),
+             reader.defect(),
+             reader.good_end(),
+             reader.chunks().size(),
+             reader.library(),
+             {}};
+    bool ours = false;
+    for (const auto& one : reader.metadata())
+        if (one.name == "versavis") {
+            facts.told = one.values;
+            ours = true;
+        }
+    for (const auto& channel : reader.channels())
+        parts.insert_or_assign(channel.id, part_of(channel));
+    if (reader.defect().empty() && reader.statistics() && !reader.channels().empty()) {
+        for (const auto& [channel, part] : parts) {
+            const auto found = reader.statistics()->of_channel.find(channel);
+            count(part, found == reader.statistics()->of_channel.end() ? 0 : found->second);
+        }
+    } else if (auto counted = count_items(); !counted) {
+        return counted;
+    }
+    places = walk({});
+    if (streams.empty() && !ours)
+        return failure(reader.path(),
+                       reader.chunks().empty() && !reader.defect().empty()
+                           ? "holds no whole chunk: " + reader.defect()
+                           : "is no recording of VersaVIS: it has none of its items",
+                       "name a file that 'versavis record' wrote");
+    return {};
+}
+
+/// Of a file that was cut off: channels are told on the way.
+Expected<> Recording::File::count_items() {
+    Walk all = walk({});
+    const Take take = [&](const RecordedItem& item) {
+        count({Role::item, item.stream, item.kind}, 1);
+        return true;
+    };
+    for (std::uint32_t chunk = 0; chunk < reader.chunks().size(); ++chunk) {
+        auto glanced = reader.glance(reader.chunks()[chunk], [&](const McapRecord& record) {
+            return visit(all, chunk, record, take, false);
+        });
+        if (!glanced) return glanced;
+    }
+    parts = std::move(all.parts);
+    return {};
+}
+
+Walk Recording::File::walk(const std::vector<std::string>& wanted) const {
+    Walk walk;
+    walk.parts = parts;
+    walk.wanted.insert(wanted.begin(), wanted.end());
+    return walk;
+}
+
+Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const McapRecord& record,
+                                      const Take& take, bool with_pixels) const {
+    if (record.opcode == McapOpcode::channel) {
+        const auto channel = parse_channel(record.content);
+        if (!channel) return reader.damaged(record.offset, "a channel is not whole");
+        walk.parts.insert_or_assign(channel->id, part_of(*channel));
+        return true;
+    }
+    if (record.opcode != McapOpcode::message) return true;
+    const auto message = parse_message(record.content);
+    if (!message) return reader.damaged(record.offset, "a message is too short");
+    const auto found = walk.parts.find(message->channel);
+    if (found == walk.parts.end()) return true;
+    const Part& part = found->second;
+    if (part.role == Role::item && walk.wants(part.stream))
+        return take_item(walk, part, chunk, record, take, with_pixels);
+    if (part.role == Role::image || part.role == Role::compressed) {
+        const auto place =
+            static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
+        walk.images.insert_or_assign(
+            part.stream, Image{message->sequence, place,
+                               with_pixels ? message->data : std::span<const std::byte>(),
+                               part.role == Role::compressed});
+    }
+    return true;
+}
+
+Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+                                          const McapRecord& record, const Take& take,
+                                          bool with_pixels) const {
+    const auto message = parse_message(record.content);
+    const auto envelope = parse_envelope(message->data);
+    if (!envelope) return reader.damaged(record.offset, "an item is too short");
+    const auto place =
+        static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
+    RecordedItem item{
+        part.stream,        part.kind, envelope->number, envelope->life,        envelope->time,
+        envelope->metadata, {},        envelope->length, {index, chunk, place}, {}};
+    if (part.kind != ring::StreamKind::frames) {
+        const std::uint64_t size = record.length - mcap_message_header - item_size;
+        if (size != envelope->length)
+            return reader.damaged(record.offset, "an item has another length than it says");
+        std::vector<std::byte> rest;
+        item.payload = message->data.subspan(item_size);
+        if (item.payload.size() < size) {  // it was only glanced at
+            rest.resize(size);
+            if (auto got = reader.read(record.end() - size, rest); !got)
+                return Unexpected(got.error());
+            item.payload = rest;
+        }
+        return take(item);
+    }
+    const auto image = walk.images.find(part.stream);
+    if (image != walk.images.end() && image->second.sequence == message->sequence) {
+        item.place.image = image->second.place;
+        if (with_pixels)
+            add_pixels(image->second, unpack<FrameMetadata>(item.metadata), walk.pixels, item);
+    }
+    return take(item);
+}
+
+Expected<bool> Recording::File::for_each(const std::vector<std::string>& wanted, const Take& take,
+                                         bool with_pixels) const {
+    Walk way = walk(wanted);
+    McapBuffer buffer;
+    bool more = true;
+    const auto& chunks = reader.chunks();
+    for (std::uint32_t chunk = 0; more && chunk < chunks.size(); ++chunk) {
+        way.images.clear();
+        const McapReader::Visit each = [&](const McapRecord& record) -> Expected<bool> {
+            auto taken = visit(way, chunk, record, take, with_pixels);
+            more = taken && *taken;
+            return taken;
+        };
+        if (!with_pixels) {
+            if (auto read = reader.glance(chunks[chunk], each); !read)
+                return Unexpected(read.error());
+            continue;
+        }
+        const auto records = reader.load(chunks[chunk], buffer);
+        if (!records) return Unexpected(records.error());
+        if (auto read = reader.for_each(chunks[chunk], *records, each); !read)
+            return Unexpected(read.error());
+    }
+    return more;
+}
+
+Expected<> Recording::for_each(const std::vector<std::string>& streams, const Take& take) const {
+    return in_each_file(streams, take, true);
+}
+
+Expected<> Recording::glance(const std::vector<std::string>& streams, const Take& take) const {
+    return in_each_file(streams, take, false);
+}
+
+Expected<> Recording::in_each_file(const std::vector<std::string>& streams, const Take& take,
+                                   bool with_pixels) const {
+    for (const auto& file : files_) {
+        const auto more = file->for_each(streams, take, with_pixels);
+        if (!more) return Unexpected(more.error());
+        if (!*more) return {};
+    }
+    return {};
+}
+
+Expected<std::span<const std::byte>> Recording::File::keep(std::uint32_t chunk) {
+    const auto found =
+        std::find_if(kept.begin(), kept.end(), [&](const Kept& one) { return one.chunk == chunk; });
+    if (found != kept.end()) {
+        kept.splice(kept.begin(), kept, found);
+        return found->records;
+    }
+    if (kept.size() < kept_chunks)
+        kept.emplace_front();
+    else
+        kept.splice(kept.begin(), kept, std::prev(kept.end()));
+    Kept& one = kept.front();
+    auto records = reader.load(reader.chunks()[chunk], one.buffer);
+    if (!records) {
+        kept.pop_front();
+        return records;
+    }
+    one.chunk = chunk;
+    one.records = *records;
+    return one.records;
+}
+
+Expected<> Recording::at(const ItemPlace& place, const Take& take) const {
+    File& file = *files_.at(place.file);
+    const McapChunk& chunk = file.reader.chunks().at(place.chunk);
+    const auto records = file.keep(place.chunk);
+    if (!records) return Unexpected(records.error());
+    file.places.images.clear();
+    for (const std::uint32_t offset : {place.image, place.item}) {
+        if (offset >= records->size()) continue;
+        const McapChunk rest{chunk.offset, chunk.records_offset + offset, 0, 0, {}};
+        auto read = file.reader.for_each(
+            rest, records->subspan(offset), [&](const McapRecord& record) -> Expected<bool> {
+                auto taken = file.visit(file.places, place.chunk, record, take, true);
+                if (!taken) return taken;
+                return false;  // only this record
+            });
+        if (!read) return read;
+    }
+    return {};
+}
+
+Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
+    for (const McapChunk& chunk : reader.chunks()) {
+        auto read = reader.glance(chunk, [&](const McapRecord& record) -> Expected<bool> {
+            const auto message =
+                record.opcode == McapOpcode::message ? parse_message(record.content) : std::nullopt;
+            if (!message) return true;
+            const auto part = parts.find(message->channel);
+            if (part == parts.end() || part->second.role != Role::gap) return true;
+            const auto text = reinterpret_cast<const char*>(message->data.data());
+            const auto json =
+                nlohmann::json::parse(text, text + message->data.size(), nullptr, false);
+            if (!json.is_object()) return reader.damaged(record.offset, "a gap is no JSON object");
+            const auto reason = json.find("reason");
+            const auto items = json.find("items");
+            gaps.push_back({part->second.stream,
+                            reason != json.end() && reason->is_string() ? reason->get<std::string>()
+                                                                        : "unknown",
+                            items != json.end() && items->is_number_unsigned()
+                                ? items->get<std::uint64_t>()
+                                : 0,
+                            {static_cast<std::int64_t>(message->log_time)}});
+            return true;
+        });
+        if (!read) return read;
+    }
+    return {};
+}
+
+Expected<std::vector<RecordedGap>> Recording::gaps() const {
+    std::vector<RecordedGap> gaps;
+    for (const auto& file : files_)
+        if (auto added = file->add_gaps(gaps); !added) return Unexpected(added.error());
+    return gaps;
+}
+
+}  // namespace versavis::client

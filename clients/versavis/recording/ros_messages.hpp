@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Frames and IMU samples as messages of ROS 2, in CDR, and the definitions of those.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "versavis/metadata.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::client {
+
+/// The name that ROS has for a pixel format; that of PFNC where it has none.
+std::string ros_encoding(std::uint32_t pixel_format);
+
+/// sensor_msgs/msg/Image up to its pixels, of which `length` bytes follow.
+std::string ros_image_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
+                           std::uint32_t length);
+
+/// sensor_msgs/msg/CompressedImage up to the PNG, of which `length` bytes follow.
+std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
+                         std::uint32_t length);
+
+/// sensor_msgs/msg/CameraInfo of a camera that nobody has calibrated.
+std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame);
+
+/// sensor_msgs/msg/Imu.
+std::string ros_imu(OutputTime time, std::string_view stream, const ImuMetadata& sample);
+
+/// sensor_msgs/msg/MagneticField.
+std::string ros_magnetic_field(OutputTime time, std::string_view stream, const ImuMetadata& sample);
+
+/// sensor_msgs/msg/Temperature.
+std::string ros_temperature(OutputTime time, std::string_view stream, const ImuMetadata& sample);
+
+/// sensor_msgs/msg/TimeReference: the PPS pulse at `time` was named `utc`.
+std::string ros_utc(OutputTime time, OutputTime utc);
+
+/// Definition of one of these types, such as `sensor_msgs/msg/Image`, with all that it is made of:
+/// MCAP's schema encoding `ros2msg`.
+std::string ros_definition(std::string_view type);
+
+}  // namespace versavis::client

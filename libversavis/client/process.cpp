@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "client/process.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <climits>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+
+namespace versavis::ring {
+
+namespace {
+
+// A writer whose heart has not beaten for this long is not taken for alive. Half: a service that
+// beats once a second and is held up for half of one looks dead. Twice: readers in another pid
+// namespace wait for 6 s before they are told of a death.
+constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
+
+// From this age of the heartbeat on, the writer's start is looked at as well as its number, which
+// costs some 20 us. Half: idle readers of services that beat every 50 ms pay for it. Twice: what is
+// left of a killed process, until its parent looks, passes for alive for 0.2 s.
+constexpr std::int64_t doubtful_ns = 100'000'000;
+
+bool can_be_judged(const Constants& constants) {
+    return constants.writer_pid != 0 && constants.writer_pid <= INT_MAX &&
+           constants.pid_namespace != 0 && constants.pid_namespace == own_pid_namespace();
+}
+
+}  // namespace
+
+Presence quick_presence(const Constants& constants) {
+    if (!can_be_judged(constants)) return Presence::unknown;
+    const auto pid = static_cast<pid_t>(constants.writer_pid);
+    return ::kill(pid, 0) != 0 && errno == ESRCH ? Presence::dead : Presence::there;
+}
+
+Presence presence(const Constants& constants) {
+    if (const Presence quick = quick_presence(constants); quick != Presence::there) return quick;
+    std::ifstream stat("/proc/" + std::to_string(constants.writer_pid) + "/stat");
+    if (!stat) return Presence::unknown;  // /proc may hide other users' processes
+    return start_ticks_of(constants.writer_pid) == constants.writer_start_ticks ? Presence::there
+                                                                                : Presence::dead;
+}
+
+std::uint64_t start_ticks_of(std::uint32_t pid) {
+    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+    std::string line;
+    std::getline(stat, line);
+    std::size_t at = line.rfind(')');  // the command may contain spaces
+    if (at != std::string::npos && line[at + 2] == 'Z') return 0;
+    for (int field = 3; field <= 22 && at != std::string::npos; ++field)
+        at = line.find(' ', at + 1);
+    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
+}
+
+std::uint64_t start_ticks_of_this_process() {
+    return start_ticks_of(static_cast<std::uint32_t>(::getpid()));
+}
+
+std::uint64_t own_pid_namespace() {
+    // A process stays where it was born; a child may be born elsewhere. Asking the kernel takes
+    // 5 us, and readers ask between waking up and handing over an item.
+    thread_local pid_t process = 0;
+    thread_local std::uint64_t known = 0;
+    if (const pid_t now = ::getpid(); now != process) {
+        struct stat space {};
+        known = ::stat("/proc/self/ns/pid", &space) == 0 ? space.st_ino : 0;
+        process = now;
+    }
+    return known;
+}
+
+bool is_own(const Constants& constants) {
+    return constants.writer_pid == static_cast<std::uint32_t>(::getpid()) &&
+           constants.writer_start_ticks == start_ticks_of_this_process();
+}
+
+bool Pulse::beats(HostTime heartbeat, HostTime now) {
+    const bool young = heartbeat.ns <= now.ns && heartbeat.ns > now.ns - heartbeat_limit_ns;
+    if (!young && last_ && heartbeat > *last_) changed_ = now;
+    last_ = heartbeat;
+    return young || (changed_ && now.ns - changed_->ns < heartbeat_limit_ns);
+}
+
+bool writer_lives(const Mapping& mapping, Pulse& pulse) {
+    const Header& header = mapping.header();
+    // SYNC 6: acquire here, release in supersede() and end(): whoever sees the segment ended also
+    // sees its last item in a second look. Without it that item could go unread.
+    const auto state = header.state.load(std::memory_order_acquire);
+    if (state != static_cast<std::uint32_t>(WriterState::live)) return false;
+    const HostTime now = host_now();
+    const HostTime heartbeat{header.heartbeat_ns.load(std::memory_order_relaxed)};
+    const bool doubtful = heartbeat.ns < now.ns - doubtful_ns;
+    const Constants& constants = mapping.constants();
+    const Presence seen = doubtful ? presence(constants) : quick_presence(constants);
+    return pulse.beats(heartbeat, now) && seen != Presence::dead;
+}
+
+}  // namespace versavis::ring

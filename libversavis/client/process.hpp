@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Whether the process that made a segment still runs, as far as this one can see.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "client/segment.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::ring {
+
+enum class Presence {
+    there,
+    dead,
+    unknown,  ///< it is of another pid namespace, or hidden from this process
+};
+
+/// By process id alone: one system call.
+Presence quick_presence(const Constants& constants);
+
+/// By process id and start: the remains of a process, and another one of its number, are told from
+/// it. Reads a file of /proc.
+Presence presence(const Constants& constants);
+
+/// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process
+/// id it identifies a process until reboot.
+std::uint64_t start_ticks_of(std::uint32_t pid);
+std::uint64_t start_ticks_of_this_process();
+
+/// Inode of this process's pid namespace; 0: unknown.
+std::uint64_t own_pid_namespace();
+
+/// True when this process made the segment.
+bool is_own(const Constants& constants);
+
+/// Whether a writer's heart beats: it is asked again and again, by one reader.
+class Pulse {
+ public:
+    /// True when the heartbeat is young. One that is far off this process's clock, as that of a
+    /// writer in another time namespace, is young when it has just changed.
+    bool beats(HostTime heartbeat, HostTime now);
+
+ private:
+    std::optional<HostTime> last_;
+    std::optional<HostTime> changed_;  ///< when it did so on a clock that is not this one's
+};
+
+/// True when the stream is open, its writer's process is not known to be dead, and its heart beats.
+bool writer_lives(const Mapping& mapping, Pulse& pulse);
+
+}  // namespace versavis::ring

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/set_reader.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "client/deadline.hpp"
+#include "versavis/wait_set.hpp"
+
+namespace versavis {
+
+namespace {
+
+// Sets that may wait for frames. Half: with one camera far behind, sets of the last 3 s at 20 Hz.
+// Twice: items of so many more are held, which costs little, and most are overwritten anyway.
+constexpr std::size_t most_pending = 128;
+
+// Between two looks at the IMU while no set waits for its samples. Half: a reader whose cameras are
+// slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is overtaken.
+constexpr Duration unwatched = milliseconds(100);
+
+using Key = std::pair<std::uint32_t, std::uint64_t>;  ///< epoch and tick
+
+struct Pending {
+    std::vector<std::optional<Frame>> frames;
+    HostTime give_up;
+};
+
+}  // namespace
+
+bool FrameSet::complete() const {
+    return std::all_of(frames.begin(), frames.end(), [](const auto& frame) { return !!frame; });
+}
+
+bool FrameSet::valid() const {
+    return std::all_of(frames.begin(), frames.end(),
+                       [](const auto& frame) { return !frame || frame->valid(); });
+}
+
+struct SetReader::State {
+    std::vector<FrameStream> cameras;
+    std::optional<ImuWindow> imu;
+    SetOptions options;
+    WaitSet waiting;
+    WaitSet cameras_waiting;     ///< the IMU's samples wake nobody while no set needs them
+    bool by_descriptor = false;  ///< somebody waits for all streams elsewhere
+    std::map<Key, Pending> pending;
+    std::vector<std::optional<Key>> newest;  ///< of each camera
+    std::optional<OutputTime> last;          ///< latest stamp of the set before
+    std::uint64_t life = 0;
+    bool told_gone = false;
+    SetReport report;
+
+    std::optional<NoItem> collect();
+    std::optional<NoItem> collect(std::size_t camera);
+    std::optional<NoItem> interrupted(const NoItem& why, std::uint64_t life_now);
+    void add(std::size_t camera, Frame frame);
+    bool decided(const Key& key, const Pending& set) const;
+    std::optional<FrameSet> ready();
+    FrameSet finish(const Key& key, Pending set);
+    std::optional<HostTime> next_deadline() const;
+};
+
+/// What is to be told of a stream that paused: each restart and each end once, for all streams.
+std::optional<NoItem> SetReader::State::interrupted(const NoItem& why, std::uint64_t life_now) {
+    if (why.why == Pause::gone && !told_gone) {
+        told_gone = true;
+        return why;
+    }
+    if (why.why != Pause::restarted || life_now == life) return std::nullopt;
+    life = life_now;
+    pending.clear();
+    newest.assign(cameras.size(), std::nullopt);
+    last.reset();
+    told_gone = false;
+    return why;
+}
+
+std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
+    for (;;) {
+        auto frame = cameras[camera].next();
+        if (frame) {
+            add(camera, std::move(*frame));
+            continue;
+        }
+        report.lost += frame.error().lost;
+        const auto told = interrupted(frame.error(), cameras[camera].reader().life());
+        const bool more = frame.error().why == Pause::lost || frame.error().why == Pause::restarted;
+        if (told || !more) return told;
+    }
+}
+
+std::optional<NoItem> SetReader::State::collect() {
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
+        if (auto told = collect(camera)) return told;
+    if (!imu) return std::nullopt;
+    const auto collected = imu->collect();
+    return collected ? std::nullopt : interrupted(collected.error(), imu->reader().life());
+}
+
+void SetReader::State::add(std::size_t camera, Frame frame) {
+    told_gone = false;
+    const bool suspect = (frame.data.flags & flag_suspect) != 0 && !options.suspect;
+    // Of another life: a camera that lags behind a restart, or is ahead of the others.
+    if (frame.data.trigger == 0 || suspect || frame.life != life) {
+        ++report.left_out;
+        return;
+    }
+    const Key key{frame.data.epoch, frame.data.tick()};
+    newest[camera] = std::max(newest[camera].value_or(key), key);
+    Pending& set = pending[key];
+    if (set.frames.empty()) {
+        set.frames.resize(cameras.size());
+        set.give_up = deadline_after(options.patience);
+    }
+    set.frames[camera] = std::move(frame);
+}
+
+/// True when nothing more can come: each camera is there, or went past it, or time is over.
+bool SetReader::State::decided(const Key& key, const Pending& set) const {
+    if (pending.size() > most_pending || set.give_up <= host_now()) return true;
+    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
+        if (!set.frames[camera] && !(newest[camera] && key < *newest[camera])) return false;
+    return true;
+}
+
+FrameSet SetReader::State::finish(const Key& key, Pending set) {
+    FrameSet made;
+    made.life = life;
+    made.epoch = key.first;
+    made.tick = key.second;
+    made.frames = std::move(set.frames);
+    std::vector<OutputTime> times;
+    for (const auto& frame : made.frames)
+        if (frame) times.push_back(frame->time);
+    const auto [earliest, latest] = std::minmax_element(times.begin(), times.end());
+    made.time = times.front();
+    made.spread = *latest - *earliest;
+    if (imu) made.imu = imu->take(last.value_or(*latest), *latest);
+    last = *latest;
+    ++report.sets;
+    return made;
+}
+
+std::optional<FrameSet> SetReader::State::ready() {
+    while (!pending.empty()) {
+        const auto first = pending.begin();
+        const auto& frames = first->second.frames;
+        if (!decided(first->first, first->second)) return std::nullopt;
+        const bool whole = std::all_of(frames.begin(), frames.end(), [](auto& f) { return !!f; });
+        if (!whole && !options.partial) {
+            ++report.incomplete;
+            pending.erase(first);
+            continue;
+        }
+        OutputTime latest{INT64_MIN};
+        for (const auto& frame : frames)
+            if (frame) latest = std::max(latest, frame->time, std::less<>());
+        const bool patient = first->second.give_up > host_now();
+        if (imu && !imu->reaches(latest) && patient) return std::nullopt;
+        if (!whole) ++report.incomplete;
+        auto node = pending.extract(first);
+        return finish(node.key(), std::move(node.mapped()));
+    }
+    return std::nullopt;
+}
+
+std::optional<HostTime> SetReader::State::next_deadline() const {
+    std::optional<HostTime> earliest;
+    for (const auto& [key, set] : pending)
+        if (!earliest || set.give_up < *earliest) earliest = set.give_up;
+    return earliest;
+}
+
+Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
+                                    const SetOptions& options) {
+    if (cameras.empty()) return failure("a set of frames", "needs the names of cameras");
+    if (std::set<std::string>(cameras.begin(), cameras.end()).size() != cameras.size())
+        return failure("a set of frames", "names a camera twice", "name each once");
+    auto state = std::make_unique<State>();
+    state->options = options;
+    for (const std::string& name : cameras) {
+        auto stream = FrameStream::open(name, options);
+        if (!stream) return Unexpected(stream.error());
+        state->cameras.push_back(std::move(*stream));
+    }
+    if (!options.imu.empty()) {
+        auto imu = ImuWindow::open(options.imu, options);
+        if (!imu) return Unexpected(imu.error());
+        state->imu.emplace(std::move(*imu));
+    }
+    for (FrameStream& camera : state->cameras)
+        for (WaitSet* waiting : {&state->waiting, &state->cameras_waiting})
+            if (auto added = waiting->add(camera.reader()); !added)
+                return Unexpected(added.error());
+    if (state->imu)
+        if (auto added = state->waiting.add(state->imu->reader()); !added)
+            return Unexpected(added.error());
+    state->newest.resize(cameras.size());
+    state->life = state->cameras.front().reader().life();
+    return SetReader(std::move(state));
+}
+
+SetReader::SetReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+SetReader::SetReader(SetReader&&) noexcept = default;
+SetReader& SetReader::operator=(SetReader&&) noexcept = default;
+SetReader::~SetReader() = default;
+
+Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
+    const HostTime deadline = deadline_after(timeout);
+    for (;;) {
+        if (const auto told = state_->collect()) return Unexpected<NoItem>(*told);
+        if (auto set = state_->ready()) return std::move(*set);
+        const auto give_up = state_->next_deadline();
+        state_->waiting.set_deadline(give_up);
+        const HostTime now = host_now();
+        const bool idle = state_->pending.empty() && !state_->by_descriptor;
+        const HostTime until =
+            std::min(deadline, idle ? now + unwatched : give_up.value_or(deadline), std::less<>());
+        WaitSet& waiting = idle ? state_->cameras_waiting : state_->waiting;
+        const bool found = waiting.wait(until - now).has_value();
+        if (!found && host_now() >= deadline && !(give_up && *give_up <= host_now()))
+            return Unexpected<NoItem>(NoItem{state_->told_gone ? Pause::gone : Pause::nothing, 0});
+    }
+}
+
+Expected<int> SetReader::fd() {
+    state_->by_descriptor = true;
+    return state_->waiting.fd();
+}
+
+const SetReport& SetReader::report() const { return state_->report; }
+
+}  // namespace versavis

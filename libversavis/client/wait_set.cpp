@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/wait_set.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "client/deadline.hpp"
+#include "client/futex.hpp"
+#include "client/segment.hpp"
+#include "client/watch.hpp"
+
+namespace versavis {
+
+using ring::FutexWord;
+
+struct WaitSet::State {
+    std::vector<ring::Reader*> readers;
+    std::vector<FutexWord> words;
+    std::size_t turn = 0;  ///< who is asked first
+    std::optional<HostTime> deadline;
+    std::unique_ptr<ring::Watch> watch;  ///< once fd() was asked for
+};
+
+WaitSet::WaitSet() : state_(std::make_unique<State>()) {}
+WaitSet::WaitSet(WaitSet&&) noexcept = default;
+WaitSet& WaitSet::operator=(WaitSet&&) noexcept = default;
+WaitSet::~WaitSet() = default;
+
+Expected<> WaitSet::add(ring::Reader& reader) {
+    if (state_->readers.size() + 1 >= ring::most_futex_words)
+        return failure(reader.name(), "is one stream too many to wait for",
+                       "use a second WaitSet in another thread");
+    state_->readers.push_back(&reader);
+    return {};
+}
+
+std::optional<std::size_t> WaitSet::ready() {
+    const std::size_t count = state_->readers.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t at = (state_->turn + i) % count;
+        if (!state_->readers[at]->ready()) continue;
+        state_->turn = at + 1;
+        return at;
+    }
+    return std::nullopt;
+}
+
+std::optional<std::size_t> WaitSet::wait(Duration timeout) {
+    const HostTime deadline = deadline_after(timeout);
+    const auto& readers = state_->readers;
+    for (;;) {
+        if (state_->watch) state_->watch->calm();
+        state_->words.clear();
+        for (const ring::Reader* reader : readers) state_->words.push_back(reader->wake_word());
+        if (const auto found = ready()) {
+            if (state_->watch) state_->watch->signal();
+            return found;
+        }
+        const std::int64_t left_ns = (deadline - host_now()).ns;
+        if (left_ns <= 0) break;
+        ring::futex_wait_any(state_->words.data(), state_->words.size(),
+                             std::min(left_ns, ring::longest_sleep_ns));
+    }
+    if (state_->watch) arm();
+    return std::nullopt;
+}
+
+void WaitSet::arm() {
+    std::vector<ring::WatchTarget> targets;
+    for (std::size_t i = 0; i < state_->readers.size(); ++i)
+        targets.push_back(state_->readers[i]->target(state_->words[i].value));
+    state_->watch->arm(std::move(targets), state_->deadline);
+}
+
+Expected<int> WaitSet::fd() {
+    if (!state_->watch) {
+        auto watch = ring::Watch::start();
+        if (!watch) return Unexpected(watch.error());
+        state_->watch = std::move(*watch);
+    }
+    return state_->watch->fd();
+}
+
+void WaitSet::set_deadline(std::optional<HostTime> deadline) { state_->deadline = deadline; }
+
+}  // namespace versavis

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/ring/crowd.hpp"
+
+#include <climits>
+#include <system_error>
+
+#include "client/futex.hpp"
+
+namespace versavis::ring {
+
+namespace {
+
+// Readers that the writer wakes by itself; where there are more, the thread wakes all. Half: a
+// stereo consumer, a recorder and a viewer wait for the thread, some 10 us. Twice: publication to
+// that many takes twice as long.
+constexpr int woken_at_once = 4;
+
+}  // namespace
+
+Crowd::~Crowd() {
+    stop_ = true;
+    calls_.fetch_add(1);
+    calls_.notify_one();
+    if (thread_.joinable()) thread_.join();
+}
+
+void Crowd::wake(const std::atomic<std::uint32_t>& word) {
+    // A crowd that was there is most likely there again: waking some of it here would only make the
+    // thread wait for a processor behind them.
+    if (present_.load(std::memory_order_relaxed) ||
+        futex_wake(word, woken_at_once) == woken_at_once)
+        call(word);
+}
+
+void Crowd::call(const std::atomic<std::uint32_t>& word) {
+    calls_.fetch_add(1, std::memory_order_release);
+    if (thread_.joinable()) return calls_.notify_one();
+    try {
+        thread_ = std::thread([this, &word] { run(word); });
+    } catch (const std::system_error&) {
+        futex_wake(word, INT_MAX);  // no thread to be had: slower, but all are woken
+    }
+}
+
+void Crowd::run(const std::atomic<std::uint32_t>& word) {
+    for (std::uint32_t seen = 0; !stop_;) {
+        const std::uint32_t called = calls_.load(std::memory_order_acquire);
+        if (called == seen) {
+            calls_.wait(seen, std::memory_order_acquire);
+            continue;
+        }
+        seen = called;
+        present_.store(futex_wake(word, INT_MAX) > woken_at_once, std::memory_order_relaxed);
+    }
+}
+
+}  // namespace versavis::ring

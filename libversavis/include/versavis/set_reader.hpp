@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Sets of frames: what all cameras saw at one tick, with the IMU samples since the set before.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "versavis/export.hpp"
+#include "versavis/imu_window.hpp"
+#include "versavis/stream.hpp"
+
+namespace versavis {
+
+struct VERSAVIS_API FrameSet {
+    std::uint64_t life = 0;
+    std::uint32_t epoch = 0;
+    std::uint64_t tick = 0;
+    OutputTime time;                           ///< of the first camera that is there
+    Duration spread;                           ///< latest less earliest stamp
+    std::vector<std::optional<Frame>> frames;  ///< in the order in which cameras were named
+    ImuSpan imu;  ///< after the set before, up to the latest stamp of this one; the first has none
+
+    bool complete() const;
+    bool valid() const;  ///< all payloads: what was read of them before this call is good
+};
+
+struct SetOptions : StreamOptions {
+    std::string imu;                        ///< name of its stream; empty: none
+    Duration patience = milliseconds(200);  ///< from a set's first frame until it is given up
+    bool partial = false;                   ///< sets that lack a frame are delivered, too
+    bool suspect = false;                   ///< frames whose pairing is not proved count, too
+};
+
+/// What became of frames that are in no set.
+struct SetReport {
+    std::uint64_t sets = 0;        ///< delivered
+    std::uint64_t incomplete = 0;  ///< sets that lacked a frame, delivered or not
+    std::uint64_t left_out =
+        0;                   ///< frames without a tick, suspect, or of another life of the service
+    std::uint64_t lost = 0;  ///< frames overwritten before they were read
+};
+
+/// Not thread-safe. Cameras must be triggered by the board; a set is of one grid point, so cameras
+/// of different rates meet where their grids do.
+class VERSAVIS_API SetReader {
+ public:
+    /// Errors: as for FrameStream::open and ImuStream::open; no camera named, or one twice.
+    static Expected<SetReader> open(const std::vector<std::string>& cameras,
+                                    const SetOptions& options = {});
+    SetReader(SetReader&&) noexcept;
+    SetReader& operator=(SetReader&&) noexcept;
+    ~SetReader();
+
+    /// The next set, in the order of ticks, waiting for it up to `timeout` (0: not at all). Errors:
+    /// Pause::nothing, restarted (once for all streams) or gone; frames that were lost only count.
+    Expected<FrameSet, NoItem> next(Duration timeout);
+
+    /// For poll and epoll: readable when next() may have a set, until it has none. Errors: no
+    /// descriptor or thread to be had.
+    Expected<int> fd();
+
+    const SetReport& report() const;
+
+ private:
+    struct State;
+    explicit SetReader(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace versavis

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/mcap_reader.hpp"
+
+#include <sys/resource.h>
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "recording/recording.hpp"
+#include "recording_file.hpp"
+#include "temporary_directory.hpp"
+
+using namespace versavis;
+using client::McapReader;
+using client::Recording;
+
+namespace {
+
+constexpr std::uint32_t mono8 = 0x01080001;
+
+struct Sample {
+    test::TemporaryDirectory directory;
+    std::string path = (directory.path() / "a.mcap").string();
+
+    void write(const std::string& bytes) const {
+        std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+    }
+};
+
+/// Everything that can be asked of a file.
+void read_all(const std::string& path) {
+    const auto recording = Recording::open(path);
+    if (!recording) {
+        CHECK_FALSE(recording.error().what.empty());
+        return;
+    }
+    std::size_t bytes = 0;
+    const auto take = [&](const client::RecordedItem& item) {
+        for (const std::byte one : item.payload) bytes += static_cast<std::size_t>(one);
+        return true;
+    };
+    std::vector<client::ItemPlace> places;
+    const auto note = [&](const client::RecordedItem& item) {
+        if (places.size() < 20) places.push_back(item.place);
+        return true;
+    };
+    (void)recording->for_each({}, take);
+    (void)recording->glance({}, note);
+    for (const auto& place : places) (void)recording->at(place, take);
+    (void)recording->gaps();
+}
+
+std::string damage(std::string bytes, std::mt19937_64& random) {
+    const auto any = [&](std::size_t below) { return static_cast<std::size_t>(random() % below); };
+    const std::size_t hits = 1 + any(3);
+    for (std::size_t hit = 0; hit < hits && !bytes.empty(); ++hit) {
+        const std::size_t at = any(bytes.size());
+        switch (any(5)) {
+            case 0: bytes[at] = static_cast<char>(random()); break;
+            case 1: bytes.resize(at); break;
+            case 2: {  // a length of anything
+                const std::uint64_t huge = random() >> any(64);
+                std::memcpy(bytes.data() + at, &huge, std::min<std::size_t>(8, bytes.size() - at));
+                break;
+            }
+            case 3: bytes.erase(at, 1 + any(64)); break;
+            default: bytes.insert(at, std::string(1 + any(64), static_cast<char>(random())));
+        }
+    }
+    return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory than they have") {
+    const Sample sample;
+    const std::string whole[] = {test::sample_recording(1, false, false, mono8),
+                                 test::sample_recording(1, true, false, mono8),
+                                 test::sample_recording(1, true, true, mono8)};
+    std::mt19937_64 random(20261121);
+    for (int i = 0; i < 10000; ++i) {
+        sample.write(damage(whole[i % 3], random));
+        read_all(sample.path);
+    }
+    rusage use{};
+    getrusage(RUSAGE_SELF, &use);
+    CHECK(use.ru_maxrss < 1 << 20U);  // KiB: files have 100 of them
+}
+
+TEST_CASE("mcap_reader: a file that was cut anywhere gives what is whole, in the same order") {
+    const Sample sample;
+    const std::string whole = test::sample_recording(1, false, false, mono8);
+    sample.write(whole);
+    std::vector<std::pair<std::string, std::uint64_t>> all;
+    const auto read = [&] {
+        std::vector<std::pair<std::string, std::uint64_t>> items;
+        const auto recording = Recording::open(sample.path);
+        if (!recording) return items;
+        REQUIRE(recording->for_each({}, [&](const client::RecordedItem& item) {
+            items.emplace_back(item.stream, item.number);
+            return true;
+        }));
+        return items;
+    };
+    all = read();
+    REQUIRE(all.size() > 100);
+    std::size_t longest = 0;
+    for (std::size_t size = 0; size < whole.size(); size += 997) {
+        sample.write(whole.substr(0, size));
+        const auto items = read();
+        CHECK(items.size() >= longest);
+        CHECK(std::equal(items.begin(), items.end(), all.begin()));
+        longest = items.size();
+    }
+    CHECK(longest > 100);
+}
+
+TEST_CASE("mcap_reader: a chunk of another checksum is an error with its place") {
+    const Sample sample;
+    std::string bytes = test::sample_recording(1, false, false, mono8);
+    sample.write(bytes);
+    const auto chunk = [&] {
+        const auto reader = McapReader::open(sample.path);
+        REQUIRE(reader);
+        CHECK(reader->defect().empty());
+        return reader->chunks().at(2);
+    }();
+    bytes[chunk.records_offset + chunk.records_size / 2] ^= 1;
+    sample.write(bytes);
+    const auto recording = Recording::open(sample.path);
+    REQUIRE(recording);
+    std::uint64_t items = 0;
+    const auto read = recording->for_each({}, [&](const client::RecordedItem&) { return ++items; });
+    REQUIRE_FALSE(read);
+    CHECK(read.error().what.find("byte " + std::to_string(chunk.offset)) != std::string::npos);
+    CHECK(items > 0);
+}
+
+TEST_CASE("mcap_reader: a compressed chunk is told by its compression") {
+    const Sample sample;
+    std::string bytes = test::sample_recording(1, false, false, mono8);
+    const std::string content = std::string(28, '\0') + std::string("\4\0\0\0zstd", 8) +
+                                std::string("\1\0\0\0\0\0\0\0x", 9);
+    sample.write(bytes.substr(0, 8) + test::RecordingFile::record(1, std::string(8, '\0')) +
+                 test::RecordingFile::record(6, content));
+    const auto recording = Recording::open(sample.path);
+    REQUIRE_FALSE(recording);
+    CHECK(recording.error().what.find("zstd") != std::string::npos);
+    CHECK_FALSE(recording.error().cure.empty());
+}
+
+TEST_CASE("mcap_reader: what is no MCAP file is told, and a directory, and nothing") {
+    const Sample sample;
+    CHECK_FALSE(McapReader::open(sample.path));
+    CHECK_FALSE(McapReader::open(sample.directory.path().string()));
+    CHECK_FALSE(McapReader::open("/dev/zero"));
+    for (const std::string& bytes : {std::string(), std::string("\x89MCAP0\r\n"),
+                                     std::string(100, 'x'), std::string(8, '\x89')}) {
+        sample.write(bytes);
+        CHECK_FALSE(McapReader::open(sample.path));
+    }
+}

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "play/player.hpp"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <map>
+#include <optional>
+
+#include "engine/ring/directory.hpp"
+#include "play/pace.hpp"
+#include "recording_file.hpp"
+#include "temporary_directory.hpp"
+#include "versavis/ring/path.hpp"
+#include "versavis/ring/reader.hpp"
+
+using namespace versavis;
+using namespace versavis::client;
+
+namespace {
+
+constexpr auto instance = "player-test";
+
+struct Sample {
+    test::TemporaryDirectory directory;
+    std::string path = (directory.path() / "a.mcap").string();
+
+    Sample() {
+        std::ofstream(path, std::ios::binary) << test::sample_recording(1, true, false, 0x01080001);
+    }
+    ~Sample() { std::filesystem::remove_all(instance_directory(instance)); }
+};
+
+}  // namespace
+
+TEST_CASE("player: items come out of the rings as they were, once each round, of another life") {
+    const Sample sample;
+    const auto recording = Recording::open(sample.path);
+    REQUIRE(recording);
+    std::map<std::uint64_t, std::vector<std::byte>> expected;
+    REQUIRE(recording->for_each({"cam0"}, [&](const RecordedItem& item) {
+        expected[item.number] = {item.payload.begin(), item.payload.end()};
+        return true;
+    }));
+    std::optional<ring::Reader> reader;
+    std::map<std::uint64_t, std::uint64_t> lives;
+    std::uint64_t good = 0;
+    std::uint64_t restarts = 0;
+    PlaySettings settings;
+    settings.instance = instance;
+    settings.streams = {"cam0"};
+    settings.rate = 1000;
+    settings.loop = true;
+    // The reader looks between any two items: it misses none.
+    settings.stop = [&] {
+        if (!reader) {
+            auto opened = ring::Reader::open(stream_path(instance, "cam0"),
+                                             {ring::Position::oldest, ring::Position::oldest});
+            if (!opened) return false;
+            reader.emplace(std::move(*opened));
+        }
+        for (;;) {
+            const auto item = reader->next();
+            if (!item && item.error().why == ring::Pause::restarted) ++restarts;
+            if (!item && item.error().why != ring::Pause::restarted) break;
+            if (!item) continue;
+            ++lives[item->life];
+            const auto frame = unpack<FrameMetadata>(item->metadata);
+            const auto& pixels = expected.at(frame.block_id - 1);
+            good += std::equal(pixels.begin(), pixels.end(), item->payload.data(),
+                               item->payload.data() + item->payload.size())
+                        ? 1
+                        : 0;
+        }
+        return lives.size() == 3;
+    };
+    const auto report = play(*recording, settings);
+    REQUIRE(report);
+    CHECK(lives.size() == 3);
+    CHECK(restarts == 2);
+    CHECK(lives.begin()->second + std::next(lives.begin())->second > expected.size());
+    CHECK(good >= 2 * expected.size());
+}
+
+TEST_CASE("player: an instance that somebody serves is refused") {
+    const Sample sample;
+    const auto recording = Recording::open(sample.path);
+    const auto owned = ring::OwnedDirectory::claim(instance_directory(instance));
+    REQUIRE(owned);
+    PlaySettings settings;
+    settings.instance = instance;
+    const auto report = play(*recording, settings);
+    REQUIRE_FALSE(report);
+    CHECK(report.error().what.find("serves this instance") != std::string::npos);
+    settings.streams = {"nothing"};
+    CHECK_FALSE(play(*recording, settings));
+}
+
+TEST_CASE("pace: by the stamps, faster or slower, and jumps are not waited for") {
+    Pace pace(2);
+    constexpr HostTime begin{1'000'000'000};
+    CHECK(pace.due({seconds(100).ns}, begin) == begin);
+    CHECK(pace.due({seconds(101).ns}, begin) == begin + milliseconds(500));
+    CHECK(pace.due({seconds(100).ns}, begin + seconds(1)) == begin);
+    const HostTime later = begin + seconds(3);
+    CHECK(pace.due({seconds(900).ns}, later) == later);
+    CHECK(pace.due({seconds(902).ns}, later) == later + seconds(1));
+    CHECK(pace.due({seconds(5).ns}, later) == later);
+}

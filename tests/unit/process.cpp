@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "client/process.hpp"
+
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+
+#include "../support/in_process.hpp"
+
+using namespace versavis;
+using namespace versavis::ring;
+using test::in_process;
+
+namespace {
+
+Constants own_constants() {
+    Constants constants;
+    constants.writer_pid = static_cast<std::uint32_t>(::getpid());
+    constants.writer_start_ticks = start_ticks_of_this_process();
+    constants.pid_namespace = own_pid_namespace();
+    return constants;
+}
+
+}  // namespace
+
+TEST_CASE("process: another one, or an earlier one with its number, did not make it") {
+    CHECK(is_own(own_constants()));
+    Constants constants = own_constants();
+    constants.writer_pid = 1;
+    CHECK_FALSE(is_own(constants));
+    constants = own_constants();
+    constants.writer_start_ticks = start_ticks_of(1);
+    CHECK_FALSE(is_own(constants));
+}
+
+TEST_CASE("process: it is there, dead, or cannot be judged from here") {
+    CHECK(own_pid_namespace() != 0);
+    CHECK(presence(own_constants()) == Presence::there);
+    Constants later = own_constants();
+    ++later.writer_start_ticks;
+    CHECK(quick_presence(later) == Presence::there);
+    CHECK(presence(later) == Presence::dead);
+    Constants none = own_constants();
+    none.writer_pid = 0x7FFFFFFF;
+    CHECK(quick_presence(none) == Presence::dead);
+    CHECK(presence(none) == Presence::dead);
+    for (const std::uint32_t odd : {0U, 0x80000000U, 0xFFFFFFFFU}) {
+        none.writer_pid = odd;
+        CHECK(presence(none) == Presence::unknown);
+    }
+    for (const std::uint64_t space : {std::uint64_t{0}, own_pid_namespace() + 1}) {
+        Constants elsewhere = later;
+        elsewhere.pid_namespace = space;
+        CHECK(quick_presence(elsewhere) == Presence::unknown);
+        CHECK(presence(elsewhere) == Presence::unknown);
+    }
+}
+
+TEST_CASE("process: a heart beats while its last beat is young") {
+    Pulse pulse;
+    const HostTime now{1'000'000'000'000};
+    CHECK(pulse.beats(now, now));
+    CHECK(pulse.beats(now, now + milliseconds(2999)));
+    CHECK_FALSE(pulse.beats(now, now + seconds(3)));
+    CHECK(pulse.beats(now + seconds(3), now + seconds(3)));
+}
+
+TEST_CASE("process: a heart on another clock beats while it changes") {
+    const HostTime now{1'000'000'000'000};
+    for (const Duration off : {seconds(500), seconds(-500)}) {
+        Pulse pulse;
+        CHECK_FALSE(pulse.beats(now + off, now));
+        CHECK_FALSE(pulse.beats(now + off, now + milliseconds(20)));
+        CHECK(pulse.beats(now + off + milliseconds(50), now + milliseconds(60)));
+        CHECK(pulse.beats(now + off + milliseconds(50), now + milliseconds(3059)));
+        CHECK_FALSE(pulse.beats(now + off + milliseconds(50), now + milliseconds(3060)));
+    }
+    for (const std::int64_t beat : {INT64_MIN, INT64_MAX}) {
+        Pulse pulse;
+        CHECK_FALSE(pulse.beats({beat}, now));
+        CHECK_FALSE(pulse.beats({beat}, now));
+    }
+}
+
+TEST_CASE("process: the start of a process, whatever its name") {
+    const std::uint64_t own = start_ticks_of_this_process();
+    CHECK(own > 0);
+    CHECK(start_ticks_of(static_cast<std::uint32_t>(::getppid())) <= own);
+    CHECK(start_ticks_of(0x7FFFFFFF) == 0);
+    CHECK(start_ticks_of(0) == 0);
+    for (const char* name : {"plain", "two words", "a) R 1 2 (b", ")) Z (", ""}) {
+        const std::uint64_t before = start_ticks_of_this_process();
+        CHECK(in_process([&] {
+            ::prctl(PR_SET_NAME, name);
+            const std::uint64_t ticks = start_ticks_of_this_process();
+            return ticks >= before && ticks < before + 100'000'000;
+        }));
+    }
+    CHECK(start_ticks_of_this_process() == own);
+}
+
+TEST_CASE("process: a process that has ended is none, though its remains are there") {
+    std::array<int, 2> gate{};
+    REQUIRE(::pipe(gate.data()) == 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+        char byte = 0;
+        ::_exit(static_cast<int>(::read(gate[0], &byte, 1)) - 1);
+    }
+    CHECK(start_ticks_of(static_cast<std::uint32_t>(child)) >= start_ticks_of_this_process());
+    REQUIRE(::write(gate[1], "x", 1) == 1);
+    siginfo_t ended{};
+    REQUIRE(::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) == 0);
+    CHECK(start_ticks_of(static_cast<std::uint32_t>(child)) == 0);
+    ::waitpid(child, nullptr, 0);
+    CHECK(start_ticks_of(static_cast<std::uint32_t>(child)) == 0);
+    ::close(gate[0]);
+    ::close(gate[1]);
+}

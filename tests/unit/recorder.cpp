@@ -1,0 +1,421 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The recorder against writers that run in step with it: its question whether to stop is their
+// turn.
+#include "record/recorder.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "../support/in_process.hpp"
+#include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
+#include "record/item_writer.hpp"
+#include "record/record_command.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording/recording.hpp"
+#include "recording/repair.hpp"
+#include "versavis/ring/path.hpp"
+
+using namespace versavis;
+using namespace versavis::client;
+using Catch::Matchers::Contains;
+
+namespace {
+
+constexpr std::uint32_t width = 64;
+constexpr std::uint32_t height = 48;
+constexpr std::uint32_t slots = 8;
+constexpr std::uint32_t mono8 = 0x01080001;
+
+std::vector<std::byte> pixels_of(std::uint64_t number) {
+    return std::vector<std::byte>(width * height, static_cast<std::byte>(number + 1));
+}
+
+/// An instance that no service owns, with a camera, an IMU and events.
+struct Instance {
+    std::string name = fmt::format("recorder-{}", ::getpid());
+    std::filesystem::path directory = instance_directory(name);
+    test::TemporaryDirectory files;
+    std::optional<ring::Writer> camera;
+    std::optional<ring::Writer> imu;
+    std::optional<ring::Writer> events;
+    std::uint32_t epoch = 1;
+
+    Instance() {
+        std::filesystem::create_directories(directory);
+        open();
+    }
+    ~Instance() {
+        close();
+        std::filesystem::remove_all(directory);
+    }
+    ring::Writer make(const ring::Shape& shape) const {
+        return *ring::Writer::create(directory, shape);
+    }
+    void open() {
+        using Kind = ring::StreamKind;
+        camera = make({"cam0", Kind::frames, 64, slots, std::uint64_t{width} * height});
+        imu = make({"imu0", Kind::imu, 256});
+        events = make({"events", Kind::events, 64});
+    }
+    void close() {
+        camera.reset();
+        imu.reset();
+        events.reset();
+    }
+
+    /// A frame, and the sample of the same instant.
+    void publish() {
+        const std::uint64_t number = camera->head();
+        const OutputTime time{1'000'000'000 + static_cast<std::int64_t>(number) * 50'000'000};
+        FrameMetadata frame{};
+        frame.trigger = number + 1;
+        frame.width = frame.stride = width;
+        frame.height = height;
+        frame.pixel_format = mono8;
+        frame.epoch = epoch;
+        const auto pixels = pixels_of(number);
+        const std::uint32_t slot = camera->acquire().value();
+        std::memcpy(camera->slot_data(slot), pixels.data(), pixels.size());
+        camera->publish(slot, static_cast<std::uint32_t>(pixels.size()), time, pack(frame));
+        ImuMetadata sample{};
+        sample.number = number;
+        sample.epoch = epoch;
+        imu->publish(time, pack(sample));
+    }
+
+    RecordSettings settings(const std::string& file = "a.mcap") const {
+        RecordSettings settings;
+        settings.instance = name;
+        settings.output = (files.path() / file).string();
+        return settings;
+    }
+
+    /// `turn` is called with 0, 1, ... between the recorder's rounds, until it returns false.
+    RecordReport record(RecordSettings settings, const std::function<bool(int)>& turn) const {
+        settings.stop = [&turn, number = 0]() mutable { return !turn(number++); };
+        auto report = client::record(settings);
+        REQUIRE(report);
+        return *report;
+    }
+};
+
+/// What a recording has of the camera: numbers, and whether all pixels are right.
+struct Frames {
+    std::vector<std::uint64_t> numbers;
+    bool right = true;
+};
+
+Frames frames_in(const std::string& path) {
+    Frames frames;
+    const auto recording = Recording::open(path);
+    REQUIRE(recording);
+    CHECK(recording->facts().defect.empty());
+    CHECK(recording->for_each({"cam0"}, [&](const RecordedItem& item) {
+        const auto expected = pixels_of(item.number);
+        frames.numbers.push_back(item.number);
+        frames.right = frames.right && std::equal(item.payload.begin(), item.payload.end(),
+                                                  expected.begin(), expected.end());
+        return true;
+    }));
+    return frames;
+}
+
+std::vector<std::uint64_t> from_to(std::uint64_t first, std::uint64_t end) {
+    std::vector<std::uint64_t> numbers;
+    for (; first < end; ++first) numbers.push_back(first);
+    return numbers;
+}
+
+std::map<std::string, std::uint64_t> gaps_in(const std::string& path, const std::string& stream) {
+    std::map<std::string, std::uint64_t> gaps;
+    const auto all = Recording::open(path)->gaps();
+    REQUIRE(all);
+    for (const RecordedGap& gap : *all)
+        if (gap.stream == stream) gaps[gap.reason] += gap.items + (gap.reason == "lost" ? 0 : 1);
+    return gaps;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Instance, "recorder: each item is in the file as it was in the ring") {
+    const bool png = GENERATE(false, true);
+    auto settings = this->settings();
+    settings.png = png;
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        if (turn == 3) events->publish(OutputTime{5}, pack(EventMetadata{}));
+        return turn < 20;
+    });
+    CHECK(report.lost() == 0);
+    CHECK(report.streams.at("cam0").items == 20);
+    CHECK(report.streams.at("events").items == 1);
+    const Frames frames = frames_in(settings.output);
+    CHECK(frames.numbers == from_to(0, 20));
+    CHECK(frames.right);
+    const auto recording = Recording::open(settings.output);
+    CHECK(recording->facts().told.at("instance") == name);
+    std::uint64_t samples = 0;
+    CHECK(recording->for_each({"imu0"}, [&](const RecordedItem& item) {
+        CHECK(unpack<ImuMetadata>(item.metadata).number == samples++);
+        return true;
+    }));
+    CHECK(samples == 20);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: what is overwritten before it is written is told as lost") {
+    const auto settings = this->settings();
+    const RecordReport report = record(settings, [&](int turn) {
+        for (int i = 0; i < (turn == 2 ? 100 : 1); ++i) publish();
+        return turn < 5;
+    });
+    const StreamReport& told = report.streams.at("cam0");
+    CHECK(told.lost > 80);
+    CHECK(told.items + told.lost == 104);
+    CHECK(gaps_in(settings.output, "cam0").at("lost") == told.lost);
+    const Frames frames = frames_in(settings.output);
+    CHECK(frames.numbers.size() == told.items);
+    CHECK(frames.right);
+    CHECK(report.streams.at("imu0").lost == 0);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: what is overwritten while it is written is taken back") {
+    auto file = McapWriter::create((files.path() / "a.mcap").string(), "a test");
+    ItemWriter writer(std::move(*file));
+    auto reader = ring::Reader::open(directory / "cam0");
+    publish();
+    publish();
+    const auto first = reader->next();
+    REQUIRE(writer.write_frame("cam0", *first));
+    const auto second = reader->next();
+    for (std::uint32_t i = 0; i < slots; ++i) publish();  // as if meanwhile
+    const auto outcome = writer.write_frame("cam0", *second);
+    REQUIRE(outcome);
+    CHECK(*outcome == ItemWriter::Outcome::overtaken);
+    REQUIRE(writer.file().close());
+    CHECK(frames_in((files.path() / "a.mcap").string()).numbers == from_to(0, 1));
+}
+
+TEST_CASE_METHOD(Instance, "recorder: a service that ends and comes back is told, and followed") {
+    const auto settings = this->settings();
+    const RecordReport report = record(settings, [&](int turn) {
+        if (turn == 4) close();
+        if (turn == 6) open();
+        if (turn == 8) ++epoch;
+        if (camera) publish();
+        return turn < 12;
+    });
+    const StreamReport& told = report.streams.at("cam0");
+    CHECK(told.restarts == 1);
+    CHECK(told.epochs == 1);
+    CHECK(told.lost == 0);
+    CHECK(told.items == 10);
+    CHECK(gaps_in(settings.output, "cam0") ==
+          std::map<std::string, std::uint64_t>{{"epoch", 1}, {"gone", 1}, {"restarted", 1}});
+    auto expected = from_to(0, 4);
+    for (const std::uint64_t number : from_to(0, 6)) expected.push_back(number);
+    CHECK(frames_in(settings.output).numbers == expected);
+}
+
+TEST_CASE_METHOD(Instance,
+                 "recorder: a stream that comes later is recorded from its first item on") {
+    std::optional<ring::Writer> late;
+    const auto settings = this->settings();
+    const RecordReport report = record(settings, [&](int turn) {
+        if (turn == 1) {
+            late = make({"late", ring::StreamKind::events, 64});
+            for (int i = 0; i < 3; ++i) late->publish(OutputTime{9}, pack(EventMetadata{}));
+        }
+        return turn < 15;  // rounds without items last a tenth of a second
+    });
+    CHECK(report.streams.at("late").items == 3);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: the past, as far as the rings go") {
+    for (int i = 0; i < 20; ++i) publish();
+    auto settings = this->settings();
+    settings.before = milliseconds(200);
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        return turn < 2;
+    });
+    CHECK(report.lost() == 0);
+    CHECK(frames_in(settings.output).numbers == from_to(15, 22));
+}
+
+TEST_CASE_METHOD(Instance,
+                 "recorder: all that the rings hold, while they are written, is no loss") {
+    for (int i = 0; i < 200; ++i) publish();
+    auto settings = this->settings();
+    settings.before = seconds(1000);
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        return turn < 3;
+    });
+    CHECK(report.lost() == 0);
+    const auto numbers = frames_in(settings.output).numbers;
+    REQUIRE(numbers.size() >= slots / 2);
+    CHECK(numbers == from_to(numbers.front(), 203));
+}
+
+TEST_CASE_METHOD(Instance, "recorder: the past of a stream with nothing new is older than wanted") {
+    events->publish(OutputTime{1}, pack(EventMetadata{}));
+    for (int i = 0; i < 200; ++i) publish();
+    auto settings = this->settings();
+    settings.before = milliseconds(300);
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        return turn < 3;
+    });
+    CHECK(report.streams.at("events").items == 0);
+    CHECK(report.streams.at("imu0").items == 10);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: a gap before the first item stands where that does") {
+    const auto settings = this->settings();
+    const RecordReport report = record(settings, [&](int turn) {
+        for (int i = 0; i < (turn == 0 ? 100 : 1); ++i) publish();
+        return turn < 3;
+    });
+    CHECK(report.streams.at("cam0").lost > 0);
+    CHECK(gaps_in(settings.output, "cam0").at("lost") == report.streams.at("cam0").lost);
+    const auto file = McapReader::open(settings.output);
+    REQUIRE(file);
+    McapBuffer buffer;
+    for (const McapChunk& chunk : file->chunks()) {
+        const auto records = file->load(chunk, buffer);
+        REQUIRE(records);
+        CHECK(file->for_each(chunk, *records, [&](const McapRecord& record) {
+            if (record.opcode == McapOpcode::message)
+                CHECK(parse_message(record.content)->log_time >= 1'000'000'000);
+            return Expected<bool>(true);
+        }));
+    }
+}
+
+TEST_CASE_METHOD(Instance,
+                 "recorder: where the next file cannot be made, the one before is whole") {
+    auto settings = this->settings();
+    settings.split_bytes = 20'000;
+    settings.output = (files.path() / "split.mcap").string();
+    files.write("split-0001.mcap", "somebody's");
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        if (turn % 8 == 7) ::usleep(600'000);  // chunks end by their age
+        return turn < 24;
+    });
+    REQUIRE(report.stopped_early);
+    CHECK_THAT(report.stopped_early->message(), Contains("split-0001.mcap"));
+    CHECK(report.bytes == std::filesystem::file_size(settings.output));
+    std::filesystem::remove(files.path() / "split-0001.mcap");
+    CHECK(frames_in(settings.output).numbers.size() == report.streams.at("cam0").items);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
+    auto settings = this->settings();
+    settings.split_bytes = 20'000;
+    settings.output = (files.path() / "split.mcap").string();
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        if (turn % 8 == 7) ::usleep(600'000);  // chunks end by their age
+        return turn < 24;
+    });
+    REQUIRE(report.files.size() == 4);
+    CHECK_THAT(report.files[1], Contains("split-0001.mcap"));
+    CHECK(frames_in(report.files.front()).numbers == from_to(0, 24));  // it has the others follow
+}
+
+TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before is whole") {
+    const auto settings = this->settings();
+    CHECK(test::in_process([&] {
+        ::signal(SIGXFSZ, SIG_IGN);
+        const rlimit limit{6'000'000, 6'000'000};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+        auto full = settings;
+        full.stop = [&] {
+            publish();
+            return camera->head() > 5000;
+        };
+        const auto report = client::record(full);
+        if (!report) return false;
+        const StreamReport& camera_report = report->streams.at("cam0");
+        std::ofstream(files.path() / "told") << camera_report.items;
+        return camera_report.lost > 0 && report->stopped_early && camera->head() < 5000 &&
+               report->stopped_early->message().find("-o") != std::string::npos;
+    }));
+    const Frames frames = frames_in(settings.output);
+    CHECK(frames.numbers.size() > 500);
+    CHECK(frames.right);
+    std::uint64_t told = 0;
+    std::ifstream(files.path() / "told") >> told;
+    CHECK(told == frames.numbers.size());
+}
+
+TEST_CASE_METHOD(Instance, "recorder: one that is killed leaves all up to the last whole chunk") {
+    const auto settings = this->settings();
+    const pid_t child = ::fork();
+    if (child == 0) {
+        auto endless = settings;
+        endless.stop = [&] {
+            publish();
+            if (camera->head() > 4000) ::raise(SIGKILL);
+            return false;
+        };
+        [[maybe_unused]] const auto never = client::record(endless);
+        ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    REQUIRE(WIFSIGNALED(status));
+    const auto cut = Recording::open(settings.output);
+    REQUIRE(cut);
+    CHECK_FALSE(cut->facts().defect.empty());
+    REQUIRE(repair(settings.output, ""));
+    const Frames frames = frames_in(settings.output);
+    CHECK(frames.numbers == from_to(0, frames.numbers.size()));
+    CHECK(frames.numbers.size() > 2000);
+    CHECK(frames.right);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: what cannot be recorded says why") {
+    const auto refusal = [](const RecordSettings& settings) {
+        const auto report = client::record(settings);
+        return report ? "" : report.error().message();
+    };
+    auto wrong = settings();
+    wrong.streams = {"cam7"};
+    CHECK_THAT(refusal(wrong), Contains("cam7"));
+    wrong.streams = {"../cam0"};
+    CHECK_THAT(refusal(wrong), Contains("is not a name of a stream"));
+    wrong = settings();
+    wrong.instance = "nobody";
+    CHECK_THAT(refusal(wrong), Contains("has no streams to record"));
+    wrong = settings();
+    wrong.output = "/nowhere/a.mcap";
+    CHECK_THAT(refusal(wrong), Contains("cannot be created"));
+    wrong = settings();
+    wrong.calibration = {"/nowhere/chain.yaml"};
+    CHECK_THAT(refusal(wrong), Contains("/nowhere/chain.yaml: cannot be read"));
+    CHECK(std::filesystem::is_empty(files.path()));
+}
+
+TEST_CASE("recorder: sizes and times of --split") {
+    RecordSettings settings;
+    REQUIRE(read_split("2GiB", settings));
+    CHECK(settings.split_bytes == std::uint64_t{2} << 30U);
+    REQUIRE(read_split("1.5MB", settings));
+    CHECK(settings.split_bytes == 1'500'000);
+    REQUIRE(read_split("10min", settings));
+    CHECK(*settings.split_length == seconds(600));
+    for (const char* wrong : {"", "2", "GiB", "-1h", "nans", "1d", "1 h", "0s"})
+        CHECK_FALSE(read_split(wrong, settings));
+}

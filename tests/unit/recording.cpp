@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/recording.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <fstream>
+#include <map>
+
+#include "recording_file.hpp"
+#include "temporary_directory.hpp"
+
+using namespace versavis;
+using client::RecordedItem;
+using client::Recording;
+
+namespace {
+
+constexpr std::uint32_t mono8 = 0x01080001;
+constexpr std::uint32_t mono12 = 0x01100005;
+
+std::vector<std::byte> without_padding(const FrameMetadata& frame, std::size_t row,
+                                       std::span<const std::byte> pixels) {
+    std::vector<std::byte> rows;
+    for (std::size_t y = 0; y < frame.height; ++y)
+        rows.insert(rows.end(), pixels.begin() + y * frame.stride,
+                    pixels.begin() + y * frame.stride + row);
+    return rows;
+}
+
+}  // namespace
+
+TEST_CASE("recording: pixels come back bit for bit, from images and PNG, of 8 and 16 bits") {
+    const bool as_png = GENERATE(false, true);
+    const bool cut_off = GENERATE(false, true);
+    const std::uint32_t format = GENERATE(mono8, mono12);
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.path() / "a.mcap";
+    std::ofstream(path, std::ios::binary) << test::sample_recording(1, as_png, cut_off, format);
+    const auto recording = Recording::open(path);
+    REQUIRE(recording);
+    CHECK(recording->facts().defect.empty() != cut_off);
+    std::uint64_t frames = 0;
+    REQUIRE(recording->for_each({"cam0", "cam1"}, [&](const RecordedItem& item) {
+        const auto frame = unpack<FrameMetadata>(item.metadata);
+        const std::size_t row = frame.width * (format == mono8 ? 1U : 2U);
+        const auto expected = test::sample_pixels(frame, item.number);
+        REQUIRE(item.payload.size() == expected.size());
+        CHECK(without_padding(frame, row, item.payload) == without_padding(frame, row, expected));
+        CHECK(item.png.empty() != as_png);
+        CHECK(item.life == 0x1122334455667788);
+        ++frames;
+        return true;
+    }));
+    CHECK(frames == recording->streams()[0].items + recording->streams()[1].items);
+    CHECK(recording->attachment("configuration.toml")->content == "instance = \"test\"\n");
+    CHECK(recording->facts().told.at("output_clock") == "realtime");
+}
+
+TEST_CASE("recording: a glance and a place give what reading gives") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.path() / "a.mcap";
+    std::ofstream(path, std::ios::binary) << test::sample_recording(1, true, false, mono8);
+    const auto recording = Recording::open(path);
+    REQUIRE(recording);
+    struct Seen {
+        std::uint64_t number;
+        ring::Metadata metadata;
+        std::vector<std::byte> payload;
+        client::ItemPlace place;
+    };
+    std::vector<Seen> seen;
+    REQUIRE(recording->for_each({}, [&](const RecordedItem& item) {
+        seen.push_back(
+            {item.number, item.metadata, {item.payload.begin(), item.payload.end()}, item.place});
+        return true;
+    }));
+    std::size_t at = 0;
+    REQUIRE(recording->glance({}, [&](const RecordedItem& item) {
+        CHECK(item.metadata == seen.at(at).metadata);
+        CHECK(item.place.item == seen.at(at).place.item);
+        if (item.kind != ring::StreamKind::frames)
+            CHECK(std::equal(item.payload.begin(), item.payload.end(), seen.at(at).payload.begin(),
+                             seen.at(at).payload.end()));
+        ++at;
+        return true;
+    }));
+    CHECK(at == seen.size());
+    std::size_t found = 0;
+    for (auto one = seen.rbegin(); one != seen.rend(); ++one)
+        REQUIRE(recording->at(one->place, [&](const RecordedItem& item) {
+            CHECK(item.number == one->number);
+            CHECK(std::equal(item.payload.begin(), item.payload.end(), one->payload.begin(),
+                             one->payload.end()));
+            ++found;
+            return true;
+        }));
+    CHECK(found == seen.size());
+}
+
+TEST_CASE("recording: gaps are those of the file, and an image without its item is none") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.path() / "a.mcap";
+    test::RecordingFile file;
+    FrameMetadata frame{};
+    frame.width = frame.stride = 4;
+    frame.height = 2;
+    frame.pixel_format = mono8;
+    const test::FileItem item{"cam0",      ring::StreamKind::frames,     5, 1, {77},
+                              pack(frame), test::sample_pixels(frame, 5)};
+    file.add(item);
+    file.add_gap("cam0", "restarted", 0, {78});
+    file.end_chunk();
+    std::string bytes = file.finish();
+    std::ofstream(path, std::ios::binary) << bytes;
+    const auto gaps = Recording::open(path)->gaps();
+    REQUIRE(gaps);
+    REQUIRE(gaps->size() == 1);
+    CHECK(gaps->at(0).stream == "cam0");
+    CHECK(gaps->at(0).reason == "restarted");
+}
+
+TEST_CASE("recording: files after the first are of it, others are told") {
+    const test::TemporaryDirectory directory;
+    const auto write = [&](const std::string& name, const std::string& part, std::uint64_t number) {
+        test::RecordingFile file(part);
+        for (int i = 0; i < 3; ++i)
+            file.add({"imu0", ring::StreamKind::imu, number++, 1, {100}, {}, {}});
+        std::ofstream(directory.path() / name, std::ios::binary) << file.finish();
+    };
+    write("a.mcap", "0", 0);
+    write("a-0001.mcap", "1", 3);
+    write("a-0002.mcap", "2", 6);
+    write("a-0003.mcap", "0", 100);
+    const auto recording = Recording::open(directory.path() / "a.mcap");
+    REQUIRE(recording);
+    CHECK(recording->facts().files == 3);
+    CHECK(recording->facts().defect.find("a-0003.mcap") != std::string::npos);
+    CHECK(recording->streams().at(0).items == 9);
+    std::uint64_t next = 0;
+    std::vector<client::ItemPlace> places;
+    REQUIRE(recording->for_each({}, [&](const RecordedItem& item) {
+        CHECK(item.number == next++);
+        places.push_back(item.place);
+        return true;
+    }));
+    CHECK(next == 9);
+    for (std::uint64_t i = 9; i-- > 0;)
+        REQUIRE(recording->at(places.at(i), [&](const RecordedItem& item) {
+            CHECK(item.number == i);
+            return true;
+        }));
+    CHECK(Recording::open_file(directory.path() / "a.mcap")->streams().at(0).items == 3);
+    CHECK(Recording::open(directory.path() / "a-0001.mcap")->streams().at(0).items == 3);
+    std::uint64_t taken = 0;
+    REQUIRE(recording->glance({}, [&](const RecordedItem&) { return ++taken < 4; }));
+    CHECK(taken == 4);
+}

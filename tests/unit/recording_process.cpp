@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "process/recording_process.hpp"
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "../pairing/pairing_bench.hpp"
+#include "../support/temporary_directory.hpp"
+#include "engine/clock/recording.hpp"
+#include "engine/pairing/recording.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording/recording.hpp"
+#include "recording_sketch.hpp"
+
+using namespace versavis;
+using namespace versavis::client;
+using Catch::Contains;
+using ring::StreamKind;
+using test::Bench;
+using test::RecordingSketch;
+
+namespace {
+
+constexpr Duration output_ahead = seconds(1'700'000'000);  ///< of the host
+constexpr int before_lock = 15;                            ///< frames that were suspect live
+
+OutputTime shown(HostTime host) { return {host.ns + output_ahead.ns}; }
+HostTime on_host(BoardTime board) { return {board.ns + test::host_ahead.ns}; }
+
+/// A minute: the board, its clock, a camera and an IMU. Live, stamps were off by some 30 us.
+class Minute {
+ public:
+    Minute() {
+        clock();
+        frames();
+        samples();
+    }
+
+    RecordingSketch file;
+    std::vector<OutputTime> truth;  ///< of the frames
+
+ private:
+    template <class T>
+    void item(const std::string& stream, StreamKind kind, OutputTime time, const T& metadata) {
+        file.add_item(stream, kind, number_++, time, pack(metadata));
+    }
+
+    void clock() {
+        std::exponential_distribution<double> delay(1 / 100e3);
+        for (int i = 0; i < 600; ++i) {
+            const HostTime sent = on_host({}) + seconds(5) + milliseconds(100) * i;
+            const HostTime there =
+                sent + Duration{60'000 + static_cast<std::int64_t>(delay(random_))};
+            const HostTime arrived =
+                there + Duration{60'000 + static_cast<std::int64_t>(delay(random_))};
+            const BoardTime at{there.ns - test::host_ahead.ns};
+            const clock::RecordedExchange exchange{3, 1, 0, sent, at, at, arrived};
+            item("clock", StreamKind::clock, shown(arrived),
+                 clock::to_metadata(clock::ClockItem{exchange}));
+            if (i % 10 == 0)
+                item("clock", StreamKind::clock, shown(sent),
+                     clock::to_metadata(
+                         clock::ClockItem{clock::RecordedOutput{1, sent, output_ahead, {}}}));
+        }
+    }
+
+    void evidence(const pairing::Evidence& told, HostTime at) {
+        item("cam0-evidence", StreamKind::evidence, shown(at), pairing::to_metadata(told));
+    }
+
+    void frames() {
+        std::normal_distribution<double> noise(0, 30e3);
+        const Bench bench;
+        pairing::Limits limits = Bench::made();
+        evidence(limits, on_host({}));
+        std::uint64_t tick = 0;
+        for (std::uint64_t n = 1; n <= 600; ++n) {
+            const std::uint64_t in_pattern = n - before_lock - 1;
+            tick += n > before_lock && in_pattern < 12
+                        ? test::pattern[in_pattern] -
+                              (in_pattern == 0 ? 0 : test::pattern[in_pattern - 1])
+                        : 1;
+            const pairing::Exposure exposure = Bench::exposure(n, tick);
+            const pairing::Arrival arrival = bench.frame(n, exposure);
+            evidence(exposure, exposure.recorded);
+            evidence(arrival, arrival.arrived);
+            const HostTime middle_then = on_host(middle(exposure.start, exposure.end));
+            truth.push_back(shown(middle_then));
+            FrameMetadata frame{};
+            frame.block_id = n;
+            frame.arrival = arrival.arrived;
+            frame.epoch = 1;
+            OutputTime time = shown(arrival.arrived);
+            frame.host_time = arrival.arrived;
+            frame.sigma_ns = sigma_unknown;
+            frame.flags = flag_suspect | 3U;
+            if (n > before_lock + 12) {
+                const Duration off{static_cast<std::int64_t>(noise(random_))};
+                frame.host_time = middle_then + off;
+                time = shown(frame.host_time);
+                frame.trigger = n;
+                frame.board_time = middle(exposure.start, exposure.end);
+                frame.sigma_ns = 30'000;
+                frame.flags = 0;
+            }
+            file.add("/cam0/image_raw", "cdr", number_, time, std::string(40, '\1'));
+            item("cam0", StreamKind::frames, time, frame);
+            file.add("/versavis/cam0/stamp", "json", number_, time,
+                     R"({"time_ns":)" + std::to_string(time.ns) + R"(,"suspect":true})");
+        }
+    }
+
+    void samples() {
+        for (int i = 0; i < 3000; ++i) {
+            ImuMetadata sample{};
+            sample.board_time = BoardTime{} + seconds(6) + milliseconds(10) * i;
+            sample.filter_delay = milliseconds(3);
+            sample.host_time = on_host(sample.board_time - sample.filter_delay);
+            sample.host_time = sample.host_time + microseconds(i % 2 == 0 ? 40 : -40);
+            sample.sigma_ns = 50'000;
+            sample.epoch = 1;
+            item("imu0", StreamKind::imu, shown(sample.host_time), sample);
+        }
+    }
+
+    std::mt19937_64 random_{7};
+    std::uint64_t number_ = 0;
+};
+
+bool on(double /*share*/) { return true; }
+
+}  // namespace
+
+TEST_CASE("recording_process: suspect frames get their stamps, and all stamps the smoothed clock") {
+    const test::TemporaryDirectory directory;
+    const std::string old_file = directory.path() / "old.mcap";
+    const std::string new_file = directory.path() / "new.mcap";
+    const Minute minute;
+    minute.file.write(old_file);
+    const auto report = process_recording(old_file, new_file, on);
+    REQUIRE(report);
+    INFO(to_text(*report));
+    const ProcessedStream& camera = report->streams.at("cam0");
+    CHECK(camera.items == 600);
+    CHECK(camera.restamped == 600);
+    CHECK(camera.suspect == before_lock + 12);
+    CHECK(camera.proved == before_lock + 12);
+    CHECK(camera.contradicted == 0);
+    CHECK(camera.change_rms_ns == Approx(30e3).epsilon(0.3));
+    CHECK(report->streams.at("imu0").restamped == 3000);
+    const auto recording = Recording::open(new_file);
+    REQUIRE(recording);
+    CHECK(recording->facts().defect.empty());
+    std::size_t index = 0;
+    OutputTime last;
+    REQUIRE(recording->for_each({"cam0"}, [&](const RecordedItem& item) {
+        const auto frame = unpack<FrameMetadata>(item.metadata);
+        CHECK(std::abs((item.time - minute.truth[index]).ns) < 15'000);
+        CHECK((frame.flags & flag_suspect) == 0);
+        CHECK(frame.trigger == ++index);
+        CHECK(frame.sigma_ns < 30'000);
+        CHECK(frame.exposure.ns == (index <= before_lock + 12 ? 5'000'000 : 0));
+        CHECK(shown(frame.host_time) == item.time);
+        CHECK(item.time > last);
+        last = item.time;
+        return true;
+    }));
+    CHECK(index == 600);
+    double rough = 0;
+    int sample_number = 0;
+    REQUIRE(recording->for_each({"imu0"}, [&](const RecordedItem& item) {
+        const OutputTime true_time =
+            shown(on_host({})) + seconds(6) + milliseconds(10) * sample_number++ - milliseconds(3);
+        rough = std::max(rough, std::abs(static_cast<double>((item.time - true_time).ns)));
+        return true;
+    }));
+    CHECK(rough < 15e3);
+    REQUIRE(recording->attachment("process.json") != nullptr);
+    CHECK(nlohmann::json::parse(
+              recording->attachment("process.json")->content)["streams"]["cam0"]["proved"] ==
+          before_lock + 12);
+}
+
+TEST_CASE("recording_process: images and texts have the stamp of their item") {
+    const test::TemporaryDirectory directory;
+    const std::string old_file = directory.path() / "old.mcap";
+    const std::string new_file = directory.path() / "new.mcap";
+    const Minute minute;
+    minute.file.write(old_file);
+    REQUIRE(process_recording(old_file, new_file, on));
+    const auto reader = McapReader::open(new_file);
+    REQUIRE(reader);
+    std::map<std::uint16_t, std::string> topics;
+    for (const McapChannel& channel : reader->channels()) topics[channel.id] = channel.topic;
+    McapBuffer buffer;
+    std::map<std::string, int> seen;
+    for (const McapChunk& chunk : reader->chunks()) {
+        const auto records = reader->load(chunk, buffer);
+        REQUIRE(records);
+        REQUIRE(reader->for_each(chunk, *records, [&](const McapRecord& record) {
+            if (record.opcode != McapOpcode::message) return true;
+            const auto message = parse_message(record.content);
+            REQUIRE(message);
+            const std::string& topic = topics[message->channel];
+            const int index = seen[topic]++;
+            const std::string data(reinterpret_cast<const char*>(message->data.data()),
+                                   message->data.size());
+            if (topic == "/cam0/image_raw") {
+                std::int32_t s = 0;
+                std::uint32_t ns = 0;
+                std::memcpy(&s, data.data() + 4, 4);
+                std::memcpy(&ns, data.data() + 8, 4);
+                CHECK(std::uint64_t(s) * 1'000'000'000 + ns == message->log_time);
+                CHECK(data.substr(12) == std::string(28, '\1'));
+            } else if (topic == "/versavis/cam0/stamp") {
+                const auto stamp = nlohmann::json::parse(data);
+                CHECK(stamp["time_ns"] == message->log_time);
+                CHECK(stamp["suspect"] == false);
+                if (index == 3) CHECK(stamp["trigger"] == 4);
+            }
+            return true;
+        }));
+    }
+    CHECK(seen["/cam0/image_raw"] == 600);
+    CHECK(seen["/versavis/clock/item"] == 660);
+}
+
+TEST_CASE("recording_process: what cannot be done is told, and leaves no file") {
+    const test::TemporaryDirectory directory;
+    const std::string old_file = directory.path() / "old.mcap";
+    const std::string new_file = directory.path() / "new.mcap";
+    Minute().file.write(old_file);
+    const auto onto_itself = process_recording(old_file, old_file, on);
+    REQUIRE_FALSE(onto_itself);
+    CHECK_THAT(onto_itself.error().message(), Contains("is there already"));
+    int asked = 0;
+    const auto stopped = process_recording(old_file, new_file,
+                                           [&](double share) { return share == 0 || ++asked < 1; });
+    CHECK_FALSE(stopped);
+    CHECK(std::distance(std::filesystem::directory_iterator(directory.path()), {}) == 1);
+    CHECK_FALSE(process_recording(directory.path() / "none.mcap", new_file, on));
+    CHECK_FALSE(process_recording(old_file, "/nonexistent/new.mcap", on));
+}

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/repair.hpp"
+
+#include <sys/file.h>
+
+#include <fcntl.h>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "recording/file_descriptor.hpp"
+#include "recording/mcap_reader.hpp"
+#include "recording_file.hpp"
+#include "temporary_directory.hpp"
+
+using namespace versavis;
+using client::repair;
+
+namespace {
+
+constexpr std::uint32_t mono8 = 0x01080001;
+
+std::string content(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Sample {
+    test::TemporaryDirectory directory;
+    std::string path = (directory.path() / "a.mcap").string();
+
+    explicit Sample(const std::string& bytes) { write(bytes); }
+    void write(const std::string& bytes) const {
+        std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("repair: a file that was cut off behind a chunk is as if it had been closed there") {
+    test::RecordingFile file;
+    for (std::uint64_t i = 0; i < 10; ++i) {
+        file.add(
+            {"imu0", ring::StreamKind::imu, i, 1, {100 + static_cast<std::int64_t>(i)}, {}, {}});
+        file.add({"events", ring::StreamKind::events, i, 1, {90}, {}, {}});
+        if (i % 3 == 2) file.end_chunk();
+    }
+    file.end_chunk();
+    const std::string cut = file.cut();
+    const std::string whole = file.finish();
+    const std::string tail =
+        GENERATE(std::string(), std::string("\x06half a chunk"), std::string(5000, '\0'));
+    const Sample sample(cut + tail);
+    const auto repaired = repair(sample.path, "");
+    REQUIRE(repaired);
+    CHECK(content(sample.path) == whole);
+    CHECK(repaired->messages == 20);
+    CHECK(repaired->cut_bytes == tail.size());
+    CHECK(repaired->cut_file.empty() == tail.empty());
+    if (!tail.empty()) CHECK(content(repaired->cut_file) == tail);
+    CHECK(repair(sample.path, "")->was_whole);
+}
+
+TEST_CASE("repair: cut anywhere, it is whole afterwards, and a new file is the same") {
+    const std::string whole = test::sample_recording(1, false, false, mono8);
+    const Sample sample(whole);
+    for (std::size_t size = 1000; size < whole.size(); size += 1511) {
+        sample.write(whole.substr(0, size));
+        const std::string output = sample.path + ".new";
+        std::filesystem::remove(output);
+        std::filesystem::remove(sample.path + ".cut");
+        const auto copied = repair(sample.path, output);
+        REQUIRE(copied);
+        CHECK(content(sample.path) == whole.substr(0, size));
+        REQUIRE(repair(sample.path, ""));
+        CHECK(content(sample.path) == content(output));
+        const auto reader = client::McapReader::open(output);
+        REQUIRE(reader);
+        CHECK(reader->defect().empty());
+        CHECK(reader->statistics()->messages == copied->messages);
+    }
+}
+
+TEST_CASE("repair: a file that is being written is left alone, and so is what lies there already") {
+    const Sample sample(test::sample_recording(1, false, true, mono8));
+    const std::string before = content(sample.path);
+    {
+        const client::FileDescriptor recorder(::open(sample.path.c_str(), O_RDWR | O_CLOEXEC));
+        REQUIRE(::flock(recorder.number(), LOCK_EX | LOCK_NB) == 0);
+        CHECK_FALSE(repair(sample.path, ""));
+        CHECK_FALSE(repair(sample.path, sample.path + ".new"));
+    }
+    std::ofstream(sample.path + ".cut") << "kept";
+    CHECK_FALSE(repair(sample.path, ""));
+    std::ofstream(sample.path + ".new") << "kept";
+    CHECK_FALSE(repair(sample.path, sample.path + ".new"));
+    CHECK(content(sample.path) == before);
+    CHECK(content(sample.path + ".cut") == "kept");
+    CHECK(content(sample.path + ".new") == "kept");
+}
+
+TEST_CASE("repair: a damaged chunk in the middle is told and nothing is changed") {
+    std::string bytes = test::sample_recording(1, false, true, mono8);
+    Sample sample(bytes);
+    const auto chunk = client::McapReader::open(sample.path)->chunks().at(1);
+    bytes[chunk.records_offset + 100] ^= 4;
+    sample.write(bytes);
+    const auto repaired = repair(sample.path, "");
+    REQUIRE_FALSE(repaired);
+    CHECK(repaired.error().what.find(std::to_string(chunk.offset)) != std::string::npos);
+    CHECK(content(sample.path) == bytes);
+}

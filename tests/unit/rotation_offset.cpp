@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evaluate/rotation_offset.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+using namespace versavis;
+using namespace versavis::client;
+using Catch::Contains;
+
+namespace {
+
+constexpr double pi = 3.14159265358979;
+
+struct Wave {
+    Eigen::Vector3d amplitude;
+    double frequency;
+    double phase;
+};
+
+/// What moves, and how it is seen.
+struct World {
+    double rate_rms = 0.6;  ///< rad/s, each axis
+    double bandwidth_hz = 2;
+    double seconds = 30;
+    double camera_sigma = 0.5e-3;
+    double outliers = 0;
+    double gyro_density = 2.4e-4;
+    double gyro_hz = 200;
+    double offset_s = 0.0123;
+    Eigen::Vector3d axes{1, 1, 1};  ///< shares of the rate
+};
+
+const Eigen::Vector3d true_rotation(1.1, -0.4, 0.7);
+const Eigen::Vector3d true_bias(0.01, -0.02, 0.005);
+
+struct Seen {
+    std::vector<FrameRotation> frames;
+    std::vector<GyroSample> gyro;
+};
+
+OutputTime at(double s) { return {1'700'000'000'000'000'000 + std::llround(s * 1e9)}; }
+
+class Simulation {
+ public:
+    Simulation(const World& world, unsigned seed) : world_(world), random_(seed) {
+        constexpr int count = 12;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int i = 0; i < count; ++i) {
+                const double amplitude = world.axes[axis] * world.rate_rms * std::sqrt(2.0 / count);
+                waves_.push_back({amplitude * Eigen::Vector3d::Unit(axis),
+                                  world.bandwidth_hz * uniform(), 2 * pi * uniform()});
+            }
+    }
+
+    Seen run() {
+        Seen seen;
+        const double interval = 1 / world_.gyro_hz;
+        for (int i = 0; i * interval < world_.seconds + 2; ++i)
+            seen.gyro.push_back(
+                {at(i * interval), rate(i * interval) + true_bias +
+                                       noise(world_.gyro_density * std::sqrt(world_.gyro_hz))});
+        const Eigen::Quaterniond camera = rotation_by(true_rotation);
+        constexpr double period = 0.05;
+        for (int i = 0; i < world_.seconds / period; ++i) {
+            const double from = 1 + i * period;
+            Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+            constexpr int steps = 40;
+            for (int k = 0; k < steps; ++k)
+                turn = turn * rotation_by(rate(from + (k + 0.5) * period / steps) * period / steps);
+            Eigen::Quaterniond shown =
+                camera * turn * camera.conjugate() * rotation_by(noise(world_.camera_sigma));
+            if (uniform() < world_.outliers) shown = rotation_by(noise(0.05));
+            seen.frames.push_back({at(from - world_.offset_s), at(from + period - world_.offset_s),
+                                   rotation_of(shown),
+                                   Eigen::Vector3d::Constant(world_.camera_sigma)});
+        }
+        return seen;
+    }
+
+ private:
+    Eigen::Vector3d rate(double s) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (const Wave& wave : waves_)
+            sum += wave.amplitude * std::sin(2 * pi * wave.frequency * s + wave.phase);
+        return sum;
+    }
+    double uniform() { return std::uniform_real_distribution<double>()(random_); }
+    Eigen::Vector3d noise(double sigma) {
+        std::normal_distribution<double> normal(0, sigma);
+        const double x = normal(random_);
+        const double y = normal(random_);
+        return {x, y, normal(random_)};
+    }
+
+    World world_;
+    std::mt19937_64 random_;
+    std::vector<Wave> waves_;
+};
+
+struct Score {
+    double rms_s = 0;
+    double sigma_s = 0;  ///< rms of what was claimed
+    double nees = 0;     ///< mean square of the error in sigmas
+    double rotation_nees = 0;
+    double bias_nees = 0;
+    int refused = 0;
+    std::string why;
+};
+
+Score score(const World& world, int runs) {
+    Score result;
+    int solved = 0;
+    for (int seed = 0; seed < runs; ++seed) {
+        const Seen seen = Simulation(world, 1000U + static_cast<unsigned>(seed)).run();
+        const auto found = rotation_offset(seen.frames, seen.gyro);
+        if (!found) {
+            ++result.refused;
+            result.why = found.error().message();
+            continue;
+        }
+        ++solved;
+        const double error = found->offset_s - world.offset_s;
+        result.rms_s += error * error;
+        result.sigma_s += found->offset_sigma_s * found->offset_sigma_s;
+        result.nees += std::pow(error / found->offset_sigma_s, 2);
+        const Eigen::Vector3d off =
+            rotation_of(found->camera_from_imu * rotation_by(true_rotation).conjugate());
+        result.rotation_nees += off.cwiseQuotient(found->rotation_sigma).squaredNorm() / 3;
+        result.bias_nees +=
+            (found->gyro_bias - true_bias).cwiseQuotient(found->gyro_bias_sigma).squaredNorm() / 3;
+    }
+    result.rms_s = std::sqrt(result.rms_s / solved);
+    result.sigma_s = std::sqrt(result.sigma_s / solved);
+    result.nees /= solved;
+    result.rotation_nees /= solved;
+    result.bias_nees /= solved;
+    return result;
+}
+
+void shake(std::vector<FrameRotation>& frames, double sigma) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal(0, sigma);
+    for (FrameRotation& frame : frames)
+        for (int i = 0; i < 3; ++i) frame.rotation[i] += normal(random);
+}
+
+constexpr int runs = 30;
+
+/// Errors in sigmas of 30 runs: their mean square scatters by 0.26 of itself.
+void honest(const Score& score) {
+    CAPTURE(score.rms_s, score.sigma_s, score.nees, score.rotation_nees, score.bias_nees,
+            score.why);
+    CHECK(score.refused == 0);
+    CHECK(score.nees > 0.35);
+    CHECK(score.nees < 1.6);
+    CHECK(score.rotation_nees > 0.35);
+    CHECK(score.rotation_nees < 1.4);
+    CHECK(score.bias_nees > 0.35);
+    CHECK(score.bias_nees < 1.4);
+}
+
+}  // namespace
+
+TEST_CASE("rotation_offset: 30 s of lively motion with good features", "[rotation_offset]") {
+    const Score found = score({}, runs);
+    honest(found);
+    CHECK(found.rms_s < 62e-6 * 1.25);
+}
+
+TEST_CASE("rotation_offset: poor features", "[rotation_offset]") {
+    World world;
+    world.camera_sigma = 2e-3;
+    const Score found = score(world, runs);
+    honest(found);
+    CHECK(found.rms_s < 236e-6 * 1.25);
+}
+
+TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[rotation_offset]") {
+    World world;
+    world.camera_sigma = 2e-3;
+    world.outliers = 0.1;
+    const Score found = score(world, runs);
+    honest(found);
+    CHECK(found.rms_s < 259e-6 * 1.25);
+}
+
+TEST_CASE("rotation_offset: slow motion tells less, and says so", "[rotation_offset]") {
+    World world;
+    world.camera_sigma = 2e-3;
+    world.rate_rms = 0.2;
+    world.bandwidth_hz = 1;
+    const Score found = score(world, runs);
+    honest(found);
+    CHECK(found.rms_s < 1.3e-3 * 1.25);
+}
+
+TEST_CASE("rotation_offset: motion that is too slow is refused", "[rotation_offset]") {
+    World world;
+    world.camera_sigma = 2e-3;
+    world.rate_rms = 0.05;
+    world.bandwidth_hz = 0.5;
+    const Score found = score(world, runs);
+    CHECK(found.refused == runs);
+    CHECK_THAT(found.why, Contains("the motion shows the offset only to") && Contains("rad/s^2"));
+}
+
+TEST_CASE("rotation_offset: a rig at rest is refused", "[rotation_offset]") {
+    World world;
+    world.rate_rms = 0;
+    CHECK(score(world, 5).refused == 5);
+}
+
+TEST_CASE("rotation_offset: turns about one axis do not show the rotation", "[rotation_offset]") {
+    World world;
+    world.axes = {0, 0, 1};
+    const Score found = score(world, 5);
+    CHECK(found.refused == 5);
+    CHECK_THAT(found.why, Contains("second axis"));
+}
+
+TEST_CASE("rotation_offset: a motion that repeats fits more than once", "[rotation_offset]") {
+    Seen seen;
+    const auto rate = [](double s) {
+        const double phase = 2 * pi * 5 * s;
+        return Eigen::Vector3d(0.5 * std::sin(phase), 0.5 * std::sin(phase + 1),
+                               0.5 * std::cos(2 * phase));
+    };
+    for (int i = 0; i < 6400; ++i) seen.gyro.push_back({at(i * 0.005), rate(i * 0.005)});
+    const GyroTrack track(seen.gyro, Eigen::Vector3d::Zero());
+    for (int i = 0; i < 600; ++i) {
+        const double from = 1 + i * 0.05;
+        seen.frames.push_back(
+            {at(from), at(from + 0.05),
+             rotation_of(track.orientation(from).conjugate() * track.orientation(from + 0.05)),
+             Eigen::Vector3d::Constant(1e-3)});
+    }
+    shake(seen.frames, 1e-3);
+    const auto found = rotation_offset(seen.frames, seen.gyro);
+    REQUIRE_FALSE(found);
+    CHECK_THAT(found.error().message(), Contains("fit nearly as well"));
+}
+
+TEST_CASE("rotation_offset: a steady cone shows a delay as a turn about its axis",
+          "[rotation_offset]") {
+    Seen seen;
+    for (int i = 0; i < 6400; ++i) {
+        const double phase = 2 * pi * 0.7 * i * 0.005;
+        seen.gyro.push_back({at(i * 0.005), {0.5 * std::sin(phase), 0.5 * std::cos(phase), 0}});
+    }
+    const GyroTrack track(seen.gyro, Eigen::Vector3d::Zero());
+    for (int i = 0; i < 600; ++i) {
+        const double from = 1 + i * 0.05;
+        seen.frames.push_back(
+            {at(from), at(from + 0.05),
+             rotation_of(track.orientation(from).conjugate() * track.orientation(from + 0.05)),
+             Eigen::Vector3d::Constant(1e-3)});
+    }
+    shake(seen.frames, 1e-3);
+    const auto found = rotation_offset(seen.frames, seen.gyro);
+    REQUIRE_FALSE(found);
+    CHECK_THAT(found.error().message(), Contains("offset") && Contains("turn the rig"));
+}
+
+TEST_CASE("rotation_offset: offsets of either sign and far off, a slow gyro and gaps in it",
+          "[rotation_offset]") {
+    for (const double offset : {-0.31, 0.0, 0.4}) {
+        World world;
+        world.offset_s = offset;
+        world.gyro_hz = 100;
+        Seen seen = Simulation(world, 5).run();
+        seen.gyro.erase(seen.gyro.begin() + 1500, seen.gyro.begin() + 1560);
+        const auto found = rotation_offset(seen.frames, seen.gyro);
+        REQUIRE(found);
+        CHECK(found->offset_s == Approx(offset).margin(3e-4));
+        CHECK(found->rotations < 580);
+        CHECK(found->residual == Approx(0.5e-3).epsilon(0.2));
+    }
+}
+
+TEST_CASE("rotation_offset: an offset out of range or too little data is told",
+          "[rotation_offset]") {
+    const Seen seen = Simulation({}, 5).run();
+    CHECK_FALSE(rotation_offset({}, seen.gyro));
+    CHECK_FALSE(rotation_offset(seen.frames, {}));
+    const std::vector<FrameRotation> few(seen.frames.begin(), seen.frames.begin() + 30);
+    const auto too_few = rotation_offset(few, seen.gyro);
+    REQUIRE_FALSE(too_few);
+    CHECK_THAT(too_few.error().message(), Contains("only 30 rotations"));
+    World far;
+    far.offset_s = 0.3;
+    const Seen other = Simulation(far, 5).run();
+    CHECK_FALSE(rotation_offset(other.frames, other.gyro, {milliseconds(100)}));
+}

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "versavis/set_reader.hpp"
+
+#include <poll.h>
+
+#include <catch2/catch.hpp>
+#include <memory>
+#include <string>
+
+#include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
+
+using namespace versavis;
+
+namespace {
+
+constexpr std::int64_t period_ns = 50'000'000;
+
+/// Two cameras and an IMU, as an instance of the service has them.
+struct Rig {
+    test::TemporaryDirectory directory{"/dev/shm"};
+    std::unique_ptr<ring::Writer> a = camera("a");
+    std::unique_ptr<ring::Writer> b = camera("b");
+    std::unique_ptr<ring::Writer> imu = std::make_unique<ring::Writer>(
+        *ring::Writer::create(directory.path(), {"imu", ring::StreamKind::imu, 64}));
+    std::uint64_t sample_number = 0;
+
+    std::unique_ptr<ring::Writer> camera(const std::string& name, std::uint64_t size = 4096) const {
+        return std::make_unique<ring::Writer>(
+            *ring::Writer::create(directory.path(), {name, ring::StreamKind::frames, 16, 8, size}));
+    }
+
+    SetOptions options() const {
+        SetOptions made;
+        made.instance = std::filesystem::relative(directory.path(), "/dev/shm/versavis");
+        made.patience = seconds(60);
+        return made;
+    }
+    SetReader open(const SetOptions& options) const {
+        auto reader = SetReader::open({"a", "b"}, options);
+        REQUIRE(reader);
+        return std::move(*reader);
+    }
+    SetReader open() const { return open(options()); }
+
+    static void frame(ring::Writer& writer, std::uint64_t tick, std::int64_t late_ns = 0,
+                      std::uint32_t flags = 0, std::uint32_t epoch = 1) {
+        FrameMetadata metadata{};
+        metadata.set_tick(tick);
+        metadata.trigger = tick + 1;
+        metadata.flags = flags;
+        metadata.epoch = epoch;
+        const auto slot = writer.acquire();
+        REQUIRE(slot);
+        writer.publish(*slot, 8, OutputTime{time_of(tick) + late_ns}, pack(metadata));
+    }
+    void sample(std::int64_t time_ns, std::uint64_t skipped = 0) {
+        ImuMetadata metadata{};
+        sample_number += 1 + skipped;
+        metadata.number = sample_number;
+        metadata.epoch = 1;
+        imu->publish(OutputTime{time_ns}, pack(metadata));
+    }
+    static std::int64_t time_of(std::uint64_t tick) {
+        return static_cast<std::int64_t>(tick % 1000) * period_ns;
+    }
+};
+
+}  // namespace
+
+TEST_CASE_METHOD(Rig, "set_reader: frames of one tick come together, in the order of cameras") {
+    SetReader sets = open();
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    frame(*b, 7, 300);
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    frame(*a, 7);
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->complete());
+    CHECK(set->valid());
+    CHECK(set->tick == 7);
+    CHECK(set->epoch == 1);
+    CHECK(set->spread == nanoseconds(300));
+    CHECK(set->time.ns == time_of(7));
+    CHECK(set->frames[1]->time.ns == time_of(7) + 300);
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    CHECK(sets.report().sets == 1);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: ticks of more than 32 bits do not meet by their lower half") {
+    SetReader sets = open();
+    frame(*a, 5);
+    frame(*b, (std::uint64_t{1} << 32U) + 5);
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    frame(*a, (std::uint64_t{1} << 32U) + 5);
+    CHECK(sets.next({})->tick == (std::uint64_t{1} << 32U) + 5);
+    CHECK(sets.report().incomplete == 1);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a set is given up as soon as a camera went past it") {
+    SetOptions partial = options();
+    partial.partial = GENERATE(true, false);
+    SetReader sets = open(partial);
+    frame(*a, 1);
+    frame(*a, 2);
+    frame(*b, 2);
+    auto set = sets.next({});
+    REQUIRE(set);
+    if (partial.partial) {
+        CHECK(set->tick == 1);
+        CHECK_FALSE(set->complete());
+        CHECK(set->frames[0]);
+        CHECK_FALSE(set->frames[1]);
+        CHECK(set->spread == nanoseconds(0));
+        set = sets.next({});
+        REQUIRE(set);
+    }
+    CHECK(set->tick == 2);
+    CHECK(sets.report().incomplete == 1);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a missing frame is waited for no longer than patience") {
+    SetOptions hasty = options();
+    hasty.partial = true;
+    hasty.patience = milliseconds(20);
+    SetReader sets = open(hasty);
+    frame(*a, 1);
+    const HostTime begin = host_now();
+    const auto set = sets.next(seconds(20));
+    REQUIRE(set);
+    CHECK_FALSE(set->complete());
+    CHECK(host_now() - begin >= milliseconds(20));
+    CHECK(host_now() - begin < seconds(10));
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: frames that prove nothing are in no set, unless asked for") {
+    SetOptions any = options();
+    any.suspect = GENERATE(true, false);
+    SetReader sets = open(any);
+    frame(*a, 1, 0, flag_suspect);
+    frame(*b, 1);
+    FrameMetadata untriggered{};
+    const auto slot = a->acquire();
+    a->publish(*slot, 8, {}, pack(untriggered));
+    CHECK(sets.next({}).has_value() == any.suspect);
+    CHECK(sets.report().left_out == (any.suspect ? 1 : 2));
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a new epoch's ticks do not meet those before") {
+    SetReader sets = open();
+    frame(*a, 100);
+    frame(*a, 3, 0, 0, 2);
+    frame(*b, 3, 0, 0, 2);
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->tick == 3);
+    CHECK(set->epoch == 2);
+    CHECK(sets.report().incomplete == 1);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: samples since the set before come with it, once covered") {
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    SetReader sets = open(with_imu);
+    const std::int64_t step = period_ns / 4;
+    sample(time_of(1) - step);
+    frame(*a, 1);
+    frame(*b, 1, 100);
+    CHECK(sets.next({}).error().why == Pause::nothing);  // the samples do not reach it yet
+    sample(time_of(1) + step);
+    auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->imu.samples.empty());  // there was none before
+    CHECK(set->imu.covered);
+    REQUIRE(set->imu.beyond);
+    CHECK(set->imu.beyond->time.ns == time_of(1) + step);
+    sample(time_of(1) + 2 * step);
+    sample(time_of(2), 3);
+    sample(time_of(2) + step);
+    frame(*a, 2);
+    frame(*b, 2);
+    set = sets.next({});
+    REQUIRE(set);
+    REQUIRE(set->imu.samples.size() == 3);
+    CHECK(set->imu.samples[0].time.ns == time_of(1) + step);
+    CHECK(set->imu.samples[2].time.ns == time_of(2));  // up to and with its stamp
+    CHECK(set->imu.lost == 3);
+    CHECK(set->imu.covered);
+    CHECK_FALSE(set->imu.complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a silent IMU does not hold sets back for ever") {
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    with_imu.patience = milliseconds(20);
+    SetReader sets = open(with_imu);
+    frame(*a, 1);
+    frame(*b, 1);
+    const auto set = sets.next(seconds(20));
+    REQUIRE(set);
+    CHECK(set->complete());
+    CHECK_FALSE(set->imu.covered);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: overtaken frames are counted, and what is in a set knows it") {
+    SetReader sets = open();
+    frame(*a, 1);
+    frame(*b, 1);
+    const auto held = sets.next({});
+    REQUIRE(held);
+    for (std::uint64_t tick = 2; tick < 30; ++tick) frame(*a, tick);
+    CHECK_FALSE(held->valid());
+    CHECK(sets.next({}).error().why == Pause::nothing);
+    CHECK(sets.report().lost > 0);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: an end is told once, and a larger ring of one life is no end") {
+    SetReader sets = open();
+    frame(*a, 1);
+    auto larger = camera("a", 8192);
+    frame(*larger, 2);
+    frame(*b, 2);
+    const auto set = sets.next({});
+    REQUIRE(set);
+    CHECK(set->tick == 2);
+    a.reset();
+    larger.reset();
+    b.reset();
+    CHECK(sets.next(seconds(20)).error().why == Pause::gone);
+    CHECK(sets.next(milliseconds(1)).error().why == Pause::gone);  // at its time-out
+    a = camera("a");
+    b = camera("b");
+    frame(*a, 9);
+    frame(*b, 9);
+    const auto back = sets.next(seconds(20));
+    REQUIRE(back);
+    CHECK(back->tick == 9);
+}
+
+TEST_CASE_METHOD(Rig,
+                 "set_reader: its descriptor is readable for sets and when patience ends "
+                 "[threads]",
+                 "[threads]") {
+    SetOptions hasty = options();
+    hasty.partial = true;
+    hasty.patience = milliseconds(50);
+    SetReader sets = open(hasty);
+    const auto descriptor = sets.fd();
+    REQUIRE(descriptor);
+    const auto readable = [&](int timeout_ms) {
+        pollfd entry{*descriptor, POLLIN, 0};
+        return ::poll(&entry, 1, timeout_ms) == 1;
+    };
+    CHECK_FALSE(sets.next({}));
+    CHECK_FALSE(readable(0));
+    frame(*a, 1);
+    REQUIRE(readable(20'000));
+    CHECK_FALSE(sets.next({}));
+    REQUIRE(readable(20'000));
+    const auto set = sets.next(seconds(20));
+    REQUIRE(set);
+    CHECK_FALSE(set->complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: what cannot be a set is refused") {
+    const auto refusal = [&](const std::vector<std::string>& cameras) {
+        return SetReader::open(cameras, options()).error().message();
+    };
+    CHECK_THAT(refusal({}), Catch::Contains("needs the names"));
+    CHECK_THAT(refusal({"a", "a"}), Catch::Contains("twice"));
+    CHECK_THAT(refusal({"a", "imu"}), Catch::Contains("another kind"));
+    CHECK_THAT(refusal({"a", "c"}), Catch::Contains("no such stream"));
+}
