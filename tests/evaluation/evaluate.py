@@ -1,9 +1,10 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs the published evaluation on the virtual rig, and writes docs/evaluation.md and its pictures.
 
 Each measurement is what a user would do: start the rig's hardware and the service, record, and let
-`versavis evaluate` look at the recording.
+`versavis evaluate` look at the recording. Debian's own Python runs this: it is the one that has
+Debian's PIL and matplotlib.
 """
 import argparse
 import contextlib
@@ -21,12 +22,11 @@ sys.dont_write_bytecode = True
 
 import report  # noqa: E402
 
-PARTS = ("leds", "imu", "clock")
-# Pairs of pictures that the publication counted, at 10 Hz.
-PAIRS, LED_FPS = 400, 10
-# Strengths of the IMU's filter and exposure times of the publication; 0 is automatic.
-FILTERS = (0, 2, 4)
-EXPOSURES_MS = (1, 3, 5, 0)
+# As published.
+LED_FPS = 10
+# Of the LED board, beyond the pairs that must match. Half: some ambiguous pictures make a run bad.
+# Twice: it takes a second longer.
+SPARE_S = 1.5
 # Until cameras are paired and the clock is settled. Half: some frames of the beginning are
 # suspect. Twice: only time is lost.
 SETTLING_S = 8
@@ -147,12 +147,25 @@ class Bench:
 class Evaluation:
     def __init__(self, options):
         self.options = options
-        self.found = {"runs": options.runs, "seconds": options.seconds}
+        self.found = {"runs": options.runs, "seconds": options.seconds, "parts": options.parts,
+                      "failed": []}
         self.total = self.done = 0
+        self.what = ""
+
+    @contextlib.contextmanager
+    def told(self, detail=""):
+        """What cannot be measured is told, and the rest goes on."""
+        try:
+            yield
+        except Failure as failure:
+            what = ", ".join(filter(None, (self.what, detail)))
+            self.found["failed"].append(f"{what}: {str(failure).strip()}")
+            print(f"evaluate: {self.found['failed'][-1]}", file=sys.stderr, flush=True)
 
     @contextlib.contextmanager
     def bench(self, what):
         self.done += 1
+        self.what = what
         print(f"evaluate: {self.done} of {self.total}: {what}", file=sys.stderr, flush=True)
         with tempfile.TemporaryDirectory(prefix="versavis-evaluation-") as directory:
             bench = Bench(self.options.programs, pathlib.Path(directory))
@@ -161,23 +174,31 @@ class Evaluation:
             finally:
                 bench.stop()
 
+    def save(self):
+        """As a whole, whatever happens meanwhile."""
+        new = self.options.json.with_name(self.options.json.name + ".new")
+        new.write_text(json.dumps(self.found, indent=1) + "\n")
+        new.replace(self.options.json)
+
     def run(self):
         parts = [getattr(self, part)() for part in self.options.parts]
         self.total = sum(len(part) for part in parts)
         for part in parts:
             for measure in part:
-                measure()
+                with self.told():
+                    measure()
+                self.save()
         return self.found
 
     # LED board: two cameras, one of which sees it upside down.
     def leds(self):
         fast = {"rate_hz": 1000.0, "exposure_us": 1000.0}
         fine = {"rate_hz": 970.0, "exposure_us": 1100.0}
-        late = {"line_rising_us": 36.0, "line_falling_us": 18.0}
-        known = {"strobe_rising_us": [36.0, 0.0], "strobe_falling_us": [18.0, 0.0]}
+        rising, falling = map(float, report.LINE_DELAY_US)
+        late = {"line_rising_us": rising, "line_falling_us": falling}
+        known = {"strobe_rising_us": [rising, 0.0], "strobe_falling_us": [falling, 0.0]}
         cases = [("published", fast, {}, {}), ("fine", fine, {}, {}),
                  ("late line", fine, late, {}), ("late line, configured", fine, late, known)]
-        self.found["leds"] = {}
         return [lambda case=case: self.measure_leds(*case) for case in cases]
 
     def measure_leds(self, name, light, rig, service):
@@ -189,10 +210,10 @@ class Evaluation:
         setup = Setup(cameras, rig="[motion]\nrate_rad_s = [0.3, 0.3, 0.3]\n[leds]\n",
                       service=f"[ports]\ntest_rate_hz = {light['rate_hz']}\n")
         with self.bench(f"LED board, {name}") as bench:
-            recording = bench.record(setup, PAIRS / LED_FPS + 1)
+            recording = bench.record(setup, report.LED_PAIRS / LED_FPS + SPARE_S)
             # A line whose edges are late by different times also misstates how long it was.
             true = ("--exposure", f"cam1={light['exposure_us']}") if rig else ()
-            self.found["leds"][name] = bench.evaluate("leds", recording, *true)
+            self.found.setdefault("leds", {})[name] = bench.evaluate("leds", recording, *true)
             if name == "fine":
                 self.keep_pictures(bench, recording)
 
@@ -209,14 +230,13 @@ class Evaluation:
     def imu(self):
         # The service corrects nothing; what it knows of the part; the same with data-ready.
         modes = {"off": {"filter_delay_us": 0.0}, "on": {}, "paced": {"data_ready": True}}
-        self.found["imu"] = {mode: {} for mode in modes}
         return [lambda m=mode, s=settings, f=strength, r=run: self.measure_imu(m, s, f, r)
                 for run in range(self.options.runs)
-                for mode, settings in modes.items() for strength in FILTERS]
+                for mode, settings in modes.items() for strength in report.FILTERS]
 
     def measure_imu(self, mode, settings, strength, run):
         cameras = []
-        for index, exposure_ms in enumerate(EXPOSURES_MS):
+        for index, exposure_ms in enumerate(report.EXPOSURES_MS):
             us = exposure_ms * 1000.0 or 3000.0
             swing = {} if exposure_ms else {"exposure_swing": 0.6}
             cameras.append(camera(index, {"width": 320, "height": 240, "focal_px": 200.0,
@@ -226,12 +246,14 @@ class Evaluation:
         setup = Setup(cameras, settings | {"filter": strength}, motion, seed=run + 1)
         with self.bench(f"camera and IMU, filter {strength}, {mode}, run {run + 1}") as bench:
             recording = bench.record(setup, self.options.seconds)
-            for index, exposure_ms in enumerate(EXPOSURES_MS):
-                seen = bench.evaluate("imu", recording, "--camera", f"cam{index}", "--focal", 200)
-                key = f"{strength}/{exposure_ms}"
-                self.found["imu"][mode].setdefault(key, []).append(
-                    {key: seen[key] for key in ("timeshift_cam_imu_s",
-                                                "timeshift_cam_imu_sigma_s")})
+            for index, exposure_ms in enumerate(report.EXPOSURES_MS):
+                with self.told(f"cam{index}"):
+                    seen = bench.evaluate("imu", recording, "--camera", f"cam{index}",
+                                          "--focal", 200)
+                    self.found.setdefault("imu", {}).setdefault(mode, {}).setdefault(
+                        f"{strength}/{exposure_ms}", []).append(
+                            {key: seen[key] for key in ("timeshift_cam_imu_s",
+                                                        "timeshift_cam_imu_sigma_s")})
 
     # Clock: whole seconds of a GNSS receiver tell the true error.
     def clock(self):
@@ -251,40 +273,59 @@ def options():
     parser = argparse.ArgumentParser(
         prog="./dev evaluate", description=__doc__.split("\n")[0],
         epilog="It takes 45 s for each recording: 25 minutes with three runs.")
-    parser.add_argument("parts", nargs="*", metavar="PART", choices=[*PARTS, []],
-                        help=f"only these: {', '.join(PARTS)} (then nothing is written but --json)")
+    parser.add_argument("parts", nargs="*", metavar="PART", choices=[*report.PARTS, []],
+                        help=f"only these: {', '.join(report.PARTS)} (then docs/ stays as it is)")
     parser.add_argument("--runs", type=int, default=3, metavar="N",
                         help="recordings for each strength of the IMU's filter (default 3)")
     parser.add_argument("--seconds", type=float, default=30, metavar="S",
                         help="length of a recording of camera and IMU (default 30)")
     parser.add_argument("--clock-seconds", type=float, default=120, metavar="S",
                         help="length of the recording of the clock (default 120)")
-    parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="all figures")
+    parser.add_argument("--json", type=pathlib.Path, metavar="FILE",
+                        help="all figures, saved after each recording (default "
+                             "build/evaluation.json, of parts build/evaluation-PART.json)")
+    parser.add_argument("--report-only", type=pathlib.Path, metavar="FILE",
+                        help="measure nothing: write docs/evaluation.md and its diagram anew from "
+                             "such a file; the picture of the LED board stays")
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build" / "bin",
                         help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.runs < 1 or not chosen.seconds >= 10 or not chosen.clock_seconds >= 30:
         parser.error("at least 1 run, 10 s for camera and IMU, and 30 s for the clock")
     chosen.whole = not chosen.parts
-    chosen.parts = chosen.parts or list(PARTS)
+    if not chosen.json:
+        name = "-".join(["evaluation", *chosen.parts]) + ".json"
+        chosen.json = chosen.programs.parent / name
+    chosen.parts = chosen.parts or list(report.PARTS)
     chosen.images = ROOT / "docs" / "images" if chosen.whole else None
     return chosen
+
+
+def measure(chosen):
+    print(f"evaluate: figures go to {chosen.json}", file=sys.stderr)
+    found = Evaluation(chosen).run()
+    if chosen.whole and not found["failed"]:
+        report.write(found, ROOT / "docs")
+    elif chosen.whole:
+        print("evaluate: docs/evaluation.md is left as it is; --report-only writes it all the same",
+              file=sys.stderr)
+    return found
 
 
 def main():
     chosen = options()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        found = Evaluation(chosen).run()
-    except Failure as failure:
-        print(f"evaluate: {failure}", file=sys.stderr)
-        return 1
+        if chosen.report_only:
+            found = json.loads(chosen.report_only.read_text())
+            report.write(found, ROOT / "docs")
+        else:
+            found = measure(chosen)
     except KeyboardInterrupt:
         return 130
-    if chosen.json:
-        chosen.json.write_text(json.dumps(found, indent=1) + "\n")
-    if chosen.whole:
-        report.write(found, ROOT / "docs")
+    except (OSError, ValueError) as error:
+        print(f"evaluate: {error}", file=sys.stderr)
+        return 1
     print(report.summary(found))
     return 0 if report.passed(found) else 1
 
