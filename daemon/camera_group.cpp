@@ -5,11 +5,10 @@
 
 namespace versavis::daemon {
 
-CameraGroup::CameraGroup(const std::filesystem::path& ring_directory,
-                         std::vector<CameraPreset> presets,
+CameraGroup::CameraGroup(const ring::Place& rings, std::vector<CameraPreset> presets,
                          const std::filesystem::path& state_directory,
                          clock::Translator& translator, EventJournal& events, BoardLink& board)
-    : environment_(ring_directory, std::move(presets), state_directory),
+    : environment_(rings, std::move(presets), state_directory),
       translator_(translator),
       events_(events),
       board_(board) {}

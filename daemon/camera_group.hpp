@@ -18,7 +18,7 @@ namespace versavis::daemon {
 /// All cameras are added before the first is started; after that it is thread-safe.
 class CameraGroup {
  public:
-    CameraGroup(const std::filesystem::path& ring_directory, std::vector<CameraPreset> presets,
+    CameraGroup(const ring::Place& rings, std::vector<CameraPreset> presets,
                 const std::filesystem::path& state_directory, clock::Translator& translator,
                 EventJournal& events, BoardLink& board);
 

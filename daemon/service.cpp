@@ -47,6 +47,10 @@ std::vector<std::string> ring_names(const Configuration& configuration) {
     return names;
 }
 
+ring::Place place_of(const ring::OwnedDirectory& directory, const Configuration& configuration) {
+    return {directory.path(), configuration.memory.sealed};
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Service>> Service::create(const Configuration& configuration) {
@@ -58,7 +62,7 @@ Expected<std::unique_ptr<Service>> Service::create(const Configuration& configur
     // First what is dead: its memory may be needed, and readers of streams that are no longer
     // configured learn that they are gone.
     directory->remove_stale(ring_names(configuration));
-    auto status = StatusPublisher::create(directory->path());
+    auto status = StatusPublisher::create(place_of(*directory, configuration));
     if (!status) return Unexpected(status.error());
     std::unique_ptr<Service> service(
         new Service(configuration, std::move(*directory), std::move(*output), std::move(*status)));
@@ -78,16 +82,16 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
       started_(host_now()) {}
 
 Expected<> Service::make_rings() {
+    const ring::Place place = place_of(directory_, configuration_);
     auto event_ring =
-        ring::Writer::create(directory_.path(), {"events", ring::StreamKind::events, event_items});
+        ring::Writer::create(place, {"events", ring::StreamKind::events, event_items});
     if (!event_ring) return Unexpected(event_ring.error());
     events_ = std::make_unique<EventJournal>(std::move(*event_ring), translator_);
-    auto clock_ring =
-        ring::Writer::create(directory_.path(), {"clock", ring::StreamKind::clock, clock_items});
+    auto clock_ring = ring::Writer::create(place, {"clock", ring::StreamKind::clock, clock_items});
     if (!clock_ring) return Unexpected(clock_ring.error());
     clock_recorder_ = std::make_unique<ClockRecorder>(std::move(*clock_ring), translator_);
     for (const ImuConfiguration& imu : configuration_.imus) {
-        auto ring = ring::Writer::create(directory_.path(), ring_of(imu));
+        auto ring = ring::Writer::create(place, ring_of(imu));
         if (!ring) return Unexpected(ring.error());
         imus_.push_back(
             std::make_unique<ImuPipeline>(imu, std::move(*ring), translator_, *events_));
@@ -105,9 +109,9 @@ Expected<> Service::make_cameras() {
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
                                          told, configuration_.clock.exchange_rate_hz, translator_,
                                          *clock_recorder_, self);
-    cameras_ = std::make_unique<CameraGroup>(directory_.path(), std::move(*presets),
-                                             state_directory(configuration_.state_directory),
-                                             translator_, *events_, *board_);
+    cameras_ = std::make_unique<CameraGroup>(
+        place_of(directory_, configuration_), std::move(*presets),
+        state_directory(configuration_.state_directory), translator_, *events_, *board_);
     for (const CameraConfiguration& camera : configuration_.cameras) cameras_->add(camera);
     return {};
 }

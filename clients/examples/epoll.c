@@ -35,6 +35,7 @@ int main(void) {
         while ((result = versavis_next(streams[ready.data.u32], &item, 0)) != VERSAVIS_NOTHING) {
             if (result == VERSAVIS_OK) print(&item);
             if (result == VERSAVIS_GONE) break;
+            if (result < 0) return 1;
         }
     }
 }

@@ -17,11 +17,15 @@ int main(void) {
     }
     for (;;) {
         int result = versavis_sets_next(sets, &set, 1000000000);
-        if (result == VERSAVIS_OK)
-            printf("tick %" PRIu64 ": %" PRId64 " ns, spread %" PRId64 " ns, %zu samples\n",
-                   set.tick, set.time, set.spread, set.imu_count);
-        else
+        if (result != VERSAVIS_OK) {
             fprintf(stderr, "%s\n", versavis_result_text(result));
+            if (result < 0) return 1;
+            continue;
+        }
+        /* ... use versavis_view(&set.frames[0], &image) and set.frames[1] here ... */
+        if (!versavis_valid(&set.frames[0]) || !versavis_valid(&set.frames[1])) continue;
+        printf("tick %" PRIu64 ": %" PRId64 " ns, spread %" PRId64 " ns, %zu samples\n", set.tick,
+               set.time, set.spread, set.imu_count);
         fflush(stdout);
     }
 }

@@ -22,6 +22,9 @@ int main(int argc, char** argv) {
                 printf("%" PRId64 " ns: %" PRIu32 " x %" PRIu32 " %s, first byte %u\n", item.time,
                        image.width, image.height, versavis_pixel_format_name(image.pixel_format),
                        (unsigned)first);
+        } else if (result < 0 || result == VERSAVIS_OK) {
+            fprintf(stderr, "%s\n", result < 0 ? versavis_result_text(result) : "not an image");
+            return 1;
         } else {
             fprintf(stderr, "%s\n", versavis_result_text(result));
         }

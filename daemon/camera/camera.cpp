@@ -248,7 +248,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
                               const std::atomic<bool>& control_lost) {
     const auto failed = [](const Error& error) { return problem(CameraState::failed, error); };
     pipeline_.set_line_delays(setup.lines);
-    if (auto done = pipeline_.prepare(environment_.ring_directory, setup.payload, setup.has_clock,
+    if (auto done = pipeline_.prepare(environment_.rings, setup.payload, setup.has_clock,
                                       setup.stamp_instant);
         !done)
         return failed(done.error());

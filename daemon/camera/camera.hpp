@@ -51,13 +51,13 @@ struct CameraReport {
 
 /// What all cameras share.
 struct CameraEnvironment {
-    CameraEnvironment(std::filesystem::path rings, std::vector<CameraPreset> known_presets,
+    CameraEnvironment(ring::Place place, std::vector<CameraPreset> known_presets,
                       const std::filesystem::path& state)
-        : ring_directory(std::move(rings)),
+        : rings(std::move(place)),
           presets(std::move(known_presets)),
           descriptions(own_program, state) {}
 
-    std::filesystem::path ring_directory;
+    ring::Place rings;
     std::vector<CameraPreset> presets;
     BandwidthPlan bandwidth;
     DescriptionVetting descriptions;

@@ -338,9 +338,11 @@ Expected<Configuration, TomlProblems> load_configuration(const std::string& path
     read_parts(file, top, "imu", configuration.imus, read_imu);
     read_part(file, top, "illumination", configuration.illumination, read_illumination);
     read_part(file, top, "ports", configuration.ports, read_ports);
-    read_part(
-        file, top, "memory", configuration.memory,
-        [](TableReader& reader, MemoryConfiguration& memory) { reader.read("lock", memory.lock); });
+    read_part(file, top, "memory", configuration.memory,
+              [](TableReader& reader, MemoryConfiguration& memory) {
+                  reader.read("lock", memory.lock);
+                  reader.read("sealed", memory.sealed);
+              });
     top.finish();
     configuration.entry = top.entry();
     complete(configuration);

@@ -183,7 +183,8 @@ struct PortConfiguration {
 
 struct MemoryConfiguration {
     TomlEntry entry;
-    bool lock = false;  ///< all of the service's memory, rings included, stays in RAM
+    bool lock = false;    ///< all of the service's memory, rings included, stays in RAM
+    bool sealed = false;  ///< nobody can cut a ring short under its readers
 };
 
 struct Configuration {

@@ -65,13 +65,12 @@ void CameraPipeline::count_refusal(EventReason reason) {
     if (number < report_.refused.size()) ++report_.refused[number];
 }
 
-Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
-                                   std::uint64_t payload_size, bool has_clock,
-                                   pairing::Instant stamp_instant) {
+Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t payload_size,
+                                   bool has_clock, pairing::Instant stamp_instant) {
     // Rings are made, and end, outside the lock that all threads wait for: that takes long. Only
     // the camera's thread does so, and what the ring before still waits for is published first.
     if (triggered() && !evidence_.recording()) {
-        auto ring = EvidenceRecorder::make_ring(directory, configuration_.name);
+        auto ring = EvidenceRecorder::make_ring(place, configuration_.name);
         if (!ring) return Unexpected(ring.error());
         const std::lock_guard lock(mutex_);
         evidence_.use(std::move(*ring));
@@ -81,7 +80,7 @@ Expected<> CameraPipeline::prepare(const std::filesystem::path& directory,
         witness_.forget();
         begin_anew();
     }
-    auto ring = frames_.make_ring(directory, payload_size);
+    auto ring = frames_.make_ring(place, payload_size);
     if (!ring) return Unexpected(ring.error());
     std::optional<ring::Writer> before;
     const std::lock_guard lock(mutex_);

@@ -67,8 +67,8 @@ class CameraPipeline final : private pairing::Outcome {
     /// Makes the rings, or one with larger slots: called by the camera once it knows its payload.
     /// Slots are void then. `has_clock`: its stamps are its own.
     /// `stamp_instant`: what they are of; unknown: it is found out.
-    Expected<> prepare(const std::filesystem::path& directory, std::uint64_t payload_size,
-                       bool has_clock, pairing::Instant stamp_instant = pairing::Instant::unknown);
+    Expected<> prepare(const ring::Place& place, std::uint64_t payload_size, bool has_clock,
+                       pairing::Instant stamp_instant = pairing::Instant::unknown);
 
     std::optional<std::uint32_t> acquire();
     std::byte* slot_data(std::uint32_t slot);

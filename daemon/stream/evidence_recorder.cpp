@@ -13,10 +13,10 @@ constexpr std::uint32_t evidence_items = 16384;
 
 }  // namespace
 
-Expected<ring::Writer> EvidenceRecorder::make_ring(const std::filesystem::path& directory,
+Expected<ring::Writer> EvidenceRecorder::make_ring(const ring::Place& place,
                                                    const std::string& camera) {
     return ring::Writer::create(
-        directory, {camera + evidence_suffix, ring::StreamKind::evidence, evidence_items});
+        place, {camera + evidence_suffix, ring::StreamKind::evidence, evidence_items});
 }
 
 void EvidenceRecorder::record(const pairing::Evidence& evidence) {

@@ -18,8 +18,7 @@ class EvidenceRecorder {
     explicit EvidenceRecorder(clock::Translator& translator) : translator_(translator) {}
 
     /// Takes long. Error: the ring cannot be made.
-    static Expected<ring::Writer> make_ring(const std::filesystem::path& directory,
-                                            const std::string& camera);
+    static Expected<ring::Writer> make_ring(const ring::Place& place, const std::string& camera);
 
     /// Nothing is recorded before.
     void use(ring::Writer ring) { ring_.emplace(std::move(ring)); }

@@ -32,8 +32,8 @@ FrameMetadata describe(const pairing::Exposure& exposure) {
 FramePublisher::FramePublisher(const CameraConfiguration& configuration)
     : name_(configuration.name), slots_(configuration.slots) {}
 
-Expected<std::optional<ring::Writer>> FramePublisher::make_ring(
-    const std::filesystem::path& directory, std::uint64_t payload_size) const {
+Expected<std::optional<ring::Writer>> FramePublisher::make_ring(const ring::Place& place,
+                                                                std::uint64_t payload_size) const {
     if (ring_ && ring_->slot_size() >= payload_size) return std::nullopt;
     ring::Shape shape;
     shape.name = name_;
@@ -41,7 +41,7 @@ Expected<std::optional<ring::Writer>> FramePublisher::make_ring(
     shape.slot_count = slots_;
     shape.slot_size = payload_size;
     shape.descriptor_count = std::bit_ceil(std::max(2 * slots_, descriptor_floor));
-    auto ring = ring::Writer::create(directory, shape);
+    auto ring = ring::Writer::create(place, shape);
     if (!ring) return Unexpected(ring.error());
     return std::move(*ring);
 }

@@ -21,7 +21,7 @@ class FramePublisher {
 
     /// A ring for payloads of that size; none: the one in use has room. Takes long, and changes
     /// nothing here. Error: the ring cannot be made.
-    Expected<std::optional<ring::Writer>> make_ring(const std::filesystem::path& directory,
+    Expected<std::optional<ring::Writer>> make_ring(const ring::Place& place,
                                                     std::uint64_t payload_size) const;
 
     /// Slots that were acquired are void. Returns the ring before, which takes long to end.

@@ -23,23 +23,22 @@ constexpr std::uint32_t slots = 8;
 /// Uncertainty of "now" as a stamp. It tells readers no more than that this is no measurement.
 constexpr Duration stamp_sigma = microseconds(1);
 
-Expected<ring::Writer> make_ring(const std::filesystem::path& directory, std::uint64_t size) {
-    return ring::Writer::create(directory,
-                                {"status", ring::StreamKind::status, slots, slots, size});
+Expected<ring::Writer> make_ring(const ring::Place& place, std::uint64_t size) {
+    return ring::Writer::create(place, {"status", ring::StreamKind::status, slots, slots, size});
 }
 
 }  // namespace
 
-Expected<StatusPublisher> StatusPublisher::create(const std::filesystem::path& directory) {
-    auto ring = make_ring(directory, first_document_size);
+Expected<StatusPublisher> StatusPublisher::create(const ring::Place& place) {
+    auto ring = make_ring(place, first_document_size);
     if (!ring) return Unexpected(ring.error());
-    return StatusPublisher(directory, std::move(*ring));
+    return StatusPublisher(place, std::move(*ring));
 }
 
 /// False: there is no room for a document of this size, and none can be made.
 bool StatusPublisher::make_room(std::size_t size) {
     if (size <= ring_.slot_size()) return true;
-    auto larger = make_ring(directory_, 2 * size);
+    auto larger = make_ring(place_, 2 * size);
     if (larger)
         ring_ = std::move(*larger);
     else

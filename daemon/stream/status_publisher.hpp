@@ -18,7 +18,7 @@ namespace versavis::daemon {
 class StatusPublisher {
  public:
     /// Error: the ring cannot be made.
-    static Expected<StatusPublisher> create(const std::filesystem::path& directory);
+    static Expected<StatusPublisher> create(const ring::Place& place);
 
     bool due(HostTime now) const { return now >= next_; }
 
@@ -31,13 +31,13 @@ class StatusPublisher {
     Health health() const { return health_; }
 
  private:
-    StatusPublisher(std::filesystem::path directory, ring::Writer ring)
-        : directory_(std::move(directory)), ring_(std::move(ring)) {}
+    StatusPublisher(ring::Place place, ring::Writer ring)
+        : place_(std::move(place)), ring_(std::move(ring)) {}
 
     bool make_room(std::size_t size);
     double rate_hz(const StreamStatus& stream, HostTime now);
 
-    std::filesystem::path directory_;
+    ring::Place place_;
     ring::Writer ring_;
     HostTime next_;
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;

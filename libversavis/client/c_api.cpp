@@ -25,6 +25,11 @@ struct versavis_wait_set {
     WaitSet set;
 };
 
+struct versavis_imu_window {
+    ImuWindow window;
+    std::vector<versavis_imu_sample> samples;  ///< of the newest span
+};
+
 struct versavis_sets {
     SetReader reader;
     std::vector<versavis_imu_sample> imu;  ///< of the newest set
@@ -118,6 +123,7 @@ std::optional<StreamOptions> translate(const char* instance, const versavis_opti
     options.start = *start;
     options.after_loss = *after_loss;
     if (from->owner >= 0) options.owner = static_cast<std::uint32_t>(from->owner);
+    options.sealed_only = from->sealed_only != 0;
     return options;
 }
 
@@ -125,14 +131,16 @@ int give(Expected<int> descriptor, versavis_error* error) {
     return descriptor ? *descriptor : fail(error, descriptor.error().message());
 }
 
-/// No exception leaves this library: there is none but for want of memory.
+/// No exception leaves this library.
 template <class Work>
 int guarded(versavis_error* error, Work work) {
     try {
         return work();
-    } catch (const std::exception& exception) {
+    } catch (const std::bad_alloc& exception) {
         describe(error, exception.what());
         return VERSAVIS_NO_MEMORY;
+    } catch (const std::exception& exception) {
+        return fail(error, exception.what());
     }
 }
 
@@ -141,6 +149,17 @@ versavis_imu_sample sample_of(const ImuSample& from) {
     sample.time = from.time.ns;
     std::memcpy(&sample.data, from.metadata.data(), sizeof sample.data);
     return sample;
+}
+
+void fill(versavis_imu_span& to, versavis_imu_window& window, const ImuSpan& span) {
+    window.samples.clear();
+    for (const ImuSample& sample : span.samples) window.samples.push_back(sample_of(sample));
+    to.samples = window.samples.data();
+    to.count = window.samples.size();
+    to.lost = span.lost;
+    to.covered = span.covered ? 1 : 0;
+    to.has_beyond = span.beyond ? 1 : 0;
+    to.beyond = span.beyond ? sample_of(*span.beyond) : versavis_imu_sample{};
 }
 
 void fill(versavis_set& to, versavis_sets& sets, FrameSet made) {
@@ -304,7 +323,14 @@ const char* versavis_reason_name(uint32_t reason) {
     return to_string(static_cast<EventReason>(reason));
 }
 
-versavis_wait_set* versavis_wait_set_new(void) { return new (std::nothrow) versavis_wait_set{}; }
+versavis_wait_set* versavis_wait_set_new(void) {
+    versavis_wait_set* made = nullptr;
+    guarded(nullptr, [&] {
+        made = new versavis_wait_set{};
+        return VERSAVIS_OK;
+    });
+    return made;
+}
 
 void versavis_wait_set_free(versavis_wait_set* set) { delete set; }
 
@@ -328,6 +354,36 @@ int versavis_wait_set_wait(versavis_wait_set* set, int64_t timeout) {
 int versavis_wait_set_fd(versavis_wait_set* set, versavis_error* error) {
     if (set == nullptr) return invalid(error, "versavis_wait_set_fd: the set is NULL");
     return guarded(error, [&] { return give(set->set.fd(), error); });
+}
+
+int versavis_imu_window_open(const char* instance, const char* stream,
+                             const versavis_options* options, versavis_imu_window** opened,
+                             versavis_error* error) {
+    if (stream == nullptr || opened == nullptr)
+        return invalid(error, "versavis_imu_window_open: the name, or where to put it, is NULL");
+    *opened = nullptr;
+    return guarded(error, [&]() -> int {
+        const auto how = translate(instance, options);
+        if (!how) return invalid(error, "versavis_imu_window_open: after_loss is not a position");
+        auto window = ImuWindow::open(stream, *how);
+        if (!window) return fail(error, window.error().message());
+        *opened = new versavis_imu_window{std::move(*window), {}};
+        return VERSAVIS_OK;
+    });
+}
+
+void versavis_imu_window_close(versavis_imu_window* window) { delete window; }
+
+int versavis_imu_window_between(versavis_imu_window* window, int64_t after, int64_t upto,
+                                int64_t patience, versavis_imu_span* span) {
+    if (window == nullptr || span == nullptr || upto < after) return VERSAVIS_INVALID;
+    return guarded(nullptr, [&]() -> int {
+        const Duration most = nanoseconds(std::max<std::int64_t>(patience, 0));
+        const auto found = window->window.between(OutputTime{after}, OutputTime{upto}, most);
+        if (!found) return static_cast<int>(found.error().why);
+        fill(*span, *window, *found);
+        return VERSAVIS_OK;
+    });
 }
 
 int versavis_sets_open(const char* instance, const char* const* cameras, size_t count,

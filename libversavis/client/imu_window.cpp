@@ -12,6 +12,11 @@ namespace {
 // Samples kept at most. Half: a minute at 1 kHz. Twice: 40 MB when nobody asks for them.
 constexpr std::size_t most_samples = 131072;
 
+// Losses that one look bears: who keeps up has none, a slow one has one or two. Half: a reader that
+// is overtaken while it catches up looks once more. Twice: a damaged ring, where each look finds
+// another loss, is given up later.
+constexpr int most_losses = 16;
+
 }  // namespace
 
 Expected<ImuWindow> ImuWindow::open(const std::string& name, const StreamOptions& options) {
@@ -23,7 +28,7 @@ Expected<ImuWindow> ImuWindow::open(const std::string& name, const StreamOptions
 }
 
 Expected<void, NoItem> ImuWindow::collect() {
-    for (;;) {
+    for (int losses = 0; losses < most_losses;) {
         auto sample = stream_.next();
         if (sample) {
             // A new epoch's times do not compare with those before.
@@ -39,8 +44,11 @@ Expected<void, NoItem> ImuWindow::collect() {
             return Unexpected<NoItem>(sample.error());
         } else if (sample.error().why != Pause::lost) {
             return {};
+        } else {
+            ++losses;
         }
     }
+    return {};
 }
 
 bool ImuWindow::reaches(OutputTime time) const {
@@ -52,7 +60,7 @@ void ImuWindow::look_back(OutputTime after) {
     const bool kept =
         before_ ? before_->time <= after : !samples_.empty() && samples_.front().time <= after;
     if (kept || (before_ == std::nullopt && samples_.empty())) return;
-    stream_.reader().seek(after);
+    stream_.reader().seek(after, 1);  // and the one before, which shows that none is missing
     samples_.clear();
     before_.reset();
 }

@@ -30,6 +30,23 @@ bool can_be_judged(const Constants& constants) {
            constants.pid_namespace != 0 && constants.pid_namespace == own_pid_namespace();
 }
 
+/// Empty: there is no such process, or it cannot be read.
+std::string stat_of(std::uint32_t pid) {
+    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+    std::string line;
+    std::getline(stat, line);
+    return line;
+}
+
+/// 0: only the remains of a process.
+std::uint64_t start_in(const std::string& line) {
+    std::size_t at = line.rfind(')');  // the command may contain spaces
+    if (at != std::string::npos && line[at + 2] == 'Z') return 0;
+    for (int field = 3; field <= 22 && at != std::string::npos; ++field)
+        at = line.find(' ', at + 1);
+    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
+}
+
 }  // namespace
 
 Presence quick_presence(const Constants& constants) {
@@ -40,22 +57,12 @@ Presence quick_presence(const Constants& constants) {
 
 Presence presence(const Constants& constants) {
     if (const Presence quick = quick_presence(constants); quick != Presence::there) return quick;
-    std::ifstream stat("/proc/" + std::to_string(constants.writer_pid) + "/stat");
-    if (!stat) return Presence::unknown;  // /proc may hide other users' processes
-    return start_ticks_of(constants.writer_pid) == constants.writer_start_ticks ? Presence::there
-                                                                                : Presence::dead;
+    const std::string line = stat_of(constants.writer_pid);
+    if (line.empty()) return Presence::unknown;  // /proc may hide other users' processes
+    return start_in(line) == constants.writer_start_ticks ? Presence::there : Presence::dead;
 }
 
-std::uint64_t start_ticks_of(std::uint32_t pid) {
-    std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-    std::string line;
-    std::getline(stat, line);
-    std::size_t at = line.rfind(')');  // the command may contain spaces
-    if (at != std::string::npos && line[at + 2] == 'Z') return 0;
-    for (int field = 3; field <= 22 && at != std::string::npos; ++field)
-        at = line.find(' ', at + 1);
-    return at == std::string::npos ? 0 : std::strtoull(line.c_str() + at, nullptr, 10);
-}
+std::uint64_t start_ticks_of(std::uint32_t pid) { return start_in(stat_of(pid)); }
 
 std::uint64_t start_ticks_of_this_process() {
     return start_ticks_of(static_cast<std::uint32_t>(::getpid()));

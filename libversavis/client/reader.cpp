@@ -7,6 +7,7 @@
 #include "client/deadline.hpp"
 #include "client/futex.hpp"
 #include "client/process.hpp"
+#include "client/sealed.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
 #include "client/watch.hpp"
@@ -19,6 +20,10 @@ namespace {
 // Twice: it is told of a death 20 ms later than it could be.
 constexpr std::int64_t look_period_ns = 10'000'000;
 
+// Before a successor that could not be followed is tried again. Half: one that never can be costs
+// twice as much. Twice: a reader that had no descriptor left is blind for 2 s.
+constexpr Duration retry_period = seconds(1);
+
 /// A few ns to read, and some ms coarse.
 std::int64_t coarse_now_ns() {
     timespec now{};
@@ -30,7 +35,10 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                                              const Options& options) {
     auto file = open_trusted(path, options.owner);
     if (!file) return Unexpected(file.error());
-    auto mapping = Mapping::open(file->descriptor(), path, Mapping::Access::read_only);
+    if (options.sealed_only && !is_sealed(file->file.descriptor()))
+        return failure(path.string(), "is not sealed",
+                       "set 'sealed = true' in [memory] of the service's configuration");
+    auto mapping = Mapping::open(*file, path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
     return std::make_shared<const Mapping>(std::move(*mapping));
 }
@@ -59,13 +67,28 @@ struct Reader::Contact {
     bool alive = true;
     bool told_gone = false;
     std::uint64_t read = 0;        ///< number behind that of the item that was handed out last
-    FileId refused{};              ///< a file of this name that could not be followed
     std::unique_ptr<Watch> watch;  ///< once fd() was asked for
+
+    void refuse(FileId successor) {
+        refused_ = successor;
+        retry_ = host_now() + retry_period;
+    }
+    /// When the file of this name that could not be followed is tried again; none: there is none.
+    std::optional<HostTime> retry() const {
+        const bool waits = refused_ != FileId{} && host_now() < retry_;
+        return waits ? std::optional(retry_) : std::nullopt;
+    }
+    FileId refused() const { return retry() ? refused_ : FileId{}; }
+
+ private:
+    FileId refused_{};
+    HostTime retry_;
 };
 
 Expected<Reader> Reader::open(const std::filesystem::path& path, const Options& options) {
     auto mapping = map(path, options);
     if (!mapping) return Unexpected(mapping.error());
+    (*mapping)->populate();
     Reader reader(path, options, std::move(*mapping));
     reader.seek(options.start);
     reader.writer_alive();
@@ -184,11 +207,12 @@ std::uint64_t Reader::place(Position position) const {
 
 void Reader::seek(Position position) { next_ = place(position); }
 
-void Reader::seek(OutputTime time) {
+void Reader::seek(OutputTime time, std::uint64_t earlier) {
     const std::uint64_t first = oldest();
     next_ = head();
     for (Item item; next_ > first; --next_)
-        if (read(next_ - 1, item) != Look::ready || item.time < time) return;
+        if (read(next_ - 1, item) != Look::ready || item.time < time) break;
+    next_ = std::max(std::min(first, next_), next_ - std::min(next_, earlier));
 }
 
 Received Reader::lapped() {
@@ -220,8 +244,8 @@ Received Reader::look() {
 }
 
 Received Reader::hand_over() {
-    if (!has_successor(path_, mapping_->file(), {})) return pause(Pause::gone);
-    contact_->refused = file_id(path_);
+    if (!has_successor(path_, mapping_->name(), contact_->refused())) return pause(Pause::gone);
+    contact_->refuse(file_id(path_));
     auto successor = map(path_, options_);
     if (!successor) return pause(Pause::gone);
     const Constants& now = (*successor)->constants();
@@ -232,13 +256,17 @@ Received Reader::hand_over() {
     auto last = take();
     if (last || last.error().why != Pause::nothing) return last;
     mapping_ = std::move(*successor);
+    mapping_->populate();
     next_ = 0;
     contact_->read = 0;
     contact_->pulse = {};
     contact_->told_gone = false;
+    contact_->refuse({});
     writer_alive();
     return pause(Pause::restarted);
 }
+
+std::optional<HostTime> Reader::retry() const { return contact_->retry(); }
 
 Received Reader::next() {
     auto received = look();
@@ -261,7 +289,7 @@ Received Reader::settle() {
         return received;
     }
     contact_->told_gone = received.error().why == Pause::gone;
-    contact_->watch->arm({target(seen)}, std::nullopt);
+    contact_->watch->arm({target(seen)}, retry());
     return received;
 }
 
@@ -275,7 +303,7 @@ FutexWord Reader::wake_word() const {
 }
 
 WatchTarget Reader::target(std::uint32_t seen) const {
-    return {mapping_, path_, seen, contact_->told_gone, contact_->refused};
+    return {mapping_, path_, seen, contact_->told_gone, contact_->refused(), contact_->pulse};
 }
 
 /// True when next() has something new to tell.
@@ -288,7 +316,7 @@ bool Reader::ready() {
     if (!not_there()) return true;
     if (writer_seen()) return false;
     if (!contact_->told_gone || !not_there()) return true;
-    return has_successor(path_, mapping_->file(), contact_->refused);
+    return has_successor(path_, mapping_->name(), contact_->refused());
 }
 
 Expected<int> Reader::fd() {

@@ -58,9 +58,7 @@ Expected<Mapping> Mapping::open_unchecked(int file, const std::filesystem::path&
     try {
         const auto mode = access == Access::read_only ? ipc::read_only : ipc::read_write;
         Mapping mapping;
-        mapping.region_ =
-            ipc::mapped_region(OpenFile{file, mode}, mode, 0, 0, nullptr, MAP_POPULATE);
-        mapping.file_ = {status.st_dev, status.st_ino};
+        mapping.region_ = ipc::mapped_region(OpenFile{file, mode}, mode);
         return mapping;
     } catch (const ipc::interprocess_exception& exception) {
         return failure(path.string(), std::string("cannot be mapped: ") + exception.what(),
@@ -70,17 +68,20 @@ Expected<Mapping> Mapping::open_unchecked(int file, const std::filesystem::path&
 
 Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access) {
     const int mode = access == Access::read_only ? O_RDONLY : O_RDWR;
-    const File file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    File file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     if (!file)
         return failure(
             path.string(),
             "cannot be opened: " + std::error_code(errno, std::generic_category()).message(),
             "is the service running?");
-    return open(file.descriptor(), path, access);
+    struct stat status {};
+    ::fstat(file.descriptor(), &status);
+    return open({std::move(file), {status.st_dev, status.st_ino}}, path, access);
 }
 
-Expected<Mapping> Mapping::open(int file, const std::filesystem::path& path, Access access) {
-    auto mapping = open_unchecked(file, path, access);
+Expected<Mapping> Mapping::open(const NamedFile& file, const std::filesystem::path& path,
+                                Access access) {
+    auto mapping = open_unchecked(file.file.descriptor(), path, access);
     if (!mapping) return mapping;
     // SYNC 7: acquire here, release at the end of the writer's fill_header(): with the magic, the
     // rest of the header is complete. Without it a header could be checked and used half filled.
@@ -96,7 +97,16 @@ Expected<Mapping> Mapping::open(int file, const std::filesystem::path& path, Acc
     mapping->read_constants();
     if (!well_formed(mapping->constants(), mapping->size()))
         return failure(path.string(), "has a damaged header");
+    mapping->name_ = file.name;
     return mapping;
+}
+
+void Mapping::populate() const {
+    const int how = region_.get_mode() == ipc::read_only ? MADV_POPULATE_READ : MADV_POPULATE_WRITE;
+    if (::madvise(bytes(), size(), how) == 0) return;
+    // Linux before 5.14 cannot.
+    const volatile std::byte* page = bytes();
+    for (std::size_t at = 0; at < size(); at += page_size) static_cast<void>(page[at]);
 }
 
 void Mapping::read_constants() {

@@ -39,48 +39,6 @@ using FileId = std::pair<std::uint64_t, std::uint64_t>;
 /// Of the file that has this name now; zeros: none has.
 FileId file_id(const std::filesystem::path& path);
 
-/// Owns a mapping of a complete segment. The views stay valid as long as it lives.
-class Mapping {
- public:
-    enum class Access { read_only, read_write };
-
-    /// Maps and checks `path`; every offset is checked to lie inside the file. Whose it is, is not.
-    static Expected<Mapping> open(const std::filesystem::path& path, Access access);
-
-    /// The same of a file that is open; `path` is for messages.
-    static Expected<Mapping> open(int file, const std::filesystem::path& path, Access access);
-
-    /// Maps a file that is still being filled in: nothing is checked. Say read_constants() when its
-    /// header is complete.
-    static Expected<Mapping> open_unchecked(int file, const std::filesystem::path& path,
-                                            Access access);
-
-    Header& header() const { return *static_cast<Header*>(region_.get_address()); }
-    const Constants& constants() const { return constants_; }
-    Descriptor& descriptor(std::uint64_t number) const {
-        return reinterpret_cast<Descriptor*>(
-            bytes() + constants_.descriptors_at)[number & (constants_.descriptor_count - 1)];
-    }
-    std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
-        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + constants_.generations_at +
-                                                              slot * generation_stride);
-    }
-    std::byte* slot(std::uint32_t slot) const {
-        return bytes() + constants_.slots_at + slot * constants_.slot_size;
-    }
-    std::size_t size() const { return region_.get_size(); }
-    FileId file() const { return file_; }
-
-    void read_constants();
-
- private:
-    std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
-
-    boost::interprocess::mapped_region region_;
-    Constants constants_;
-    FileId file_;
-};
-
 /// A file descriptor that closes itself.
 class File {
  public:
@@ -97,6 +55,58 @@ class File {
 
  private:
     int descriptor_;
+};
+
+/// A segment that is open, and what has its name: of a sealed one, a socket.
+struct NamedFile {
+    File file;
+    FileId name;
+};
+
+/// Owns a mapping of a complete segment. The views stay valid as long as it lives.
+class Mapping {
+ public:
+    enum class Access { read_only, read_write };
+
+    /// Maps and checks `path`; every offset is checked to lie inside the file. Whose it is, is not.
+    static Expected<Mapping> open(const std::filesystem::path& path, Access access);
+
+    /// The same of a file that is open; `path` is for messages.
+    static Expected<Mapping> open(const NamedFile& file, const std::filesystem::path& path,
+                                  Access access);
+
+    /// Maps a file that is still being filled in: nothing is checked. Say read_constants() when its
+    /// header is complete.
+    static Expected<Mapping> open_unchecked(int file, const std::filesystem::path& path,
+                                            Access access);
+
+    /// Has all pages at hand, so that none is waited for when it is first touched.
+    void populate() const;
+
+    Header& header() const { return *static_cast<Header*>(region_.get_address()); }
+    const Constants& constants() const { return constants_; }
+    Descriptor& descriptor(std::uint64_t number) const {
+        return reinterpret_cast<Descriptor*>(
+            bytes() + constants_.descriptors_at)[number & (constants_.descriptor_count - 1)];
+    }
+    std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
+        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + constants_.generations_at +
+                                                              slot * generation_stride);
+    }
+    std::byte* slot(std::uint32_t slot) const {
+        return bytes() + constants_.slots_at + slot * constants_.slot_size;
+    }
+    std::size_t size() const { return region_.get_size(); }
+    FileId name() const { return name_; }
+
+    void read_constants();
+
+ private:
+    std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
+
+    boost::interprocess::mapped_region region_;
+    Constants constants_;
+    FileId name_{};
 };
 
 }  // namespace versavis::ring

@@ -2,6 +2,8 @@
 #include "versavis/set_reader.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -21,12 +23,22 @@ constexpr std::size_t most_pending = 128;
 // slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is overtaken.
 constexpr Duration unwatched = milliseconds(100);
 
+// Losses of a camera that one look bears, as in ImuWindow.
+constexpr int most_losses = 16;
+
 using Key = std::pair<std::uint32_t, std::uint64_t>;  ///< epoch and tick
 
 struct Pending {
     std::vector<std::optional<Frame>> frames;
     HostTime give_up;
 };
+
+/// Stamps may be anything.
+Duration spread_of(OutputTime earliest, OutputTime latest) {
+    std::int64_t ns = 0;
+    const bool too_large = __builtin_sub_overflow(latest.ns, earliest.ns, &ns);
+    return {too_large ? std::numeric_limits<std::int64_t>::max() : ns};
+}
 
 }  // namespace
 
@@ -48,14 +60,17 @@ struct SetReader::State {
     bool by_descriptor = false;  ///< somebody waits for all streams elsewhere
     std::map<Key, Pending> pending;
     std::vector<std::optional<Key>> newest;  ///< of each camera
+    std::optional<Key> finished;             ///< of the set before
     std::optional<OutputTime> last;          ///< latest stamp of the set before
     std::uint64_t life = 0;
-    bool told_gone = false;
+    std::vector<bool> ended;  ///< of each camera: its stream is gone
     SetReport report;
 
     std::optional<NoItem> collect();
     std::optional<NoItem> collect(std::size_t camera);
-    std::optional<NoItem> interrupted(const NoItem& why, std::uint64_t life_now);
+    std::optional<NoItem> restarted(const NoItem& why, std::uint64_t life_now);
+    std::optional<NoItem> gone(const NoItem& why, std::size_t camera);
+    bool any_ended() const;
     void add(std::size_t camera, Frame frame);
     bool decided(const Key& key, const Pending& set) const;
     std::optional<FrameSet> ready();
@@ -63,33 +78,45 @@ struct SetReader::State {
     std::optional<HostTime> next_deadline() const;
 };
 
-/// What is to be told of a stream that paused: each restart and each end once, for all streams.
-std::optional<NoItem> SetReader::State::interrupted(const NoItem& why, std::uint64_t life_now) {
-    if (why.why == Pause::gone && !told_gone) {
-        told_gone = true;
-        return why;
-    }
+/// What is to be told: a restart once for all streams.
+std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64_t life_now) {
     if (why.why != Pause::restarted || life_now == life) return std::nullopt;
     life = life_now;
     pending.clear();
     newest.assign(cameras.size(), std::nullopt);
+    finished.reset();
     last.reset();
-    told_gone = false;
+    ended.assign(cameras.size(), false);
     return why;
 }
 
+/// What is to be told: the end of the first camera that ends, until one of them goes on.
+std::optional<NoItem> SetReader::State::gone(const NoItem& why, std::size_t camera) {
+    if (why.why != Pause::gone) return std::nullopt;
+    const bool is_first = !any_ended();
+    ended[camera] = true;
+    return is_first ? std::optional(why) : std::nullopt;
+}
+
+bool SetReader::State::any_ended() const {
+    return std::find(ended.begin(), ended.end(), true) != ended.end();
+}
+
 std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
-    for (;;) {
+    for (int losses = 0; losses < most_losses;) {
         auto frame = cameras[camera].next();
         if (frame) {
+            ended[camera] = false;
             add(camera, std::move(*frame));
             continue;
         }
         report.lost += frame.error().lost;
-        const auto told = interrupted(frame.error(), cameras[camera].reader().life());
-        const bool more = frame.error().why == Pause::lost || frame.error().why == Pause::restarted;
-        if (told || !more) return told;
+        losses += frame.error().why == Pause::lost ? 1 : 0;
+        if (auto told = restarted(frame.error(), cameras[camera].reader().life())) return told;
+        if (auto told = gone(frame.error(), camera)) return told;
+        if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
     }
+    return std::nullopt;
 }
 
 std::optional<NoItem> SetReader::State::collect() {
@@ -97,11 +124,10 @@ std::optional<NoItem> SetReader::State::collect() {
         if (auto told = collect(camera)) return told;
     if (!imu) return std::nullopt;
     const auto collected = imu->collect();
-    return collected ? std::nullopt : interrupted(collected.error(), imu->reader().life());
+    return collected ? std::nullopt : restarted(collected.error(), imu->reader().life());
 }
 
 void SetReader::State::add(std::size_t camera, Frame frame) {
-    told_gone = false;
     const bool suspect = (frame.data.flags & flag_suspect) != 0 && !options.suspect;
     // Of another life: a camera that lags behind a restart, or is ahead of the others.
     if (frame.data.trigger == 0 || suspect || frame.life != life) {
@@ -109,6 +135,10 @@ void SetReader::State::add(std::size_t camera, Frame frame) {
         return;
     }
     const Key key{frame.data.epoch, frame.data.tick()};
+    if (finished && key <= *finished) {  // its set was given up
+        ++report.left_out;
+        return;
+    }
     newest[camera] = std::max(newest[camera].value_or(key), key);
     Pending& set = pending[key];
     if (set.frames.empty()) {
@@ -137,7 +167,8 @@ FrameSet SetReader::State::finish(const Key& key, Pending set) {
         if (frame) times.push_back(frame->time);
     const auto [earliest, latest] = std::minmax_element(times.begin(), times.end());
     made.time = times.front();
-    made.spread = *latest - *earliest;
+    made.spread = spread_of(*earliest, *latest);
+    finished = key;
     if (imu) made.imu = imu->take(last.value_or(*latest), *latest);
     last = *latest;
     ++report.sets;
@@ -152,6 +183,7 @@ std::optional<FrameSet> SetReader::State::ready() {
         const bool whole = std::all_of(frames.begin(), frames.end(), [](auto& f) { return !!f; });
         if (!whole && !options.partial) {
             ++report.incomplete;
+            finished = first->first;
             pending.erase(first);
             continue;
         }
@@ -199,6 +231,7 @@ Expected<SetReader> SetReader::open(const std::vector<std::string>& cameras,
         if (auto added = state->waiting.add(state->imu->reader()); !added)
             return Unexpected(added.error());
     state->newest.resize(cameras.size());
+    state->ended.resize(cameras.size());
     state->life = state->cameras.front().reader().life();
     return SetReader(std::move(state));
 }
@@ -210,7 +243,7 @@ SetReader::~SetReader() = default;
 
 Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
     const HostTime deadline = deadline_after(timeout);
-    for (;;) {
+    for (bool is_last = false;;) {
         if (const auto told = state_->collect()) return Unexpected<NoItem>(*told);
         if (auto set = state_->ready()) return std::move(*set);
         const auto give_up = state_->next_deadline();
@@ -221,8 +254,13 @@ Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
             std::min(deadline, idle ? now + unwatched : give_up.value_or(deadline), std::less<>());
         WaitSet& waiting = idle ? state_->cameras_waiting : state_->waiting;
         const bool found = waiting.wait(until - now).has_value();
-        if (!found && host_now() >= deadline && !(give_up && *give_up <= host_now()))
-            return Unexpected<NoItem>(NoItem{state_->told_gone ? Pause::gone : Pause::nothing, 0});
+        const HostTime then = host_now();
+        const bool due = give_up && *give_up <= then;
+        // What is found when time is over is looked at once more, and no longer: streams may go on.
+        if (then >= deadline && !due && (!found || is_last))
+            return Unexpected<NoItem>(
+                NoItem{state_->any_ended() ? Pause::gone : Pause::nothing, 0});
+        is_last = then >= deadline;
     }
 }
 

@@ -10,6 +10,10 @@
 #include <cerrno>
 #include <cstdlib>
 #include <string>
+#include <system_error>
+#include <utility>
+
+#include "client/sealed.hpp"
 
 namespace versavis::ring {
 
@@ -26,6 +30,20 @@ std::optional<std::uint32_t> user_id(const char* name) {
     return found->pw_uid;
 }
 
+Unexpected<> not_opened(const std::filesystem::path& path) {
+    if (errno == EACCES)
+        return failure(path.string(), "permission denied",
+                       "join the group that may read streams (usually 'versavis')");
+    if (errno == ELOOP) return failure(path.string(), "is a link, not a stream", "remove it");
+    if (errno == ENOENT || errno == ENOTDIR)
+        return failure(path.string(), "no such stream",
+                       "is the service running? 'versavis list' shows the streams");
+    return failure(path.string(), "cannot be opened: " +
+                                      std::error_code(errno, std::generic_category()).message());
+}
+
+}  // namespace
+
 bool may_own(std::uint32_t user, std::optional<std::uint32_t> named) {
     if (named) return user == *named;
     const char* name = std::getenv("VERSAVIS_OWNER");
@@ -33,23 +51,17 @@ bool may_own(std::uint32_t user, std::optional<std::uint32_t> named) {
     return user == 0 || user == ::geteuid() || user == user_id(service_user);
 }
 
-Unexpected<> not_opened(const std::filesystem::path& path) {
-    if (errno == EACCES)
-        return failure(path.string(), "permission denied",
-                       "join the group that may read streams (usually 'versavis')");
-    if (errno == ELOOP) return failure(path.string(), "is a link, not a stream", "remove it");
-    return failure(path.string(), "no such stream",
-                   "is the service running? 'versavis list' shows the streams");
-}
-
-}  // namespace
-
-Expected<File> open_trusted(const std::filesystem::path& path, std::optional<std::uint32_t> owner) {
+Expected<NamedFile> open_trusted(const std::filesystem::path& path,
+                                 std::optional<std::uint32_t> owner) {
     const auto parent = path.parent_path();
     const File directory(::open(parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
     if (!directory) return not_opened(path);
     File file(::openat(directory.descriptor(), path.filename().c_str(),
                        O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    const bool sealed = !file && errno == ENXIO;  // it is a socket
+    if (sealed)
+        file = File(::openat(directory.descriptor(), path.filename().c_str(),
+                             O_PATH | O_NOFOLLOW | O_CLOEXEC));
     if (!file) return not_opened(path);
     struct stat of_file {};
     struct stat of_directory {};
@@ -62,9 +74,14 @@ Expected<File> open_trusted(const std::filesystem::path& path, std::optional<std
     if (!may_own(of_file.st_uid, owner))
         return failure(path.string(),
                        "belongs to user " + std::to_string(of_file.st_uid) +
-                           ", who is neither root, nor you, nor 'versavis'",
-                       "if the service runs as that user, name it in VERSAVIS_OWNER");
-    return file;
+                           (owner ? ", not to user " + std::to_string(*owner)
+                                  : ", who is neither root, nor you, nor 'versavis'"),
+                       "if the service runs as that user, name it in VERSAVIS_OWNER, or as owner");
+    const FileId name{of_file.st_dev, of_file.st_ino};
+    if (!sealed) return NamedFile{std::move(file), name};
+    auto segment = fetch_sealed(file.descriptor(), path, of_file.st_uid);
+    if (!segment) return Unexpected(segment.error());
+    return NamedFile{std::move(*segment), name};
 }
 
 }  // namespace versavis::ring

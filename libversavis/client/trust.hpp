@@ -11,7 +11,13 @@
 
 namespace versavis::ring {
 
-/// Errors: not there, no permission, of another owner, or in a directory that others can write.
-Expected<File> open_trusted(const std::filesystem::path& path, std::optional<std::uint32_t> owner);
+/// Who may own streams: `named`; or root, this process's user, that of the name in
+/// $VERSAVIS_OWNER, or `versavis`.
+bool may_own(std::uint32_t user, std::optional<std::uint32_t> named);
+
+/// A sealed segment is fetched from the socket that has its name. Errors: not there, no permission,
+/// of another owner, in a directory that others can write, or not handed over.
+Expected<NamedFile> open_trusted(const std::filesystem::path& path,
+                                 std::optional<std::uint32_t> owner);
 
 }  // namespace versavis::ring

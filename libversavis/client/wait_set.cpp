@@ -67,9 +67,14 @@ std::optional<std::size_t> WaitSet::wait(Duration timeout) {
 
 void WaitSet::arm() {
     std::vector<ring::WatchTarget> targets;
-    for (std::size_t i = 0; i < state_->readers.size(); ++i)
-        targets.push_back(state_->readers[i]->target(state_->words[i].value));
-    state_->watch->arm(std::move(targets), state_->deadline);
+    std::optional<HostTime> deadline = state_->deadline;
+    for (std::size_t i = 0; i < state_->readers.size(); ++i) {
+        const ring::Reader& reader = *state_->readers[i];
+        targets.push_back(reader.target(state_->words[i].value));
+        const auto retry = reader.retry();
+        if (retry && (!deadline || *retry < *deadline)) deadline = retry;
+    }
+    state_->watch->arm(std::move(targets), deadline);
 }
 
 Expected<int> WaitSet::fd() {

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "client/futex.hpp"
+#include "client/quiet_thread.hpp"
 
 namespace versavis::ring {
 
@@ -18,7 +19,7 @@ namespace {
 bool stirred(const WatchTarget& target, Pulse& pulse) {
     // SYNC 5: acquire, as in Reader::next().
     if (target.mapping->header().wake.load(std::memory_order_acquire) != target.seen) return true;
-    return target.gone ? has_successor(target.path, target.mapping->file(), target.refused)
+    return target.gone ? has_successor(target.path, target.mapping->name(), target.refused)
                        : !writer_lives(*target.mapping, pulse);
 }
 
@@ -36,7 +37,7 @@ Expected<std::unique_ptr<Watch>> Watch::start() {
                        std::error_code(errno, std::generic_category()).message());
     auto watch = std::unique_ptr<Watch>(new Watch(std::move(event)));
     try {
-        watch->thread_ = std::thread([self = watch.get()] { self->run(); });
+        watch->thread_ = quiet_thread([self = watch.get()] { self->run(); });
     } catch (const std::system_error& error) {
         return failure("a thread to wait in", error.what());
     }
@@ -95,10 +96,12 @@ void Watch::run() {
 /// Returns when something happened, or the watch was armed anew.
 void Watch::keep(std::uint32_t version, const std::vector<WatchTarget>& targets,
                  std::optional<HostTime> deadline) {
-    std::vector<Pulse> pulses(targets.size());
+    std::vector<Pulse> pulses;
     std::vector<FutexWord> words{{&version_, version}};
-    for (const WatchTarget& target : targets)
+    for (const WatchTarget& target : targets) {
+        pulses.push_back(target.pulse);
         words.push_back({&target.mapping->header().wake, target.seen});
+    }
     while (!outdated(version)) {
         for (std::size_t i = 0; i < targets.size(); ++i)
             if (stirred(targets[i], pulses[i])) return;

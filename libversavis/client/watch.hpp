@@ -26,6 +26,7 @@ struct WatchTarget {
     std::uint32_t seen = 0;  ///< value of `wake` before the reader looked, and found nothing
     bool gone = false;       ///< it has told that the writer is gone: only a successor is news
     FileId refused{};        ///< a file of this name that is no successor
+    Pulse pulse{};           ///< what the reader knows of the writer's heart
 };
 
 /// True when there is a file of this name that its reader does not know.

@@ -88,11 +88,13 @@ typedef struct versavis_error {
 
 /* Zeros are good defaults, but for owner: use VERSAVIS_OPTIONS_INIT. */
 typedef struct versavis_options {
-    uint32_t start;      /* versavis_position */
-    uint32_t after_loss; /* versavis_position */
-    int64_t owner;       /* user id that the streams must belong to; -1: root, you, 'versavis' */
+    uint32_t start;       /* versavis_position */
+    uint32_t after_loss;  /* versavis_position */
+    int64_t owner;        /* user id that the streams must belong to; -1: root, you, 'versavis' */
+    uint32_t sealed_only; /* 1: only streams that nobody can cut short */
+    uint32_t reserved;
 } versavis_options;
-#define VERSAVIS_OPTIONS_INIT {0, 0, VERSAVIS_ANY_OWNER}
+#define VERSAVIS_OPTIONS_INIT {0, 0, VERSAVIS_ANY_OWNER, 0, 0}
 
 typedef struct versavis_frame {
     uint64_t trigger;
@@ -194,7 +196,8 @@ VERSAVIS_EXPORT void versavis_close(versavis_stream *stream); /* NULL does nothi
 VERSAVIS_EXPORT int versavis_stream_kind(const versavis_stream *stream);
 VERSAVIS_EXPORT const char *versavis_stream_name(const versavis_stream *stream);
 
-/* The next item, waiting for it up to timeout (0 or less: not at all). What the item held is released. */
+/* The next item, waiting for it up to timeout (0 or less: not at all). What the item held is
+ * released. */
 VERSAVIS_EXPORT int versavis_next(versavis_stream *stream, versavis_item *item, int64_t timeout);
 
 /* The newest item, passing over older ones; if it has been read already, the next one. */
@@ -229,6 +232,7 @@ VERSAVIS_EXPORT const char *versavis_reason_name(uint32_t reason);
 
 /* ---- Several streams --------------------------------------------------------------------- */
 
+/* NULL: no memory. */
 VERSAVIS_EXPORT versavis_wait_set *versavis_wait_set_new(void);
 VERSAVIS_EXPORT void versavis_wait_set_free(versavis_wait_set *set);
 
@@ -243,6 +247,37 @@ VERSAVIS_EXPORT int versavis_wait_set_wait(versavis_wait_set *set, int64_t timeo
 /* Readable when versavis_wait_set_wait may find something, until it returns -1. */
 VERSAVIS_EXPORT int versavis_wait_set_fd(versavis_wait_set *set, versavis_error *error);
 
+typedef struct versavis_imu_sample {
+    int64_t time; /* output time */
+    versavis_imu data;
+} versavis_imu_sample;
+
+/* ---- IMU samples between two instants ----------------------------------------------------- */
+
+typedef struct versavis_imu_window versavis_imu_window;
+
+typedef struct versavis_imu_span {
+    const versavis_imu_sample *samples; /* until the next call or close */
+    size_t count;
+    uint64_t lost;              /* samples missing within them */
+    int32_t covered;            /* 1: they reach from the first instant to the second */
+    int32_t has_beyond;         /* 1: beyond is there */
+    versavis_imu_sample beyond; /* the first one after the second instant, to interpolate */
+} versavis_imu_span;
+
+/* Begins with what the ring still holds, whatever options say of the start. */
+VERSAVIS_EXPORT int versavis_imu_window_open(const char *instance, const char *stream,
+                                             const versavis_options *options,
+                                             versavis_imu_window **opened, versavis_error *error);
+VERSAVIS_EXPORT void versavis_imu_window_close(versavis_imu_window *window);
+
+/* Samples with after < time <= upto. Waits up to patience until one of upto or later has come; then
+ * covered is 0. Spans may follow each other or overlap. VERSAVIS_RESTARTED, once: times before and
+ * after do not compare. */
+VERSAVIS_EXPORT int versavis_imu_window_between(versavis_imu_window *window, int64_t after,
+                                                int64_t upto, int64_t patience,
+                                                versavis_imu_span *span);
+
 /* ---- Sets of frames ---------------------------------------------------------------------- */
 
 enum { VERSAVIS_MOST_CAMERAS = 16 };
@@ -255,11 +290,6 @@ typedef struct versavis_sets_options {
     versavis_options streams;
 } versavis_sets_options;
 #define VERSAVIS_SETS_OPTIONS_INIT {NULL, 0, 0, 0, VERSAVIS_OPTIONS_INIT}
-
-typedef struct versavis_imu_sample {
-    int64_t time; /* output time */
-    versavis_imu data;
-} versavis_imu_sample;
 
 typedef struct versavis_set {
     uint64_t life;
@@ -288,7 +318,7 @@ VERSAVIS_EXPORT int versavis_sets_next(versavis_sets *sets, versavis_set *set, i
 typedef struct versavis_set_report {
     uint64_t sets;       /* delivered */
     uint64_t incomplete; /* sets that lacked a frame, delivered or not */
-    uint64_t left_out;   /* frames without a tick, suspect, or of another life of the service */
+    uint64_t left_out;   /* frames without a tick, suspect, of another life, or of a set given up */
     uint64_t lost;       /* frames overwritten before they were read */
 } versavis_set_report;
 VERSAVIS_EXPORT int versavis_sets_report(const versavis_sets *sets, versavis_set_report *report);

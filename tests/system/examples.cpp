@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
@@ -16,40 +17,53 @@ using test::Stack;
 namespace {
 
 struct Example {
-    std::string program;
+    std::vector<std::string> command;
     std::string line;   ///< a part of what it prints
     std::string after;  ///< and of what it prints of a service that died; empty: it is silent
 };
 
+std::vector<std::string> python(const std::string& name) {
+    return {"/usr/bin/python3", "-u", VERSAVIS_SOURCE_DIR "/clients/examples/" + name};
+}
+
 const std::vector<Example> examples{
-    {"example-viewer", "mean brightness", "the service is gone"},
-    {"example-stereo", "samples", "the service is gone"},
-    {"example-epoll", "rad/s", ""},
-    {"example-viewer-c", "first byte", "the service is gone"},
-    {"example-stereo-c", "samples", "the service is gone"},
-    {"example-epoll-c", "a frame of", ""},
+    {{test::program("example-viewer")}, "mean brightness", "the service is gone"},
+    {{test::program("example-stereo")}, "samples", "the service is gone"},
+    {{test::program("example-epoll")}, "rad/s", ""},
+    {{test::program("example-viewer-c")}, "first byte", "the service is gone"},
+    {{test::program("example-stereo-c")}, "samples", "the service is gone"},
+    {{test::program("example-epoll-c")}, "a frame of", ""},
+    {python("viewer.py"), "ns +- ", "the service is gone"},
+    {python("stereo.py"), "IMU samples", "the service is gone"},
+    {python("epoll.py"), "imu0", ""},
+    {python("numpy_consumer.py"), "changed by", "the service is gone"},
 };
 
 }  // namespace
 
 TEST_CASE("examples: each does what it says, and goes on after a restart") {
-    Stack stack({"examples", 61, 2, 20, "", "", ""});
+    test::StackSettings settings{"examples", 61, 2, 20, "", "", ""};
+    settings.imu_extra = "[memory]\nsealed = true\n";  // other tests read plain rings
+    Stack stack(settings);
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status([](const auto& status) { return status["health"] == "ok"; });
     ::setenv("VERSAVIS_INSTANCE", stack.instance().c_str(), 1);
+    ::setenv("VERSAVIS_LIBRARY", VERSAVIS_LIBRARY_FILE, 1);
+    ::setenv("PYTHONPATH", VERSAVIS_SOURCE_DIR "/clients/python", 1);
+    ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
+    CHECK(std::filesystem::is_socket(stream_path(stack.instance(), "cam0")));
     std::vector<std::unique_ptr<Process>> running;
     for (const Example& example : examples)
-        running.push_back(
-            std::make_unique<Process>(std::vector<std::string>{test::program(example.program)},
-                                      stack.log_path(example.program + ".log")));
+        running.push_back(std::make_unique<Process>(
+            example.command, stack.log_path("example-" + std::to_string(running.size()))));
     for (std::size_t i = 0; i < examples.size(); ++i) {
-        CAPTURE(examples[i].program);
+        CAPTURE(examples[i].command);
         CHECK(running[i]->wait_for_output(examples[i].line, seconds(20)));
     }
     stack.kill_service();
     for (std::size_t i = 0; i < examples.size(); ++i) {
-        CAPTURE(examples[i].program);
+        CAPTURE(examples[i].command);
         CHECK(running[i]->wait_for_output(examples[i].after, seconds(20)));
     }
     std::vector<std::size_t> printed;
@@ -57,7 +71,7 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
     stack.start_service();
     const HostTime deadline = host_now() + seconds(40);
     for (std::size_t i = 0; i < examples.size(); ++i) {
-        CAPTURE(examples[i].program);
+        CAPTURE(examples[i].command);
         const auto goes_on = [&] {
             return running[i]->output().find(examples[i].line, printed[i]) != std::string::npos;
         };
@@ -66,5 +80,6 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
         CHECK(goes_on());
         running[i]->signal(SIGKILL);
     }
-    ::unsetenv("VERSAVIS_INSTANCE");
+    for (const char* name : {"VERSAVIS_INSTANCE", "VERSAVIS_LIBRARY", "PYTHONPATH"})
+        ::unsetenv(name);
 }

@@ -143,6 +143,10 @@ TEST_CASE_METHOD(CApi, "c_api: what cannot be opened says why and what to do") {
     odd.owner = 12345;
     CHECK(versavis_open(instance.c_str(), "cam0", &odd, &stream, &error) == VERSAVIS_ERROR);
     CHECK_THAT(error.message, Catch::Contains("belongs to user"));
+    odd = VERSAVIS_OPTIONS_INIT;
+    odd.sealed_only = 1;
+    CHECK(versavis_open(instance.c_str(), "cam0", &odd, &stream, &error) == VERSAVIS_ERROR);
+    CHECK_THAT(error.message, Catch::Contains("is not sealed"));
     for (const char* name : {"", "/etc/passwd", "../default/cam0", ".lock"}) {
         CHECK(versavis_open(instance.c_str(), name, nullptr, &stream, &error) == VERSAVIS_ERROR);
         CHECK_THAT(error.message, Catch::Contains("not a name"));
@@ -202,6 +206,39 @@ TEST_CASE_METHOD(CApi, "c_api: several streams in one wait, and by descriptors [
     versavis_wait_set_free(set);
     versavis_close(first);
     versavis_close(second);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
+    ring::Writer imu = *ring::Writer::create(directory.path(), {"imu0", ring::StreamKind::imu, 64});
+    ImuMetadata sample{};
+    for (std::int64_t i = 0; i < 5; ++i) {
+        sample.number = static_cast<std::uint64_t>(i == 3 ? i + 1 : i);
+        imu.publish(OutputTime{1000 + i}, pack(sample));
+    }
+    versavis_imu_window* window = nullptr;
+    versavis_error error{};
+    REQUIRE(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, &window, &error) ==
+            VERSAVIS_OK);
+    versavis_imu_span span{};
+    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    REQUIRE(span.count == 2);
+    CHECK(span.samples[1].time == 1002);
+    CHECK(span.covered == 1);
+    CHECK(span.lost == 1);  // up to the one beyond
+    CHECK(span.has_beyond == 1);
+    CHECK(span.beyond.data.number == 4);
+    REQUIRE(versavis_imu_window_between(window, 1002, 2000, 0, &span) == VERSAVIS_OK);
+    CHECK(span.count == 2);
+    CHECK(span.covered == 0);
+    CHECK(span.has_beyond == 0);
+    CHECK(versavis_imu_window_between(window, 2, 1, 0, &span) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_between(nullptr, 1, 2, 0, &span) == VERSAVIS_INVALID);
+    versavis_imu_window_close(window);
+    CHECK(versavis_imu_window_open(instance.c_str(), "cam0", nullptr, &window, &error) ==
+          VERSAVIS_ERROR);
+    CHECK_THAT(error.message, Catch::Contains("another kind"));
+    CHECK(versavis_imu_window_open(instance.c_str(), nullptr, nullptr, &window, &error) ==
+          VERSAVIS_INVALID);
 }
 
 TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/ring/reader.hpp"
 
@@ -149,6 +150,18 @@ TEST_CASE("directory: one that cannot be made, or not locked, says why") {
     CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("cannot be locked"));
 }
 
+TEST_CASE("directory: a ring that names no process is nobody's") {
+    test::TemporaryDirectory parent("/dev/shm");
+    const auto path = parent.path() / "instance";
+    REQUIRE(OwnedDirectory::claim(path));
+    const auto writer = Writer::create(path, {"events", StreamKind::events, 8});
+    REQUIRE(writer);
+    const auto segment = Mapping::open(path / "events", Mapping::Access::read_write);
+    segment->header().writer_pid = 0x7FFFFFF0;
+    segment->header().writer_start_ticks = 0;
+    CHECK(OwnedDirectory::claim(path));
+}
+
 TEST_CASE("directory: segments of a dead owner are retired, our own are kept") {
     test::TemporaryDirectory parent("/dev/shm");
     auto directory = OwnedDirectory::claim(parent.path() / "instance");
@@ -200,4 +213,9 @@ TEST_CASE("directory: a link or another's directory is refused") {
         REQUIRE(::chown(foreign.c_str(), 12345, 12345) == 0);
     }
     CHECK_THAT(OwnedDirectory::claim(foreign).error().message(), Catch::Contains("another user"));
+    if (::geteuid() != 0) return;
+    REQUIRE(::chown(foreign.c_str(), 0, 0) == 0);
+    REQUIRE(::chown(parent.path().c_str(), 12345, 12345) == 0);
+    CHECK_THAT(OwnedDirectory::claim(foreign).error().message(),
+               Catch::Contains("who could put another directory in its place"));
 }

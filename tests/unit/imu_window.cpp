@@ -102,7 +102,10 @@ TEST_CASE_METHOD(Samples, "imu_window: what was forgotten is found again while t
     for (int i = 1; i <= 10; ++i) add(100 * i);
     ImuWindow window = open();
     CHECK(times(*window.between({700}, {900}, {})) == Times{800, 900});
-    CHECK(times(*window.between({200}, {400}, {})) == Times{300, 400});
+    const auto earlier = window.between({250}, {400}, {});
+    CHECK(times(*earlier) == Times{300, 400});
+    CHECK(earlier->complete());
+    CHECK_FALSE(window.between({50}, {400}, {})->covered);  // there is none before
 }
 
 TEST_CASE_METHOD(Samples, "imu_window: times of two epochs, or of two services, do not meet") {

@@ -317,7 +317,7 @@ bool make_memory_tight() {
 
 /// In a small memory of its own: a dead writer's ring takes more than half of it.
 bool made_anew_in_tight_memory() {
-    const char* memory = "/dev/shm";
+    const std::filesystem::path memory = "/dev/shm";
     if (!make_memory_tight()) return false;
     const Shape shape{"frames", StreamKind::frames, 8, 4, 512 << 10};
     const bool left = in_process([&] {
@@ -326,7 +326,7 @@ bool made_anew_in_tight_memory() {
         for (int i = 0; i < 3; ++i) writer->publish(*writer->acquire(), 1, {}, {});
         ::_exit(0);  // without its destructor
     });
-    const auto path = std::filesystem::path(memory) / "frames";
+    const auto path = memory / "frames";
     auto reader = Reader::open(path, {Position::middle});
     const auto dead = Mapping::open(path, Mapping::Access::read_only);
     if (!left || !reader || !dead) return false;
@@ -346,6 +346,19 @@ bool made_anew_in_tight_memory() {
     while (item.found == test::Found::lost) item = test::look(reader->next());
     return item.found == test::Found::restarted &&
            test::look(reader->next()).found == test::Found::item;
+}
+
+/// The ring of a dead writer that nobody makes anew, as that of a camera that is away.
+bool made_beside_the_dead() {
+    const std::filesystem::path memory = "/dev/shm";
+    if (!make_memory_tight()) return false;
+    const bool left = in_process([&]() -> bool {
+        const auto writer = Writer::create(memory, {"frames", StreamKind::frames, 8, 4, 512 << 10});
+        ::_exit(writer ? 0 : 1);
+    });
+    const auto own = Writer::create(memory, {"own", StreamKind::events, 8});
+    const auto other = Writer::create(memory, {"other", StreamKind::frames, 8, 4, 512 << 10});
+    return left && own && other && Reader::open(memory / "own")->writer_alive();
 }
 
 }  // namespace
@@ -374,6 +387,7 @@ TEST_CASE("ring: a dead writer's memory is used again where there is no other") 
         return;
     }
     CHECK(in_process(made_anew_in_tight_memory));
+    CHECK(in_process(made_beside_the_dead));
 }
 
 TEST_CASE_METHOD(Fixture, "ring: no item is lost when one writer follows another [threads]",

@@ -4,10 +4,13 @@
 #include <poll.h>
 
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 
 using namespace versavis;
@@ -260,6 +263,65 @@ TEST_CASE_METHOD(Rig,
     const auto set = sets.next(seconds(20));
     REQUIRE(set);
     CHECK_FALSE(set->complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a frame that comes after its set was given up makes no other") {
+    const bool partial = GENERATE(false, true);
+    SetOptions impatient = options();
+    impatient.partial = partial;
+    impatient.patience = {};
+    SetReader sets = open(impatient);
+    frame(*a, 1);
+    CHECK(sets.next({}).has_value() == partial);
+    frame(*b, 1);
+    CHECK_FALSE(sets.next({}));
+    CHECK(sets.report().sets == (partial ? 1 : 0));
+    CHECK(sets.report().incomplete == 1);
+    CHECK(sets.report().left_out == 1);
+    frame(*a, 2);
+    frame(*b, 2);
+    CHECK(sets.next({})->tick == 2);
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: the end of one camera is told once, whatever the others do") {
+    SetOptions impatient = options();
+    impatient.partial = true;
+    impatient.patience = {};
+    SetReader sets = open(impatient);
+    b.reset();
+    frame(*a, 1);
+    CHECK(sets.next({}).error().why == Pause::gone);
+    for (std::uint64_t tick = 1; tick < 10; ++tick) {
+        CHECK(sets.next({})->tick == tick);
+        frame(*a, tick + 1);
+    }
+    CHECK(sets.next({}));
+    CHECK(sets.next({}).error().why == Pause::gone);  // time is over
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: a damaged ring, or stamps that are anything, hold nobody up") {
+    {
+        SetReader sets = open();
+        FrameMetadata metadata{};
+        metadata.trigger = 1;
+        for (const auto& [writer, time] : {std::pair{a.get(), INT64_MIN}, {b.get(), INT64_MAX}})
+            writer->publish(*writer->acquire(), 8, OutputTime{time}, pack(metadata));
+        CHECK(sets.next({})->spread.ns == INT64_MAX);
+    }
+    SetReader sets = open();
+    const auto damaged =
+        *ring::Mapping::open(directory.path() / "a", ring::Mapping::Access::read_write);
+    damaged.header().head = std::uint64_t{1} << 62U;
+    for (unsigned i = 0; i < 16; ++i) damaged.descriptor(i).sequence = std::uint64_t{1} << 62U;
+    CHECK_FALSE(sets.next({}));
+    CHECK_FALSE(sets.next(milliseconds(1)));
+    const auto samples =
+        *ring::Mapping::open(directory.path() / "imu", ring::Mapping::Access::read_write);
+    samples.header().head = std::uint64_t{1} << 62U;
+    for (unsigned i = 0; i < 64; ++i) samples.descriptor(i).sequence = std::uint64_t{1} << 62U;
+    StreamOptions where;
+    where.instance = options().instance;
+    CHECK_FALSE(ImuWindow::open("imu", where)->between({0}, {1}, milliseconds(1))->covered);
 }
 
 TEST_CASE_METHOD(Rig, "set_reader: what cannot be a set is refused") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/trust.hpp"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -78,7 +79,7 @@ TEST_CASE_METHOD(Instance, "trust: a directory that a stranger made first is not
     CHECK(told_as_stranger(""));  // to whom it is his own
     Options other;
     other.owner = stranger + 1;
-    CHECK_FALSE(refusal(other).empty());
+    CHECK_THAT(refusal(other), Catch::Contains("belongs to user 12345, not to user 12346"));
 }
 
 TEST_CASE_METHOD(Instance, "trust: the environment names an owner") {
@@ -104,6 +105,14 @@ TEST_CASE_METHOD(Instance, "trust: a file of somebody else in a good directory i
 TEST_CASE_METHOD(Instance, "trust: a directory that everybody can write is refused") {
     REQUIRE(::chmod(directory.path().c_str(), 0777) == 0);
     CHECK_THAT(refusal(), Catch::Contains("does not belong"));
+}
+
+TEST_CASE_METHOD(Instance, "trust: where no descriptor is left, that is what is told") {
+    CHECK(test::in_process([&] {
+        const rlimit none{0, 0};
+        return ::setrlimit(RLIMIT_NOFILE, &none) == 0 &&
+               refusal().find("cannot be opened: Too many open files") != std::string::npos;
+    }));
 }
 
 TEST_CASE_METHOD(Instance, "trust: links and pipes are not streams, and nobody waits for them") {

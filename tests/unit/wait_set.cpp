@@ -2,8 +2,14 @@
 #include "versavis/wait_set.hpp"
 
 #include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <set>
 #include <string>
 #include <thread>
@@ -175,6 +181,54 @@ TEST_CASE_METHOD(Streams, "wait_set: any time is a time to wait [threads]", "[th
     CHECK(set.wait(nanoseconds(INT64_MAX)) == 0U);
     CHECK(of_a.next(nanoseconds(INT64_MAX)));
     writing.join();
+}
+
+TEST_CASE_METHOD(Streams, "wait_set: a writer on another clock is no news while its heart beats") {
+    Writer writing = writer("a");
+    Reader reading = reader("a");
+    const HostTime far = host_now() - seconds(1000);
+    for (int i = 0; i < 2; ++i) {
+        writing.heartbeat(far + milliseconds(i));
+        reading.writer_alive();
+    }
+    const auto descriptor = reading.fd();
+    REQUIRE(descriptor);
+    CHECK(reading.next().error().why == Pause::nothing);
+    CHECK_FALSE(readable(*descriptor, 100));
+    writing.publish({}, {});
+    CHECK(readable(*descriptor, 20'000));
+}
+
+TEST_CASE_METHOD(Streams, "wait_set: the library's threads take none of the program's signals") {
+    const Writer writing = writer("a");
+    Reader reading = reader("a");
+    REQUIRE(reading.fd());
+    int own = 0;
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+        if (task.path().filename() == std::to_string(::getpid())) continue;
+        std::ifstream status(task.path() / "status");
+        std::string word;
+        while (status >> word && word != "SigBlk:") continue;
+        std::uint64_t blocked = 0;
+        status >> std::hex >> blocked;
+        CHECK((blocked >> (SIGTERM - 1U) & 1U) == 1);
+        ++own;
+    }
+    CHECK(own >= 1);
+}
+
+TEST_CASE_METHOD(Streams, "wait_set: a successor that could not be followed is tried again") {
+    Writer writing = writer("a");
+    Reader reading = reader("a");
+    const bool by_descriptor = GENERATE(false, true);
+    const int descriptor = by_descriptor ? *reading.fd() : -1;
+    REQUIRE(::chmod(directory.path().c_str(), 0777) == 0);  // nobody trusts that
+    writing = writer("a");
+    CHECK(reading.next().error().why == Pause::gone);
+    CHECK(reading.next().error().why == Pause::gone);
+    REQUIRE(::chmod(directory.path().c_str(), 0750) == 0);
+    if (by_descriptor) CHECK(readable(descriptor, 20'000));
+    CHECK(reading.next(seconds(20)).error().why == Pause::restarted);
 }
 
 TEST_CASE_METHOD(Streams, "wait_set: too many streams are refused") {

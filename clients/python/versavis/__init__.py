@@ -13,12 +13,14 @@ from ._library import library_version
 from .errors import (Error, Gone, Lost, Nothing, Overtaken, Pause, Released, Restarted,
                      ViewEscaped)
 from .items import Event, Flags, Frame, ImuSample, Item, Status
-from .sets import FrameSet, Sets, imu_dtype, sets
+from .sets import FrameSet, Sets, sets
 from .streams import Stream, open, wait  # pylint: disable=redefined-builtin
+from .window import ImuSpan, ImuWindow, imu_dtype, imu_window
 
 __version__ = "0.1.0"
 __all__ = [
-    "Error", "Event", "Flags", "Frame", "FrameSet", "Gone", "ImuSample", "Item", "Lost", "Nothing",
-    "Overtaken", "Pause", "Released", "Restarted", "Sets", "Status", "Stream", "ViewEscaped",
-    "imu_dtype", "library_version", "open", "sets", "wait",
+    "Error", "Event", "Flags", "Frame", "FrameSet", "Gone", "ImuSample", "ImuSpan",
+    "ImuWindow", "Item", "Lost", "Nothing", "Overtaken", "Pause", "Released", "Restarted", "Sets",
+    "Status", "Stream", "ViewEscaped", "imu_dtype", "imu_window", "library_version", "open", "sets",
+    "wait",
 ]

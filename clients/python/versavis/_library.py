@@ -24,7 +24,8 @@ class ErrorText(ctypes.Structure):
 
 
 class Options(ctypes.Structure):
-    _fields_ = [("start", c_uint32), ("after_loss", c_uint32), ("owner", c_int64)]
+    _fields_ = [("start", c_uint32), ("after_loss", c_uint32), ("owner", c_int64),
+                ("sealed_only", c_uint32), ("reserved", c_uint32)]
 
 
 class FrameData(ctypes.Structure):
@@ -85,6 +86,23 @@ class ImuSample(ctypes.Structure):
     _fields_ = [("time", c_int64), ("data", ImuData)]
 
 
+class ImuSample(ctypes.Structure):
+    _fields_ = [("time", c_int64), ("data", ImuData)]
+
+
+class ImuSpan(ctypes.Structure):
+    _fields_ = [
+        ("samples", c_void_p), ("count", c_size_t), ("lost", c_uint64), ("covered", c_int32),
+        ("has_beyond", c_int32), ("beyond", ImuSample),
+    ]
+
+
+class SetReport(ctypes.Structure):
+    _fields_ = [
+        ("sets", c_uint64), ("incomplete", c_uint64), ("left_out", c_uint64), ("lost", c_uint64),
+    ]
+
+
 class Set(ctypes.Structure):
     _fields_ = [
         ("life", c_uint64), ("tick", c_uint64), ("epoch", c_uint32), ("present", c_uint32),
@@ -117,10 +135,15 @@ SIGNATURES = {
     "wait_set_free": (None, [c_void_p]),
     "wait_set_add": (c_int, [c_void_p, c_void_p, POINTER(ErrorText)]),
     "wait_set_wait": (c_int, [c_void_p, c_int64]),
+    "imu_window_open": (c_int, [c_char_p, c_char_p, POINTER(Options), POINTER(c_void_p),
+                                POINTER(ErrorText)]),
+    "imu_window_close": (None, [c_void_p]),
+    "imu_window_between": (c_int, [c_void_p, c_int64, c_int64, c_int64, POINTER(ImuSpan)]),
     "sets_open": (c_int, [c_char_p, POINTER(c_char_p), c_size_t, POINTER(SetsOptions),
                           POINTER(c_void_p), POINTER(ErrorText)]),
     "sets_close": (None, [c_void_p]),
     "sets_next": (c_int, [c_void_p, POINTER(Set), c_int64]),
+    "sets_report": (c_int, [c_void_p, POINTER(SetReport)]),
     "sets_fd": (c_int, [c_void_p, POINTER(ErrorText)]),
 }
 

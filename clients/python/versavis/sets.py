@@ -2,20 +2,11 @@
 """Sets: what all cameras saw at one tick, with the IMU samples since the set before."""
 import ctypes
 
-import numpy as np
-
 from . import _library as library
 from .errors import Error
 from .items import Frame, Held
 from .streams import Handle, Source, encoded, nanoseconds, stream_options
-
-# As versavis_imu_sample lies in memory.
-imu_dtype = np.dtype([
-    ("time", "<i8"), ("board_time", "<i8"), ("host_time", "<i8"), ("number", "<u8"),
-    ("gyro", "<f4", 3), ("accel", "<f4", 3), ("magnetic", "<f4", 3), ("temperature", "<f4"),
-    ("pressure", "<f4"), ("sigma", "<u4"), ("epoch", "<u4"), ("flags", "<u4"),
-    ("filter_delay", "<i8"), ("accel_age", "<i4"), ("reserved", "<u4"),
-])
+from .window import samples_at
 
 
 class FrameSet:
@@ -33,9 +24,7 @@ class FrameSet:
         self.time, self.spread = made.time, made.spread
         self.frames = [Frame(frame) if made.present >> i & 1 else None
                        for i, frame in enumerate(held)]
-        self.imu = np.empty(made.imu_count, imu_dtype)
-        if made.imu_count > 0:
-            ctypes.memmove(self.imu.ctypes.data, made.imu, self.imu.nbytes)
+        self.imu = samples_at(made.imu, made.imu_count)
         self.imu_lost, self.imu_covered = made.imu_lost, bool(made.imu_covered)
 
     @property
@@ -65,11 +54,21 @@ class FrameSet:
 
 
 class Sets(Source):
-    """Sets of frames, one after the other. Frames that were lost are not told."""
+    """Sets of frames, one after the other. Frames that were lost only count: see report()."""
 
     def __init__(self, handle, cameras):
         super().__init__(handle, "sets of " + ", ".join(cameras))
         self._count = len(cameras)
+
+    def report(self):
+        """So far: sets delivered; incomplete ones, delivered or not; frames left_out, as they have
+        no tick, are suspect, of another life of the service, or late; frames lost, as they were
+        overwritten before they were read."""
+        known = library.SetReport()
+        with self._opened() as pointer:
+            library.functions.sets_report(pointer, known)
+        self.lost = known.lost
+        return {name: getattr(known, name) for name, _ in known._fields_}
 
     def next(self, timeout=None):
         """The next set, waiting up to timeout seconds (None: without end; 0: not at all).
@@ -90,7 +89,7 @@ class Sets(Source):
 
 
 def sets(cameras, imu=None, patience=0.2, partial=False, suspect=False, instance=None,
-         start="next", after_loss=None, owner=None):
+         start="next", after_loss=None, owner=None, sealed_only=False):
     """Opens sets of frames of the cameras, which the board must trigger.
 
     imu: name of its stream; None: none.
@@ -102,7 +101,7 @@ def sets(cameras, imu=None, patience=0.2, partial=False, suspect=False, instance
         raise TypeError("sets() needs a list of the cameras' names")
     cameras = list(cameras)
     options = library.SetsOptions(encoded(imu), max(1, nanoseconds(patience)), partial, suspect,
-                                  stream_options(start, after_loss, owner))
+                                  stream_options(start, after_loss, owner, sealed_only))
     names = (ctypes.c_char_p * len(cameras))(*map(encoded, cameras))
     pointer, error = ctypes.c_void_p(), library.ErrorText()
     result = library.functions.sets_open(encoded(instance), names, len(cameras), options, pointer,

@@ -92,7 +92,7 @@ class Source:
     def _wait(self, call, timeout):
         """Calls call(pointer, ns) in slices until it gives something, or time is over. Returns
         what it said last."""
-        deadline = None if timeout is None else time.monotonic() + timeout
+        deadline = deadline_after(timeout)
         while True:
             left = remaining(deadline)
             with self._opened() as pointer:
@@ -118,6 +118,10 @@ class Source:
         if descriptor < 0:
             raise Error(error.text())
         return descriptor
+
+
+def deadline_after(timeout):
+    return None if timeout is None else time.monotonic() + timeout
 
 
 def remaining(deadline):
@@ -196,12 +200,12 @@ def encoded(text):
     return None if text is None else os.fsencode(text)
 
 
-def stream_options(start, after_loss, owner):
+def stream_options(start, after_loss, owner, sealed_only):
     return library.Options(position_number(start), position_number(after_loss),
-                           owner_number(owner))
+                           owner_number(owner), sealed_only)
 
 
-def open(name, instance=None, start="next", after_loss=None, owner=None):
+def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_only=False):
     """Opens a stream, as "cam0", "imu0", "events" or "status".
 
     instance: of the service; None: that of $VERSAVIS_INSTANCE, or "default".
@@ -209,9 +213,10 @@ def open(name, instance=None, start="next", after_loss=None, owner=None):
     when items were lost (None: "middle").
     owner: user, by name or number, to whom the streams must belong; None: root, oneself, or
     "versavis", or whom $VERSAVIS_OWNER names.
+    sealed_only: only of a service that seals its streams: nobody can cut them short.
 
     Raises Error with what to do."""
-    options = stream_options(start, after_loss, owner)
+    options = stream_options(start, after_loss, owner, sealed_only)
     pointer, error = ctypes.c_void_p(), library.ErrorText()
     result = library.functions.open(encoded(instance), encoded(name), options, pointer, error)
     if result != library.OK:
@@ -226,7 +231,10 @@ def wait(streams, timeout=None):
     streams = list(streams)
     if not streams:
         raise ValueError("wait() needs streams to wait for")
-    deadline = None if timeout is None else time.monotonic() + timeout
+    for stream in streams:
+        if not isinstance(stream, Stream):
+            raise TypeError(f"wait() waits for streams; for {stream!r} use select and fileno()")
+    deadline = deadline_after(timeout)
     while True:
         left = remaining(deadline)
         found = wait_once(streams, left)
@@ -258,4 +266,6 @@ def all_ready(waiting, nanoseconds_left):
     while which >= 0 and which not in found:
         found.add(which)
         which = library.functions.wait_set_wait(waiting, 0)
+    if which < -1:
+        raise Error(library.result_text(which))
     return found

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "client/futex.hpp"
+#include "client/quiet_thread.hpp"
 
 namespace versavis::ring {
 
@@ -36,7 +37,7 @@ void Crowd::call(const std::atomic<std::uint32_t>& word) {
     calls_.fetch_add(1, std::memory_order_release);
     if (thread_.joinable()) return calls_.notify_one();
     try {
-        thread_ = std::thread([this, &word] { run(word); });
+        thread_ = quiet_thread([this, &word] { run(word); });
     } catch (const std::system_error&) {
         futex_wake(word, INT_MAX);  // no thread to be had: slower, but all are woken
     }

@@ -9,11 +9,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <optional>
 #include <system_error>
 #include <utility>
 
 #include "client/process.hpp"
 #include "client/segment.hpp"
+#include "client/trust.hpp"
 #include "engine/ring/ending.hpp"
 
 namespace versavis::ring {
@@ -38,12 +40,26 @@ Expected<> check_trust(const std::filesystem::path& path) {
         return failure(path.string(), "can be written by others",
                        fmt::format("remove it, or 'chmod 0750 {}'", path.string()));
     const auto above = path.parent_path();
-    const bool open_to_all = ::stat(above.c_str(), &parent) == 0 &&
-                             (parent.st_mode & S_IWOTH) != 0 && (parent.st_mode & S_ISVTX) == 0;
-    if (open_to_all)
+    if (::stat(above.c_str(), &parent) != 0) return {};
+    if (!may_own(parent.st_uid, std::nullopt))
+        return failure(above.string(),
+                       fmt::format("belongs to another user (uid {}), who could put another "
+                                   "directory in its place",
+                                   parent.st_uid),
+                       "remove it, or 'chown root' it");
+    if ((parent.st_mode & S_IWOTH) != 0 && (parent.st_mode & S_ISVTX) == 0)
         return failure(above.string(), "can be written by everybody",
                        fmt::format("'chmod 0755 {}'", above.string()));
     return {};
+}
+
+/// None: it is no segment, or a sealed one whose process has ended.
+std::optional<Constants> constants_of(const std::filesystem::path& path) {
+    const auto file = open_trusted(path, ::geteuid());
+    if (!file) return std::nullopt;
+    const auto segment = Mapping::open(*file, path, Mapping::Access::read_only);
+    if (!segment) return std::nullopt;
+    return segment->constants();
 }
 
 /// Another process that writes a ring there; 0: none. It is found even when somebody has removed
@@ -51,11 +67,10 @@ Expected<> check_trust(const std::filesystem::path& path) {
 std::uint32_t living_writer(const std::filesystem::path& directory) {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
-        const auto segment = Mapping::open(entry.path(), Mapping::Access::read_only);
-        if (!segment || is_own(segment->constants())) continue;
-        const Constants& constants = segment->constants();
-        if (start_ticks_of(constants.writer_pid) == constants.writer_start_ticks)
-            return constants.writer_pid;
+        const auto constants = constants_of(entry.path());
+        if (!constants || is_own(*constants)) continue;
+        const std::uint64_t start = start_ticks_of(constants->writer_pid);
+        if (start != 0 && start == constants->writer_start_ticks) return constants->writer_pid;
     }
     return 0;
 }
@@ -107,8 +122,9 @@ void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {
     for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
         const std::string name = entry.path().filename();
         if (name == lock_name || std::find(keep.begin(), keep.end(), name) != keep.end()) continue;
+        const auto constants = constants_of(entry.path());
+        if (constants && is_own(*constants)) continue;
         auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
-        if (segment && is_own(segment->constants())) continue;
         std::filesystem::remove(entry.path(), error);
         if (segment) end(segment->header());
     }

@@ -43,6 +43,16 @@ Error too_large(const std::filesystem::path& ring, std::uint64_t size, std::uint
 
 }  // namespace
 
+Expected<> check_memory(const std::filesystem::path& ring, std::uint64_t size,
+                        const std::filesystem::path& memory) {
+    const auto available = available_memory(memory);
+    if (available && size > *available - std::min(*available, memory_left))
+        return Unexpected(too_large(ring, size, *available,
+                                    "in this machine's memory, of which some is left to others",
+                                    "end other programs"));
+    return {};
+}
+
 Expected<> check_room(const std::filesystem::path& ring, std::uint64_t size,
                       const std::filesystem::path& memory) {
     struct statvfs system {};
@@ -54,12 +64,7 @@ Expected<> check_room(const std::filesystem::path& ring, std::uint64_t size,
             return Unexpected(too_large(ring, size, free, "in its file system",
                                         "enlarge it: mount -o remount,size=SIZE /dev/shm"));
     }
-    const auto available = available_memory(memory);
-    if (available && size > *available - std::min(*available, memory_left))
-        return Unexpected(too_large(ring, size, *available,
-                                    "in this machine's memory, of which some is left to others",
-                                    "end other programs"));
-    return {};
+    return check_memory(ring, size, memory);
 }
 
 }  // namespace versavis::ring

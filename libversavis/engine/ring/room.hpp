@@ -15,4 +15,8 @@ namespace versavis::ring {
 Expected<> check_room(const std::filesystem::path& ring, std::uint64_t size,
                       const std::filesystem::path& memory = "/proc/meminfo");
 
+/// The same of memory that is in no file system.
+Expected<> check_memory(const std::filesystem::path& ring, std::uint64_t size,
+                        const std::filesystem::path& memory = "/proc/meminfo");
+
 }  // namespace versavis::ring

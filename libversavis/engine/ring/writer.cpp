@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -16,6 +17,7 @@
 #include "client/process.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/crowd.hpp"
+#include "engine/ring/door.hpp"
 #include "engine/ring/ending.hpp"
 #include "engine/ring/room.hpp"
 
@@ -23,20 +25,25 @@ namespace versavis::ring {
 
 struct Writer::Segment {
     std::filesystem::path path;
+    FileId name;
     Mapping mapping;
+    std::unique_ptr<Door> door;  ///< of a sealed one
     std::uint64_t head;
     Crowd crowd;  ///< before the mapping goes, its thread ends
 
-    Segment(std::filesystem::path file, Mapping mapped, std::uint64_t first)
-        : path(std::move(file)), mapping(std::move(mapped)), head(first) {}
+    Segment(std::filesystem::path file, Mapping mapped, std::unique_ptr<Door> opened,
+            std::uint64_t first)
+        : path(std::move(file)),
+          name(file_id(path)),
+          mapping(std::move(mapped)),
+          door(std::move(opened)),
+          head(first) {}
     ~Segment() {
         const auto live = static_cast<std::uint32_t>(WriterState::live);
         // Relaxed: a successor may be retiring this segment right now. Ended twice does no harm.
         if (mapping.header().state.load(std::memory_order_relaxed) == live) end(mapping.header());
         // The name may belong to a newer writer by now: remove it only while it is this segment's.
-        auto current = Mapping::open(path, Mapping::Access::read_only);
-        if (current && current->constants().generation == mapping.constants().generation)
-            ::unlink(path.c_str());
+        if (file_id(path) == name) ::unlink(path.c_str());
     }
 };
 
@@ -59,6 +66,14 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
             static_cast<std::uint8_t>(std::strtoul(text.substr(2 * i, 2).c_str(), nullptr, 16));
 }
 
+Expected<> reserve(const File& file, const std::filesystem::path& path, std::uint64_t size) {
+    const int error = ::posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
+    if (error == 0) return {};
+    return failure(path.string(),
+                   fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
+                   "lower 'slots' or 'history_s', or enlarge /dev/shm");
+}
+
 /// A file of its own, whatever lay there under this name. None of it is ever shared with somebody
 /// else's: a link left there is removed, not followed.
 Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) {
@@ -67,12 +82,27 @@ Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) 
     if (!file || ::fchmod(file.descriptor(), 0640) != 0)  // whatever umask says
         return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)),
                        "does its directory belong to the service's user?");
-    const int error = ::posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
-    if (error == 0) return file;
-    ::unlink(path.c_str());
-    return failure(path.string(),
-                   fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
-                   "lower 'slots' or 'history_s', or enlarge /dev/shm");
+    if (auto reserved = reserve(file, path, size); !reserved) {
+        ::unlink(path.c_str());
+        return Unexpected(reserved.error());
+    }
+    return file;
+}
+
+Expected<File> make_nameless(const std::filesystem::path& path, std::uint64_t size) {
+    File file(::memfd_create(path.filename().c_str(), MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    if (!file) return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
+    if (auto reserved = reserve(file, path, size); !reserved) return Unexpected(reserved.error());
+    return file;
+}
+
+/// From here on the only one who can write is who has mapped it already.
+Expected<std::unique_ptr<Door>> seal(File file, const std::filesystem::path& path) {
+    const int seals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL;
+    if (::fcntl(file.descriptor(), F_ADD_SEALS, seals) != 0)
+        return failure(path.string(), fmt::format("cannot be sealed: {}", reason(errno)),
+                       "set 'sealed = false' in [memory], or use Linux 5.1 or newer");
+    return Door::open(path, std::move(file));
 }
 
 /// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
@@ -88,6 +118,16 @@ void release(const std::filesystem::path& path, const Mapping& dead) {
     ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
                 static_cast<off_t>(constants.total_size) - begin);
     ::close(file);
+}
+
+/// What dead writers left in the directory takes memory that is needed now.
+void release_dead(const std::filesystem::path& directory) {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
+        const auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
+        if (!segment || is_own(segment->constants())) continue;
+        if (presence(segment->constants()) != Presence::there) release(entry.path(), *segment);
+    }
 }
 
 /// Of the process that fills the header: no other one of this machine, ever, has the same.
@@ -152,24 +192,25 @@ std::uint64_t total_size(const Shape& shape) {
 
 }  // namespace
 
-Expected<Writer> Writer::create(const std::filesystem::path& directory, const Shape& shape) {
+Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     const bool power_of_two =
         shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
     if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
         return failure(
             shape.name,
             "a ring needs a name shorter than 64 characters and a power of two of descriptors");
-    const auto path = directory / shape.name;
-    const auto temporary = directory / ("." + shape.name + ".new");
+    const auto path = place.directory / shape.name;
+    const auto temporary = place.directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
     auto old = Mapping::open(path, Mapping::Access::read_write);
     const auto make = [&]() -> Expected<File> {
-        if (auto fits = check_room(path, size); !fits) return Unexpected(fits.error());
-        return make_file(temporary, size);
+        auto fits = place.sealed ? check_memory(path, size) : check_room(path, size);
+        if (!fits) return Unexpected(fits.error());
+        return place.sealed ? make_nameless(path, size) : make_file(temporary, size);
     };
     auto file = make();
-    if (!file && old && !is_own(old->constants())) {
-        release(path, *old);
+    if (!file) {
+        release_dead(place.directory);
         file = make();
     }
     if (!file) return Unexpected(file.error());
@@ -179,9 +220,19 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
         ::unlink(temporary.c_str());
         return Unexpected(mapping.error());
     }
+    mapping->populate();
     fill_header(mapping->header(), shape, size);
     mapping->read_constants();
     number_descriptors(*mapping, shape.first_item);
+    std::unique_ptr<Door> door;
+    if (place.sealed) {
+        auto opened = seal(std::move(*file), temporary);
+        if (!opened) {
+            ::unlink(temporary.c_str());
+            return Unexpected(opened.error());
+        }
+        door = std::move(*opened);
+    }
     // Superseded before the name changes: when this process dies in between, readers know at once
     // that nothing more comes from the old one. They are woken when there is something to find.
     if (old) supersede(old->header());
@@ -193,7 +244,8 @@ Expected<Writer> Writer::create(const std::filesystem::path& directory, const Sh
                        fmt::format("cannot be renamed into place: {}", reason(error)));
     }
     if (old) wake_readers(old->header());
-    return Writer(std::make_unique<Segment>(path, std::move(*mapping), shape.first_item));
+    return Writer(
+        std::make_unique<Segment>(path, std::move(*mapping), std::move(door), shape.first_item));
 }
 
 Writer::Writer(std::unique_ptr<Segment> segment) : segment_(std::move(segment)) {

@@ -26,14 +26,23 @@ struct Shape {
     std::uint64_t life = 0;        ///< 0: that of this process
 };
 
+/// Where rings are made, and how.
+struct Place {
+    Place(std::filesystem::path in, bool seal = false) : directory(std::move(in)), sealed(seal) {}
+
+    std::filesystem::path directory;
+    /// Nobody can cut a ring short under its readers: it is no file, and a socket hands it to them.
+    bool sealed;
+};
+
 /// Not thread-safe: one thread at a time may call it. Readers never block it.
 class Writer {
  public:
-    /// Makes the segment `directory / shape.name`, its memory allocated and populated. A segment
-    /// that an earlier writer left there is marked superseded and its readers are woken; where
-    /// memory is short, what a dead writer left is freed first. Errors: the file cannot be created,
-    /// or its memory not reserved.
-    static Expected<Writer> create(const std::filesystem::path& directory, const Shape& shape);
+    /// Makes the segment `place.directory / shape.name`, its memory allocated and populated. A
+    /// segment that an earlier writer left there is marked superseded and its readers are woken;
+    /// where memory is short, what a dead writer left is freed first. Errors: the file cannot be
+    /// created, or its memory not reserved.
+    static Expected<Writer> create(const Place& place, const Shape& shape);
 
     Writer(Writer&&) noexcept;
     Writer& operator=(Writer&&) noexcept;

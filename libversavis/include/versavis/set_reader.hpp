@@ -38,8 +38,8 @@ struct SetOptions : StreamOptions {
 struct SetReport {
     std::uint64_t sets = 0;        ///< delivered
     std::uint64_t incomplete = 0;  ///< sets that lacked a frame, delivered or not
-    std::uint64_t left_out =
-        0;                   ///< frames without a tick, suspect, or of another life of the service
+    /// Frames without a tick, suspect, of another life of the service, or of a set given up before.
+    std::uint64_t left_out = 0;
     std::uint64_t lost = 0;  ///< frames overwritten before they were read
 };
 

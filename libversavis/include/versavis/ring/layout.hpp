@@ -67,7 +67,7 @@ struct Header {
     std::uint64_t generations_at;
     std::uint64_t slots_at;
     char name[64];                ///< zero-terminated
-    std::uint64_t life;           ///< random: equal in all segments that one run of a service made
+    std::uint64_t life;           ///< equal in all segments that one run of a service made
     std::uint64_t pid_namespace;  ///< inode of the writer's /proc/self/ns/pid; 0: unknown
 
     alignas(128) std::atomic<std::uint64_t> head;   ///< items published since creation (SYNC 1)

@@ -68,6 +68,9 @@ struct Options {
     /// User id that the stream must belong to. None: root, this process's user, that of the name in
     /// $VERSAVIS_OWNER, or `versavis`.
     std::optional<std::uint32_t> owner{};
+    /// Only streams of a service with `sealed = true`: no one, not even their owner, can cut them
+    /// short, which ends a program that reads with SIGBUS.
+    bool sealed_only = false;
 };
 
 /// Not thread-safe: one thread at a time may call it; any number of readers may exist.
@@ -98,8 +101,9 @@ class VERSAVIS_API Reader {
     /// Goes to a place among the items that there are.
     void seek(Position position);
 
-    /// Goes to the oldest item from which on no output time is before `time`.
-    void seek(OutputTime time);
+    /// Goes to the oldest item from which on no output time is before `time`; or to one that is
+    /// so many `earlier`, if there are.
+    void seek(OutputTime time, std::uint64_t earlier = 0);
 
     /// A file descriptor for poll or epoll, the reader's own: readable when a call of next() may
     /// find something, until one finds nothing. Errors: no descriptor or thread to be had.
@@ -132,6 +136,7 @@ class VERSAVIS_API Reader {
     Received settle();
     bool writer_seen();
     bool ready();
+    std::optional<HostTime> retry() const;
     FutexWord wake_word() const;
     WatchTarget target(std::uint32_t seen) const;
 

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""IMU samples as arrays, and those between two instants."""
+import ctypes
+
+import numpy as np
+
+from . import _library as library
+from .errors import Error
+from .streams import SLICE, Handle, Source, deadline_after, encoded, nanoseconds, remaining
+from .streams import stream_options
+
+# As versavis_imu_sample lies in memory.
+imu_dtype = np.dtype([
+    ("time", "<i8"), ("board_time", "<i8"), ("host_time", "<i8"), ("number", "<u8"),
+    ("gyro", "<f4", 3), ("accel", "<f4", 3), ("magnetic", "<f4", 3), ("temperature", "<f4"),
+    ("pressure", "<f4"), ("sigma", "<u4"), ("epoch", "<u4"), ("flags", "<u4"),
+    ("filter_delay", "<i8"), ("accel_age", "<i4"), ("reserved", "<u4"),
+])
+
+
+def samples_at(address, count):
+    """An array of one's own, of imu_dtype."""
+    samples = np.empty(count, imu_dtype)
+    if count > 0:
+        ctypes.memmove(samples.ctypes.data, address, samples.nbytes)
+    return samples
+
+
+class ImuSpan:
+    """samples: array, see imu_dtype; lost: how many are missing within them; covered: they reach
+    from the first instant to the second; beyond: the first sample after that (None: not there
+    yet), to interpolate."""
+
+    def __init__(self, span):
+        self.samples = samples_at(span.samples, span.count)
+        self.lost, self.covered = span.lost, bool(span.covered)
+        beyond = samples_at(ctypes.addressof(span.beyond), 1)
+        self.beyond = beyond[0] if span.has_beyond else None
+
+    @property
+    def complete(self):
+        return self.covered and self.lost == 0
+
+
+class ImuWindow(Source):
+    """Samples between any two instants, as far as the ring holds them."""
+
+    def between(self, after, upto, patience=None):
+        """An ImuSpan of the samples with after < time <= upto (output time, ns). Waits for a sample
+        of upto or later for patience seconds (None: without end); then it is not covered.
+
+        Raises Restarted, once: times before and after do not compare."""
+        if upto < after:
+            raise ValueError("between() needs the earlier instant first")
+        span = library.ImuSpan()
+        deadline = deadline_after(patience)
+        while True:
+            left = remaining(deadline)
+            with self._opened() as pointer:
+                result = library.functions.imu_window_between(pointer, after, upto,
+                                                              nanoseconds(left), span)
+                made = ImuSpan(span) if result == library.OK else None
+            if made is None:
+                raise self._pause(result)
+            if made.covered or made.beyond is not None or left < SLICE:
+                return made
+
+
+def imu_window(name, instance=None, owner=None, sealed_only=False):
+    """Opens the samples of an IMU, those that the ring still holds included.
+
+    The arguments are as for open(). Raises Error with what to do."""
+    options = stream_options("oldest", None, owner, sealed_only)
+    pointer, error = ctypes.c_void_p(), library.ErrorText()
+    result = library.functions.imu_window_open(encoded(instance), encoded(name), options, pointer,
+                                               error)
+    if result != library.OK:
+        raise Error(error.text())
+    return ImuWindow(Handle(pointer, library.functions.imu_window_close), name)

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "client/sealed.hpp"
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+namespace versavis::ring {
+
+namespace {
+
+/// A service hands a segment over at once. Half: one that is held up by load looks stuck. Twice: a
+/// program that looks for its streams is held up by a service that is stopped for 2 s each.
+constexpr timeval patience{1, 0};
+
+constexpr int seals = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE;
+
+Unexpected<> not_handed(const std::filesystem::path& path) {
+    if (errno == ECONNREFUSED)
+        return failure(path.string(), "no such stream: its service has ended",
+                       "start it; 'versavis list' shows the streams");
+    if (errno == EACCES)
+        return failure(path.string(), "permission denied",
+                       "join the group that may read streams (usually 'versavis')");
+    return failure(path.string(),
+                   "was not handed over by the service: " +
+                       std::error_code(errno, std::generic_category()).message(),
+                   "does it still run? try again");
+}
+
+/// The descriptor that came with one byte; none: errno says why.
+File receive(int connection) {
+    char byte = 0;
+    iovec data{&byte, sizeof byte};
+    alignas(cmsghdr) char room[CMSG_SPACE(sizeof(int))]{};
+    msghdr message{};
+    message.msg_iov = &data;
+    message.msg_iovlen = 1;
+    message.msg_control = room;
+    message.msg_controllen = CMSG_LEN(sizeof(int));  // a second descriptor does not come in
+    const ssize_t size = ::recvmsg(connection, &message, MSG_CMSG_CLOEXEC);
+    const cmsghdr* rights = CMSG_FIRSTHDR(&message);
+    if (size < 0) return File(-1);
+    errno = EPROTO;
+    if (rights == nullptr || rights->cmsg_level != SOL_SOCKET || rights->cmsg_type != SCM_RIGHTS ||
+        rights->cmsg_len != CMSG_LEN(sizeof(int)))
+        return File(-1);
+    int file = -1;
+    std::memcpy(&file, CMSG_DATA(rights), sizeof file);
+    return File(file);
+}
+
+bool is_of(int connection, std::uint32_t owner) {
+    ucred peer{};
+    socklen_t size = sizeof peer;
+    return ::getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+           peer.uid == owner;
+}
+
+}  // namespace
+
+bool is_sealed(int file) {
+    const int found = ::fcntl(file, F_GET_SEALS);
+    return found >= 0 && (found & seals) == seals;
+}
+
+Expected<File> fetch_sealed(int socket, const std::filesystem::path& path, std::uint32_t owner) {
+    const File connection(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    if (!connection) return not_handed(path);
+    for (const int option : {SO_RCVTIMEO, SO_SNDTIMEO})
+        ::setsockopt(connection.descriptor(), SOL_SOCKET, option, &patience, sizeof patience);
+    // By what was looked at, not by the name, which may be another's by now.
+    const std::string name = "/proc/self/fd/" + std::to_string(socket);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    name.copy(address.sun_path, sizeof address.sun_path - 1);
+    if (::connect(connection.descriptor(), reinterpret_cast<const sockaddr*>(&address),
+                  sizeof address) != 0)
+        return not_handed(path);
+    if (!is_of(connection.descriptor(), owner))
+        return failure(path.string(), "is served by another user than its owner",
+                       "somebody else may have put it there: remove it");
+    File file = receive(connection.descriptor());
+    if (!file) return not_handed(path);
+    if (!is_sealed(file.descriptor()))
+        return failure(path.string(), "is not sealed, though it should be",
+                       "install service and clients of the same release");
+    return file;
+}
+
+}  // namespace versavis::ring

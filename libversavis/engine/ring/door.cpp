@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/ring/door.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <system_error>
+
+#include "client/quiet_thread.hpp"
+
+namespace versavis::ring {
+
+namespace {
+
+/// Who may connect at once and wait to be let in. Half or twice: each waits for some microseconds.
+constexpr int waiting = 64;
+
+/// Before the next try where no descriptor or memory is to be had. Half: a service that is short of
+/// both spends twice as much on it. Twice: who connects then waits for longer.
+constexpr auto pause = std::chrono::milliseconds(10);
+
+Unexpected<> not_made(const std::filesystem::path& path) {
+    return failure(
+        path.string(),
+        fmt::format("cannot be made a socket: {}", std::generic_category().message(errno)),
+        "does its directory belong to the service's user?");
+}
+
+/// Never waits. Who does not take it, or has left, goes without.
+void hand_over(int segment, int connection) {
+    char byte = 0;
+    iovec data{&byte, sizeof byte};
+    alignas(cmsghdr) char room[CMSG_SPACE(sizeof segment)]{};
+    msghdr message{};
+    message.msg_iov = &data;
+    message.msg_iovlen = 1;
+    message.msg_control = room;
+    message.msg_controllen = sizeof room;
+    cmsghdr* rights = CMSG_FIRSTHDR(&message);
+    rights->cmsg_level = SOL_SOCKET;
+    rights->cmsg_type = SCM_RIGHTS;
+    rights->cmsg_len = CMSG_LEN(sizeof segment);
+    std::memcpy(CMSG_DATA(rights), &segment, sizeof segment);
+    ::sendmsg(connection, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, File segment) {
+    const File directory(::open(path.parent_path().c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    File socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    if (!directory || !socket) return not_made(path);
+    // An address holds 107 characters, and a path may be longer.
+    const std::string name =
+        fmt::format("/proc/self/fd/{}/{}", directory.descriptor(), path.filename().string());
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    name.copy(address.sun_path, sizeof address.sun_path - 1);
+    ::unlink(path.c_str());
+    if (::bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+            0 ||
+        ::chmod(path.c_str(), 0660) != 0 ||  // whatever umask says
+        ::listen(socket.descriptor(), waiting) != 0)
+        return not_made(path);
+    std::unique_ptr<Door> door(new Door(std::move(segment), std::move(socket)));
+    try {
+        door->thread_ = quiet_thread([self = door.get()] { self->serve(); });
+    } catch (const std::system_error& error) {
+        return failure(path.string(), fmt::format("gets no thread: {}", error.what()),
+                       "raise the limit on tasks");
+    }
+    return door;
+}
+
+Door::Door(File segment, File socket) : segment_(std::move(segment)), socket_(std::move(socket)) {}
+
+Door::~Door() {
+    ::shutdown(socket_.descriptor(), SHUT_RDWR);  // accept() returns
+    if (thread_.joinable()) thread_.join();
+}
+
+void Door::serve() const {
+    for (;;) {
+        const File connection(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
+        if (connection)
+            hand_over(segment_.descriptor(), connection.descriptor());
+        else if (errno == EINVAL)
+            return;
+        else
+            std::this_thread::sleep_for(pause);
+    }
+}
+
+}  // namespace versavis::ring
