@@ -40,7 +40,8 @@ RecordedClocks clocks(int seconds_long, Duration off, bool pulses) {
         // 0.75 s later, the output clock shows a whole second.
         const std::int64_t pulse = host + 750'000'000 - off.ns;
         if (pulses && s < seconds_long)
-            all.pulses.push_back({board_at(pulse), {pulse + output_ahead}, microseconds(5)});
+            all.pulses.push_back(
+                {board_at(pulse), {pulse}, {pulse + output_ahead}, microseconds(5)});
     }
     all.lives.push_back(std::move(life));
     return all;
@@ -75,6 +76,34 @@ TEST_CASE("clock_evaluation: PPS tells the true error") {
     CHECK(found->pps_link.mean == Approx(-static_cast<double>(off.ns)).margin(8e3));
     CHECK(found->pps_smoothed.mean == Approx(-static_cast<double>(off.ns)).margin(8e3));
     CHECK_THAT(to_text(*found), Contains("by messages alone, smoothed"));
+}
+
+TEST_CASE("clock_evaluation: pulses of another life of the board are not translated by this one") {
+    RecordedClocks twice = clocks(120, {}, true);
+    // The board restarts: its clock shows again what it showed before.
+    for (int s = 0; s < 60; ++s) {
+        const std::int64_t host = 140'350'000'000 + s * 1'000'000'000LL;
+        twice.pulses.push_back({board_at(30'000'000'000 + s * 1'000'000'000LL),
+                                {host},
+                                {host + output_ahead},
+                                microseconds(5)});
+    }
+    const auto found = evaluate_clock(twice);
+    REQUIRE(found);
+    CHECK(found->pps_link.count < 105);
+    CHECK(found->pps_link.most < 50e3);
+    CHECK(found->pps_smoothed.most < 50e3);
+}
+
+TEST_CASE("clock_evaluation: exchanges that ended before they began tell nothing") {
+    RecordedClocks wrong = clocks(60, {}, true);
+    for (TimedMessage& message : wrong.lives[0].stamps.messages) {
+        auto& exchange = std::get<clock::Exchange>(message.message);
+        std::swap(exchange.sent, exchange.arrived);
+    }
+    const auto found = evaluate_clock(wrong);
+    REQUIRE_FALSE(found);
+    CHECK_THAT(found.error().message(), Contains("none took any time"));
 }
 
 TEST_CASE("clock_evaluation: nothing to judge is told") {

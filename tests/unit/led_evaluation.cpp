@@ -30,6 +30,7 @@ void each_frame(Camera& camera, int from, int count,
     for (int i = from; i < from + count; ++i) {
         const HostTime middle = HostTime{0} + seconds(1) + camera.phase + milliseconds(100) * i;
         FrameMetadata frame = LedBench::frame(exposure);
+        frame.trigger = static_cast<std::uint64_t>(i + 1);
         frame.set_tick(static_cast<std::uint64_t>(i));
         const auto pixels = camera.bench->pixels(middle + camera.late - exposure / 2, exposure);
         take(OutputTime{middle.ns}, frame, pixels);
@@ -115,6 +116,7 @@ TEST_CASE("led_evaluation: a place and an exposure that are given are used, susp
     REQUIRE(evaluation.find({"cam0"}));
     each_frame(cameras[0], 0, 20, [&](OutputTime time, FrameMetadata frame, const auto& pixels) {
         frame.exposure = {};
+        if (frame.tick() < 2) frame.trigger = 0;
         if (frame.tick() == 3) frame.flags |= flag_suspect;
         REQUIRE(evaluation.add("cam0", 1, time, frame, pixels));
         REQUIRE(evaluation.add("cam9", 1, time, frame, pixels));
@@ -122,6 +124,7 @@ TEST_CASE("led_evaluation: a place and an exposure that are given are used, susp
     const auto report = evaluation.report();
     REQUIRE(report);
     CHECK(report->cameras.at(0).read == 19);
+    CHECK(report->cameras.at(0).untriggered == 2);
 }
 
 namespace {

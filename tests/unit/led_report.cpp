@@ -184,3 +184,17 @@ TEST_CASE("led_report: pairs are of one tick, epoch and life, and one camera mak
     CHECK_FALSE(alone.ok());
     CHECK(notes(alone, "only one camera"));
 }
+
+TEST_CASE("led_report: pictures that were not triggered are in no pair, and that is told") {
+    auto arrived = shots({});
+    for (LedShot& shot : arrived) {
+        shot.triggered = false;
+        shot.tick = 0;
+    }
+    const LedReport free = report({{"cam0", arrived}, {"cam1", arrived}});
+    CHECK(free.pairs.at(0).pairs == 0);
+    CHECK(free.cameras.at(0).untriggered == 400);
+    CHECK(notes(free, "cam0: 400 pictures were not triggered"));
+    CHECK(report({{"cam0", arrived}, {"cam1", shots({})}}).pairs.at(0).pairs == 0);
+    CHECK(to_json(free)["cameras"][0]["untriggered"] == 400);
+}

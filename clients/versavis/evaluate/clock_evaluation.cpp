@@ -107,14 +107,19 @@ void add_event(const RecordedItem& item, RecordedClocks& clocks) {
     if (event.kind == EventKind::utc_label) clocks.labelled = true;
     if (event.kind != EventKind::pps || (event.flags & flag_suspect) != 0) return;
     const bool known = event.sigma_ns != sigma_unknown;
-    clocks.pulses.push_back(
-        {event.board_time, item.time, {known ? std::int64_t{event.sigma_ns} : std::int64_t{-1}}});
+    clocks.pulses.push_back({event.board_time,
+                             event.host_time,
+                             item.time,
+                             {known ? std::int64_t{event.sigma_ns} : std::int64_t{-1}}});
 }
 
 /// What the messages say, of those in the recording from when they are settled.
-void judge_messages(const BoardLife& life, ClockEvaluation& evaluation) {
+Expected<> judge_messages(const BoardLife& life, ClockEvaluation& evaluation) {
     const auto estimator = make_estimator(EstimatorKind::envelope);
     const std::vector<ClockPoint> history = clock_history(life.stamps, *estimator);
+    if (history.empty())
+        return failure("clock", "no exchange with the board can be true: none took any time",
+                       "record again, and see what 'versavis status' says of the clock");
     evaluation.skew_ppm = history.back().skew_ppm;
     SpreadOf innovation;
     SpreadOf residual;
@@ -142,6 +147,7 @@ void judge_messages(const BoardLife& life, ClockEvaluation& evaluation) {
         off.add(static_cast<double>((live[i].time - best[i].time).ns),
                 static_cast<double>(live[i].sigma.ns));
     evaluation.live = off.spread();
+    return {};
 }
 
 void judge_pulses(const RecordedClocks& clocks, const BoardLife& life,
@@ -164,6 +170,7 @@ void judge_pulses(const RecordedClocks& clocks, const BoardLife& life,
     for (const PpsPulse& pulse : clocks.pulses) {
         const HostEstimate best = smoother.translate(pulse.board);
         if (best.state != ClockState::locked || best.time < settled) continue;
+        if (absolute(best.time - pulse.host) > same_life) continue;
         queries.push_back({best.time + milliseconds(100), pulse.board});
         smoothed.push_back(best);
     }
@@ -277,7 +284,8 @@ Expected<ClockEvaluation> evaluate_clock(const RecordedClocks& clocks) {
     if (evaluation.lives > 1)
         evaluation.notes.push_back(fmt::format(
             "the board restarted: the longest of {} lives is evaluated", evaluation.lives));
-    judge_messages(*longest, evaluation);
+    if (auto judged = judge_messages(*longest, evaluation); !judged)
+        return Unexpected(judged.error());
     evaluation.labelled = clocks.labelled;
     if (!clocks.pulses.empty()) judge_pulses(clocks, *longest, evaluation);
     if (clocks.pulses.empty())

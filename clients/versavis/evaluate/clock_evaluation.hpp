@@ -26,9 +26,14 @@ struct BoardLife {
 
 struct PpsPulse {
     BoardTime board;
+    HostTime host;  ///< as published: it tells which life of the board it is of
     OutputTime published;
     Duration sigma;  ///< as published; < 0: unknown
 };
+
+/// Lives of the board overlap in board time, not in host time. Half: a guess of a suspect frame
+/// that is off by seconds is not taken. Twice: restarts within seconds could be mixed up.
+inline constexpr Duration same_life = seconds(2);
 
 /// What a recording holds of the clocks.
 struct RecordedClocks {
@@ -73,7 +78,7 @@ struct ClockEvaluation {
     std::vector<std::string> notes;
 };
 
-/// Error: no exchange, or less than ten seconds.
+/// Error: no exchange that tells anything, or less than ten seconds.
 Expected<ClockEvaluation> evaluate_clock(const RecordedClocks& clocks);
 
 nlohmann::json to_json(const ClockEvaluation& evaluation);

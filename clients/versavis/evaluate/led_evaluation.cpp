@@ -86,6 +86,7 @@ Expected<> LedEvaluation::add(const std::string& camera, std::uint64_t life, Out
     shot.life = life;
     shot.epoch = frame.epoch;
     shot.tick = frame.tick();
+    shot.triggered = frame.trigger != 0;
     shot.time = time;
     shot.exposure = given != settings_.exposures.end() ? given->second : frame.exposure;
     shot.picture = measure_leds(*picture, place->second);

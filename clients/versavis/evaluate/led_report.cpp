@@ -173,6 +173,7 @@ LedCameraReport report_camera(const std::string& name, const Camera& camera, dou
         if (shot.picture.sight == LedSight::saturated) ++report.saturated;
         if (read.usable) ++report.read;
         if (read.split) ++report.split;
+        if (!shot.triggered) ++report.untriggered;
     }
     const Increments counted = increments(*camera.shots, camera.reads, rate_hz);
     report.increments = counted.all;
@@ -212,8 +213,10 @@ LedPairReport report_pair(const std::string& first, const Camera& a, const std::
     const auto key = [](const LedShot& shot) {
         return std::pair(shot.life, std::pair(shot.epoch, shot.tick));
     };
-    for (std::size_t i = 0; i < b.shots->size(); ++i) of_tick[key((*b.shots)[i])] = i;
+    for (std::size_t i = 0; i < b.shots->size(); ++i)
+        if ((*b.shots)[i].triggered) of_tick[key((*b.shots)[i])] = i;
     for (std::size_t i = 0; i < a.shots->size(); ++i) {
+        if (!(*a.shots)[i].triggered) continue;
         const auto found = of_tick.find(key((*a.shots)[i]));
         if (found == of_tick.end()) continue;
         const LedShot& shot_b = (*b.shots)[found->second];
@@ -338,6 +341,10 @@ void note_cameras(LedReport& report) {
                 "{}: {} exposures are unknown or last more than {:g} steps; expose shorter, or say "
                 "--exposure {}=US",
                 camera.name, camera.too_long, most_led_steps, camera.name));
+        if (camera.untriggered > 0)
+            report.notes.push_back(fmt::format(
+                "{}: {} pictures were not triggered: they have no tick, and are in no pair",
+                camera.name, camera.untriggered));
         if (camera.rate_hz > 0 && std::abs(camera.rate_hz / report.rate_hz - 1) > most_skew)
             report.notes.push_back(
                 fmt::format("{}: by its stamps the board makes {:.3f} steps per second, not {:g}",
@@ -454,6 +461,7 @@ nlohmann::json to_json(const LedReport& report) {
              {"hidden", c.hidden},
              {"too_long", c.too_long},
              {"split", c.split},
+             {"untriggered", c.untriggered},
              {"increments", c.increments},
              {"wrong_increments", c.wrong_increments},
              {"scatter_us", c.scatter_us},

@@ -21,7 +21,8 @@ struct LedShot {
     std::uint64_t life = 0;
     std::uint32_t epoch = 0;
     std::uint64_t tick = 0;
-    OutputTime time;  ///< middle of the exposure
+    bool triggered = true;  ///< else the tick says nothing
+    OutputTime time;        ///< middle of the exposure
     Duration exposure;
     LedPicture picture;
 };
@@ -39,8 +40,9 @@ struct LedCameraReport {
     std::size_t ambiguous = 0;
     std::size_t saturated = 0;  ///< read for their count only
     std::size_t hidden = 0;
-    std::size_t too_long = 0;  ///< of more steps than can be read, or of unknown exposure
-    std::size_t split = 0;     ///< a step fell into the exposure: read to parts of a step
+    std::size_t too_long = 0;     ///< of more steps than can be read, or of unknown exposure
+    std::size_t split = 0;        ///< a step fell into the exposure: read to parts of a step
+    std::size_t untriggered = 0;  ///< in no pair
     std::size_t increments = 0;
     std::size_t wrong_increments = 0;  ///< do not fit the stamps
     double scatter_us = 0;             ///< RMS of readings against stamps, where they are split

@@ -7,10 +7,6 @@ namespace versavis::client {
 
 namespace {
 
-// Lives of the board overlap in board time, not in host time. Half: a guess of a suspect frame that
-// is off by seconds is not taken. Twice: restarts within seconds could be mixed up.
-constexpr Duration same_life = seconds(2);
-
 /// Differences of stamps beyond this overflow.
 constexpr std::int64_t plausible = std::int64_t{1} << 61;
 
