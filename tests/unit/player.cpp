@@ -106,3 +106,55 @@ TEST_CASE("pace: by the stamps, faster or slower, and jumps are not waited for")
     CHECK(pace.due({seconds(902).ns}, later) == later + seconds(1));
     CHECK(pace.due({seconds(5).ns}, later) == later);
 }
+
+TEST_CASE("pace: who does not set it waits as the others do, but not for what is before or far") {
+    Pace pace(2);
+    constexpr HostTime begin{1'000'000'000};
+    CHECK(pace.due_beside({seconds(100).ns}, begin) == begin);
+    CHECK(pace.due({seconds(200).ns}, begin) == begin);
+    CHECK(pace.due_beside({seconds(199).ns}, begin + seconds(1)) == begin + seconds(1));
+    CHECK(pace.due_beside({seconds(204).ns}, begin) == begin + seconds(2));
+    CHECK(pace.due_beside({seconds(500).ns}, begin) == begin);
+    CHECK(pace.due({seconds(202).ns}, begin) == begin + seconds(1));
+}
+
+TEST_CASE("player: what the clock was told in the minutes before is there at once") {
+    const test::TemporaryDirectory directory;
+    constexpr std::int64_t begin = 1'700'000'000'000'000'000;
+    test::RecordingFile file;
+    for (int i = 0; i < 60; ++i)
+        file.add({"clock",
+                  ring::StreamKind::clock,
+                  static_cast<std::uint64_t>(i),
+                  1,
+                  OutputTime{begin} - seconds(60 - i),
+                  {},
+                  {}});
+    for (int i = 0; i < 20; ++i)
+        file.add({"imu0",
+                  ring::StreamKind::imu,
+                  static_cast<std::uint64_t>(i),
+                  1,
+                  OutputTime{begin} + milliseconds(10) * i,
+                  {},
+                  {}});
+    const auto recording = Recording::open(directory.write("a.mcap", file.finish()));
+    REQUIRE(recording);
+    PlaySettings settings;
+    settings.instance = instance;
+    const HostTime until = host_now() + seconds(5);
+    settings.stop = [&] { return host_now() > until; };
+    double all = 0;
+    settings.progress = [&](double /*seconds*/, double length) { all = length; };
+    const HostTime started = host_now();
+    const auto report = play(*recording, settings);
+    REQUIRE(report);
+    CHECK(report->items == 80);
+    CHECK(host_now() - started >= milliseconds(190));
+    CHECK(all == Approx(0.19));
+    settings.streams = {"clock"};
+    settings.rate = 1000;
+    REQUIRE(play(*recording, settings));
+    CHECK(all == Approx(59));
+    std::filesystem::remove_all(instance_directory(instance));
+}

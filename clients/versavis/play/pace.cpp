@@ -20,6 +20,15 @@ HostTime Pace::due(OutputTime stamp, HostTime now) {
         newest_ = stamp;
     }
     newest_ = std::max(newest_, stamp);
+    return at(stamp);
+}
+
+HostTime Pace::due_beside(OutputTime stamp, HostTime now) const {
+    const bool beside = anchor_ && stamp >= *anchor_ && absolute(stamp - newest_) <= longest_step;
+    return beside ? at(stamp) : now;
+}
+
+HostTime Pace::at(OutputTime stamp) const {
     const auto since = static_cast<double>((stamp - *anchor_).ns) / rate_;
     return anchored_ + Duration{static_cast<std::int64_t>(since)};
 }

@@ -16,7 +16,13 @@ class Pace {
     /// was set or the recorder's machine slept, are no reason to wait: the next item comes at once.
     HostTime due(OutputTime stamp, HostTime now);
 
+    /// The same for one that others set the pace of: `now` if it is older than the first of them,
+    /// or far from the newest.
+    HostTime due_beside(OutputTime stamp, HostTime now) const;
+
  private:
+    HostTime at(OutputTime stamp) const;
+
     double rate_;
     std::optional<OutputTime> anchor_;
     HostTime anchored_;

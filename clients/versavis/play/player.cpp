@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "engine/ring/directory.hpp"
 #include "engine/ring/writer.hpp"
@@ -37,10 +38,19 @@ struct Extent {
     std::uint32_t payload = 0;
 };
 
+bool has_stamp(ring::StreamKind kind) {
+    return kind == ring::StreamKind::frames || kind == ring::StreamKind::imu;
+}
+
+/// Of what is played. Frames and samples set the pace: what pairing and clock were told may be from
+/// minutes before them. Without them, all items do.
 struct Span {
     std::map<std::string, Extent> streams;
+    bool stamped = false;  ///< there are frames or samples
     std::optional<OutputTime> first;
     OutputTime last;
+
+    bool paced_by(ring::StreamKind kind) const { return !stamped || has_stamp(kind); }
 };
 
 /// Looks once through the file: a ring cannot grow.
@@ -56,6 +66,8 @@ Expected<Span> measure(const Recording& recording, const std::vector<std::string
             if (pixels <= 0xFFFFFFFFU)
                 extent.payload = std::max(extent.payload, static_cast<std::uint32_t>(pixels));
         }
+        if (has_stamp(item.kind) && !std::exchange(span.stamped, true)) span.first.reset();
+        if (!span.paced_by(item.kind)) return true;
         if (!span.first) span.first = item.time;
         span.last = item.time;
         return true;
@@ -118,6 +130,7 @@ class Player {
             writers_.insert_or_assign(name, std::move(*writer));
         }
         directory_.remove_stale({});
+        newest_ = *span_.first;
         return {};
     }
 
@@ -125,7 +138,9 @@ class Player {
         Pace pace(settings_.rate);
         return recording_.for_each(settings_.streams, [&](const RecordedItem& item) {
             const HostTime now = host_now();
-            const HostTime due = pace.due(item.time, now);
+            const bool paces = span_.paced_by(item.kind);
+            const HostTime due = paces ? pace.due(item.time, now) : pace.due_beside(item.time, now);
+            if (paces) newest_ = std::max(newest_, item.time);
             if (!wait_until(due)) return false;
             if (due < now) report_.latest = std::max(report_.latest, now - due);
             publish(item);
@@ -156,7 +171,6 @@ class Player {
 
     void publish(const RecordedItem& item) {
         ring::Writer& writer = writers_.at(item.stream);
-        newest_ = std::max(newest_, item.time);
         if (item.payload.empty()) {
             const bool missing = item.kind == ring::StreamKind::frames;
             if (missing) ++report_.without_pixels;
@@ -183,7 +197,7 @@ class Player {
     ring::OwnedDirectory directory_;
     std::map<std::string, ring::Writer> writers_;
     HostTime beaten_;
-    OutputTime newest_{};
+    OutputTime newest_;  ///< of those that set the pace
     PlayReport report_;
 };
 
