@@ -126,12 +126,13 @@ std::string RecordingFile::record(std::uint8_t opcode, const std::string& conten
     return raw(opcode) + raw(static_cast<std::uint64_t>(content.size())) + content;
 }
 
-RecordingFile::RecordingFile(const std::string& part) {
+RecordingFile::RecordingFile(const std::string& part, const std::string& recording) {
     bytes_ = "\x89MCAP0\r\n" + record(1, text("ros2") + text("a test"));
     const std::string told = record(0x0C, text("versavis") + map_text({{"version", "1"},
                                                                        {"instance", "test"},
                                                                        {"output_clock", "realtime"},
                                                                        {"part", part},
+                                                                       {"recording", recording},
                                                                        {"recorder", "0"}}));
     summary_.metadata.push_back({bytes_.size(), told.size(), "versavis"});
     bytes_ += told;

@@ -28,7 +28,7 @@ struct FileItem {
 
 class RecordingFile {
  public:
-    explicit RecordingFile(const std::string& part = "0");
+    explicit RecordingFile(const std::string& part = "0", const std::string& recording = "1");
 
     void add(const FileItem& item, bool as_png = false);
     void add_gap(const std::string& stream, const std::string& reason, std::uint64_t items,

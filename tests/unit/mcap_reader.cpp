@@ -151,6 +151,49 @@ TEST_CASE("mcap_reader: a compressed chunk is told by its compression") {
     CHECK_FALSE(recording.error().cure.empty());
 }
 
+TEST_CASE("mcap_reader: a summary that names a place twice, or one in another, is not believed") {
+    const Sample sample;
+    const auto number = [](std::uint64_t value) {
+        return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+    };
+    const std::string begin =
+        std::string("\x89MCAP0\r\n", 8) + test::RecordingFile::record(1, std::string(8, '\0'));
+    const auto attachment = [&](const std::string& content) {
+        return test::RecordingFile::record(
+            9, std::string(24, '\0') + number(content.size()) + content + std::string(4, '\0'));
+    };
+    const std::string inner = attachment("within");
+    const std::string outer = attachment(inner);
+    const std::string chunk = test::RecordingFile::record(
+        6, std::string(28, '\0') + std::string(4, '\0') + std::string(8, '\0'));
+    client::McapSummary summary;
+    const auto add = [&](std::uint64_t offset, std::uint64_t length) {
+        summary.attachments.push_back({offset, length, 0, 0, 0, "", ""});
+    };
+    const std::uint64_t at = begin.size();
+    const std::uint64_t after = at + outer.size();
+    SECTION("an attachment twice") {
+        add(at, outer.size());
+        add(at, outer.size());
+    }
+    SECTION("an attachment in another") {
+        add(at, outer.size());
+        add(after - 4 - inner.size(), inner.size());
+    }
+    SECTION("the other one first") {
+        add(after - 4 - inner.size(), inner.size());
+        add(at, outer.size());
+    }
+    SECTION("a chunk twice") { summary.chunks.resize(2, {0, 0, after, chunk.size(), {}, 0, 0}); }
+    sample.write(begin + outer + chunk +
+                 client::mcap_end(summary, begin.size() + outer.size() + chunk.size()));
+    const auto reader = McapReader::open(sample.path);
+    REQUIRE(reader);
+    CHECK(reader->defect().find("named twice") != std::string::npos);
+    CHECK(reader->attachments().size() == 1);
+    CHECK(reader->chunks().size() == 1);
+}
+
 TEST_CASE("mcap_reader: what is no MCAP file is told, and a directory, and nothing") {
     const Sample sample;
     CHECK_FALSE(McapReader::open(sample.path));

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <map>
 
+#include "recording/recording_info.hpp"
+#include "recording/shallow_json.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 
@@ -121,8 +123,9 @@ TEST_CASE("recording: gaps are those of the file, and an image without its item 
 
 TEST_CASE("recording: files after the first are of it, others are told") {
     const test::TemporaryDirectory directory;
-    const auto write = [&](const std::string& name, const std::string& part, std::uint64_t number) {
-        test::RecordingFile file(part);
+    const auto write = [&](const std::string& name, const std::string& part, std::uint64_t number,
+                           const std::string& recording = "1") {
+        test::RecordingFile file(part, recording);
         for (int i = 0; i < 3; ++i)
             file.add({"imu0", ring::StreamKind::imu, number++, 1, {100}, {}, {}});
         std::ofstream(directory.path() / name, std::ios::binary) << file.finish();
@@ -154,4 +157,48 @@ TEST_CASE("recording: files after the first are of it, others are told") {
     std::uint64_t taken = 0;
     REQUIRE(recording->glance({}, [&](const RecordedItem&) { return ++taken < 4; }));
     CHECK(taken == 4);
+    write("a-0001.mcap", "1", 3, "2");  // left from an earlier one of the same name
+    const auto other = Recording::open(directory.path() / "a.mcap");
+    REQUIRE(other);
+    CHECK(other->facts().files == 1);
+    CHECK(other->facts().defect.find("a-0001.mcap") != std::string::npos);
+}
+
+TEST_CASE("recording: its begin and length are those of stamps, where there are any") {
+    const test::TemporaryDirectory directory;
+    const auto item = [](const char* stream, ring::StreamKind kind, Duration time) {
+        return test::FileItem{stream, kind, 0, 1, OutputTime{} + time, {}, {}};
+    };
+    test::RecordingFile file;
+    file.add(item("clock", ring::StreamKind::clock, seconds(100)));
+    const auto told = [&](const test::RecordingFile& written) {
+        auto copy = written;
+        const auto path = directory.write("a.mcap", copy.finish());
+        const auto recording = Recording::open(path);
+        REQUIRE(recording);
+        const auto info = client::recording_info(path, *recording);
+        REQUIRE(info);
+        return std::pair((*info)["begin_ns"].get<std::int64_t>(),
+                         (*info)["duration_ns"].get<std::int64_t>());
+    };
+    file.add(item("clock", ring::StreamKind::clock, seconds(103)));
+    CHECK(told(file) == std::pair(seconds(100).ns, seconds(3).ns));
+    file.add(item("events", ring::StreamKind::events, seconds(401)));
+    file.add(item("imu0", ring::StreamKind::imu, seconds(400)));
+    file.add(item("imu0", ring::StreamKind::imu, seconds(402)));
+    file.add(item("cam0-evidence", ring::StreamKind::evidence, seconds(50)));
+    file.add(item("status", ring::StreamKind::status, seconds(500)));
+    CHECK(told(file) == std::pair(seconds(400).ns, seconds(2).ns));
+}
+
+TEST_CASE("recording: JSON that is nested without end is as good as damaged") {
+    const auto nested = [](int levels) {
+        return std::string(levels, '[') + std::string(levels, ']');
+    };
+    CHECK(client::parse_shallow_json(R"({"a":[{"b":1}]})")["a"][0]["b"] == 1);
+    CHECK(client::parse_shallow_json(nested(client::deepest_json)).is_array());
+    CHECK(client::parse_shallow_json(nested(client::deepest_json + 2)).is_discarded());
+    CHECK(client::parse_shallow_json(nested(1'000'000)).is_discarded());
+    CHECK(client::parse_shallow_json(std::string(1'000'000, '[')).is_discarded());
+    CHECK(client::parse_shallow_json("{").is_discarded());
 }

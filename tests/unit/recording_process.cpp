@@ -4,9 +4,11 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 
 #include "../pairing/pairing_bench.hpp"
+#include "../support/recording_file.hpp"
 #include "../support/temporary_directory.hpp"
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
@@ -41,12 +43,12 @@ class Minute {
     RecordingSketch file;
     std::vector<OutputTime> truth;  ///< of the frames
 
- private:
     template <class T>
     void item(const std::string& stream, StreamKind kind, OutputTime time, const T& metadata) {
         file.add_item(stream, kind, number_++, time, pack(metadata));
     }
 
+ private:
     void clock() {
         std::exponential_distribution<double> delay(1 / 100e3);
         for (int i = 0; i < 600; ++i) {
@@ -225,6 +227,69 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
     }
     CHECK(seen["/cam0/image_raw"] == 600);
     CHECK(seen["/versavis/clock/item"] == 660);
+}
+
+TEST_CASE("recording_process: stamps that would be equal are held one after the other") {
+    const test::TemporaryDirectory directory;
+    const std::string old_file = directory.path() / "old.mcap";
+    const std::string new_file = directory.path() / "new.mcap";
+    Minute minute;
+    for (int i = 0; i < 20; ++i) {
+        ImuMetadata sample{};  // two of each board time
+        sample.board_time = BoardTime{} + seconds(6) + milliseconds(10) * (i / 2);
+        sample.host_time = on_host(sample.board_time) + microseconds(i % 2);
+        sample.sigma_ns = i == 1 ? sigma_unknown : 50'000;
+        sample.epoch = 1;
+        minute.item("imu1", StreamKind::imu, shown(sample.host_time), sample);
+    }
+    minute.file.write(old_file);
+    REQUIRE(process_recording(old_file, new_file, on));
+    const auto recording = Recording::open(new_file);
+    REQUIRE(recording);
+    std::optional<OutputTime> last;
+    int index = 0;
+    REQUIRE(recording->for_each({"imu1"}, [&](const RecordedItem& item) {
+        const auto sample = unpack<ImuMetadata>(item.metadata);
+        if (index % 2 == 1) CHECK((item.time - *last).ns == 1);
+        CHECK(((sample.flags & flag_clamped) != 0) == (index % 2 == 1));
+        CHECK((sample.sigma_ns == sigma_unknown) == (index == 1));
+        last = item.time;
+        ++index;
+        return true;
+    }));
+    CHECK(index == 20);
+}
+
+TEST_CASE("recording_process: of a recording in several files, the one that is named") {
+    const test::TemporaryDirectory directory;
+    std::vector<std::string> files;
+    for (const int part : {0, 1}) {
+        test::RecordingFile file(std::to_string(part));
+        for (int i = 0; i < 300; ++i) {
+            const HostTime sent = HostTime{} + seconds(100 + 30 * part) + milliseconds(100) * i;
+            const BoardTime at{sent.ns + 70'000};
+            const auto number = static_cast<std::uint64_t>(300 * part + i);
+            const auto add = [&](const clock::ClockItem& item) {
+                file.add({"clock",
+                          StreamKind::clock,
+                          number,
+                          1,
+                          shown(sent),
+                          pack(clock::to_metadata(item)),
+                          {}});
+            };
+            add(clock::RecordedExchange{3, 1, 0, sent, at, at, sent + microseconds(140)});
+            if (i % 10 == 0) add(clock::RecordedOutput{1, sent, output_ahead, {}});
+            ImuMetadata sample{};
+            sample.board_time = BoardTime{sent.ns};
+            sample.host_time = sent;
+            file.add({"imu0", StreamKind::imu, number, 1, shown(sent), pack(sample), {}});
+        }
+        files.push_back(directory.write(part == 0 ? "a.mcap" : "a-0001.mcap", file.finish()));
+    }
+    const auto report = process_recording(files[0], directory.path() / "new.mcap", on);
+    REQUIRE(report);
+    CHECK(report->streams.at("imu0").items == 300);
 }
 
 TEST_CASE("recording_process: what cannot be done is told, and leaves no file") {

@@ -13,6 +13,7 @@
 #include "export/metadata_csv.hpp"
 #include "export/text_file.hpp"
 #include "pairing/evidence_json.hpp"
+#include "recording/shallow_json.hpp"
 
 namespace versavis::client {
 
@@ -33,8 +34,8 @@ std::string json_line(const RecordedItem& item) {
         const auto told = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
         line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
     } else {
-        const auto* text = reinterpret_cast<const char*>(item.payload.data());
-        line["status"] = json::parse(text, text + item.payload.size(), nullptr, false);
+        line["status"] = parse_shallow_json(
+            {reinterpret_cast<const char*>(item.payload.data()), item.payload.size()});
         if (line["status"].is_discarded()) line["status"] = nullptr;
     }
     return line.dump(-1, ' ', false, json::error_handler_t::replace);

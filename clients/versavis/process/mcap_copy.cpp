@@ -131,9 +131,12 @@ class Copy {
     }
 
     Expected<> chunk_at(std::uint64_t offset) {
-        for (const McapChunk& chunk : from_.chunks())
-            if (chunk.offset == offset) return copy_chunk(chunk);
-        return {};  // one that is not whole
+        const auto& chunks = from_.chunks();
+        const auto found = std::lower_bound(
+            chunks.begin(), chunks.end(), offset,
+            [](const McapChunk& chunk, std::uint64_t at) { return chunk.offset < at; });
+        if (found == chunks.end() || found->offset != offset) return {};  // one that is not whole
+        return copy_chunk(*found);
     }
 
     Expected<> copy_chunk(const McapChunk& chunk) {

@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
 
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
 #include "recording/recording.hpp"
+#include "recording/shallow_json.hpp"
 
 namespace versavis::client {
 
@@ -42,7 +44,7 @@ struct Stream {
     ProcessedStream told;
     std::uint64_t life = 0;
     std::uint32_t epoch = 0;
-    OutputTime newest;  ///< of this epoch, suspects aside
+    std::optional<OutputTime> newest;  ///< of this epoch, suspects aside
 };
 
 std::uint32_t sigma_of(Duration clock, Duration other) {
@@ -62,7 +64,7 @@ Duration uncertain(const ProvedFrame& proof, HostTime middle) {
 Duration asymmetry_of(const Recording& recording) {
     const Attachment* status = recording.attachment("status.json");
     if (status == nullptr) return {};
-    const json document = json::parse(status->content, nullptr, false);
+    const json document = parse_shallow_json(status->content);
     if (!document.is_object() || !document.contains("clock")) return {};
     const json& clock = document["clock"];
     if (!clock.is_object() || clock.value("asymmetry_source", json()) == json("none")) return {};
@@ -175,16 +177,18 @@ class Processing {
                     });
     }
 
-    /// Within an epoch no stamp lies before an earlier one: what would is held, and says so.
+    /// Within an epoch each stamp lies after the one before, as live: what would not is held just
+    /// after that, and says so.
     static void hold(Change change, std::uint64_t life, std::uint32_t epoch, Stream& stream) {
-        if (life != stream.life || epoch != stream.epoch) stream.newest = change.after;
+        if (life != stream.life || epoch != stream.epoch) stream.newest.reset();
         stream.life = life;
         stream.epoch = epoch;
-        const Duration back = stream.newest - change.after;
-        if (back.ns > 0) {
-            change.after = stream.newest;
+        if (stream.newest && change.after <= *stream.newest) {
+            const OutputTime held = *stream.newest + nanoseconds(1);
             change.flags |= flag_clamped;
-            change.sigma_ns = sigma_of({change.sigma_ns}, back);
+            if (change.sigma_ns != sigma_unknown)
+                change.sigma_ns = sigma_of({change.sigma_ns}, held - change.after);
+            change.after = held;
         }
         stream.newest = change.after;
         const bool new_stamp = change.after != change.before || change.restamped;
@@ -351,7 +355,7 @@ std::string Processing::changed_item(const std::string& name, const Change& chan
 /// Of the stamps as JSON.
 std::string Processing::changed_text(const std::string& name, const Change& change,
                                      const std::string& data) const {
-    json stamp = json::parse(data, nullptr, false);
+    json stamp = parse_shallow_json(data);
     if (!stamp.is_object()) return data;
     stamp["time_ns"] = change.after.ns;
     stamp["host_time_ns"] = change.host.ns;
@@ -411,7 +415,7 @@ std::optional<ChangedMessage> Processing::change(const McapChannel& channel,
 
 Expected<ProcessReport> process_recording(const std::string& path, const std::string& output,
                                           const std::function<bool(double share)>& go_on) {
-    const auto recording = Recording::open(path);
+    const auto recording = Recording::open_file(path);  // it alone is written anew
     if (!recording) return Unexpected(recording.error());
     ProcessReport report;
     report.file = output;

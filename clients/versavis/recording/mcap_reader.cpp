@@ -11,6 +11,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -162,6 +163,7 @@ Expected<McapReader> McapReader::open(const std::string& path) {
         reader.defect_ = read.error().what;
         reader.scan();
     }
+    reader.claimed_.clear();
     return reader;
 }
 
@@ -302,6 +304,7 @@ Expected<> McapReader::take_summary_record(Window& window, const McapRecord& rec
                 return damaged(record.offset, "an index of a chunk");
             auto chunk = chunk_at(window, offset);
             if (!chunk) return Unexpected(chunk.error());
+            if (auto claimed = claim(offset, chunk->end()); !claimed) return claimed;
             chunks_.push_back(std::move(*chunk));
             break;
         }
@@ -314,7 +317,19 @@ Expected<> McapReader::take_summary_record(Window& window, const McapRecord& rec
     return cursor.good() ? Expected<>() : damaged(record.offset, "a record is too short");
 }
 
+/// A summary that names a place twice, or one within another, would have a file take more memory
+/// than it has bytes.
+Expected<> McapReader::claim(std::uint64_t begin, std::uint64_t end) {
+    const auto next = claimed_.lower_bound(begin);
+    const bool into_next = next != claimed_.end() && next->first < end;
+    const bool into_previous = next != claimed_.begin() && std::prev(next)->second > begin;
+    if (into_next || into_previous) return damaged(begin, "this place is named twice");
+    claimed_.emplace_hint(next, begin, end);
+    return {};
+}
+
 void McapReader::forget() {
+    claimed_.clear();
     chunks_.clear();
     channels_.clear();
     schemas_.clear();
@@ -398,6 +413,7 @@ Expected<> McapReader::add_attachment(Window& window, std::uint64_t offset) {
     if (!record) return Unexpected(record.error());
     if (record->opcode != McapOpcode::attachment)
         return damaged(offset, "no attachment, as the summary says");
+    if (auto claimed = claim(offset, record->end()); !claimed) return claimed;
     auto content = content_of(*record);
     if (!content) return Unexpected(content.error());
     ByteCursor cursor(*content);
@@ -424,6 +440,7 @@ Expected<> McapReader::add_metadata(Window& window, std::uint64_t offset) {
     if (!record) return Unexpected(record.error());
     if (record->opcode != McapOpcode::metadata)
         return damaged(offset, "no metadata, as the summary says");
+    if (auto claimed = claim(offset, record->end()); !claimed) return claimed;
     auto content = content_of(*record);
     if (!content) return Unexpected(content.error());
     ByteCursor cursor(*content);

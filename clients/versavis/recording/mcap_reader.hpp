@@ -180,6 +180,7 @@ class McapReader {
     bool take_record(Window& window, const McapRecord& record);
     void drop_damaged_end();
     Expected<McapChunk> chunk_at(Window& window, std::uint64_t offset) const;
+    Expected<> claim(std::uint64_t begin, std::uint64_t end);
     Expected<> add_attachment(Window& window, std::uint64_t offset);
     Expected<> add_metadata(Window& window, std::uint64_t offset);
     Expected<std::vector<std::byte>> content_of(const McapRecord& record) const;
@@ -193,6 +194,7 @@ class McapReader {
     std::string defect_;
     std::uint64_t data_begin_ = 0;
     std::uint64_t good_end_ = 0;
+    std::map<std::uint64_t, std::uint64_t> claimed_;  ///< of what was found: begin and end
     std::vector<McapChunk> chunks_;
     std::vector<McapChannel> channels_;
     std::map<std::uint16_t, McapSchema> schemas_;

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <list>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "recording/byte_cursor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
+#include "recording/shallow_json.hpp"
 #include "versavis/ring/path.hpp"
 
 namespace versavis::client {
@@ -194,6 +194,7 @@ void Recording::follow(const std::string& path) {
         if (!std::filesystem::exists(next, error)) return;
         auto opened = open_file(next.string());
         const bool belongs = opened && told(opened->facts_, "part") == std::to_string(part) &&
+                             told(opened->facts_, "recording") == told(facts_, "recording") &&
                              told(opened->facts_, "boot_id") == told(facts_, "boot_id") &&
                              told(opened->facts_, "instance") == told(facts_, "instance");
         if (!belongs) {
@@ -469,9 +470,8 @@ Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
             if (!message) return true;
             const auto part = parts.find(message->channel);
             if (part == parts.end() || part->second.role != Role::gap) return true;
-            const auto text = reinterpret_cast<const char*>(message->data.data());
-            const auto json =
-                nlohmann::json::parse(text, text + message->data.size(), nullptr, false);
+            const auto json = parse_shallow_json(
+                {reinterpret_cast<const char*>(message->data.data()), message->data.size()});
             if (!json.is_object()) return reader.damaged(record.offset, "a gap is no JSON object");
             const auto reason = json.find("reason");
             const auto items = json.find("items");

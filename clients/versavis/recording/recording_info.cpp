@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "stream/kind_name.hpp"
 #include "versavis/pixel_format.hpp"
@@ -90,6 +92,28 @@ json stream_json(const RecordedStream& stream, const StreamFacts& facts) {
     return one;
 }
 
+/// From the first stamp to the last. What pairing and clock were told may be from minutes before
+/// the recording: it counts where there is nothing else.
+std::pair<OutputTime, OutputTime> extent(const std::vector<RecordedStream>& all,
+                                         const std::map<std::string, StreamFacts>& streams) {
+    using ring::StreamKind;
+    for (const bool stamped : {true, false}) {
+        std::optional<std::pair<OutputTime, OutputTime>> found;
+        for (const RecordedStream& stream : all) {
+            const StreamFacts& its = streams.at(stream.name);
+            const bool has_stamps = stream.kind == StreamKind::frames ||
+                                    stream.kind == StreamKind::imu ||
+                                    stream.kind == StreamKind::events;
+            if (its.items == 0 || has_stamps != stamped) continue;
+            if (!found) found.emplace(its.first, its.last);
+            found->first = std::min(found->first, its.first);
+            found->second = std::max(found->second, its.last);
+        }
+        if (found) return *found;
+    }
+    return {};
+}
+
 json gaps_json(const std::vector<RecordedGap>& gaps) {
     json list = json::array();
     for (const auto& gap : gaps)
@@ -150,17 +174,11 @@ Expected<json> recording_info(const std::string& path, const Recording& recordin
               {"streams", json::array()},
               {"gaps", gaps_json(*gaps)},
               {"attachments", json::array()}};
-    std::int64_t first = 0;
-    std::int64_t last = 0;
-    for (const auto& stream : recording.streams()) {
-        const StreamFacts& its = streams[stream.name];
-        info["streams"].push_back(stream_json(stream, its));
-        if (its.items == 0) continue;
-        first = first == 0 ? its.first.ns : std::min(first, its.first.ns);
-        last = std::max(last, its.last.ns);
-    }
-    info["begin_ns"] = first;
-    info["duration_ns"] = last - first;
+    for (const auto& stream : recording.streams())
+        info["streams"].push_back(stream_json(stream, streams[stream.name]));
+    const auto [first, last] = extent(recording.streams(), streams);
+    info["begin_ns"] = first.ns;
+    info["duration_ns"] = (last - first).ns;
     for (const auto& one : recording.attachments())
         info["attachments"].push_back(
             {{"name", one.name}, {"media_type", one.media_type}, {"bytes", one.content.size()}});

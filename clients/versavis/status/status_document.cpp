@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "recording/shallow_json.hpp"
+
 namespace versavis::client {
 
 Expected<nlohmann::json> read_status(const std::string& instance) {
@@ -24,7 +26,7 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
     if (!newest)
         return failure(fmt::format("instance {}", instance),
                        "the service has not published its status yet", "try again in a second");
-    auto document = nlohmann::json::parse(*newest, nullptr, false);
+    auto document = parse_shallow_json(*newest);
     if (document.is_discarded() || document.value("schema", 0) != 1)
         return failure(fmt::format("instance {}", instance),
                        "the status document has another version",

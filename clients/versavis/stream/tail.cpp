@@ -11,6 +11,7 @@
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "pairing/evidence_json.hpp"
+#include "recording/shallow_json.hpp"
 #include "status/status_document.hpp"
 #include "versavis/stream.hpp"
 
@@ -107,7 +108,7 @@ json describe(const StatusDocument& item) {
     std::string text(item.payload.size(), '\0');
     json line = describe(static_cast<const ring::Item&>(item));
     if (item.payload.copy_to(reinterpret_cast<std::byte*>(text.data())))
-        line["status"] = json::parse(text, nullptr, false);
+        line["status"] = parse_shallow_json(text);
     return line;
 }
 
