@@ -4,6 +4,7 @@
 #include "record/recorder.hpp"
 
 #include <fmt/format.h>
+#include <pthread.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <thread>
 
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
@@ -107,6 +109,25 @@ struct Instance {
         REQUIRE(report);
         return *report;
     }
+};
+
+/// Threads want a stack that no machine has.
+class NoMoreThreads {
+ public:
+    NoMoreThreads() {
+        ::pthread_getattr_default_np(&usual_);
+        pthread_attr_t impossible;
+        ::pthread_getattr_default_np(&impossible);
+        ::pthread_attr_setstacksize(&impossible, std::size_t{1} << 50U);
+        REQUIRE(::pthread_setattr_default_np(&impossible) == 0);
+        CHECK_THROWS(std::thread([] {}));
+    }
+    NoMoreThreads(const NoMoreThreads&) = delete;
+    NoMoreThreads& operator=(const NoMoreThreads&) = delete;
+    ~NoMoreThreads() { ::pthread_setattr_default_np(&usual_); }
+
+ private:
+    pthread_attr_t usual_{};
 };
 
 /// What a recording has of the camera: numbers, and whether all pixels are right.
@@ -307,8 +328,8 @@ TEST_CASE_METHOD(Instance,
     auto settings = this->settings();
     settings.split_bytes = 20'000;
     settings.output = (files.path() / "split.mcap").string();
-    files.write("split-0001.mcap", "somebody's");
     const RecordReport report = record(settings, [&](int turn) {
+        if (turn == 1) files.write("split-0001.mcap", "somebody's");
         publish();
         if (turn % 8 == 7) ::usleep(600'000);  // chunks end by their age
         return turn < 24;
@@ -318,6 +339,24 @@ TEST_CASE_METHOD(Instance,
     CHECK(report.bytes == std::filesystem::file_size(settings.output));
     std::filesystem::remove(files.path() / "split-0001.mcap");
     CHECK(frames_in(settings.output).numbers.size() == report.streams.at("cam0").items);
+}
+
+TEST_CASE_METHOD(Instance,
+                 "recorder: a name that a later file needs is looked at in the beginning") {
+    auto settings = this->settings("split.mcap");
+    settings.stop = [] { return true; };
+    files.write("split-0017.mcap", "somebody's");
+    files.write("split-x.mcap", "no part");
+    files.write("split-0001.txt", "no part");
+    CHECK(client::record(settings));  // one file needs no other name
+    std::filesystem::remove(settings.output);
+    settings.split_bytes = 1 << 30U;
+    const auto refused = client::record(settings);
+    REQUIRE_FALSE(refused);
+    CHECK_THAT(refused.error().message(), Contains("split-0017.mcap"));
+    CHECK_FALSE(std::filesystem::exists(settings.output));
+    std::filesystem::remove(files.path() / "split-0017.mcap");
+    CHECK(client::record(settings));
 }
 
 TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
@@ -332,6 +371,11 @@ TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
     REQUIRE(report.files.size() == 4);
     CHECK_THAT(report.files[1], Contains("split-0001.mcap"));
     CHECK(frames_in(report.files.front()).numbers == from_to(0, 24));  // it has the others follow
+    const auto id = [](const std::string& path) {
+        return Recording::open_file(path)->facts().told.at("recording");
+    };
+    CHECK(id(report.files[0]).size() == 16);
+    CHECK(id(report.files[0]) == id(report.files[3]));
 }
 
 TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before is whole") {
@@ -358,6 +402,45 @@ TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before 
     std::uint64_t told = 0;
     std::ifstream(files.path() / "told") >> told;
     CHECK(told == frames.numbers.size());
+}
+
+TEST_CASE_METHOD(Instance, "recorder: a disk without room for the summary costs no item") {
+    const auto run = [&](const std::string& file) {
+        auto settings = this->settings(file);
+        return record(settings, [&](int turn) {
+            publish();
+            return turn < 10;
+        });
+    };
+    const std::uint64_t whole = run("a.mcap").bytes;
+    CHECK(test::in_process([&] {
+        close();
+        open();  // numbers begin anew: the file will be as long
+        ::signal(SIGXFSZ, SIG_IGN);
+        const rlimit limit{whole - 4, whole - 4};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+        const RecordReport report = run("b.mcap");
+        return report.stopped_early && report.lost() == 0 && report.streams.at("cam0").items == 10;
+    }));
+    const std::string cut = (files.path() / "b.mcap").string();
+    REQUIRE(repair(cut, ""));
+    CHECK(frames_in(cut).numbers == from_to(0, 10));
+}
+
+TEST_CASE_METHOD(Instance, "recorder: where no thread is to be had, it packs by itself") {
+    auto settings = this->settings();
+    settings.png = true;
+    std::optional<NoMoreThreads> none;
+    const RecordReport report = record(settings, [&](int turn) {
+        if (turn == 0) none.emplace();  // readers have theirs by now
+        publish();
+        return turn < 20;
+    });
+    none.reset();
+    CHECK(report.lost() == 0);
+    const Frames frames = frames_in(settings.output);
+    CHECK(frames.numbers == from_to(0, 20));
+    CHECK(frames.right);
 }
 
 TEST_CASE_METHOD(Instance, "recorder: one that is killed leaves all up to the last whole chunk") {

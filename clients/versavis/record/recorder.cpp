@@ -14,6 +14,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <utility>
 
 #include "record/frame_packer.hpp"
@@ -100,6 +101,29 @@ std::string text_at(const nlohmann::json& document, const char* place) {
     return document.contains(at) && document[at].is_string() ? document[at].get<std::string>() : "";
 }
 
+/// A file that stands where a later one of this recording will: its name.
+std::optional<std::string> later_file(const std::string& first) {
+    const std::filesystem::path path(first);
+    const std::string begin = path.stem().string() + "-";
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(
+             path.parent_path().empty() ? "." : path.parent_path(), error)) {
+        const std::filesystem::path name = entry.path().filename();
+        const std::string stem = name.stem().string();
+        const std::string number = stem.substr(std::min(begin.size(), stem.size()));
+        if (name.extension() == path.extension() && stem.starts_with(begin) && number.size() >= 4 &&
+            number.find_first_not_of("0123456789") == std::string::npos)
+            return entry.path().string();
+    }
+    return std::nullopt;
+}
+
+/// Files of one recording have it in common, and nothing else has it.
+std::string random_id() {
+    std::random_device random;
+    return fmt::format("{:08x}{:08x}", random(), random());
+}
+
 struct Content {
     std::string name;
     std::string media_type;
@@ -116,6 +140,7 @@ class Recorder {
     Expected<> open_streams();
     Expected<> open_stream(const std::string& name, ring::Position start);
     Expected<> read_calibration();
+    Expected<> choose_file();
     void go_back();
     void look_for_streams();
     void wait_for_streams();
@@ -139,6 +164,7 @@ class Recorder {
     bool over(HostTime now) const;
 
     const RecordSettings& settings_;
+    const std::string id_ = random_id();
     RecordReport report_;
     std::vector<std::unique_ptr<Source>> sources_;
     WaitSet waiting_;
@@ -259,9 +285,18 @@ void Recorder::keep_configuration(const nlohmann::json& status) {
         {name, "application/toml", std::string(std::istreambuf_iterator<char>(file), {})});
 }
 
+/// A name that is taken must not end the recording when its turn comes.
+Expected<> Recorder::choose_file() {
+    report_.files.push_back(settings_.output.empty() ? default_name() : settings_.output);
+    const bool split = settings_.split_bytes > 0 || settings_.split_length;
+    const auto taken = split ? later_file(report_.files.front()) : std::nullopt;
+    if (!taken) return {};
+    return failure(*taken,
+                   "is there already, and a later file of this recording would take its place",
+                   "name another file with -o, or move it away; none is overwritten");
+}
+
 Expected<> Recorder::begin_file() {
-    const std::string first = settings_.output.empty() ? default_name() : settings_.output;
-    if (report_.files.empty()) report_.files.push_back(first);
     const auto part = static_cast<unsigned>(writer_ ? report_.files.size() : 0);
     const std::string path = part_name(report_.files.front(), part);
     auto file = McapWriter::create(path, "versavis " VERSAVIS_VERSION);
@@ -273,6 +308,7 @@ Expected<> Recorder::begin_file() {
     const auto status = read_status(settings_.instance);
     std::map<std::string, std::string> facts{{"version", "1"},
                                              {"instance", settings_.instance},
+                                             {"recording", id_},
                                              {"part", std::to_string(part)},
                                              {"recorder", VERSAVIS_VERSION}};
     std::ifstream("/proc/sys/kernel/random/boot_id") >> facts["boot_id"];
@@ -296,9 +332,10 @@ Expected<> Recorder::attach_all() {
 
 Expected<> Recorder::end_file() {
     write_back_.finish();
+    if (auto ended = writer_->file().end_chunk(); !ended) return ended;
+    in_chunk_.clear();  // what it held is in the file, even where that has no room for its summary
     if (auto closed = writer_->file().close(); !closed) return closed;
     file_open_ = false;
-    in_chunk_.clear();
     closed_bytes_ += writer_->file().size();
     return {};
 }
@@ -481,6 +518,7 @@ void Recorder::stop_early(const Error& why) {
 Expected<RecordReport> Recorder::run() {
     if (auto read = read_calibration(); !read) return Unexpected(read.error());
     if (auto opened = open_streams(); !opened) return Unexpected(opened.error());
+    if (auto chosen = choose_file(); !chosen) return Unexpected(chosen.error());
     if (settings_.png) packer_.emplace();
     if (auto made = begin_file(); !made) return Unexpected(made.error());
     begun_ = round_begun_ = chunk_begun_ = host_now();
