@@ -109,5 +109,32 @@ TEST_CASE("repair: a damaged chunk in the middle is told and nothing is changed"
     const auto repaired = repair(sample.path, "");
     REQUIRE_FALSE(repaired);
     CHECK(repaired.error().what.find(std::to_string(chunk.offset)) != std::string::npos);
+    CHECK(repaired.error().cure.find("--cut") != std::string::npos);
     CHECK(content(sample.path) == bytes);
+}
+
+TEST_CASE("repair: asked to, it cuts at the first chunk that is damaged, and keeps the rest") {
+    std::string bytes = test::sample_recording(1, false, GENERATE(true, false), mono8);
+    Sample sample(bytes);
+    const auto chunks = client::McapReader::open(sample.path)->chunks();
+    bytes[chunks.at(2).records_offset + 100] ^= 4;
+    bytes[chunks.at(3).records_offset + 100] ^= 4;
+    sample.write(bytes);
+    const std::string output = sample.path + ".new";
+    const auto copied = repair(sample.path, output, true);
+    REQUIRE(copied);
+    CHECK(content(sample.path) == bytes);
+    const auto cut = repair(sample.path, "", true);
+    REQUIRE(cut);
+    CHECK(content(sample.path) == content(output));
+    CHECK(cut->chunks == 2);
+    CHECK(cut->defect.find(std::to_string(chunks.at(2).offset)) != std::string::npos);
+    CHECK(content(sample.path).substr(0, chunks.at(2).offset) + content(cut->cut_file) == bytes);
+    const auto reader = client::McapReader::open(sample.path);
+    REQUIRE(reader);
+    CHECK(reader->defect().empty());
+    CHECK(reader->statistics()->messages == cut->messages);
+    client::McapBuffer buffer;
+    for (const auto& chunk : reader->chunks()) CHECK(reader->load(chunk, buffer));
+    CHECK(repair(sample.path, "", true)->was_whole);
 }

@@ -100,7 +100,8 @@ class EurocExport {
           selection_(selection),
           formats_(formats),
           mav_(directory / "mav0"),
-          watch_(watch) {}
+          watch_(watch),
+          without_exposure_(selection.cameras.size()) {}
 
     Expected<> run(const ExportCalibration& calibration) {
         if (auto made = make_folders(); !made) return made;
@@ -111,6 +112,14 @@ class EurocExport {
         for (TextFile& file : files_)
             if (auto closed = file.close(); !closed) return closed;
         return write_lists();
+    }
+
+    void note_exposures(std::vector<std::string>& notes) const {
+        for (std::size_t i = 0; i < without_exposure_.size(); ++i)
+            if (without_exposure_[i] > 0)
+                notes.push_back(fmt::format(
+                    "{}: the exposure of {} frames is not known; exposure.csv has no row for them",
+                    selection_.cameras[i].name, without_exposure_[i]));
     }
 
  private:
@@ -198,7 +207,11 @@ class EurocExport {
         const std::string name = fmt::format("{}.png", frame.name.ns);
         const fs::path path = camera_folder(frame.camera) / "data" / name;
         camera_file(frame.camera, 0).write(fmt::format("{},{}\n", frame.name.ns, name));
-        camera_file(frame.camera, 1).write(fmt::format("{},{}\n", frame.name.ns, data.exposure.ns));
+        if (data.exposure.ns != 0)
+            camera_file(frame.camera, 1)
+                .write(fmt::format("{},{}\n", frame.name.ns, data.exposure.ns));
+        else
+            ++without_exposure_[frame.camera];
         camera_file(frame.camera, 2).write(fmt::format("{},{}\n", frame.name.ns, csv_row(item)));
         if (!item.png.empty() && !item.payload.empty() && format.shift == 0)
             return write_text(path,
@@ -236,6 +249,7 @@ class EurocExport {
     std::vector<TextFile> files_;
     PngCrew crew_;
     std::uint64_t frames_ = 0;
+    std::vector<std::uint64_t> without_exposure_;  ///< frames of each camera
 };
 
 }  // namespace
@@ -243,8 +257,11 @@ class EurocExport {
 Expected<> export_euroc(const Recording& recording, const Selection& selection,
                         const std::vector<ExportFormat>& formats,
                         const ExportCalibration& calibration, const fs::path& directory,
-                        const ExportWatch& watch) {
-    return EurocExport(recording, selection, formats, directory, watch).run(calibration);
+                        const ExportWatch& watch, std::vector<std::string>& notes) {
+    EurocExport exported(recording, selection, formats, directory, watch);
+    auto written = exported.run(calibration);
+    exported.note_exposures(notes);
+    return written;
 }
 
 }  // namespace versavis::client

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "export/export.hpp"
@@ -15,6 +16,7 @@ namespace versavis::client {
 Expected<> export_euroc(const Recording& recording, const Selection& selection,
                         const std::vector<ExportFormat>& formats,
                         const ExportCalibration& calibration,
-                        const std::filesystem::path& directory, const ExportWatch& watch);
+                        const std::filesystem::path& directory, const ExportWatch& watch,
+                        std::vector<std::string>& notes);
 
 }  // namespace versavis::client

@@ -42,40 +42,77 @@ Expected<std::optional<NamedText>> find_yaml(const Recording& recording, const s
     return std::optional(NamedText{file, std::string(std::istreambuf_iterator<char>(in), {})});
 }
 
-/// By their topics where all of them name a camera, else by their order.
-void assign_cameras(std::vector<CalibratedCamera> known, const Selection& selection,
-                    ExportReport& report, ExportCalibration& calibration) {
-    const auto place_of = [&](const CalibratedCamera& camera) {
-        std::size_t i = 0;
-        while (i < selection.cameras.size() &&
-               camera.topic != image_topic(selection.cameras[i].name))
-            ++i;
-        return i;
-    };
-    const bool by_topic = std::all_of(known.begin(), known.end(), [&](const auto& camera) {
-        return place_of(camera) < selection.cameras.size();
-    });
-    if (!by_topic && known.size() != selection.cameras.size()) {
+/// Where each camera that is exported stands in the camchain; none: it does not.
+using Places = std::vector<std::optional<std::size_t>>;
+
+/// By their topics where all of the camchain, or all that are exported, are named by them, else by
+/// their order. Empty: neither fits.
+Places places_in(const std::vector<CalibratedCamera>& chain, const Selection& selection,
+                 ExportReport& report) {
+    Places places(selection.cameras.size());
+    std::size_t named = 0;
+    for (std::size_t i = 0; i < places.size(); ++i)
+        for (std::size_t place = 0; place < chain.size() && !places[i]; ++place)
+            if (chain[place].topic == image_topic(selection.cameras[i].name)) {
+                places[i] = place;
+                ++named;
+            }
+    if (named > 0 && (named == chain.size() || named == places.size())) return places;
+    if (chain.size() != places.size()) {
         report.notes.push_back(fmt::format(
             "the camchain has {} cameras, and their topics do not name the {} of the recording: it "
             "is not used",
-            known.size(), selection.cameras.size()));
-        return;
+            chain.size(), places.size()));
+        return {};
     }
-    for (std::size_t i = 0; i < known.size(); ++i)
-        calibration.cameras[by_topic ? place_of(known[i]) : i] = known[i];
-    if (!by_topic) report.notes.emplace_back("cameras of the camchain are taken in their order");
-    for (std::size_t i = 0; i < selection.cameras.size(); ++i) {
-        auto& camera = calibration.cameras[i];
-        if (!camera) continue;
+    report.notes.emplace_back("cameras of the camchain are taken in their order");
+    for (std::size_t i = 0; i < places.size(); ++i) places[i] = i;
+    return places;
+}
+
+void drop_other_sizes(const std::vector<CalibratedCamera>& chain, const Selection& selection,
+                      Places& places, ExportReport& report) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        if (!places[i]) continue;
+        const CalibratedCamera& camera = chain[*places[i]];
         const auto& selected = selection.cameras[i];
-        if (camera->width == selected.width && camera->height == selected.height) continue;
+        if (camera.width == selected.width && camera.height == selected.height) continue;
         report.notes.push_back(fmt::format(
             "{} was calibrated with {} x {} pixels and recorded with {} x {}: its "
             "calibration is not used",
-            selected.name, camera->width, camera->height, selected.width, selected.height));
-        camera.reset();
+            selected.name, camera.width, camera.height, selected.width, selected.height));
+        places[i].reset();
     }
+}
+
+/// Cameras of camchain.yaml are numbered as those that are exported, without holes.
+void note_chain(const std::vector<CalibratedCamera>& cameras, const Places& places,
+                const Selection& selection, ExportReport& report) {
+    for (std::size_t i = 1; i < cameras.size(); ++i)
+        if (!cameras[i].to_previous)
+            report.notes.push_back(fmt::format(
+                "the camchain does not say how {} lies to {}: T_cn_cnm1 is not in camchain.yaml",
+                selection.cameras[i].name, selection.cameras[i - 1].name));
+    for (std::size_t i = cameras.size(); i < places.size(); ++i)
+        report.notes.push_back(
+            fmt::format("{} is not in camchain.yaml: {}", selection.cameras[i].name,
+                        !places[i] ? "its calibration is not known"
+                                   : "that of " + selection.cameras[cameras.size()].name +
+                                         ", before it, is not known; --streams sets the order"));
+}
+
+void assign_cameras(const std::vector<CalibratedCamera>& chain, ExportReport& report,
+                    ExportCalibration& calibration) {
+    const Selection& selection = report.selection;
+    Places places = places_in(chain, selection, report);
+    if (places.empty()) return;
+    drop_other_sizes(chain, selection, places, report);
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < places.size() && places[i]; ++i) order.push_back(*places[i]);
+    calibration.chain = rearranged(chain, order);
+    for (std::size_t i = 0; i < places.size(); ++i)
+        if (places[i]) calibration.cameras[i] = chain[*places[i]];
+    note_chain(calibration.chain, places, selection, report);
 }
 
 Expected<ExportCalibration> find_calibration(const Recording& recording,
@@ -87,9 +124,9 @@ Expected<ExportCalibration> find_calibration(const Recording& recording,
     if (!chain) return Unexpected(chain.error());
     if (!noise) return Unexpected(noise.error());
     if (*chain) {
-        auto cameras = parse_camchain((*chain)->text, (*chain)->where);
+        const auto cameras = parse_camchain((*chain)->text, (*chain)->where);
         if (!cameras) return Unexpected(cameras.error());
-        assign_cameras(std::move(*cameras), report.selection, report, calibration);
+        assign_cameras(*cameras, report, calibration);
     }
     if (*noise) {
         const auto parsed = parse_imu_noise((*noise)->text, (*noise)->where);
@@ -104,12 +141,10 @@ Expected<ExportCalibration> find_calibration(const Recording& recording,
 
 Expected<> write_kalibr(const Selection& selection, const ExportCalibration& calibration,
                         const std::filesystem::path& directory) {
-    std::vector<CalibratedCamera> cameras;
-    for (std::size_t i = 0; i < selection.cameras.size(); ++i) {
-        if (!calibration.cameras[i]) break;  // a chain has no holes
-        cameras.push_back(*calibration.cameras[i]);
-        cameras.back().key = fmt::format("cam{}", i);
-        cameras.back().topic = image_topic(selection.cameras[i].name);
+    std::vector<CalibratedCamera> cameras = calibration.chain;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        cameras[i].key = fmt::format("cam{}", i);
+        cameras[i].topic = image_topic(selection.cameras[i].name);
     }
     if (!cameras.empty())
         if (auto written = write_text(directory / "camchain.yaml", camchain_text(cameras));
@@ -134,7 +169,8 @@ Expected<> write_left_out(const Selection& selection, const std::filesystem::pat
     return write_text(directory / "left_out.csv", text);
 }
 
-void note_peculiarities(const std::vector<ExportFormat>& formats, ExportReport& report) {
+void note_peculiarities(const std::vector<ExportFormat>& formats, ExportKind kind,
+                        ExportReport& report) {
     const Selection& selection = report.selection;
     for (std::size_t i = 0; i < formats.size(); ++i) {
         const auto& camera = selection.cameras[i];
@@ -144,8 +180,12 @@ void note_peculiarities(const std::vector<ExportFormat>& formats, ExportReport& 
                             camera.name, pixel_format_name(camera.pixel_format), formats[i].shift));
         if (formats[i].encoding.starts_with("bayer"))
             report.notes.push_back(
-                fmt::format("{}: images are the sensor's mosaic ({}), not colours", camera.name,
-                            formats[i].encoding));
+                fmt::format("{}: images are the sensor's mosaic ({}), not colours{}", camera.name,
+                            formats[i].encoding,
+                            kind == ExportKind::bag && formats[i].bytes == 2
+                                ? "; Kalibr refuses bags with mosaics of more than 8 bits: record "
+                                  "a format of 8 bits for it, or export with --to euroc"
+                                : ""));
     }
     for (const auto& imu : selection.imus) {
         if (imu.samples == 0)
@@ -189,12 +229,12 @@ Expected<> export_selected(const Recording& recording, const ExportSettings& set
     }
     const auto calibration = find_calibration(recording, settings, report);
     if (!calibration) return Unexpected(calibration.error());
-    note_peculiarities(formats, report);
+    note_peculiarities(formats, settings.kind, report);
     const auto stem = std::filesystem::path(settings.recording).stem().string();
     auto written =
         settings.kind == ExportKind::euroc
             ? export_euroc(recording, report.selection, formats, *calibration, directory,
-                           settings.watch)
+                           settings.watch, report.notes)
             : export_bag(recording, report.selection, formats, directory / (stem + ".bag"),
                          settings.compression, settings.watch);
     if (!written) return written;

@@ -28,6 +28,7 @@ struct ExportSettings {
 /// What is known of the cameras, in the order of the selection, and of the IMUs' noise.
 struct ExportCalibration {
     std::vector<std::optional<CalibratedCamera>> cameras;
+    std::vector<CalibratedCamera> chain;  ///< the first of them, up to one that is not known
     std::optional<ImuNoise> noise;
 };
 

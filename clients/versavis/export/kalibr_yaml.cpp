@@ -119,6 +119,41 @@ std::string transform_text(const std::string& key, const Transform& transform) {
     return text;
 }
 
+/// First `b`, then `a`.
+Transform product(const Transform& a, const Transform& b) {
+    Transform result{};
+    for (std::size_t row = 0; row < 4; ++row)
+        for (std::size_t column = 0; column < 4; ++column)
+            for (std::size_t i = 0; i < 4; ++i)
+                result[4 * row + column] += a[4 * row + i] * b[4 * i + column];
+    return result;
+}
+
+using Pose = std::optional<Transform>;
+
+/// From the first camera to each: along the links, or by way of the IMU.
+std::vector<Pose> from_first(const std::vector<CalibratedCamera>& chain) {
+    constexpr Transform identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    std::vector<Pose> poses;
+    for (const CalibratedCamera& camera : chain) {
+        if (poses.empty())
+            poses.emplace_back(identity);
+        else if (camera.to_previous && poses.back())
+            poses.emplace_back(product(*camera.to_previous, *poses.back()));
+        else if (camera.from_imu && chain.front().from_imu)
+            poses.emplace_back(product(*camera.from_imu, inverse(*chain.front().from_imu)));
+        else
+            poses.emplace_back();
+    }
+    return poses;
+}
+
+/// From one camera to the other.
+Pose between(const Pose& one, const Pose& other) {
+    if (!one || !other) return std::nullopt;
+    return product(*other, inverse(*one));
+}
+
 }  // namespace
 
 std::string yaml_number(double value) {
@@ -198,6 +233,27 @@ Transform inverse(const Transform& transform) {
     }
     result[15] = 1;
     return result;
+}
+
+std::vector<CalibratedCamera> rearranged(const std::vector<CalibratedCamera>& chain,
+                                         const std::vector<std::size_t>& order) {
+    const auto poses = from_first(chain);
+    std::vector<CalibratedCamera> cameras;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        CalibratedCamera camera = chain[order[i]];
+        if (i == 0)
+            camera.to_previous.reset();
+        else if (order[i] != order[i - 1] + 1 || !camera.to_previous)
+            camera.to_previous = between(poses[order[i - 1]], poses[order[i]]);
+        camera.overlaps.clear();
+        for (const std::uint32_t other : chain[order[i]].overlaps)
+            if (const auto found = std::find(order.begin(), order.end(), other);
+                found != order.end())
+                camera.overlaps.push_back(static_cast<std::uint32_t>(found - order.begin()));
+        std::sort(camera.overlaps.begin(), camera.overlaps.end());
+        cameras.push_back(std::move(camera));
+    }
+    return cameras;
 }
 
 }  // namespace versavis::client

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -49,5 +50,11 @@ std::string yaml_number(double value);
 
 /// The inverse of a rotation and translation.
 Transform inverse(const Transform& transform);
+
+/// Cameras of a chain in another order, or some of them: `order` has their places in `chain`. Links
+/// (T_cn_cnm1) and overlaps are those of the new order; a link that the chain does not tell is
+/// none.
+std::vector<CalibratedCamera> rearranged(const std::vector<CalibratedCamera>& chain,
+                                         const std::vector<std::size_t>& order);
 
 }  // namespace versavis::client

@@ -47,6 +47,29 @@ std::string advice(const TimeShift& shift) {
 
 }  // namespace
 
+Expected<Duration> recorded_filter_delay(const Recording& recording, const std::string& imu,
+                                         const std::string& where) {
+    std::vector<std::string> imus;
+    for (const RecordedStream& stream : recording.streams())
+        if (stream.kind == ring::StreamKind::imu && (imu.empty() || stream.name == imu))
+            imus.push_back(stream.name);
+    if (imus.empty())
+        return failure(
+            where, imu.empty() ? "has no IMU" : "has no IMU " + imu,
+            "name the recording that was calibrated with; 'versavis info' lists streams");
+    if (imus.size() > 1)
+        return failure(where, fmt::format("has several IMUs: {}", fmt::join(imus, ", ")),
+                       "say with --imu which of them was calibrated");
+    std::optional<Duration> delay;
+    const auto read = recording.glance(imus, [&](const RecordedItem& item) {
+        delay = unpack<ImuMetadata>(item.metadata).filter_delay;
+        return false;
+    });
+    if (!read) return Unexpected(read.error());
+    if (!delay) return failure(where, imus.front() + " has no sample");
+    return *delay;
+}
+
 Expected<TimeShift> time_shift(const std::vector<CalibratedCamera>& cameras,
                                const std::optional<Duration>& taken_off, const std::string& where) {
     TimeShift shift;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "export/kalibr_yaml.hpp"
+#include "recording/recording.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::client {
@@ -22,6 +23,11 @@ struct TimeShift {
     bool known = false;  ///< taken_off is of a recording
     double total_s = 0;  ///< of the IMU after the first camera: filter and all else
 };
+
+/// Of an IMU's first sample; `imu` may be empty if there is one IMU. Errors, with `where` as the
+/// recording's name: no such IMU, or which of several is not said.
+Expected<Duration> recorded_filter_delay(const Recording& recording, const std::string& imu,
+                                         const std::string& where);
 
 /// `taken_off`: from the items of the recording that was calibrated with. Error: no camera has a
 /// shift.

@@ -51,20 +51,14 @@ class ProgressLine {
     HostTime shown_;
 };
 
-/// Of the first IMU that has one.
-Expected<std::optional<Duration>> filter_delay(const std::string& path) {
+/// None: no recording was named.
+Expected<std::optional<Duration>> filter_delay(const std::string& path, const std::string& imu) {
     if (path.empty()) return std::optional<Duration>();
     const auto recording = Recording::open(path);
     if (!recording) return Unexpected(recording.error());
-    std::optional<Duration> delay;
-    auto read = recording->glance({}, [&](const RecordedItem& item) {
-        if (item.kind == ring::StreamKind::imu)
-            delay = unpack<ImuMetadata>(item.metadata).filter_delay;
-        return !delay;
-    });
-    if (!read) return Unexpected(read.error());
-    if (!delay) return failure(path, "has no IMU", "name the recording that was calibrated with");
-    return delay;
+    const auto delay = recorded_filter_delay(*recording, imu, path);
+    if (!delay) return Unexpected(delay.error());
+    return std::optional(*delay);
 }
 
 }  // namespace
@@ -93,6 +87,7 @@ void FileCommands::add_repair(CLI::App& app) {
         "kept in FILE.cut");
     repair_->add_option("file", file_, "Recording")->required();
     repair_->add_option("-o,--output", output_, "Write a new file, and leave this one alone");
+    repair_->add_flag("--cut", cut_, "End it before the first chunk that is damaged");
     repair_->add_flag("--json", json_, "Print a JSON object");
 }
 
@@ -151,7 +146,9 @@ void FileCommands::add_calibration(CLI::App& app) {
         "Turn the time offset between cameras and IMU in Kalibr's camchain-imucam.yaml into a "
         "value of the configuration");
     calibration_->add_option("file", file_, "Kalibr's results")->required();
-    calibration_->add_option("--recording", recording_, "The recording that was calibrated with");
+    auto* recording = calibration_->add_option("--recording", recording_,
+                                               "The recording that was calibrated with");
+    calibration_->add_option("--imu", imu_, "Its IMU, where it has several")->needs(recording);
     calibration_->add_flag("--json", json_, "Print a JSON object");
 }
 
@@ -180,7 +177,7 @@ int FileCommands::show_info() const {
 }
 
 int FileCommands::repair_file() const {
-    const auto repaired = repair(file_, output_);
+    const auto repaired = repair(file_, output_, cut_);
     if (!repaired) return fail(repaired.error());
     fmt::print("{}", to_text(*repaired, json_));
     return EX_OK;
@@ -224,7 +221,7 @@ int FileCommands::show_calibration() const {
     if (!in) return fail({file_, "cannot be read", "check its name and permissions"});
     const auto cameras = parse_camchain(std::string(std::istreambuf_iterator<char>(in), {}), file_);
     if (!cameras) return fail(cameras.error());
-    const auto delay = filter_delay(recording_);
+    const auto delay = filter_delay(recording_, imu_);
     if (!delay) return fail(delay.error());
     const auto shift = time_shift(*cameras, *delay, file_);
     if (!shift) return fail(shift.error());

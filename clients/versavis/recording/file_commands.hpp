@@ -48,7 +48,9 @@ class FileCommands {
     bool json_ = false;
     std::string file_;
     std::string output_;
+    bool cut_ = false;
     std::string recording_;
+    std::string imu_;
     ExportSettings export_settings_;
     PlaySettings play_settings_;
 };

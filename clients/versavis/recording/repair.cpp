@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include "recording/byte_cursor.hpp"
 #include "recording/mcap_reader.hpp"
@@ -53,13 +55,22 @@ Expected<> write_at(const FileDescriptor& file, const std::string& path, std::ui
 /// Reads what the file holds once more, and says what its end must be.
 class Stock {
  public:
-    explicit Stock(const McapReader& reader) : reader_(reader) {}
+    Stock(const McapReader& reader, std::uint64_t end) : reader_(reader), end_(end) {}
 
+    /// What lies before the end.
     Expected<> take() {
-        for (const McapChunk& chunk : reader_.chunks())
-            if (auto taken = take_chunk(chunk); !taken) return taken;
+        for (const McapChunk& chunk : reader_.chunks()) {
+            if (chunk.offset >= end_) break;
+            if (auto taken = take_chunk(chunk); !taken) {
+                if (chunk.compression.empty()) damaged_at_ = chunk.offset;
+                return taken;
+            }
+        }
         return reader_.top_level([this](const McapRecord& record) { return place(record); });
     }
+
+    /// After take() failed: the chunk that it failed by.
+    std::optional<std::uint64_t> damaged_at() const { return damaged_at_; }
 
     /// What is kept of the old file ends here.
     std::uint64_t kept() const { return kept_; }
@@ -71,7 +82,7 @@ class Stock {
 
     /// After take(): the last chunk may be there without all its indexes.
     void complete() {
-        kept_ = reader_.good_end();
+        kept_ = end_;
         if (summary_.chunks.empty()) return;
         SummaryChunk& last = summary_.chunks.back();
         if (last.indexes.size() == last_.size()) return;
@@ -84,6 +95,8 @@ class Stock {
         }
         last.indexes_length = missing_indexes_.size();
     }
+
+    std::uint64_t chunks() const { return summary_.chunks.size(); }
 
     std::uint64_t messages() const {
         std::uint64_t all = 0;
@@ -133,6 +146,7 @@ class Stock {
     }
 
     Expected<bool> place(const McapRecord& record) {
+        if (record.offset >= end_ || record.opcode == McapOpcode::data_end) return false;
         ByteCursor cursor(record.content);
         if (record.opcode == McapOpcode::chunk) {
             current_ = chunk_at(record.offset);
@@ -169,6 +183,8 @@ class Stock {
     }
 
     const McapReader& reader_;
+    std::uint64_t end_;
+    std::optional<std::uint64_t> damaged_at_;
     McapBuffer buffer_;
     McapSummary summary_;
     SummaryChunk* current_ = nullptr;  ///< the chunk whose message indexes follow
@@ -212,6 +228,11 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
     return file;
 }
 
+Error with_cure(Error damage) {
+    damage.cure = "'versavis repair --cut' ends it before that, and keeps the rest in FILE.cut";
+    return damage;
+}
+
 Expected<> append_end(const FileDescriptor& file, const std::string& path, const Stock& stock) {
     if (auto written = write_at(file, path, stock.kept(), stock.end()); !written) {
         [[maybe_unused]] const int back =
@@ -249,7 +270,7 @@ Expected<> repair_into(const std::string& output, const McapReader& reader, cons
 
 }  // namespace
 
-Expected<RepairReport> repair(const std::string& path, const std::string& output) {
+Expected<RepairReport> repair(const std::string& path, const std::string& output, bool cut) {
     const auto file = lock(path, output.empty());
     if (!file) return Unexpected(file.error());
     const auto reader = McapReader::open(path);
@@ -259,17 +280,29 @@ Expected<RepairReport> repair(const std::string& path, const std::string& output
     report.defect = reader->defect();
     report.chunks = reader->chunks().size();
     report.was_whole = report.defect.empty();
+    if (report.was_whole && !cut) {
+        report.file = path;
+        return report;
+    }
+    std::optional<Stock> stock(std::in_place, *reader, reader->good_end());
+    if (auto taken = stock->take(); !taken) {
+        const auto end = stock->damaged_at();
+        if (!end || !cut) return Unexpected(end ? with_cure(taken.error()) : taken.error());
+        report.defect += (report.was_whole ? "" : ", and ") + taken.error().what;
+        report.was_whole = false;
+        stock.emplace(*reader, *end);
+        if (auto again = stock->take(); !again) return Unexpected(again.error());
+    }
     if (report.was_whole) {
         report.file = path;
         return report;
     }
-    Stock stock(*reader);
-    if (auto taken = stock.take(); !taken) return Unexpected(taken.error());
-    stock.complete();
-    report.messages = stock.messages();
-    report.cut_bytes = reader->size() - stock.kept();
-    auto repaired = output.empty() ? repair_in_place(*file, *reader, stock, report)
-                                   : repair_into(output, *reader, stock);
+    stock->complete();
+    report.chunks = stock->chunks();
+    report.messages = stock->messages();
+    report.cut_bytes = reader->size() - stock->kept();
+    auto repaired = output.empty() ? repair_in_place(*file, *reader, *stock, report)
+                                   : repair_into(output, *reader, *stock);
     if (!repaired) return Unexpected(repaired.error());
     return report;
 }
@@ -286,11 +319,9 @@ std::string to_text(const RepairReport& report, bool json) {
     std::string text = fmt::format("{}: {}; it is whole now, with {} messages in {} chunks\n",
                                    report.file, report.defect, report.messages, report.chunks);
     if (!report.cut_file.empty())
-        text += fmt::format("{} bytes behind the last whole chunk are in {}\n", report.cut_bytes,
-                            report.cut_file);
+        text += fmt::format("{} bytes behind that are in {}\n", report.cut_bytes, report.cut_file);
     else if (report.cut_bytes > 0)
-        text +=
-            fmt::format("{} bytes behind the last whole chunk are not in it\n", report.cut_bytes);
+        text += fmt::format("{} bytes behind that are not in it\n", report.cut_bytes);
     return text;
 }
 
