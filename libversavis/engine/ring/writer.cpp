@@ -89,8 +89,13 @@ Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) 
     return file;
 }
 
+/// MFD_NOEXEC_SEAL: that it holds no program, which a host may insist on since Linux 6.3.
+constexpr unsigned no_program = 0x0008;
+
 Expected<File> make_nameless(const std::filesystem::path& path, std::uint64_t size) {
-    File file(::memfd_create(path.filename().c_str(), MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    const unsigned flags = MFD_CLOEXEC | MFD_ALLOW_SEALING;
+    File file(::memfd_create(path.filename().c_str(), flags | no_program));
+    if (!file && errno == EINVAL) file = File(::memfd_create(path.filename().c_str(), flags));
     if (!file) return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
     if (auto reserved = reserve(file, path, size); !reserved) return Unexpected(reserved.error());
     return file;

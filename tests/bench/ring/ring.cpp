@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <atomic>
+#include <cstring>
 #include <map>
 #include <stdexcept>
 
 #include "../../support/temporary_directory.hpp"
 #include "../metric.hpp"
+#include "client/futex.hpp"
 #include "engine/ring/writer.hpp"
 #include "race.hpp"
 #include "set_reading.hpp"
+#include "versavis/ring/reader.hpp"
 
 namespace versavis::bench {
 
@@ -160,20 +164,62 @@ void measure_sets(Metrics& metrics) {
         {"set_reader_cpu_to_bare_readers", cost.set_cpu_ns / cost.bare_cpu_ns, "ratio", 1.2});
 }
 
+/// Nanoseconds that something takes, in the middle of many times.
+template <class Work>
+double middle_ns(int times, Work work) {
+    std::vector<double> costs;
+    for (int i = 0; i < times; ++i) {
+        const HostTime begin = host_now();
+        work(i);
+        costs.push_back(static_cast<double>((host_now() - begin).ns));
+    }
+    return quantile(std::move(costs), 0.5);
+}
+
+/// What a copy of a frame costs that is checked afterwards: the alternative to holding it.
+void measure_copy(Metrics& metrics) {
+    constexpr unsigned slots = 8;
+    const test::TemporaryDirectory directory("/dev/shm");
+    auto writer = *ring::Writer::create(
+        directory.path(), {"frames", ring::StreamKind::frames, 64, slots, frame_size});
+    auto reader = *ring::Reader::open(directory.path() / "frames");
+    std::vector<ring::Item> items;
+    for (unsigned i = 0; i < slots; ++i) {
+        writer.publish(*writer.acquire(), frame_size, {}, {});
+        items.push_back(*reader.next());
+    }
+    std::vector<std::byte> copy(frame_size);
+    const auto payload = [&](int i) -> const ring::Payload& {
+        return items[static_cast<unsigned>(i) % slots].payload;
+    };
+    const double checked =
+        middle_ns(800, [&](int i) { static_cast<void>(payload(i).copy_to(copy.data())); });
+    const double plain =
+        middle_ns(800, [&](int i) { std::memcpy(copy.data(), payload(i).data(), frame_size); });
+    metrics.push_back({"frame_copy", checked / 1000, "us", {}});
+    metrics.push_back({"frame_copy_to_memcpy", checked / plain, "ratio", {}});
+}
+
+/// Readers map rings read-only, so a writer cannot know that nobody waits: it asks the kernel.
+void measure_nobody(Metrics& metrics) {
+    const test::TemporaryDirectory directory("/dev/shm");
+    auto writer = *ring::Writer::create(directory.path(), {"imu", ring::StreamKind::imu, 4096});
+    const std::atomic<std::uint32_t> nobody{0};
+    const double published = middle_ns(20000, [&](int) { writer.publish({}, {}); });
+    const double woken = middle_ns(20000, [&](int) { ring::futex_wake(nobody, 1); });
+    metrics.push_back({"publish_nobody_waiting_to_futex_wake", published / woken, "ratio", {}});
+}
+
 /// What it takes to acquire and publish one frame that somebody else has filled.
 double frame_publication_ns(std::uint64_t size) {
     const test::TemporaryDirectory directory("/dev/shm");
     auto writer =
         ring::Writer::create(directory.path(), {"frames", ring::StreamKind::frames, 64, 8, size});
     if (!writer) throw std::runtime_error(writer.error().message());
-    std::vector<double> costs;
-    for (int i = 0; i < 20000; ++i) {
-        const HostTime begin = host_now();
+    return middle_ns(20000, [&](int) {
         const auto slot = writer->acquire();
         writer->publish(*slot, static_cast<std::uint32_t>(size), {}, {});
-        costs.push_back(static_cast<double>((host_now() - begin).ns));
-    }
-    return quantile(std::move(costs), 0.5);
+    });
 }
 
 }  // namespace
@@ -190,6 +236,8 @@ std::vector<Metric> bench_ring() {
     const double small = frame_publication_ns(4096);
     const double large = frame_publication_ns(16 << 20);
     metrics.push_back({"frame_publication_16MiB_to_4KiB", large / small, "ratio", 1.2});
+    measure_nobody(metrics);
+    measure_copy(metrics);
     measure_polling(metrics, peer);
     measure_blocking(metrics, peer);
     measure_crowd(metrics);
