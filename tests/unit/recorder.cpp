@@ -14,6 +14,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <thread>
 
@@ -359,6 +360,32 @@ TEST_CASE_METHOD(Instance,
     CHECK(client::record(settings));
 }
 
+TEST_CASE_METHOD(Instance, "recorder: camera infos have the intrinsics that it is given") {
+    auto settings = this->settings();
+    const auto calibrated = [](const char* key, const char* lens, const char* topic) {
+        return fmt::format(
+            "{}: {{camera_model: pinhole, intrinsics: [321.5, 1.0, 1.0, 1.0], {}, resolution: "
+            "[{}, {}], rostopic: {}}}\n",
+            key, lens, width, height, topic);
+    };
+    constexpr auto radtan = "distortion_model: radtan, distortion_coeffs: [1.0, 2.0, 3.0, 4.0]";
+    const bool known = GENERATE(true, false);
+    settings.calibration = {
+        files.write("chain.yaml",
+                    calibrated("cam0", "distortion_model: fov, distortion_coeffs: [1.0]", "/x/y") +
+                        calibrated("cam1", radtan, known ? "/cam0/image_raw" : "/cam1/image_raw"))};
+    record(settings, [&](int turn) {
+        publish();
+        return turn < 1;
+    });
+    std::ifstream file(settings.output, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    const double fx = 321.5;
+    const std::string number(reinterpret_cast<const char*>(&fx), sizeof fx);
+    CHECK((bytes.find(number) != std::string::npos) == known);
+    CHECK(Recording::open(settings.output)->attachment("calibration/camchain.yaml") != nullptr);
+}
+
 TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
     auto settings = this->settings();
     settings.split_bytes = 20'000;
@@ -489,6 +516,8 @@ TEST_CASE_METHOD(Instance, "recorder: what cannot be recorded says why") {
     wrong.calibration = {"/nowhere/chain.yaml"};
     CHECK_THAT(refusal(wrong), Contains("/nowhere/chain.yaml: cannot be read"));
     CHECK(std::filesystem::is_empty(files.path()));
+    wrong.calibration = {files.write("chain.yaml", "cam0: 3\n")};
+    CHECK_THAT(refusal(wrong), Contains("chain.yaml:1"));
 }
 
 TEST_CASE("recorder: sizes and times of --split") {

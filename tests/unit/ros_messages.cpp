@@ -65,6 +65,28 @@ TEST_CASE("ros_messages: an IMU sample without orientation") {
     CHECK(at<double>(message, orientation + 8 * (4 + 9 + 3 + 9)) == -9.75);
 }
 
+TEST_CASE("ros_messages: a lens stands in CameraInfo, if it is of the frame's size") {
+    const RosLens lens{1920, 1200, 900, 901, 960, 600, "plumb_bob", {-0.25, 0.5, 0, 0, 0}};
+    const std::string message = ros_camera_info(stamp, "cam0", frame(), &lens);
+    const std::size_t d = 4 + 20 + 8 + 4 + 12;
+    CHECK(message.substr(36, 10) == std::string("plumb_bob", 10));
+    CHECK(at<std::uint32_t>(message, d) == 5);
+    CHECK(at<double>(message, d + 4) == -0.25);
+    const std::size_t k = d + 4 + 5 * 8;
+    CHECK(at<double>(message, k) == 900);
+    CHECK(at<double>(message, k + 2 * 8) == 960);
+    CHECK(at<double>(message, k + 4 * 8) == 901);
+    CHECK(at<double>(message, k + 8 * 8) == 1);
+    const std::size_t p = k + 18 * 8;
+    CHECK(at<double>(message, p - 8) == 1);
+    CHECK(at<double>(message, p + 6 * 8) == 600);
+    CHECK(at<double>(message, p + 10 * 8) == 1);
+    FrameMetadata other = frame();
+    other.width /= 2;
+    CHECK(ros_camera_info(stamp, "cam0", other, &lens) == ros_camera_info(stamp, "cam0", other));
+    CHECK(ros_camera_info(stamp, "cam0", other).size() == message.size() - 52);
+}
+
 TEST_CASE("ros_messages: times before 1970 and their rest") {
     const std::string message = ros_utc(OutputTime{-1}, OutputTime{1'000'000'000});
     CHECK(at<std::int32_t>(message, 4) == -1);

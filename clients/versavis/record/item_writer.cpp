@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "recording/mcap_record.hpp"
-#include "recording/ros_messages.hpp"
 
 namespace versavis::client {
 
@@ -187,9 +186,11 @@ void ItemWriter::write_frame_notes(Channels& channels, const std::string& stream
     file_.write({json_channel(channels, "/versavis/" + stream + "/stamp", "Stamp"),
                  channels.sequence, item.time.ns},
                 dump(stamp_json(item)));
-    file_.write({ros_channel(channels, "/" + stream + "/camera_info", "sensor_msgs/msg/CameraInfo"),
-                 channels.sequence, item.time.ns},
-                ros_camera_info(item.time, stream, frame));
+    const auto lens = lenses_.find(stream);
+    file_.write(
+        {ros_channel(channels, "/" + stream + "/camera_info", "sensor_msgs/msg/CameraInfo"),
+         channels.sequence, item.time.ns},
+        ros_camera_info(item.time, stream, frame, lens == lenses_.end() ? nullptr : &lens->second));
 }
 
 void ItemWriter::write_imu(Channels& channels, const std::string& stream, const ring::Item& item) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "recording/mcap_writer.hpp"
+#include "recording/ros_messages.hpp"
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
 #include "versavis/ring/reader.hpp"
@@ -23,7 +24,9 @@ const char* to_string(GapReason reason);
 /// One file. Streams are told in it when their first item comes.
 class ItemWriter {
  public:
-    explicit ItemWriter(McapWriter file) : file_(std::move(file)) {}
+    /// `lenses`: of the cameras of which they are known.
+    explicit ItemWriter(McapWriter file, std::map<std::string, RosLens> lenses = {})
+        : file_(std::move(file)), lenses_(std::move(lenses)) {}
 
     /// What came of an item.
     enum class Outcome { written, overtaken };
@@ -69,6 +72,7 @@ class ItemWriter {
     void write_status(Channels& channels, const ring::Item& item, const std::string& document);
 
     McapWriter file_;
+    std::map<std::string, RosLens> lenses_;
     std::map<std::string, Channels> streams_;
 };
 

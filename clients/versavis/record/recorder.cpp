@@ -17,6 +17,7 @@
 #include <random>
 #include <utility>
 
+#include "export/kalibr_yaml.hpp"
 #include "record/frame_packer.hpp"
 #include "record/item_writer.hpp"
 #include "record/write_back.hpp"
@@ -140,6 +141,7 @@ class Recorder {
     Expected<> open_streams();
     Expected<> open_stream(const std::string& name, ring::Position start);
     Expected<> read_calibration();
+    Expected<> read_lenses(const std::string& camchain, const std::string& path);
     Expected<> choose_file();
     void go_back();
     void look_for_streams();
@@ -173,6 +175,7 @@ class Recorder {
     WriteBack write_back_;
     std::optional<FramePacker> packer_;
     std::vector<Content> attachments_;
+    std::map<std::string, RosLens> lenses_;
     std::map<std::string, std::uint64_t> in_chunk_;  ///< items in the chunk that is open
     HostTime begun_;
     HostTime file_begun_;
@@ -260,6 +263,36 @@ void Recorder::look_for_streams() {
     if (found) wait_for_streams();
 }
 
+/// None: CameraInfo has no name for it.
+std::optional<RosLens> lens_of(const CalibratedCamera& camera) {
+    const std::vector<double>& of = camera.intrinsics;
+    RosLens lens{camera.width, camera.height, of[0], of[1], of[2], of[3], {}, camera.coefficients};
+    if (camera.model != "pinhole") return std::nullopt;
+    if (camera.distortion == "none") lens.coefficients.resize(4);
+    if (lens.coefficients.size() != 4) return std::nullopt;
+    if (camera.distortion == "equidistant") {
+        lens.distortion = "equidistant";
+    } else if (camera.distortion == "radtan" || camera.distortion == "none") {
+        lens.distortion = "plumb_bob";
+        lens.coefficients.push_back(0);  // k3
+    } else {
+        return std::nullopt;
+    }
+    return lens;
+}
+
+/// Cameras are named by their topics.
+Expected<> Recorder::read_lenses(const std::string& camchain, const std::string& path) {
+    const auto cameras = parse_camchain(camchain, path);
+    if (!cameras) return Unexpected(cameras.error());
+    for (const CalibratedCamera& camera : *cameras) {
+        const std::size_t end = camera.topic.find("/", 1);
+        const auto lens = lens_of(camera);
+        if (lens && end != std::string::npos) lenses_[camera.topic.substr(1, end - 1)] = *lens;
+    }
+    return {};
+}
+
 Expected<> Recorder::read_calibration() {
     for (const std::string& path : settings_.calibration) {
         std::ifstream file(path, std::ios::binary);
@@ -268,6 +301,8 @@ Expected<> Recorder::read_calibration() {
         std::string bytes{std::istreambuf_iterator<char>(file), {}};
         const bool imu = bytes.find("rostopic") != std::string::npos &&
                          bytes.find("gyroscope_noise_density") != std::string::npos;
+        if (!imu)
+            if (auto read = read_lenses(bytes, path); !read) return read;
         attachments_.push_back({imu ? "calibration/imu.yaml" : "calibration/camchain.yaml",
                                 "application/yaml", std::move(bytes)});
     }
@@ -302,7 +337,7 @@ Expected<> Recorder::begin_file() {
     auto file = McapWriter::create(path, "versavis " VERSAVIS_VERSION);
     if (!file) return Unexpected(file.error());
     if (part > 0) report_.files.push_back(path);
-    writer_.emplace(std::move(*file));
+    writer_.emplace(std::move(*file), lenses_);
     file_open_ = true;
     file_begun_ = host_now();
     const auto status = read_status(settings_.instance);

@@ -62,8 +62,7 @@ constexpr std::pair<std::string_view, std::string_view> part_definitions[]{
 
 std::string part(std::string_view name) {
     for (const auto& [type, fields] : part_definitions)
-        if (type == name)
-            return fmt::format("{:=>80}\nMSG: {}\n{}", "", name, fields);
+        if (type == name) return fmt::format("{:=>80}\nMSG: {}\n{}", "", name, fields);
     return {};
 }
 
@@ -118,13 +117,20 @@ std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMe
         .bytes();
 }
 
-std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame) {
+std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame,
+                            const RosLens* lens) {
+    const bool known =
+        lens != nullptr && lens->width == frame.width && lens->height == frame.height;
+    const RosLens all = known ? *lens : RosLens{};
+    const double one = known ? 1 : 0;  // k of zeros: not calibrated
     CdrWriter message;
-    message.header(time, stream).number(frame.height).number(frame.width).text("");
-    message.number(std::uint32_t{0});                                         // d
-    message.numbers(std::array<double, 9>{});                                 // k: not calibrated
-    message.numbers(std::array<double, 9>{});                                 // r
-    message.numbers(std::array<double, 12>{});                                // p
+    message.header(time, stream).number(frame.height).number(frame.width).text(all.distortion);
+    message.number(static_cast<std::uint32_t>(all.coefficients.size()));
+    for (const double coefficient : all.coefficients) message.number(coefficient);
+    message.numbers(std::array{all.fx, 0.0, all.cx, 0.0, all.fy, all.cy, 0.0, 0.0, one});  // k
+    message.numbers(std::array{one, 0.0, 0.0, 0.0, one, 0.0, 0.0, 0.0, one});              // r
+    message.numbers(
+        std::array{all.fx, 0.0, all.cx, 0.0, 0.0, all.fy, all.cy, 0.0, 0.0, 0.0, one, 0.0});  // p
     message.numbers(std::array<std::uint32_t, 2>{});                          // binning
     message.numbers(std::array<std::uint32_t, 4>{}).number(std::uint8_t{0});  // roi: all
     return message.bytes();

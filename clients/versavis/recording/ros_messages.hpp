@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "versavis/metadata.hpp"
 #include "versavis/time.hpp"
@@ -22,8 +23,22 @@ std::string ros_image_head(OutputTime time, std::string_view stream, const Frame
 std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                          std::uint32_t length);
 
-/// sensor_msgs/msg/CameraInfo of a camera that nobody has calibrated.
-std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame);
+/// What a CameraInfo tells of a lens: a pinhole, and its distortion by a name of ROS.
+struct RosLens {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    double fx = 0;
+    double fy = 0;
+    double cx = 0;
+    double cy = 0;
+    std::string distortion;
+    std::vector<double> coefficients;
+};
+
+/// sensor_msgs/msg/CameraInfo; without a lens, or with one of another size than the frame, that of
+/// a camera that nobody has calibrated.
+std::string ros_camera_info(OutputTime time, std::string_view stream, const FrameMetadata& frame,
+                            const RosLens* lens = nullptr);
 
 /// sensor_msgs/msg/Imu.
 std::string ros_imu(OutputTime time, std::string_view stream, const ImuMetadata& sample);
