@@ -386,6 +386,23 @@ TEST_CASE_METHOD(Instance, "recorder: camera infos have the intrinsics that it i
     CHECK(Recording::open(settings.output)->attachment("calibration/camchain.yaml") != nullptr);
 }
 
+TEST_CASE_METHOD(Instance, "recorder: a status that is none, as of a file that is played") {
+    const std::string text = GENERATE(std::string("[1]"), std::string(R"({"schema":"1"})"),
+                                      std::string(200'000, '[') + std::string(200'000, ']'));
+    auto status = make({"status", ring::StreamKind::status, 8, 4, 500'000});
+    status.heartbeat(host_now());
+    const std::uint32_t slot = status.acquire().value();
+    std::memcpy(status.slot_data(slot), text.data(), text.size());
+    status.publish(slot, static_cast<std::uint32_t>(text.size()), OutputTime{5}, {});
+    const auto settings = this->settings();
+    const RecordReport report = record(settings, [&](int turn) {
+        publish();
+        return turn < 3;
+    });
+    CHECK(report.lost() == 0);
+    CHECK(Recording::open(settings.output)->attachment("status.json") == nullptr);
+}
+
 TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
     auto settings = this->settings();
     settings.split_bytes = 20'000;

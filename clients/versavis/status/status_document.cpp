@@ -27,7 +27,7 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
         return failure(fmt::format("instance {}", instance),
                        "the service has not published its status yet", "try again in a second");
     auto document = parse_shallow_json(*newest);
-    if (document.is_discarded() || document.value("schema", 0) != 1)
+    if (!document.is_object() || document.value("schema", nlohmann::json()) != 1)
         return failure(fmt::format("instance {}", instance),
                        "the status document has another version",
                        "install service and clients of the same release");
