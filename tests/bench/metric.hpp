@@ -39,8 +39,9 @@ std::vector<Metric> bench_cameras(double seconds);
 std::vector<Metric> bench_link();
 
 /// Three cameras and a fast IMU recorded for `seconds`: losses, processor time against bare
-/// writing, PNG, a recorder that is stopped or killed.
-std::vector<Metric> bench_record(double seconds);
+/// writing, PNG, the highest rate that a disk takes, a recorder that is stopped or killed.
+/// `directory`: where to; empty: the current one, or memory where its disk is too slow.
+std::vector<Metric> bench_record(double seconds, const std::string& directory);
 
 /// How soon a camera delivers verified frames again after it, or the board, rebooted.
 std::vector<Metric> bench_recovery();

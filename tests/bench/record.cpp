@@ -4,14 +4,19 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <bit>
+#include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
+#include <tuple>
 
 #include "../support/process.hpp"
 #include "../support/temporary_directory.hpp"
@@ -34,8 +39,35 @@ constexpr std::uint32_t mono8 = 0x01080001;
 constexpr std::size_t frame_size = std::size_t{width} * height;
 constexpr unsigned cameras = 3;
 constexpr double frame_hz = 20;
-constexpr unsigned samples_for_a_frame = 40;
-constexpr std::uint32_t slots = 17;
+constexpr double sample_hz = 800;
+constexpr double set_size = cameras * frame_size;
+
+/// A disk that takes so much more than the cameras make is taken for one that can. Half: it cannot.
+/// Twice: good disks are not used.
+constexpr double disk_margin = 1.5;
+
+/// To learn a disk's rate. Half: its own memory may hold what was written. Twice: it takes longer.
+constexpr Duration probe_time = milliseconds(1500);
+
+/// Written at a time, and how its memory must lie. Half: more calls. Twice: nothing is faster.
+constexpr std::size_t block_size = 4 << 20U;
+
+/// At each rate that is tried. Half: fsync is a large part of it. Twice: it takes longer.
+constexpr double rung_size = 1e9;
+
+/// The first rate that is tried, as a share of the disk's, and from one to the next. Half: it takes
+/// longer. Twice: the first may be too much, and the highest is known less well.
+constexpr double first_rung = 0.3;
+constexpr double rung_step = 1.2;
+
+/// What gets so much less onto the disk than the cameras should make is behind: the recorder, or
+/// the cameras. Half: the last fsync alone is that much. Twice: the disk is asked for more and
+/// more.
+constexpr double behind = 1.3;
+
+/// After its first chunk a recorder is killed at a random instant of so long. Half: most files have
+/// one or two chunks. Twice: it takes longer.
+constexpr int kill_range_ms = 300;
 
 template <class T>
 T checked(Expected<T> made) {
@@ -43,9 +75,13 @@ T checked(Expected<T> made) {
     return std::move(*made);
 }
 
+using Scenes = std::vector<std::vector<std::byte>>;
+
+Scenes flat_scene() { return Scenes(1, std::vector<std::byte>(frame_size)); }
+
 /// A scene whose detail falls with its frequency, and the shot noise of a sensor: blocks of all
 /// sizes, and a spread that grows with the root of the brightness.
-std::vector<std::vector<std::byte>> noisy_scenes() {
+Scenes noisy_scenes() {
     constexpr unsigned count = 4;
     std::mt19937 random(1);
     std::normal_distribution<double> normal;
@@ -59,7 +95,7 @@ std::vector<std::vector<std::byte>> noisy_scenes() {
                 scene[std::size_t{y} * width + x] +=
                     values[std::size_t{y / block} * (width / block + 2) + x / block];
     }
-    std::vector<std::vector<std::byte>> frames(count, std::vector<std::byte>(frame_size));
+    Scenes frames(count, std::vector<std::byte>(frame_size));
     for (auto& frame : frames)
         for (std::size_t i = 0; i < frame_size; ++i) {
             const double level = std::clamp(scene[i], 4.0, 250.0);
@@ -79,13 +115,14 @@ struct Course {
 /// The service's part, in a process of its own: three cameras and an IMU.
 class Streams {
  public:
-    /// `pace`: from one set of frames to the next; none: as fast as `limit_mb_s` allows.
-    Streams(std::string instance, Duration pace, bool noisy)
+    /// `rate_hz`: of sets of frames.
+    Streams(std::string instance, double rate_hz, const Scenes& scenes)
         : instance_(std::move(instance)),
           directory_(instance_directory(instance_)),
           course_(make_shared_between_processes<Course>()) {
         std::filesystem::create_directories(directory_);
-        child_ = std::make_unique<Child>([this, pace, noisy] { publish_all(pace, noisy); });
+        child_ =
+            std::make_unique<Child>([this, rate_hz, &scenes] { publish_all(rate_hz, scenes); });
         while (!course_->ready) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     Streams(const Streams&) = delete;
@@ -98,26 +135,31 @@ class Streams {
     std::uint64_t frames() const { return course_->frames; }
 
  private:
-    void publish_all(Duration pace, bool noisy) {
+    void publish_all(double rate_hz, const Scenes& scenes) {
         using Kind = ring::StreamKind;
-        const auto scenes =
-            noisy ? noisy_scenes()
-                  : std::vector<std::vector<std::byte>>(1, std::vector<std::byte>(frame_size));
+        // As many as the service makes by default.
+        const auto slots = static_cast<std::uint32_t>(std::ceil(14 + 0.12 * rate_hz));
+        const auto descriptors = std::bit_ceil(std::max(64U, 2 * slots));
         std::vector<ring::Writer> rings;
         for (unsigned camera = 0; camera < cameras; ++camera)
             rings.push_back(checked(ring::Writer::create(
-                directory_, {fmt::format("cam{}", camera), Kind::frames, 64, slots, frame_size})));
+                directory_, {fmt::format("cam{}", camera), Kind::frames, descriptors, slots,
+                             static_cast<std::uint32_t>(frame_size)})));
         auto imu = checked(ring::Writer::create(directory_, {"imu0", Kind::imu, 16384}));
         course_->ready = true;
         auto due = std::chrono::steady_clock::now();
+        const auto samples =
+            std::max<std::uint64_t>(1, static_cast<std::uint64_t>(sample_hz / rate_hz));
+        const std::chrono::nanoseconds pause(
+            static_cast<std::int64_t>(1e9 / rate_hz / static_cast<double>(samples)));
         for (std::uint64_t tick = 0; !course_->stop; ++tick) {
-            due += std::chrono::nanoseconds(pace.ns / samples_for_a_frame);
+            due += pause;
             std::this_thread::sleep_until(due);
             const OutputTime time{host_now().ns};
             ImuMetadata sample{};
             sample.number = tick;
             imu.publish(time, pack(sample));
-            if (tick % samples_for_a_frame == 0)
+            if (tick % samples == 0)
                 for (ring::Writer& ring : rings) publish(ring, time, scenes);
             if (tick % 16 != 0) continue;
             for (ring::Writer& ring : rings) ring.heartbeat(host_now());
@@ -125,8 +167,7 @@ class Streams {
         }
     }
 
-    void publish(ring::Writer& ring, OutputTime time,
-                 const std::vector<std::vector<std::byte>>& scenes) {
+    void publish(ring::Writer& ring, OutputTime time, const Scenes& scenes) {
         FrameMetadata frame{};
         frame.trigger = ring.head() + 1;
         frame.width = frame.stride = width;
@@ -145,7 +186,87 @@ class Streams {
     std::unique_ptr<Child> child_;
 };
 
-constexpr Duration set_period = {static_cast<std::int64_t>(1e9 / frame_hz)};
+/// Bytes per second that the disk of `directory` takes: past the page cache, where the file system
+/// can, since that may cost more than the disk.
+double raw_rate(const std::string& directory, const Scenes& scenes) {
+    const std::string path = fmt::format("{}/versavis-bench-raw-{}", directory, ::getpid());
+    constexpr int flags = O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC;
+    int file = ::open(path.c_str(), flags | O_DIRECT, 0600);
+    if (file < 0) file = ::open(path.c_str(), flags, 0600);
+    if (file < 0) throw std::runtime_error(path + " cannot be written: name another --directory");
+    const std::unique_ptr<void, decltype(&std::free)> block(
+        std::aligned_alloc(block_size, block_size), &std::free);
+    for (std::size_t at = 0; at < block_size; at += frame_size)
+        std::memcpy(static_cast<std::byte*>(block.get()) + at, scenes.back().data(),
+                    std::min(frame_size, block_size - at));
+    const HostTime begin = host_now();
+    double written = 0;
+    bool good = true;
+    while (good && host_now() - begin < probe_time) {
+        good = ::write(file, block.get(), block_size) == static_cast<ssize_t>(block_size);
+        written += block_size;
+    }
+    good = good && ::fdatasync(file) == 0;
+    const double seconds = static_cast<double>((host_now() - begin).ns) * 1e-9;
+    ::close(file);
+    std::filesystem::remove(path);
+    if (!good) throw std::runtime_error(directory + " is full: name another --directory");
+    return written / seconds;
+}
+
+/// What was recorded of an item: stream, number, stamp, pixels.
+using Seen = std::tuple<std::string, std::uint64_t, std::int64_t, std::size_t>;
+
+/// None: the file cannot be read.
+std::optional<std::vector<Seen>> items_in(const std::string& path) {
+    const auto recording = client::Recording::open(path);
+    if (!recording) return std::nullopt;
+    std::vector<Seen> items;
+    const auto read = recording->for_each({}, [&](const client::RecordedItem& item) {
+        const std::string_view pixels(reinterpret_cast<const char*>(item.payload.data()),
+                                      item.payload.size());
+        items.emplace_back(item.stream, item.number, item.time.ns,
+                           std::hash<std::string_view>()(pixels));
+        return true;
+    });
+    if (!read) return std::nullopt;
+    return items;
+}
+
+/// npm's @mcap/core, if this build has fetched it.
+class OthersReader {
+ public:
+    explicit OthersReader(const std::string& directory) : log_(directory + "/reader.log") {
+        std::string ignored;
+        there_ = std::filesystem::exists(script_) &&
+                 test::run({"sh", "-c", "command -v node"}, log_, &ignored) == 0;
+    }
+
+    bool there() const { return there_; }
+
+    /// Items of all streams that it reads; none: it cannot, or is not there. `how`: --stream, of a
+    /// file without its end; or nothing: by its indexes, too, which must say the same.
+    std::optional<std::uint64_t> items(const std::string& path,
+                                       const std::vector<std::string>& how) const {
+        if (!there_) return std::nullopt;
+        std::vector<std::string> command{"node", script_, path};
+        command.insert(command.end(), how.begin(), how.end());
+        std::string output;
+        if (test::run(command, log_, &output) != 0) return std::nullopt;
+        const auto seen = nlohmann::json::parse(output, nullptr, false);
+        if (seen.is_discarded()) return std::nullopt;
+        if (how.empty() && seen["streamed"] != seen["indexed"]) return std::nullopt;
+        std::uint64_t items = 0;
+        for (const auto& [topic, messages] : seen["streamed"].items())
+            if (topic.ends_with("/item")) items += messages.get<std::uint64_t>();
+        return items;
+    }
+
+ private:
+    std::string script_ = test::program("../readers/read_mcap.mjs");
+    std::string log_;
+    bool there_ = false;
+};
 
 struct Recorded {
     nlohmann::json report;
@@ -155,17 +276,39 @@ struct Recorded {
 
 class Bench {
  public:
-    explicit Bench(double seconds) : seconds_(seconds) {}
+    Bench(double seconds, const std::string& disk)
+        : seconds_(seconds),
+          disk_(disk.empty() ? std::filesystem::current_path().string() : disk),
+          directory_(disk.empty() ? fast_directory() : disk),
+          others_(directory_.path().string()) {
+        const auto room = static_cast<double>(std::filesystem::space(directory_.path()).available);
+        if (room < 1.2 * seconds_ * frame_hz * set_size)
+            throw std::runtime_error("too little room there for so long: --directory or --seconds");
+        if (!others_.there())
+            fmt::print(stderr,
+                       "bench record: @mcap/core is not asked: it needs node, and "
+                       "'ninja -C build readers'\n");
+    }
 
     std::vector<Metric> run() {
         measure_cost();
         measure_png();
+        measure_highest_rate();
         measure_stop();
         measure_kills();
         return std::move(metrics_);
     }
 
  private:
+    /// The disk, if it takes what the cameras make; else memory.
+    std::string fast_directory() const {
+        const double rate = raw_rate(disk_, noisy_);
+        const bool fast = rate >= disk_margin * frame_hz * set_size;
+        fmt::print(stderr, "bench record: {} takes {:.0f} MB/s: {}\n", disk_, rate * 1e-6,
+                   fast ? "recordings go there" : "recordings go to /dev/shm");
+        return fast ? disk_ : "/dev/shm";
+    }
+
     std::vector<std::string> command(const std::string& file,
                                      std::vector<std::string> more = {}) const {
         std::vector<std::string> all{
@@ -176,10 +319,15 @@ class Bench {
     std::string file(const std::string& name) const { return (directory_.path() / name).string(); }
 
     /// Runs the recorder; `meanwhile` gets its process.
-    Recorded record(const std::string& name, std::vector<std::string> options,
+    Recorded record(const std::string& name, double seconds, std::vector<std::string> options = {},
                     const std::function<void(test::Process&)>& meanwhile = {}) {
-        options.insert(options.end(), {"--seconds", fmt::format("{}", seconds_)});
-        test::Process process(command(file(name), options), file(name + ".log"));
+        return record_into(file(name), seconds, std::move(options), meanwhile);
+    }
+
+    Recorded record_into(const std::string& path, double seconds, std::vector<std::string> options,
+                         const std::function<void(test::Process&)>& meanwhile = {}) {
+        options.insert(options.end(), {"--seconds", fmt::format("{}", seconds)});
+        test::Process process(command(path, options), file("record.log"));
         if (meanwhile) meanwhile(process);
         Recorded recorded;
         while (process.wait(milliseconds(50)) < 0) {
@@ -210,26 +358,26 @@ class Bench {
             *cost = (Usage::now() - before).cpu_ns * 1e-9;
             ::close(out);
         });
-        child.finish(seconds(300));
+        child.finish(seconds(60 + static_cast<int>(2 * seconds_)));
         std::filesystem::remove(path);
         return *cost;
     }
 
     void measure_cost() {
-        const Streams streams(instance_, set_period, false);
-        const Recorded recorded = record("raw.mcap", {});
+        const Streams streams(instance_, frame_hz, flat_);
+        const Recorded recorded = record("raw.mcap", seconds_);
+        std::filesystem::remove(file("raw.mcap"));
         metrics_.push_back({"record, lost", recorded.report["lost"], "items", 0});
         metrics_.push_back(
             {"record, rate", static_cast<double>(recorded.bytes) / seconds_ * 1e-6, "MB/s", {}});
         metrics_.push_back({"record, CPU", recorded.cpu_s / seconds_, "processors", {}});
         metrics_.push_back({"record, CPU to bare writing",
                             recorded.cpu_s / bare_cpu_s(recorded.bytes), "ratio", 1.2});
-        std::filesystem::remove(file("raw.mcap"));
     }
 
     void measure_png() {
-        const Streams streams(instance_, set_period, true);
-        const Recorded recorded = record("png.mcap", {"--compress", "png"});
+        const Streams streams(instance_, frame_hz, noisy_);
+        const Recorded recorded = record("png.mcap", seconds_, {"--compress", "png"});
         const double frames = recorded.report["streams"]["cam0"]["items"].get<double>() +
                               recorded.report["streams"]["cam1"]["items"].get<double>() +
                               recorded.report["streams"]["cam2"]["items"].get<double>();
@@ -241,10 +389,44 @@ class Bench {
         std::filesystem::remove(file("png.mcap"));
     }
 
+    /// The rate of frames rises until items are lost, or the disk is surely behind. What counts is
+    /// when all is on the disk, as with raw writing: the page cache takes any rate for a while.
+    void measure_highest_rate() {
+        const test::TemporaryDirectory directory(disk_);
+        const std::string path = (directory.path() / "fast.mcap").string();
+        const double before = raw_rate(disk_, noisy_);
+        double highest = 0;
+        double cpu = 0;
+        for (double rate = first_rung * before;; rate *= rung_step) {
+            const Streams streams(instance_, rate / set_size, noisy_);
+            const double length = std::max(1.0, rung_size / rate);
+            const Recorded recorded = record_into(path, length, {});
+            std::filesystem::remove(path);
+            const std::uint64_t lost = recorded.report["lost"];
+            const double taken =
+                static_cast<double>(recorded.bytes) / recorded.report["seconds"].get<double>();
+            fmt::print(stderr, "bench record: at {:.0f} MB/s {:.0f} come to the disk, {} lost\n",
+                       rate * 1e-6, taken * 1e-6, lost);
+            if (lost != 0) break;
+            if (taken > highest) {
+                highest = taken;
+                cpu = recorded.cpu_s / recorded.report["seconds"].get<double>();
+            }
+            if (taken * behind < rate) break;
+        }
+        // Disks are not always equally fast: the recorder is held against the better one.
+        const double raw = std::max(before, raw_rate(disk_, noisy_));
+        metrics_.push_back({"record, disk's raw write rate", raw * 1e-6, "MB/s", {}});
+        metrics_.push_back({"record, highest rate without loss", highest * 1e-6, "MB/s", {}});
+        metrics_.push_back({"record, CPU at that rate", cpu, "processors", {}});
+        metrics_.push_back({"record, raw rate to highest", raw / highest, "ratio", 1 / 0.9});
+    }
+
     /// Missing numbers are those that the file tells.
     void measure_stop() {
-        const Streams streams(instance_, set_period, false);
-        const Recorded recorded = record("stopped.mcap", {}, [](test::Process& process) {
+        const Streams streams(instance_, frame_hz, flat_);
+        const double length = std::max(seconds_, 6.0);
+        const Recorded recorded = record("stopped.mcap", length, {}, [](test::Process& process) {
             std::this_thread::sleep_for(std::chrono::seconds(1));
             process.signal(SIGSTOP);
             std::this_thread::sleep_for(std::chrono::seconds(2));
@@ -267,7 +449,7 @@ class Bench {
         metrics_.push_back(
             {"record, stopped for 2 s: lost", static_cast<double>(told), "items", {}});
         metrics_.push_back({"record, stopped for 2 s: lost and not told", untold, "items", 0});
-        const double expected = (seconds_ - 1) * frame_hz * cameras;
+        const double expected = (length - 1) * frame_hz * cameras;
         metrics_.push_back({"record, stopped for 2 s: frames the service published, of what is due",
                             expected / static_cast<double>(streams.frames()), "ratio", 1});
         std::filesystem::remove(file("stopped.mcap"));
@@ -276,47 +458,59 @@ class Bench {
     /// Each file is read up to its last whole chunk, and repaired with the same items.
     void measure_kills() {
         constexpr int kills = 100;
-        const Streams streams(instance_, set_period, false);
+        const Streams streams(instance_, frame_hz, noisy_);
         std::mt19937 random(3);
-        double unreadable = 0;
+        double bad = 0;
+        double unread = 0;
         for (int i = 0; i < kills; ++i) {
             const std::string path = file("killed.mcap");
-            {
-                test::Process process(command(path, {"imu0", "cam0"}), file("killed.log"));
-                std::this_thread::sleep_for(std::chrono::milliseconds(20 + random() % 900));
-                process.signal(SIGKILL);
-                process.wait(seconds(10));
-            }
-            if (std::filesystem::exists(path) && !good(path)) ++unreadable;
+            kill_recorder(path, milliseconds(static_cast<int>(random() % kill_range_ms)));
+            const auto before = items_in(path);
+            const auto cut_off = others_.items(path, {"--stream"});
+            const auto repaired = client::repair(path, "");
+            const auto after = items_in(path);
+            if (!before || before->empty() || !repaired || repaired->was_whole || after != before)
+                ++bad;
+            if (!before || cut_off != before->size() || others_.items(path, {}) != before->size())
+                ++unread;
             for (const char* end : {"", ".cut"}) std::filesystem::remove(path + end);
         }
-        metrics_.push_back(
-            {"record, 100 kills: files not read or repaired", unreadable, "files", 0});
+        metrics_.push_back({"record, 100 kills: files not read or repaired", bad, "files", 0});
+        if (others_.there())
+            metrics_.push_back({"record, 100 kills: not read by @mcap/core", unread, "files", 0});
     }
 
-    static std::uint64_t items_in(const std::string& path) {
-        const auto recording = client::Recording::open(path);
-        std::uint64_t items = 0;
-        if (recording)
-            for (const auto& stream : recording->streams()) items += stream.items;
-        return items;
+    /// So long after the first chunk stood in the file.
+    void kill_recorder(const std::string& path, Duration later) {
+        test::Process process(command(path, {"imu0", "cam0"}), file("killed.log"));
+        const HostTime deadline = host_now() + seconds(20);
+        const auto begun = [&] {
+            const auto recording = client::Recording::open(path);
+            return recording && recording->facts().chunks > 0;
+        };
+        while (!begun()) {
+            if (host_now() > deadline) throw std::runtime_error("the recorder writes nothing");
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        std::this_thread::sleep_for(std::chrono::nanoseconds(later.ns));
+        process.signal(SIGKILL);
+        process.wait(seconds(10));
     }
 
-    /// One that was killed before its first chunk has nothing to repair.
-    static bool good(const std::string& path) {
-        const std::uint64_t before = items_in(path);
-        const auto repaired = client::repair(path, "");
-        return before == 0 || (repaired && items_in(path) == before);
-    }
-
+    Scenes flat_ = flat_scene();
+    Scenes noisy_ = noisy_scenes();
     double seconds_;
-    test::TemporaryDirectory directory_{"/dev/shm"};
+    std::string disk_;
+    test::TemporaryDirectory directory_;
+    OthersReader others_;
     std::string instance_ = fmt::format("bench-record-{}", ::getpid());
     std::vector<Metric> metrics_;
 };
 
 }  // namespace
 
-std::vector<Metric> bench_record(double seconds) { return Bench(seconds).run(); }
+std::vector<Metric> bench_record(double seconds, const std::string& directory) {
+    return Bench(seconds, directory).run();
+}
 
 }  // namespace versavis::bench
