@@ -286,7 +286,7 @@ Expected<> Recorder::read_lenses(const std::string& camchain, const std::string&
     const auto cameras = parse_camchain(camchain, path);
     if (!cameras) return Unexpected(cameras.error());
     for (const CalibratedCamera& camera : *cameras) {
-        const std::size_t end = camera.topic.find("/", 1);
+        const std::size_t end = camera.topic.find('/', 1);
         const auto lens = lens_of(camera);
         if (lens && end != std::string::npos) lenses_[camera.topic.substr(1, end - 1)] = *lens;
     }
