@@ -76,43 +76,43 @@ TEST_CASE("kalibr_yaml: cameras in another order have the links of that order") 
     // Turned by 90 degrees about z, and about x.
     const Transform one{0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1};
     const Transform two{1, 0, 0, -0.5, 0, 0, -1, 0, 0, 1, 0, 0.25, 0, 0, 0, 1};
-    std::vector<CalibratedCamera> chain(3);
-    chain[0].overlaps = {1};
-    chain[1].overlaps = {0, 2};
-    chain[2].overlaps = {1};
-    chain[1].to_previous = one;
-    chain[2].to_previous = two;
-    const auto same = rearranged(chain, {0, 1, 2});
+    std::vector<CalibratedCamera> cameras(3);
+    cameras[0].overlaps = {1};
+    cameras[1].overlaps = {0, 2};
+    cameras[2].overlaps = {1};
+    cameras[1].to_previous = one;
+    cameras[2].to_previous = two;
+    const auto same = rearranged(cameras, {0, 1, 2});
     CHECK(same[1].to_previous == one);
     CHECK(same[2].to_previous == two);
     CHECK(same[1].overlaps == std::vector<std::uint32_t>{0, 2});
 
-    const auto swapped = rearranged(chain, {1, 0});
+    const auto swapped = rearranged(cameras, {1, 0});
     CHECK_FALSE(swapped[0].to_previous);
     for (std::size_t i = 0; i < 16; ++i)
         CHECK(swapped[1].to_previous->at(i) == Approx(inverse(one)[i]).margin(1e-12));
     CHECK(swapped[0].overlaps == std::vector<std::uint32_t>{1});
 
     // Of two after one: rows of the one's rotation are turned, and its origin is moved.
-    const auto without_middle = rearranged(chain, {0, 2});
+    const auto without_middle = rearranged(cameras, {0, 2});
     const Transform both{0, -1, 0, -0.4, 0, 0, -1, -0.3, 1, 0, 0, 0.45, 0, 0, 0, 1};
     for (std::size_t i = 0; i < 16; ++i)
         CHECK(without_middle[1].to_previous->at(i) == Approx(both[i]).margin(1e-12));
     CHECK(without_middle[0].overlaps.empty());
 
-    const auto turned = rearranged(chain, {2, 0, 1});
+    const auto turned = rearranged(cameras, {2, 0, 1});
     for (std::size_t i = 0; i < 16; ++i)
         CHECK(turned[1].to_previous->at(i) == Approx(inverse(both)[i]).margin(1e-12));
     CHECK(turned[2].to_previous == one);
     CHECK(turned[0].overlaps == std::vector<std::uint32_t>{2});
 
-    chain[1].to_previous.reset();
-    CHECK_FALSE(rearranged(chain, {1, 0})[1].to_previous);
-    chain[0].from_imu = two;
-    chain[1].from_imu = Transform{both};
+    cameras[1].to_previous.reset();
+    CHECK_FALSE(rearranged(cameras, {1, 0})[1].to_previous);
+    cameras[0].from_imu = two;
+    cameras[1].from_imu = Transform{both};
     for (std::size_t i = 0; i < 16; ++i)  // T_cam0_imu less T_cam1_imu: two less both
-        CHECK(rearranged(chain, {0, 1})[1].to_previous->at(i) ==
-              Approx(inverse(*rearranged(chain, {1, 0})[1].to_previous)[i]).margin(1e-12));
+        CHECK(rearranged(cameras, {0, 1})[1].to_previous->at(i) ==
+              Approx(inverse(*rearranged(cameras, {1, 0})[1].to_previous)[i]).margin(1e-12));
 }
 
 TEST_CASE("time_shift: the IMU that was calibrated is the only one, or is named") {
