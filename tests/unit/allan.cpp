@@ -71,7 +71,7 @@ TEST_CASE("allan: too few rates have no deviation", "[allan]") {
     CHECK_FALSE(axis_noise(std::vector<float>(5000, 0.5F), 0.1));
 }
 
-TEST_CASE("allan: density and walk of simulated noise, and honest sigmas", "[allan]") {
+TEST_CASE("allan: density and walk of simulated noise, and honest sigmas", "[statistics]") {
     constexpr int runs = 60;
     double density_square = 0;
     double walk_square = 0;

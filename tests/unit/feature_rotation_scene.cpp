@@ -61,7 +61,8 @@ Scene look(double seconds_long, Duration exposure, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("feature_rotation_scene: the rig's world shows no offset, and the right axes") {
+TEST_CASE("feature_rotation_scene: the rig's world shows no offset, and the right axes",
+          "[statistics]") {
     const Duration exposure = GENERATE(milliseconds(1), milliseconds(5));
     const Scene scene = look(15, exposure, 4);
     CHECK(scene.frames.size() > 270);

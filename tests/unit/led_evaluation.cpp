@@ -66,7 +66,7 @@ std::unique_ptr<LedBench> bench(const LedBenchSettings& settings) {
 
 }  // namespace
 
-TEST_CASE("led_evaluation: from pixels to the offset, within 5 us") {
+TEST_CASE("led_evaluation: from pixels to the offset, within 5 us", "[statistics]") {
     const double rate_hz = GENERATE(1000.0, 970.0);
     const Duration late =
         GENERATE(microseconds(-60), microseconds(0), microseconds(23), microseconds(180));

@@ -163,13 +163,13 @@ void honest(const Score& score) {
 
 }  // namespace
 
-TEST_CASE("rotation_offset: 30 s of lively motion with good features", "[rotation_offset]") {
+TEST_CASE("rotation_offset: 30 s of lively motion with good features", "[statistics]") {
     const Score found = score({}, runs);
     honest(found);
     CHECK(found.rms_s < 62e-6 * 1.25);
 }
 
-TEST_CASE("rotation_offset: poor features", "[rotation_offset]") {
+TEST_CASE("rotation_offset: poor features", "[statistics]") {
     World world;
     world.camera_sigma = 2e-3;
     const Score found = score(world, runs);
@@ -177,7 +177,7 @@ TEST_CASE("rotation_offset: poor features", "[rotation_offset]") {
     CHECK(found.rms_s < 236e-6 * 1.25);
 }
 
-TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[rotation_offset]") {
+TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[statistics]") {
     World world;
     world.camera_sigma = 2e-3;
     world.outliers = 0.1;
@@ -186,7 +186,7 @@ TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[rotation_offs
     CHECK(found.rms_s < 259e-6 * 1.25);
 }
 
-TEST_CASE("rotation_offset: slow motion tells less, and says so", "[rotation_offset]") {
+TEST_CASE("rotation_offset: slow motion tells less, and says so", "[statistics]") {
     World world;
     world.camera_sigma = 2e-3;
     world.rate_rms = 0.2;
@@ -196,7 +196,7 @@ TEST_CASE("rotation_offset: slow motion tells less, and says so", "[rotation_off
     CHECK(found.rms_s < 1.3e-3 * 1.25);
 }
 
-TEST_CASE("rotation_offset: motion that is too slow is refused", "[rotation_offset]") {
+TEST_CASE("rotation_offset: motion that is too slow is refused", "[statistics]") {
     World world;
     world.camera_sigma = 2e-3;
     world.rate_rms = 0.05;
