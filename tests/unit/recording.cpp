@@ -191,6 +191,18 @@ TEST_CASE("recording: its begin and length are those of stamps, where there are 
     CHECK(told(file) == std::pair(seconds(400).ns, seconds(2).ns));
 }
 
+TEST_CASE("recording: a stamp that is no time is told, with its place") {
+    const test::TemporaryDirectory directory;
+    const std::int64_t ns = GENERATE(INT64_MIN, INT64_MAX, std::int64_t{1} << 61);
+    test::RecordingFile file;
+    file.add({"imu0", ring::StreamKind::imu, 0, 1, OutputTime{ns}, {}, {}});
+    const auto recording = Recording::open(directory.write("a.mcap", file.finish()));
+    REQUIRE(recording);
+    const auto read = recording->for_each({}, [](const RecordedItem&) { return true; });
+    REQUIRE_FALSE(read);
+    CHECK_THAT(read.error().message(), Catch::Contains("the stamp of an item is no time"));
+}
+
 TEST_CASE("recording: JSON that is nested without end is as good as damaged") {
     const auto nested = [](int levels) {
         return std::string(levels, '[') + std::string(levels, ']');

@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "clock/clock_csv.hpp"
+#include "clock/plausible_time.hpp"
 
 namespace versavis::client {
 
@@ -34,12 +35,6 @@ class Estimator final : public ClockEstimator {
     Filter filter_;
 };
 
-/// Stamps within 73 years of zero leave the estimators room for differences of differences.
-bool plausible(std::int64_t ns) {
-    constexpr std::int64_t most = std::int64_t{1} << 61;
-    return ns > -most && ns < most;
-}
-
 Expected<void> read_exchanges(const std::string& path, ClockRecording& recording) {
     const auto table = read_csv(path, {{"h1_ns", "m2_ns", "m3_ns", "h4_ns"}, {"available_ns"}});
     if (!table) return Unexpected(table.error());
@@ -50,8 +45,8 @@ Expected<void> read_exchanges(const std::string& path, ClockRecording& recording
     const auto& available = columns[4].empty() ? columns[3] : columns[4];
     for (std::size_t i = 0; i < table->rows; ++i) {
         const Exchange exchange{{columns[0][i]}, {columns[1][i]}, {columns[2][i]}, {columns[3][i]}};
-        const bool kept = plausible(exchange.sent.ns) && plausible(exchange.received.ns) &&
-                          plausible(exchange.answered.ns) && plausible(exchange.arrived.ns);
+        const bool kept = is_plausible(exchange.sent.ns) && is_plausible(exchange.received.ns) &&
+                          is_plausible(exchange.answered.ns) && is_plausible(exchange.arrived.ns);
         if (kept)
             recording.messages.push_back({{available[i]}, exchange});
         else
@@ -65,7 +60,7 @@ Expected<void> read_oneway(const std::string& path, ClockRecording& recording) {
     if (!table) return Unexpected(table.error());
     for (std::size_t i = 0; i < table->rows; ++i) {
         const OneWay message{{table->columns[0][i]}, {table->columns[1][i]}};
-        if (plausible(message.sent.ns) && plausible(message.arrived.ns))
+        if (is_plausible(message.sent.ns) && is_plausible(message.arrived.ns))
             recording.messages.push_back({message.arrived, message});
         else
             ++recording.ignored;
@@ -130,7 +125,7 @@ ClockAnswers replayed_answers(const std::vector<TimedMessage>& messages,
         const ClockQuery& query = queries[index];
         for (; next != messages.end() && next->available <= query.available; ++next)
             estimator.add(next->message);
-        if (plausible(query.board.ns)) answers[index] = estimator.translate(query.board);
+        if (is_plausible(query.board.ns)) answers[index] = estimator.translate(query.board);
     }
     return answers;
 }
@@ -143,7 +138,7 @@ ClockAnswers smoothed_answers(const std::vector<TimedMessage>& messages,
     const Smoother smoother(stamps);
     ClockAnswers answers(queries.size());
     for (std::size_t i = 0; i < queries.size(); ++i)
-        if (plausible(queries[i].board.ns)) answers[i] = smoother.translate(queries[i].board);
+        if (is_plausible(queries[i].board.ns)) answers[i] = smoother.translate(queries[i].board);
     return answers;
 }
 

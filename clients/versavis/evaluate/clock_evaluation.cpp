@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "clock/clock_plot.hpp"
+#include "clock/plausible_time.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::client {
@@ -87,17 +88,24 @@ class ClockItems {
     }
 
     void take(const RecordedExchange& told) {
+        if (!is_plausible(told.sent.ns) || !is_plausible(told.received.ns) ||
+            !is_plausible(told.answered.ns) || !is_plausible(told.arrived.ns))
+            return;
         BoardLife& known = life(told.nonce);
         known.stamps.messages.push_back(
             {told.arrived, Exchange{told.sent, told.received, told.answered, told.arrived}});
         ++known.exchanges;
     }
     void take(const RecordedMessage& told) {
+        if (!is_plausible(told.departed.ns) || !is_plausible(told.arrived.ns)) return;
         life(told.nonce)
             .stamps.messages.push_back({told.arrived, OneWay{told.departed, told.arrived}});
     }
     void take(const RecordedRestart& told) { life(told.nonce); }
-    void take(const RecordedOutput& told) { clocks_.outputs.push_back(told); }
+    void take(const RecordedOutput& told) {
+        if (is_plausible(told.host.ns) && is_plausible(told.minus_host.ns))
+            clocks_.outputs.push_back(told);
+    }
 
     RecordedClocks& clocks_;
 };
@@ -106,6 +114,7 @@ void add_event(const RecordedItem& item, RecordedClocks& clocks) {
     const auto event = unpack<EventMetadata>(item.metadata);
     if (event.kind == EventKind::utc_label) clocks.labelled = true;
     if (event.kind != EventKind::pps || (event.flags & flag_suspect) != 0) return;
+    if (!is_plausible(event.board_time.ns) || !is_plausible(event.host_time.ns)) return;
     const bool known = event.sigma_ns != sigma_unknown;
     clocks.pulses.push_back({event.board_time,
                              event.host_time,

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "process/restamping.hpp"
 
-#include <cstdlib>
+#include "clock/plausible_time.hpp"
 
 namespace versavis::client {
-
-namespace {
-
-/// Differences of stamps beyond this overflow.
-constexpr std::int64_t plausible = std::int64_t{1} << 61;
-
-}  // namespace
 
 Restamping::Restamping(const RecordedClocks& clocks, Duration asymmetry)
     : outputs_(clocks.outputs), asymmetry_(asymmetry) {
@@ -25,7 +18,7 @@ Restamping::Restamping(const RecordedClocks& clocks, Duration asymmetry)
 }
 
 std::optional<Restamping::Stamp> Restamping::stamp(BoardTime board, HostTime about) const {
-    if (std::abs(board.ns) > plausible || std::abs(about.ns) > plausible) return std::nullopt;
+    if (!is_plausible(board.ns) || !is_plausible(about.ns)) return std::nullopt;
     for (const clock::Smoother& smoother : smoothers_) {
         const clock::HostEstimate estimate = smoother.translate(board);
         if (estimate.state != clock::ClockState::locked) continue;

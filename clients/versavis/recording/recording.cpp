@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "clock/plausible_time.hpp"
 #include "recording/byte_cursor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
@@ -348,6 +349,8 @@ Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uin
     const auto message = parse_message(record.content);
     const auto envelope = parse_envelope(message->data);
     if (!envelope) return reader.damaged(record.offset, "an item is too short");
+    if (!is_plausible(envelope->time.ns))
+        return reader.damaged(record.offset, "the stamp of an item is no time");
     const auto place =
         static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
     RecordedItem item{
