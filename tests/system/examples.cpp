@@ -52,7 +52,11 @@ TEST_CASE("examples: each does what it says, and goes on after a restart") {
     ::setenv("VERSAVIS_LIBRARY", VERSAVIS_LIBRARY_FILE, 1);
     ::setenv("PYTHONPATH", VERSAVIS_SOURCE_DIR "/clients/python", 1);
     ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
-    CHECK(std::filesystem::is_socket(stream_path(stack.instance(), "cam0")));
+    const std::filesystem::path door = stream_path(stack.instance(), "cam0");
+    CHECK(std::filesystem::is_socket(door));
+    // A reader written from the document finds the way in, too.
+    CHECK(test::run({"python3", VERSAVIS_SOURCE_DIR "/tests/system/read_ring.py", door, "3"},
+                    stack.log_path("foreign"), nullptr) == 0);
     std::vector<std::unique_ptr<Process>> running;
     for (const Example& example : examples)
         running.push_back(std::make_unique<Process>(

@@ -6,22 +6,41 @@ read_ring.py FILE COUNT: prints item number, output time, trigger, size and corr
 frame.
 Exits 0 after COUNT intact frames, 1 if FILE is not a ring or they do not arrive in ten seconds.
 """
+import fcntl
 import mmap
 import os
+import socket
+import stat
 import struct
 import sys
 import time
+
+SEALS = 1 | 2 | 4 | 16  # seal, shrink, grow, future write
+F_GET_SEALS = 1034
 
 
 def unpack(memory, layout, offset):
     return struct.unpack_from("<" + layout, memory, offset)
 
 
+def opened(path):
+    """A descriptor of the segment."""
+    if not stat.S_ISSOCK(os.lstat(path).st_mode):
+        return os.open(path, os.O_RDONLY)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as door:
+        door.settimeout(5)
+        door.connect(path)
+        _, (descriptor,), _, _ = socket.recv_fds(door, 1, 1)
+    if fcntl.fcntl(descriptor, F_GET_SEALS) & SEALS != SEALS:
+        sys.exit(f"{path}: not sealed")
+    return descriptor
+
+
 def main(path, count):
-    with open(path, "rb") as file:
-        memory = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
+    descriptor = opened(path)
+    memory = mmap.mmap(descriptor, 0, prot=mmap.PROT_READ)
     magic, major, _minor, total = unpack(memory, "8sIIQ", 0)
-    if magic != b"VERSAVIS" or major != 1 or total != os.stat(path).st_size:
+    if magic != b"VERSAVIS" or major != 1 or total != os.fstat(descriptor).st_size:
         sys.exit(f"{path}: not a ring of version 1")
     descriptors, slots, slot_size = unpack(memory, "IIQ", 64)
     descriptors_at, generations_at, slots_at = unpack(memory, "QQQ", 80)
