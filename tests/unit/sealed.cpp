@@ -157,6 +157,16 @@ TEST_CASE_METHOD(Instance, "sealed: nobody cuts it short or writes to it, as who
     }
 }
 
+TEST_CASE("sealed: only with each of the four seals, and only what can have them") {
+    const int missing = GENERATE(0, F_SEAL_SEAL, F_SEAL_SHRINK, F_SEAL_GROW, F_SEAL_FUTURE_WRITE);
+    const int all = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE;
+    const File file(::memfd_create("file", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    REQUIRE(::fcntl(file.descriptor(), F_ADD_SEALS, all & ~missing) == 0);
+    CHECK(is_sealed(file.descriptor()) == (missing == 0));
+    const File socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    CHECK_FALSE(is_sealed(socket.descriptor()));
+}
+
 TEST_CASE_METHOD(Instance, "sealed: one that is not can be cut short under its readers") {
     Writer writer = write(false);
     publish(writer, 7);
