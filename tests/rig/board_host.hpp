@@ -83,7 +83,7 @@ class BoardHost {
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
     std::uint64_t imu_samples_ = 0;
-    HostTime signalled_{};  ///< until here edges of the data-ready line are scheduled
+    HostTime signalled_{};         ///< until here edges of the data-ready line are scheduled
     std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
     std::deque<std::pair<HostTime, std::vector<std::uint8_t>>> late_;  ///< on its way to the host
     bool plugged_ = true;

@@ -81,7 +81,8 @@ TEST_CASE("imu_model: what the board reads on its own grid may be new or old, an
     const Duration paced = imu::filter_delay(adis, 2, 819.2, true).sigma;
     const Duration unpaced = imu::filter_delay(adis, 2, 819.2, false).sigma;
     CHECK(paced == microseconds(100));
-    CHECK(static_cast<double>(unpaced.ns) == Approx(std::hypot(100e3, 1e9 / 819.2 / std::sqrt(12))));
+    CHECK(static_cast<double>(unpaced.ns) ==
+          Approx(std::hypot(100e3, 1e9 / 819.2 / std::sqrt(12))));
     // That of a filter nobody states stays unknown; the age does not.
     const imu::ImuModel& icm = *imu::find_model("icm42688p");
     const double filter_ns = 0.3 / 400 * 1e9, period_ns = 1e9 / 800;

@@ -187,8 +187,7 @@ TEST_CASE("nmea_reader: a checksum has two hexadecimal digits, and all must be r
     const std::string hex = "0123456789ABCDEFabcdef";
     for (const char first : {'A', 'a', 'p', 'Q'})  // between them, all digits are right ones
         for (char last = 'A'; last <= 'P'; ++last) {
-            const std::string good =
-                sentence(std::string{first, last} + "ZDA,000001,01,01,1970,,");
+            const std::string good = sentence(std::string{first, last} + "ZDA,000001,01,01,1970,,");
             for (const std::size_t at : {good.size() - 2, good.size() - 1})
                 for (int c = 0; c < 256; ++c) {
                     std::string other = good;

@@ -133,8 +133,8 @@ FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz,
     FilterDelay delay = of_filters(model, filter, part_rate(rate_hz, data_ready));
     const double oldest = oldest_s(model, rate_hz, data_ready);
     delay.delay = delay.delay + from_s(oldest / 2);
-    delay.sigma = from_s(std::hypot(static_cast<double>(delay.sigma.ns) * 1e-9,
-                                    age_sigma_s(oldest)));
+    delay.sigma =
+        from_s(std::hypot(static_cast<double>(delay.sigma.ns) * 1e-9, age_sigma_s(oldest)));
     return delay;
 }
 
