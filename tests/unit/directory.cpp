@@ -9,6 +9,7 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -148,6 +149,14 @@ TEST_CASE("directory: one that cannot be made, or not locked, says why") {
     std::filesystem::create_directories(path / ".lock");
     std::filesystem::permissions(path, std::filesystem::perms(0750));
     CHECK_THAT(OwnedDirectory::claim(path).error().message(), Catch::Contains("cannot be locked"));
+}
+
+TEST_CASE("directory: whom readers shall believe does not keep its owner out") {
+    test::TemporaryDirectory parent("/dev/shm");
+    ::setenv("VERSAVIS_OWNER", "nobody", 1);
+    const bool claimed = OwnedDirectory::claim(parent.path() / "instance").has_value();
+    ::unsetenv("VERSAVIS_OWNER");
+    CHECK(claimed);
 }
 
 TEST_CASE("directory: a ring that names no process is nobody's") {
