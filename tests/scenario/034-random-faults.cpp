@@ -41,8 +41,10 @@ TEST_CASE(
         world.run(static_cast<Nanoseconds>(draw(500)) * ms);
         if (draw(5) == 0) world.stall_board(static_cast<Nanoseconds>(draw(60)) * ms);
         if (draw(5) == 0) world.stall_host(static_cast<Nanoseconds>(draw(900)) * ms);
-        if (draw(5) == 0)
-            world.start(static_cast<std::uint8_t>(draw(16)), static_cast<std::uint8_t>(draw(3)));
+        if (draw(5) == 0) {
+            const auto cameras = static_cast<std::uint8_t>(draw(16));
+            world.start(cameras, static_cast<std::uint8_t>(draw(3)));
+        }
         if (draw(7) == 0) world.stop(static_cast<std::uint8_t>(draw(16)));
         if (draw(3) == 0)
             world.send(wire::ExpectedExposure{static_cast<std::uint8_t>(draw(5)),
