@@ -43,6 +43,8 @@ class Stepper {
     void store(const State& state);
     void update(const State& state);
     void wait(const State& state);
+    void wait_on(const State& state, const std::vector<Word>& words, std::size_t which);
+    void lock(const State& state);
     void time_out(const State& state);
     void wake(const State& state);
     void choose(const State& state);
@@ -62,7 +64,8 @@ class Stepper {
 std::string number(int value) { return std::to_string(value); }
 
 State Stepper::start() {
-    Successor first{make_state(model_.initial(), model_.programs().size()), {}, {}};
+    Successor first{
+        make_state(model_.initial(), model_.programs().size(), model_.is_object()), {}, {}};
     for (thread_ = 0; thread_ < model_.programs().size(); ++thread_) settle(first);
     start_violation_ = first.violation;
     forget(first.state);
@@ -173,12 +176,35 @@ void Stepper::update(const State& state) {
     }
 }
 
+void get_up(Thread& thread) {
+    thread.activity = Activity::running;
+    thread.beds = 0;
+}
+
 /// The kernel compares under the bucket's lock: it sees the word at least as new as all who woke
-/// sleepers on it before, and nothing else is ordered.
+/// sleepers on it before, and nothing else is ordered. Of several words, those compared first may
+/// be woken while it compares the others: then it does not sleep, as if it had compared them last.
 void Stepper::wait(const State& state) {
     const Instruction& now = instruction(state);
-    const std::size_t word = location(state, now.location);
-    const int expected = value(state);
+    std::vector<Word> words = now.more;
+    words.insert(words.begin(), {now.location, now.value});
+    wait_on(state, words, 0);
+}
+
+void Stepper::wait_on(const State& state, const std::vector<Word>& words, std::size_t which) {
+    if (which == words.size()) {
+        Successor asleep{state, {}, {}};
+        asleep.state.threads[thread_].activity = Activity::asleep;
+        tell(asleep, model_.programs()[thread_].name() + " sleeps");
+        for (const Word& word : words)
+            tell(asleep, ", " + place(location(state, word.location)) + " is " +
+                             number(word.expected(state.threads[thread_].registers)));
+        forget(asleep.state);
+        found_.push_back(std::move(asleep));
+        return;
+    }
+    const std::size_t word = location(state, words[which].location);
+    const int expected = words[which].expected(state.threads[thread_].registers);
     const Location& of = state.locations[word];
     auto i = std::max(oldest_readable(state, thread_, word), of.kernel);
     for (; i < of.size; ++i) {
@@ -188,23 +214,24 @@ void Stepper::wait(const State& state) {
         thread.acquired[word] = std::max(thread.acquired[word], i);
         next.locations[word].kernel = i;
         if (of.messages[i].value != expected) {
+            get_up(thread);
             advance(next, "does not sleep, " + place(word) + " is " + number(of.messages[i].value) +
                               " and not " + number(expected));
             continue;
         }
-        thread.activity = Activity::asleep;
-        thread.bed = static_cast<std::uint8_t>(word);
-        Successor successor{next, {}, {}};
-        tell(successor, model_.programs()[thread_].name() + " sleeps, " + place(word) + " is " +
-                            number(expected));
-        forget(successor.state);
-        found_.push_back(std::move(successor));
+        thread.beds = static_cast<std::uint16_t>(thread.beds | 1U << word);
+        wait_on(next, words, which + 1);
     }
 }
 
-void get_up(Thread& thread) {
-    thread.activity = Activity::running;
-    thread.bed = 0;
+/// Nothing happens while another has it.
+void Stepper::lock(const State& state) {
+    const std::size_t mutex = location(state, instruction(state).location);
+    if (state.newest(mutex) != 0) return;
+    State next = state;
+    const auto last = static_cast<std::uint8_t>(state.locations[mutex].size - 1);
+    model::update(next, thread_, mutex, last, 1, instruction(state).order);
+    advance(next, "locks " + place(mutex));
 }
 
 void Stepper::time_out(const State& state) {
@@ -243,7 +270,8 @@ void Stepper::wake(const State& state) {
     const std::size_t word = location(state, instruction(state).location);
     unsigned asleep = 0;
     for (std::size_t i = 0; i < state.thread_count; ++i)
-        if (state.threads[i].activity == Activity::asleep && state.threads[i].bed == word)
+        if (state.threads[i].activity == Activity::asleep &&
+            (state.threads[i].beds >> word & 1U) != 0)
             asleep |= 1U << i;
     const int count = std::min(__builtin_popcount(asleep), value(state));
     for (unsigned some = 0; some <= asleep; ++some)
@@ -281,6 +309,7 @@ void Stepper::step(const State& state) {
         case Action::exchange: return update(state);
         case Action::wait: return wait(state);
         case Action::wake: return wake(state);
+        case Action::lock: return lock(state);
         case Action::choose: return choose(state);
         default: throw std::logic_error("model: not an access");
     }
@@ -421,7 +450,14 @@ Result Search::run() {
 int Model::place(const std::string& name, int initial) {
     places_.push_back(name);
     initial_.push_back(static_cast<std::int8_t>(initial));
+    is_object_.push_back(false);
     return static_cast<int>(places_.size()) - 1;
+}
+
+int Model::object(const std::string& name, int initial) {
+    const int number = place(name, initial);
+    is_object_.back() = true;
+    return number;
 }
 
 void Model::run(Program program) {

@@ -16,15 +16,19 @@ class Model {
  public:
     /// The new location's number.
     int place(const std::string& name, int initial = 0);
+    /// Of a mutex, or of something in the kernel: everybody sees its newest state, and no other.
+    int object(const std::string& name, int initial = 0);
     void run(Program program);
 
     const std::vector<std::string>& places() const { return places_; }
     const std::vector<std::int8_t>& initial() const { return initial_; }
+    const std::vector<bool>& is_object() const { return is_object_; }
     const std::vector<Program>& programs() const { return programs_; }
 
  private:
     std::vector<std::string> places_;
     std::vector<std::int8_t> initial_;
+    std::vector<bool> is_object_;
     std::vector<Program> programs_;
 };
 

@@ -215,6 +215,55 @@ TEST_CASE("model: some of the sleepers are woken, any of them") {
     CHECK_FALSE(explore(model).holds());
 }
 
+TEST_CASE("model: between lock and unlock nobody else is, and what was written there is seen") {
+    const auto ends = [](bool locked) {
+        Model model;
+        const int mutex = model.object("mutex");
+        const int count = model.place("count");
+        for (const char* name : {"a", "b"}) {
+            auto adder = thread(name);
+            if (locked) adder.lock(mutex);
+            adder.load(0, count, relaxed)
+                .store(
+                    count, [](const Registers& r) { return r[0] + 1; }, relaxed)
+                .set(0, 0);
+            if (locked) adder.unlock(mutex);
+            model.run(adder);
+        }
+        std::set<int> counts;
+        REQUIRE(
+            explore(model, [&](const State& state) { counts.insert(state.newest(1)); }).holds());
+        return counts;
+    };
+    CHECK(ends(true) == std::set<int>{2});
+    CHECK(ends(false) == std::set<int>{1, 2});
+}
+
+TEST_CASE("model: a mutex that is not given back is found") {
+    Model model;
+    const int mutex = model.object("mutex");
+    model.run(thread("a").lock(mutex));
+    model.run(thread("b").lock(mutex).unlock(mutex));
+    const Result result = explore(model);
+    CHECK_FALSE(result.holds());
+    CHECK(result.violation == "b waits for what never comes");
+}
+
+TEST_CASE("model: who sleeps on two words is woken by either, and by no third") {
+    const auto wakes = [](int which) {
+        Model model;
+        const std::vector<int> words{model.place("x"), model.place("y"), model.place("z")};
+        model.run(thread("sleeper").wait_any({{words[0], 0}, {words[1], 0}}));
+        model.run(thread("waker")
+                      .add(words[static_cast<std::size_t>(which)], 1, release)
+                      .wake(words[static_cast<std::size_t>(which)], 1, 0));
+        return explore(model).holds();
+    };
+    CHECK(wakes(0));
+    CHECK(wakes(1));
+    CHECK_FALSE(wakes(2));
+}
+
 TEST_CASE("model: a killed thread goes on elsewhere, from any of its steps") {
     Model model;
     const int x = model.place("x");

@@ -16,9 +16,10 @@ constexpr int wrong_usage = 64;
 
 Collection everything() {
     Collection all = publishing();
-    const Collection more = waiting();
-    all.subjects.insert(all.subjects.end(), more.subjects.begin(), more.subjects.end());
-    all.changes.insert(all.changes.end(), more.changes.begin(), more.changes.end());
+    for (const Collection& more : {waiting(), watching()}) {
+        all.subjects.insert(all.subjects.end(), more.subjects.begin(), more.subjects.end());
+        all.changes.insert(all.changes.end(), more.changes.begin(), more.changes.end());
+    }
     return all;
 }
 

@@ -51,6 +51,7 @@ void see(Thread& thread, std::size_t location, std::uint8_t at) {
 /// The oldest write that some thread may still read, or insert another one behind.
 std::uint8_t oldest_needed(const State& state, std::size_t location) {
     auto oldest = static_cast<std::uint8_t>(state.locations[location].size - 1);
+    if (state.locations[location].is_object) return oldest;
     for (std::size_t i = 0; i < state.thread_count; ++i)
         if (state.threads[i].activity != Activity::ended)
             oldest = std::min(oldest, state.threads[i].current[location]);
@@ -89,7 +90,8 @@ class Input {
 void encode_thread(std::string& code, const Thread& thread, std::size_t locations) {
     put(code, static_cast<std::uint8_t>(thread.activity));
     put(code, thread.counter);
-    put(code, thread.bed);
+    put(code, static_cast<std::uint8_t>(thread.beds & 0xFFU));
+    put(code, static_cast<std::uint8_t>(thread.beds >> 8U));
     code.append(reinterpret_cast<const char*>(thread.registers.data()), register_count);
     put(code, thread.current, locations);
     put(code, thread.acquired, locations);
@@ -99,7 +101,8 @@ void encode_thread(std::string& code, const Thread& thread, std::size_t location
 void decode_thread(Input& input, Thread& thread, std::size_t locations) {
     thread.activity = static_cast<Activity>(input.byte());
     thread.counter = input.byte();
-    thread.bed = input.byte();
+    thread.beds = input.byte();
+    thread.beds = static_cast<std::uint16_t>(thread.beds | input.byte() << 8U);
     for (std::int8_t& value : thread.registers) value = static_cast<std::int8_t>(input.byte());
     input.bytes(thread.current.data(), locations);
     input.bytes(thread.acquired.data(), locations);
@@ -126,13 +129,15 @@ std::int8_t State::newest(std::size_t location) const {
     return of.messages[of.size - 1].value;
 }
 
-State make_state(const std::vector<std::int8_t>& initial, std::size_t threads) {
+State make_state(const std::vector<std::int8_t>& initial, std::size_t threads,
+                 const std::vector<bool>& is_object) {
     if (initial.size() > most_locations || threads > most_threads)
         throw std::length_error("model: too many locations or threads");
     State state{};
     state.thread_count = static_cast<std::uint8_t>(threads);
     state.location_count = static_cast<std::uint8_t>(initial.size());
     for (std::size_t i = 0; i < initial.size(); ++i) {
+        state.locations[i].is_object = i < is_object.size() && is_object[i];
         state.locations[i].size = 1;
         state.locations[i].messages[0].value = initial[i];
     }
@@ -204,6 +209,7 @@ std::string encode(const State& state) {
         encode_thread(code, state.threads[i], state.location_count);
     for (std::size_t i = 0; i < state.location_count; ++i) {
         const Location& location = state.locations[i];
+        put(code, location.is_object ? 1 : 0);
         put(code, location.size);
         put(code, location.kernel);
         for (std::size_t j = 0; j < location.size; ++j) {
@@ -224,6 +230,7 @@ State decode(const std::string& code) {
         decode_thread(input, state.threads[i], state.location_count);
     for (std::size_t i = 0; i < state.location_count; ++i) {
         Location& location = state.locations[i];
+        location.is_object = input.byte() != 0;
         location.size = input.byte();
         location.kernel = input.byte();
         for (std::size_t j = 0; j < location.size; ++j) {

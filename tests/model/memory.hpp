@@ -15,7 +15,7 @@
 
 namespace versavis::model {
 
-inline constexpr std::size_t most_locations = 16;
+inline constexpr std::size_t most_locations = 16;  // as many as `beds` has bits
 inline constexpr std::size_t most_messages = 14;
 inline constexpr std::size_t most_threads = 5;
 inline constexpr std::size_t register_count = 8;
@@ -36,6 +36,7 @@ struct Message {
 };
 
 struct Location {
+    bool is_object;  ///< a mutex, or the kernel's: everybody sees its newest state, and no other
     std::uint8_t size;
     std::uint8_t kernel;  ///< how much of the history the futex's bucket lock has handed on
     std::array<Message, most_messages> messages;
@@ -46,7 +47,7 @@ enum class Activity : std::uint8_t { running, asleep, ended };
 struct Thread {
     std::uint8_t counter;  ///< of its program
     Activity activity;
-    std::uint8_t bed;  ///< the location on which it sleeps
+    std::uint16_t beds;  ///< the locations on which it sleeps, a bit each
     Registers registers;
     View current;   ///< what it has to see
     View acquired;  ///< what it will have to see after an acquire fence
@@ -63,7 +64,8 @@ struct State {
     std::int8_t newest(std::size_t location) const;
 };
 
-State make_state(const std::vector<std::int8_t>& initial, std::size_t threads);
+State make_state(const std::vector<std::int8_t>& initial, std::size_t threads,
+                 const std::vector<bool>& is_object = {});
 
 /// The writes that a load of this thread may read: from here to the end of the history.
 std::uint8_t oldest_readable(const State& state, std::size_t thread, std::size_t location);

@@ -48,6 +48,7 @@ struct Collection {
 
 Collection publishing();  ///< descriptors, slots, the header
 Collection waiting();     ///< sleep, end, hand-over, crowds
+Collection watching();    ///< the descriptor for epoll, and the thread behind it
 
 /// How a reader learns that item n is there.
 enum class Reading : std::uint8_t { head, sequence };

@@ -13,19 +13,19 @@ Program& Program::append(Instruction instruction) {
 }
 
 Program& Program::load(std::size_t into, Value from, Order order) {
-    return append({Action::load, order, into, std::move(from), 0, {}, {}, 0});
+    return append({Action::load, order, into, std::move(from), 0, {}, {}, 0, {}});
 }
 
 Program& Program::store(Value to, Value value, Order order) {
-    return append({Action::store, order, 0, std::move(to), std::move(value), {}, {}, 0});
+    return append({Action::store, order, 0, std::move(to), std::move(value), {}, {}, 0, {}});
 }
 
 Program& Program::add(Value to, Value value, Order order) {
-    return append({Action::add, order, 0, std::move(to), std::move(value), {}, {}, 0});
+    return append({Action::add, order, 0, std::move(to), std::move(value), {}, {}, 0, {}});
 }
 
 Program& Program::exchange(Value to, Value value, Order order) {
-    return append({Action::exchange, order, 0, std::move(to), std::move(value), {}, {}, 0});
+    return append({Action::exchange, order, 0, std::move(to), std::move(value), {}, {}, 0, {}});
 }
 
 Program& Program::wait(Value word, Value expected, Test may_time_out) {
@@ -36,21 +36,35 @@ Program& Program::wait(Value word, Value expected, Test may_time_out) {
                    std::move(expected),
                    std::move(may_time_out),
                    {},
-                   0});
+                   0,
+                   {}});
+}
+
+Program& Program::wait_any(std::vector<Word> words) {
+    wait(words.front().location, words.front().expected);
+    words.erase(words.begin());
+    instructions_.back().more = std::move(words);
+    return *this;
 }
 
 Program& Program::wake(Value word, int most, std::size_t woken) {
-    return append({Action::wake, Order::relaxed, woken, std::move(word), most, {}, {}, 0});
+    return append({Action::wake, Order::relaxed, woken, std::move(word), most, {}, {}, 0, {}});
+}
+
+Program& Program::lock(Value mutex) {
+    return append({Action::lock, Order::acquire, 0, std::move(mutex), 1, {}, {}, 0, {}});
 }
 
 Program& Program::choose(std::size_t into, int options) {
-    return append({Action::choose, Order::relaxed, into, 0, options, {}, {}, 0});
+    return append({Action::choose, Order::relaxed, into, 0, options, {}, {}, 0, {}});
 }
 
-Program& Program::fence(Order order) { return append({Action::fence, order, 0, 0, 0, {}, {}, 0}); }
+Program& Program::fence(Order order) {
+    return append({Action::fence, order, 0, 0, 0, {}, {}, 0, {}});
+}
 
 Program& Program::set(std::size_t into, Value value) {
-    return append({Action::set, Order::relaxed, into, 0, std::move(value), {}, {}, 0});
+    return append({Action::set, Order::relaxed, into, 0, std::move(value), {}, {}, 0, {}});
 }
 
 Program& Program::go(const std::string& label) { return go_if(1, label); }
@@ -62,11 +76,11 @@ Program& Program::go_if(Value condition, const std::string& label) {
 }
 
 Program& Program::go_when(Test condition, const std::string& label) {
-    return append({Action::branch, Order::relaxed, 0, 0, 0, std::move(condition), label, 0});
+    return append({Action::branch, Order::relaxed, 0, 0, 0, std::move(condition), label, 0, {}});
 }
 
 Program& Program::check(Test test, const std::string& otherwise) {
-    return append({Action::check, Order::relaxed, 0, 0, 0, std::move(test), otherwise, 0});
+    return append({Action::check, Order::relaxed, 0, 0, 0, std::move(test), otherwise, 0, {}});
 }
 
 Program& Program::end() { return append({}); }

@@ -28,13 +28,20 @@ class Value {
 /// Of the whole state: for checks and time-outs, which no real thread could evaluate.
 using Test = std::function<bool(const State&, const Registers&)>;
 
+/// A futex, and what it has to hold for a thread to sleep on it.
+struct Word {
+    Value location;
+    Value expected;
+};
+
 enum class Action : std::uint8_t {
     load,
     store,
     add,       ///< atomic
     exchange,  ///< atomic
-    wait,      ///< FUTEX_WAIT
+    wait,      ///< FUTEX_WAIT, or FUTEX_WAITV on several words
     wake,      ///< FUTEX_WAKE
+    lock,      ///< of a mutex: 0 while nobody has it
     choose,    ///< any of some numbers
     fence,
     set,
@@ -52,6 +59,7 @@ struct Instruction {
     Test test;
     std::string text;  ///< label to go to, or what is wrong if a check fails
     std::size_t target = 0;
+    std::vector<Word> more;  ///< that it waits on
 };
 
 /// From its first to its last instruction a thread may be killed: it goes on elsewhere.
@@ -68,7 +76,10 @@ class Program {
     Program& add(Value to, Value value, Order order);
     Program& exchange(Value to, Value value, Order order);
     Program& wait(Value word, Value expected, Test may_time_out = {});
+    Program& wait_any(std::vector<Word> words);
     Program& wake(Value word, int most, std::size_t woken);
+    Program& lock(Value mutex);
+    Program& unlock(Value mutex) { return store(std::move(mutex), 0, Order::release); }
     Program& choose(std::size_t into, int options);
     Program& fence(Order order);
     Program& set(std::size_t into, Value value);
