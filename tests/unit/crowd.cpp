@@ -4,60 +4,58 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <thread>
-#include <vector>
 
-#include "client/futex.hpp"
+#include "../support/shortage.hpp"
+#include "../support/sleepers.hpp"
+#include "../support/threads.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
+using test::Sleepers;
 
-namespace {
-
-constexpr std::int64_t long_ns = 60'000'000'000;
-
-/// Threads that sleep on one word, each until the word has moved on.
-struct Sleepers {
-    explicit Sleepers(int count) {
-        for (int i = 0; i < count; ++i)
-            threads.emplace_back([this] {
-                ++awake;
-                futex_wait(word, 0, long_ns);
-                ++woken;
-            });
-        while (awake < count) std::this_thread::yield();
-    }
-    ~Sleepers() {
-        for (std::thread& thread : threads) thread.join();
-    }
-
+TEST_CASE("crowd: all are woken, few or many, time and again [threads]", "[threads]") {
     std::atomic<std::uint32_t> word{0};
-    std::atomic<int> awake{0};
-    std::atomic<int> woken{0};
-    std::vector<std::thread> threads;
-};
-
-}  // namespace
-
-TEST_CASE("crowd: all are woken, few or many [threads]", "[threads]") {
-    for (const int count : {0, 1, 4, 5, 40}) {
-        Sleepers sleepers(count);
-        Crowd crowd;
-        sleepers.word = 1;  // who is not asleep yet does not fall asleep
-        crowd.wake(sleepers.word);
-        while (sleepers.woken < count) std::this_thread::yield();
-        CHECK(sleepers.woken == count);
+    Crowd crowd;
+    for (const int count : {0, 1, 4, 5, 40, 40, 0, 5, 1, 40}) {
+        const Sleepers sleepers(word, count);
+        crowd.wake(word);
+        sleepers.wait_until_all_are_woken();
     }
 }
 
+TEST_CASE("crowd: a few need no thread, and one for many rests [threads]", "[threads]") {
+    std::atomic<std::uint32_t> word{0};
+    const auto before = test::threads();
+    Crowd crowd;
+    for (const int count : {0, 1, 2}) {
+        const Sleepers sleepers(word, count);
+        crowd.wake(word);
+        sleepers.wait_until_all_are_woken();
+    }
+    while (test::threads() != before) std::this_thread::yield();
+    {
+        const Sleepers sleepers(word, 40);
+        crowd.wake(word);
+        sleepers.wait_until_all_are_woken();
+    }
+    test::Rest(test::wait_for_one_more(before)).wait();
+}
+
+TEST_CASE("crowd: where no thread is to be had, all are woken as well [threads]", "[threads]") {
+    std::atomic<std::uint32_t> word{0};
+    const Sleepers sleepers(word, 40);
+    Crowd crowd;
+    const test::NoThreads none;
+    crowd.wake(word);
+    sleepers.wait_until_all_are_woken();
+}
+
 TEST_CASE("crowd: it ends while its thread is at work [threads]", "[threads]") {
+    std::atomic<std::uint32_t> word{0};
     for (int i = 0; i < 50; ++i) {
-        Sleepers sleepers(8);
-        sleepers.word = 1;
-        {
-            Crowd crowd;
-            for (int call = 0; call < 3; ++call) crowd.wake(sleepers.word);
-        }
-        futex_wake(sleepers.word, 8);
+        const Sleepers sleepers(word, 8);
+        Crowd crowd;
+        for (int call = 0; call < 3; ++call) crowd.wake(word);
     }
     SUCCEED();
 }

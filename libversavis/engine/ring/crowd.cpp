@@ -20,8 +20,7 @@ constexpr int woken_at_once = 4;
 
 Crowd::~Crowd() {
     stop_ = true;
-    calls_.fetch_add(1);
-    calls_.notify_one();
+    tell();
     if (thread_.joinable()) thread_.join();
 }
 
@@ -33,9 +32,14 @@ void Crowd::wake(const std::atomic<std::uint32_t>& word) {
         call(word);
 }
 
-void Crowd::call(const std::atomic<std::uint32_t>& word) {
+void Crowd::tell() {
     calls_.fetch_add(1, std::memory_order_release);
-    if (thread_.joinable()) return calls_.notify_one();
+    calls_.notify_one();
+}
+
+void Crowd::call(const std::atomic<std::uint32_t>& word) {
+    tell();
+    if (thread_.joinable()) return;
     try {
         thread_ = quiet_thread([this, &word] { run(word); });
     } catch (const std::system_error&) {
@@ -45,12 +49,8 @@ void Crowd::call(const std::atomic<std::uint32_t>& word) {
 
 void Crowd::run(const std::atomic<std::uint32_t>& word) {
     for (std::uint32_t seen = 0; !stop_;) {
-        const std::uint32_t called = calls_.load(std::memory_order_acquire);
-        if (called == seen) {
-            calls_.wait(seen, std::memory_order_acquire);
-            continue;
-        }
-        seen = called;
+        calls_.wait(seen, std::memory_order_acquire);
+        seen = calls_.load(std::memory_order_acquire);
         present_.store(futex_wake(word, INT_MAX) > woken_at_once, std::memory_order_relaxed);
     }
 }

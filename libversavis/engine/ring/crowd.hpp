@@ -21,11 +21,12 @@ class Crowd {
     void wake(const std::atomic<std::uint32_t>& word);
 
  private:
+    void tell();
     void call(const std::atomic<std::uint32_t>& word);
     void run(const std::atomic<std::uint32_t>& word);
 
     // No lock: the thread could lose the processor while it holds one.
-    std::atomic<std::uint32_t> calls_{0};
+    std::atomic<std::uint32_t> calls_{};
     std::atomic<bool> present_{false};  ///< the thread found a crowd when it was last called
     std::atomic<bool> stop_{false};
     std::thread thread_;
