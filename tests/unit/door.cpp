@@ -2,16 +2,22 @@
 #include "engine/ring/door.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <unistd.h>
 
+#include <array>
 #include <catch2/catch.hpp>
+#include <cstring>
 #include <string>
 #include <vector>
 
+#include "../support/shortage.hpp"
 #include "../support/temporary_directory.hpp"
+#include "../support/threads.hpp"
 #include "client/trust.hpp"
 
 using namespace versavis;
@@ -27,13 +33,47 @@ File sealed_file() {
     return file;
 }
 
-File connect(const std::filesystem::path& path) {
-    File socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+File make_socket() {
+    return File(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+}
+
+bool connects(const File& socket, const std::filesystem::path& path) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    ::connect(socket.descriptor(), reinterpret_cast<sockaddr*>(&address), sizeof address);
+    return ::connect(socket.descriptor(), reinterpret_cast<sockaddr*>(&address), sizeof address) ==
+           0;
+}
+
+File connect(const std::filesystem::path& path) {
+    File socket = make_socket();
+    connects(socket, path);
     return socket;
+}
+
+/// It gets one byte, and with it a descriptor of that file, and then nothing more.
+bool is_handed(const File& socket, const File& file) {
+    pollfd any{socket.descriptor(), POLLIN, 0};
+    ::poll(&any, 1, -1);
+    std::array<char, 2> bytes{};
+    iovec data{bytes.data(), bytes.size()};
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(2 * sizeof(int))> room{};
+    msghdr message{};
+    message.msg_iov = &data;
+    message.msg_iovlen = 1;
+    message.msg_control = room.data();
+    message.msg_controllen = room.size();
+    const auto size = ::recvmsg(socket.descriptor(), &message, MSG_CMSG_CLOEXEC);
+    const cmsghdr* rights = CMSG_FIRSTHDR(&message);
+    if (size != 1 || rights == nullptr || rights->cmsg_len != CMSG_LEN(sizeof(int))) return false;
+    int descriptor = -1;
+    std::memcpy(&descriptor, CMSG_DATA(rights), sizeof descriptor);
+    const File handed(descriptor);
+    struct stat one {};
+    struct stat other {};
+    ::poll(&any, 1, -1);
+    return ::fstat(handed.descriptor(), &one) == 0 && ::fstat(file.descriptor(), &other) == 0 &&
+           one.st_ino == other.st_ino && ::recv(socket.descriptor(), bytes.data(), 1, 0) == 0;
 }
 
 }  // namespace
@@ -51,6 +91,35 @@ TEST_CASE("door: a crowd that takes nothing, or leaves at once, stops nobody") {
             connect(path);
         CHECK(open_trusted(path, std::nullopt));
     }
+}
+
+TEST_CASE("door: who connects gets one byte with the file, without a word, and is disconnected") {
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto path = directory.path() / "door";
+    const File file = sealed_file();
+    const auto door = Door::open(path, File(::dup(file.descriptor())));
+    REQUIRE(door);
+    CHECK(is_handed(connect(path), file));
+}
+
+TEST_CASE("door: without a descriptor to be had it rests, and lets all in later") {
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto path = directory.path() / "door";
+    const File file = sealed_file();
+    const auto others = test::threads();
+    const auto door = Door::open(path, File(::dup(file.descriptor())));
+    REQUIRE(door);
+    test::Rest rest(test::wait_for_one_more(others));
+    rest.wait();
+    std::vector<File> crowd;
+    for (int i = 0; i < 50; ++i) crowd.push_back(make_socket());
+    {
+        const test::NoDescriptors none;
+        // The first has the descriptor at which the door has been waiting for somebody.
+        for (const File& socket : crowd) CHECK(connects(socket, path));
+        rest.wait();
+    }
+    for (const File& socket : crowd) CHECK(is_handed(socket, file));
 }
 
 TEST_CASE("door: where an address has no room for the path, and whatever lay there") {
@@ -75,4 +144,15 @@ TEST_CASE("door: where it cannot be made, it says so") {
                Catch::Contains("cannot be made a socket: No such file or directory"));
     CHECK_THAT(Door::open("/proc/door", sealed_file()).error().message(),
                Catch::Contains("/proc/door: cannot be made a socket"));
+    const std::string longest(300, 'x');
+    CHECK_THAT(Door::open("/" + longest + "/door", sealed_file()).error().message(),
+               Catch::Contains("cannot be made a socket: File name too long"));
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto pipe = directory.path() / "pipe";
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    CHECK_THAT(Door::open(pipe / "door", sealed_file()).error().message(),
+               Catch::Contains("cannot be made a socket: Not a directory"));
+    const test::NoThreads none;
+    CHECK_THAT(Door::open(directory.path() / "door", sealed_file()).error().message(),
+               Catch::Contains("gets no thread") && Catch::Contains("raise the limit on tasks"));
 }

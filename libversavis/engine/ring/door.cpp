@@ -35,7 +35,7 @@ Unexpected<> not_made(const std::filesystem::path& path) {
 
 /// Never waits. Who does not take it, or has left, goes without.
 void hand_over(int segment, int connection) {
-    char byte = 0;
+    char byte{};
     iovec data{&byte, sizeof byte};
     alignas(cmsghdr) char room[CMSG_SPACE(sizeof segment)]{};
     msghdr message{};
@@ -54,7 +54,7 @@ void hand_over(int segment, int connection) {
 }  // namespace
 
 Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, File segment) {
-    const File directory(::open(path.parent_path().c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    const File directory(::open(path.parent_path().c_str(), O_PATH | O_CLOEXEC));
     File socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     if (!directory || !socket) return not_made(path);
     // An address holds 107 characters, and a path may be longer.
@@ -62,7 +62,7 @@ Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, Fi
         fmt::format("/proc/self/fd/{}/{}", directory.descriptor(), path.filename().string());
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    name.copy(address.sun_path, sizeof address.sun_path - 1);
+    name.copy(address.sun_path, sizeof address.sun_path);  // zero-terminated or full
     ::unlink(path.c_str());
     if (::bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
             0 ||
