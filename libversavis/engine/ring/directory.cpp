@@ -40,7 +40,7 @@ Expected<> check_trust(const std::filesystem::path& path) {
         return failure(path.string(), "can be written by others",
                        fmt::format("remove it, or 'chmod 0750 {}'", path.string()));
     const auto above = path.parent_path();
-    if (::stat(above.c_str(), &parent) != 0) return {};
+    ::stat(above.c_str(), &parent);  // it is there: `path` was found in it
     // Whom readers are told to believe does not take the right from root and this user.
     if (parent.st_uid != 0 && parent.st_uid != ::geteuid() && !may_own(parent.st_uid, std::nullopt))
         return failure(above.string(),
@@ -94,28 +94,17 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
     if (auto trusted = check_trust(path); !trusted) return Unexpected(trusted.error());
-    const int lock = ::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
-    if (lock < 0)
+    File lock(::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600));
+    if (!lock)
         return failure(path.string(),
                        fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
                        "run the service as the user that owns it");
-    if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
-        ::close(lock);
+    if (::flock(lock.descriptor(), LOCK_EX | LOCK_NB) != 0)
         return served(path, living_writer(path));
-    }
-    OwnedDirectory owned(path, lock);
+    OwnedDirectory owned(path, std::move(lock));
     if (const std::uint32_t process = living_writer(path); process != 0)
         return served(path, process);
     return owned;
-}
-
-OwnedDirectory::OwnedDirectory(OwnedDirectory&& other) noexcept
-    : path_(std::move(other.path_)),
-      lock_(std::exchange(other.lock_, -1)),
-      epochs_(other.epochs_) {}
-
-OwnedDirectory::~OwnedDirectory() {
-    if (lock_ >= 0) ::close(lock_);
 }
 
 void OwnedDirectory::remove_stale(const std::vector<std::string>& keep) const {

@@ -6,11 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "client/segment.hpp"
 #include "engine/ring/epoch_block.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::ring {
 
+/// Owned until this is destroyed.
 class OwnedDirectory {
  public:
     /// Creates `path` (0750) if needed and locks it for this process. Segments that a dead owner
@@ -18,9 +20,8 @@ class OwnedDirectory {
     /// permission, another service owns it, others may write there.
     static Expected<OwnedDirectory> claim(const std::filesystem::path& path);
 
-    OwnedDirectory(OwnedDirectory&& other) noexcept;
+    OwnedDirectory(OwnedDirectory&&) noexcept = default;
     OwnedDirectory& operator=(OwnedDirectory&&) = delete;
-    ~OwnedDirectory();  ///< releases the lock
 
     /// Retires and removes the segments that another process made, except those named in `keep`:
     /// their readers are handed over when the segment is made anew.
@@ -32,11 +33,11 @@ class OwnedDirectory {
     EpochBlock& epochs() { return epochs_; }
 
  private:
-    OwnedDirectory(std::filesystem::path path, int lock)
-        : path_(std::move(path)), lock_(lock), epochs_(lock) {}
+    OwnedDirectory(std::filesystem::path path, File lock)
+        : path_(std::move(path)), lock_(std::move(lock)), epochs_(lock_.descriptor()) {}
 
     std::filesystem::path path_;
-    int lock_;
+    File lock_;
     EpochBlock epochs_;  ///< in the file that is locked
 };
 
