@@ -6,8 +6,7 @@
 namespace versavis::ring {
 
 EpochBlock::EpochBlock(int file) : file_(file) {
-    std::uint32_t used = 0;
-    if (::pread(file, &used, sizeof used, 0) == sizeof used) first_ = used;
+    if (::pread(file, &first_, sizeof first_, 0) != sizeof first_) first_ = 0;
     reserve_until(first_ + epochs_reserved);
 }
 

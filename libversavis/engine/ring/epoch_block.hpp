@@ -27,8 +27,8 @@ class EpochBlock {
     void reserve_until(std::uint32_t end);
 
     int file_;
-    std::uint32_t first_ = 0;
-    std::uint32_t end_ = 0;
+    std::uint32_t first_{};
+    std::uint32_t end_{};
 };
 
 }  // namespace versavis::ring
