@@ -3,12 +3,15 @@
 
 #include <catch2/catch.hpp>
 
+#include "../support/in_process.hpp"
+#include "../support/small_disk.hpp"
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
 using Catch::Matchers::Contains;
+using test::in_process;
 
 namespace {
 
@@ -36,6 +39,8 @@ TEST_CASE_METHOD(Machine, "room: a ring leaves 64 MiB to others") {
     REQUIRE_FALSE(refused);
     CHECK_THAT(refused.error().message(), Contains("/cam0: takes 101 MiB, and 164 MiB are free"));
     CHECK_THAT(refused.error().message(), Contains("lower 'slots' or 'history_s'"));
+    CHECK_THAT(check(100 * mib, with(163)).error().message(),
+               Contains("takes 100 MiB, and 163 MiB are free"));
     CHECK_FALSE(check(1, with(64)));
     CHECK_FALSE(check(1, with(1)));
 }
@@ -51,6 +56,24 @@ TEST_CASE_METHOD(Machine, "room: a file system that is too small says how to enl
     REQUIRE_FALSE(refused);
     CHECK_THAT(refused.error().message(), Contains("free in its file system"));
     CHECK_THAT(refused.error().message(), Contains("remount"));
+}
+
+TEST_CASE_METHOD(Machine, "room: a file system that does not count its blocks has room") {
+    // As a tmpfs without a limit.
+    CHECK(check_room("/proc/cam0", mib, directory.write("meminfo", "")));
+}
+
+TEST_CASE_METHOD(Machine, "room: a ring may take all of its file system, and no byte more") {
+    const auto meminfo = directory.write("meminfo", "");
+    const auto mounted = [&] { return test::mount_small_disk(directory.path(), "1m"); };
+    if (!in_process(mounted)) {
+        WARN("not tested: the machine lets no process mount a file system of its own");
+        return;
+    }
+    CHECK(in_process([&] {
+        return mounted() && check_room(directory.path() / "cam0", mib, meminfo) &&
+               !check_room(directory.path() / "cam0", mib + 1, meminfo);
+    }));
 }
 
 TEST_CASE_METHOD(Machine, "room: a ring that does not fit is not made, and leaves nothing behind") {

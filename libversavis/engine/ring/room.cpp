@@ -25,7 +25,7 @@ constexpr const char* cure = "lower 'slots' or 'history_s'";
 std::optional<std::uint64_t> available_memory(const std::filesystem::path& memory) {
     std::ifstream file(memory);
     std::string name;
-    std::uint64_t kib = 0;
+    std::uint64_t kib{};
     while (file >> name >> kib) {
         if (name == "MemAvailable:") return kib << 10U;
         file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
