@@ -8,9 +8,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <random>
 #include <system_error>
 
@@ -75,10 +77,10 @@ Expected<> reserve(const File& file, const std::filesystem::path& path, std::uin
 }
 
 /// A file of its own, whatever lay there under this name. None of it is ever shared with somebody
-/// else's: a link left there is removed, not followed.
+/// else's: what is left there is removed, and O_EXCL follows no link.
 Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) {
     ::unlink(path.c_str());
-    File file(::open(path.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_RDWR | O_CLOEXEC, 0640));
+    File file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0640));
     if (!file || ::fchmod(file.descriptor(), 0640) != 0)  // whatever umask says
         return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)),
                        "does its directory belong to the service's user?");
@@ -90,12 +92,12 @@ Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) 
 }
 
 /// MFD_NOEXEC_SEAL: that it holds no program, which a host may insist on since Linux 6.3.
-constexpr unsigned no_program = 0x0008;
+constexpr unsigned no_program = 1U << 3U;
 
 Expected<File> make_nameless(const std::filesystem::path& path, std::uint64_t size) {
     const unsigned flags = MFD_CLOEXEC | MFD_ALLOW_SEALING;
     File file(::memfd_create(path.filename().c_str(), flags | no_program));
-    if (!file && errno == EINVAL) file = File(::memfd_create(path.filename().c_str(), flags));
+    if (!file) file = File(::memfd_create(path.filename().c_str(), flags));  // an older Linux
     if (!file) return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
     if (auto reserved = reserve(file, path, size); !reserved) return Unexpected(reserved.error());
     return file;
@@ -137,19 +139,10 @@ void release_dead(const std::filesystem::path& directory) {
 
 /// Of the process that fills the header: no other one of this machine, ever, has the same.
 std::uint64_t life_of(const Header& header) {
-    std::uint64_t life = 0;
-    // Source of the mixing: the finalizer of SplitMix64, by S. Vigna.
-    const auto mix = [&life](std::uint64_t value) {
-        life += value + 0x9E3779B97F4A7C15U;
-        life = (life ^ life >> 30U) * 0xBF58476D1CE4E5B9U;
-        life = (life ^ life >> 27U) * 0x94D049BB133111EBU;
-        life ^= life >> 31U;
-    };
-    for (const std::uint8_t byte : header.boot_id) mix(byte);
-    mix(header.pid_namespace);
-    mix(header.writer_pid);
-    mix(header.writer_start_ticks);
-    return std::max<std::uint64_t>(life, 1);  // 0 is of segments that do not tell
+    // 0, as of segments that do not tell, is one hash of 2^64.
+    return std::hash<std::string>{}(fmt::format("{} {} {} {}", fmt::join(header.boot_id, " "),
+                                                header.pid_namespace, header.writer_pid,
+                                                header.writer_start_ticks));
 }
 
 void fill_header(Header& header, const Shape& shape, std::uint64_t total) {
@@ -198,9 +191,8 @@ std::uint64_t total_size(const Shape& shape) {
 }  // namespace
 
 Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
-    const bool power_of_two =
-        shape.descriptor_count != 0 && (shape.descriptor_count & (shape.descriptor_count - 1)) == 0;
-    if (!power_of_two || shape.name.empty() || shape.name.size() >= sizeof Header::name)
+    if (!std::has_single_bit(shape.descriptor_count) || shape.name.empty() ||
+        shape.name.size() >= sizeof Header::name)
         return failure(
             shape.name,
             "a ring needs a name shorter than 64 characters and a power of two of descriptors");

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a ring is made, and what is left where it cannot be made.
+#include "engine/ring/writer.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "../support/in_process.hpp"
+#include "../support/look.hpp"
+#include "../support/shortage.hpp"
+#include "../support/sleepers.hpp"
+#include "../support/small_disk.hpp"
+#include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
+#include "client/trust.hpp"
+#include "versavis/ring/reader.hpp"
+
+using namespace versavis;
+using namespace versavis::ring;
+using Catch::Matchers::Contains;
+using test::in_process;
+
+namespace {
+
+const Shape events{"events", StreamKind::events, 8};
+const Shape frames{"frames", StreamKind::frames, 8, 4, 1 << 20U};
+
+struct Memory {
+    test::TemporaryDirectory directory{"/dev/shm"};
+
+    std::filesystem::path path(const std::string& name) const { return directory.path() / name; }
+
+    /// Why there is no such ring. None of it is left.
+    std::string refusal(const Shape& shape, bool sealed) const {
+        const auto writer = Writer::create({directory.path(), sealed}, shape);
+        if (writer) return "";
+        return std::filesystem::is_empty(directory.path()) ? writer.error().message() : "left";
+    }
+    bool refuses(const Shape& shape, bool sealed, const std::string& why) const {
+        return refusal(shape, sealed).find(why) != std::string::npos;
+    }
+    std::string bytes(const std::string& name) const {
+        std::ifstream file(path(name), std::ios::binary);
+        return {std::istreambuf_iterator<char>(file), {}};
+    }
+};
+
+std::uint64_t life_of(const std::filesystem::path& path) {
+    return Mapping::open(path, Mapping::Access::read_only)->constants().life;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Memory, "writer: a shape needs no more than a name") {
+    CHECK(Writer::create(directory.path(), {"plain"}));
+    CHECK(Writer::create(directory.path(), {"single", StreamKind::events, 1}));
+    CHECK_FALSE(Writer::create(directory.path(), {"none", StreamKind::events, 0}));
+}
+
+TEST_CASE_METHOD(Memory, "writer: before the first item, no descriptor says that one is there") {
+    const Writer fresh = *Writer::create(directory.path(), events);
+    CHECK(bytes("events").find_first_not_of('\0', page_size) == std::string::npos);
+    const Writer later =
+        *Writer::create(directory.path(), {"later", StreamKind::events, 8, 0, 0, 9});
+    const auto mapping = Mapping::open(path("later"), Mapping::Access::read_only);
+    REQUIRE(mapping);
+    for (std::uint64_t number = 9; number < 17; ++number)
+        CHECK(mapping->descriptor(number).sequence == 2 * (number - 8) + 1);
+}
+
+TEST_CASE_METHOD(Memory, "writer: what lies under its temporary name is not used") {
+    const bool is_link = GENERATE(true, false);
+    if (is_link)
+        std::filesystem::create_symlink("victim", path(".events.new"));
+    else
+        std::filesystem::create_hard_link(directory.write("victim", "own"), path(".events.new"));
+    const auto writer = Writer::create(directory.path(), events);
+    REQUIRE(writer);
+    CHECK(std::filesystem::is_regular_file(std::filesystem::symlink_status(path("events"))));
+    CHECK(bytes("victim") == (is_link ? "" : "own"));
+    CHECK_FALSE(std::filesystem::exists(path(".events.new")));
+}
+
+TEST_CASE_METHOD(Memory, "writer: the group may read its file, whatever the umask") {
+    const mode_t mask = ::umask(0777);
+    const auto writer = Writer::create(directory.path(), events);
+    ::umask(mask);
+    REQUIRE(writer);
+    struct stat file {};
+    REQUIRE(::stat(path("events").c_str(), &file) == 0);
+    CHECK((file.st_mode & 07777U) == 0640U);
+}
+
+TEST_CASE_METHOD(Memory, "writer: its memory is at hand before the first payload") {
+    const bool sealed = GENERATE(false, true);
+    Writer writer = *Writer::create({directory.path(), sealed}, frames);
+    std::byte* data = writer.slot_data(0);
+    const std::size_t pages = writer.slot_size() / page_size;
+    rusage before{};
+    rusage after{};
+    REQUIRE(::getrusage(RUSAGE_THREAD, &before) == 0);
+    for (std::size_t page = 0; page < pages; ++page) data[page * page_size] = std::byte{1};
+    REQUIRE(::getrusage(RUSAGE_THREAD, &after) == 0);
+    CHECK(after.ru_minflt - before.ru_minflt < static_cast<long>(pages / 2));
+}
+
+TEST_CASE_METHOD(Memory, "writer: all who sleep are woken by an item, and by a successor") {
+    Writer writer = *Writer::create(directory.path(), events);
+    const auto mapping = Mapping::open(path("events"), Mapping::Access::read_write);
+    REQUIRE(mapping);
+    {
+        const test::Sleepers readers(mapping->header().wake, 2);
+        writer.publish({}, {});
+        readers.wait_until_all_are_woken();
+    }
+    const test::Sleepers readers(mapping->header().wake, 2);
+    const Writer next = *Writer::create(directory.path(), events);
+    readers.wait_until_all_are_woken();
+}
+
+TEST_CASE_METHOD(Memory, "writer: all rings of a process are of one life, those of others not") {
+    const Writer one = *Writer::create(directory.path(), events);
+    const Writer two = *Writer::create(directory.path(), frames);
+    const std::uint64_t life = life_of(path("events"));
+    CHECK(life_of(path("frames")) == life);
+    CHECK(in_process([&] {
+        const Writer other = *Writer::create(directory.path(), {"other", StreamKind::events, 8});
+        return life_of(path("other")) != life;
+    }));
+    const Writer told =
+        *Writer::create(directory.path(), {"told", StreamKind::events, 8, 0, 0, 0, 1});
+    CHECK(life_of(path("told")) == 1);
+}
+
+TEST_CASE_METHOD(Memory, "writer: where files may not be so large, it says so") {
+    const bool sealed = GENERATE(false, true);
+    const test::SmallFiles limited(1 << 20U);
+    CHECK_THAT(refusal(frames, sealed), Contains("cannot reserve 4 MiB: File too large"));
+}
+
+TEST_CASE_METHOD(Memory, "writer: where there is no descriptor, it says so") {
+    const bool sealed = GENERATE(false, true);
+    CHECK(in_process([&] {
+        const auto create = [&] { return Writer::create({directory.path(), sealed}, events); };
+        const auto writer = [&] {
+            const test::NoDescriptors none;
+            return create();
+        }();
+        return !writer && std::filesystem::is_empty(directory.path()) &&
+               writer.error().message().find("cannot be created: Too many open files") !=
+                   std::string::npos;
+    }));
+}
+
+TEST_CASE_METHOD(Memory, "writer: a sealed one without a thread is not made") {
+    const test::NoThreads none;
+    CHECK_THAT(refusal(events, true), Contains("gets no thread"));
+}
+
+TEST_CASE_METHOD(Memory, "writer: where nothing can be sealed, it says what to do") {
+    CHECK(in_process([&] {
+        return test::refuse(SYS_fcntl, EINVAL, F_ADD_SEALS) &&
+               refuses(events, true, "cannot be sealed: Invalid argument; set 'sealed = false'");
+    }));
+}
+
+TEST_CASE_METHOD(Memory, "writer: a sealed one is no program, unless Linux is too old for that") {
+    constexpr unsigned no_program = 0x8;  // MFD_NOEXEC_SEAL
+    const auto executable = [&] {
+        const auto writer = Writer::create({directory.path(), true}, events);
+        struct stat file {};
+        const auto handed = open_trusted(path("events"), std::nullopt);
+        return !writer || !handed || ::fstat(handed->file.descriptor(), &file) != 0 ||
+               (file.st_mode & 0111U) != 0;
+    };
+    if (File(::memfd_create("new", MFD_CLOEXEC | no_program))) CHECK_FALSE(executable());
+    CHECK(in_process([&] {
+        return test::refuse(SYS_memfd_create, EINVAL,
+                            MFD_CLOEXEC | MFD_ALLOW_SEALING | no_program) &&
+               Writer::create({directory.path(), true}, events);
+    }));
+}
+
+TEST_CASE_METHOD(Memory, "writer: programs that the service starts get no descriptor of a ring") {
+    const bool sealed = GENERATE(false, true);
+    const auto writer = Writer::create({directory.path(), sealed}, events);
+    REQUIRE(writer);
+    for (const auto& file : std::filesystem::directory_iterator("/proc/self/fd")) {
+        const auto target = std::filesystem::read_symlink(file.path()).string();
+        if (target.find("events") == std::string::npos) continue;
+        CHECK((::fcntl(std::stoi(file.path().filename()), F_GETFD) & FD_CLOEXEC) != 0);
+    }
+}
+
+TEST_CASE_METHOD(Memory, "writer: only what the dead have left gives way to a new ring") {
+    const auto mounted = [&] { return test::mount_small_disk(directory.path(), "7m"); };
+    if (!in_process(mounted)) {
+        WARN("not tested: the machine lets no process mount a file system of its own");
+        return;
+    }
+    CHECK(in_process([&] {
+        if (!mounted()) return false;
+        Writer own = *Writer::create(directory.path(), {"own", StreamKind::frames, 8, 1, 1 << 20U});
+        own.slot_data(0)[0] = std::byte{7};
+        directory.write("note", "no ring");
+        const bool left = in_process([&]() -> bool {
+            const auto dead =
+                Writer::create(directory.path(), {"dead", StreamKind::frames, 8, 4, 1 << 20U});
+            ::_exit(dead ? 0 : 1);
+        });
+        const auto writer = Writer::create(directory.path(), frames);
+        return left && writer && own.slot_data(0)[0] == std::byte{7} && bytes("note") == "no ring";
+    }));
+}
+
+TEST_CASE_METHOD(Memory, "writer: a ring whose successor gets no name goes on") {
+    CHECK(in_process([&] {
+        Writer writer = *Writer::create(directory.path(), events);
+        auto reader = Reader::open(path("events"));
+#ifdef SYS_rename
+        const bool refused = test::refuse(SYS_rename, EIO);
+#else
+        const bool refused = test::refuse(SYS_renameat, EIO);
+#endif
+        if (!reader || !refused) return false;
+        const auto next = Writer::create(directory.path(), events);
+        if (next || next.error().message().find("cannot be renamed into place: Input/output") ==
+                        std::string::npos)
+            return false;
+        writer.publish({}, {});
+        return reader->writer_alive() && test::look(reader->next()).found == test::Found::item &&
+               !std::filesystem::exists(path(".events.new"));
+    }));
+}
