@@ -260,22 +260,20 @@ TEST_CASE("directory: whose the one above it may be") {
         const char* believed;  ///< VERSAVIS_OWNER
         bool claimed;
     };
-    for (const auto& [above, service, believed, claimed] : {Case{0, stranger, "nobody", true},
-                                                            {stranger, stranger, "nobody", true},
-                                                            {nobody, 0, "nobody", true},
-                                                            {nobody, stranger, "nobody", true},
-                                                            {nobody, 0, "", false},
-                                                            {nobody, stranger, "", false}}) {
-        CAPTURE(above, service, believed);
+    for (const Case& one :
+         {Case{0, stranger, "nobody", true}, Case{stranger, stranger, "nobody", true},
+          Case{nobody, 0, "nobody", true}, Case{nobody, stranger, "nobody", true},
+          Case{nobody, 0, "", false}, Case{nobody, stranger, "", false}}) {
+        CAPTURE(one.above, one.service, one.believed);
         test::TemporaryDirectory parent("/dev/shm");
         const auto path = parent.path() / "instance";
         REQUIRE(::mkdir(path.c_str(), 0750) == 0);
-        REQUIRE(::chown(path.c_str(), service, service) == 0);
+        REQUIRE(::chown(path.c_str(), one.service, one.service) == 0);
         REQUIRE(::chmod(parent.path().c_str(), 0755) == 0);
-        REQUIRE(::chown(parent.path().c_str(), above, above) == 0);
-        CHECK(claimed == test::in_process([&] {
-                  ::setenv("VERSAVIS_OWNER", believed, 1);
-                  return ::seteuid(service) == 0 && OwnedDirectory::claim(path);
+        REQUIRE(::chown(parent.path().c_str(), one.above, one.above) == 0);
+        CHECK(one.claimed == test::in_process([&] {
+                  ::setenv("VERSAVIS_OWNER", one.believed, 1);
+                  return ::seteuid(one.service) == 0 && OwnedDirectory::claim(path);
               }));
     }
 }
