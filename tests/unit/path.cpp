@@ -41,3 +41,9 @@ TEST_CASE("path: streams lie in the directory of their instance") {
     CHECK(stream_path("rover", "imu0") == "/dev/shm/versavis/rover/imu0");
     CHECK(instance_directory("rover") == "/dev/shm/versavis/rover");
 }
+
+TEST_CASE("path: a stream's name leads to no other directory, and hides nothing") {
+    for (const char* name : {"imu0", "a", "with space", "a.b", "a."}) CHECK(is_stream_name(name));
+    for (const char* name : {"", ".", "..", ".lock", "/imu0", "a/b", "a/", "../default/imu0"})
+        CHECK_FALSE(is_stream_name(name));
+}
