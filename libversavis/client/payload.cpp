@@ -21,14 +21,15 @@ using Words = long long __attribute__((vector_size(16), may_alias));
 __attribute__((no_sanitize("thread"))) void copy_words(const std::byte* source,
                                                        std::byte* destination, std::size_t size) {
     const auto* words = reinterpret_cast<const volatile Words*>(source);
+    const std::size_t rest = size % sizeof(Words);
     std::size_t at = 0;
-    for (; at + sizeof(Words) <= size; at += sizeof(Words)) {
+    for (; at < size - rest; at += sizeof(Words)) {
         const Words loaded = *words++;
         std::memcpy(destination + at, &loaded, sizeof loaded);
     }
-    if (at < size) {
+    if (rest != 0) {
         const Words loaded = *words;
-        std::memcpy(destination + at, &loaded, size - at);
+        std::memcpy(destination + at, &loaded, rest);
     }
 }
 
@@ -52,7 +53,7 @@ bool Payload::valid() const {
 }
 
 bool Payload::copy_to(std::byte* destination) const {
-    if (size_ != 0) copy_words(data_, destination, size_);
+    copy_words(data_, destination, size_);
     return valid();
 }
 

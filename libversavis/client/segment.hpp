@@ -17,20 +17,20 @@ namespace versavis::ring {
 /// What a header says once and for all. It is read once: what the writer, or somebody in its place,
 /// changes there later leads nobody astray.
 struct Constants {
-    std::uint64_t total_size = 0;
-    std::uint64_t generation = 0;
-    std::uint32_t writer_pid = 0;
-    StreamKind kind{};
-    std::uint64_t writer_start_ticks = 0;
-    std::uint32_t descriptor_count = 0;
-    std::uint32_t slot_count = 0;
-    std::uint64_t slot_size = 0;
-    std::uint64_t descriptors_at = 0;
-    std::uint64_t generations_at = 0;
-    std::uint64_t slots_at = 0;
-    std::array<char, sizeof Header::name> name{};
-    std::uint64_t life = 0;
-    std::uint64_t pid_namespace = 0;
+    std::uint64_t total_size;
+    std::uint64_t generation;
+    std::uint32_t writer_pid;
+    StreamKind kind;
+    std::uint64_t writer_start_ticks;
+    std::uint32_t descriptor_count;
+    std::uint32_t slot_count;
+    std::uint64_t slot_size;
+    std::uint64_t descriptors_at;
+    std::uint64_t generations_at;
+    std::uint64_t slots_at;
+    std::array<char, sizeof Header::name> name;
+    std::uint64_t life;
+    std::uint64_t pid_namespace;
 };
 
 /// Device and inode: tells a segment from its successor of the same name.
@@ -105,7 +105,7 @@ class Mapping {
     std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
 
     boost::interprocess::mapped_region region_;
-    Constants constants_;
+    Constants constants_{};
     FileId name_{};
 };
 

@@ -17,7 +17,7 @@ using test::in_process;
 namespace {
 
 Constants own_constants() {
-    Constants constants;
+    Constants constants{};
     constants.writer_pid = static_cast<std::uint32_t>(::getpid());
     constants.writer_start_ticks = start_ticks_of_this_process();
     constants.pid_namespace = own_pid_namespace();
