@@ -162,11 +162,11 @@ void fill(versavis_imu_span& to, versavis_imu_window& window, const ImuSpan& spa
     to.beyond = span.beyond ? sample_of(*span.beyond) : versavis_imu_sample{};
 }
 
+/// Into one that was released.
 void fill(versavis_set& to, versavis_sets& sets, FrameSet made) {
     to.life = made.life;
     to.tick = made.tick;
     to.epoch = made.epoch;
-    to.present = 0;
     to.time = made.time.ns;
     to.spread = made.spread.ns;
     for (std::size_t i = 0; i < made.frames.size(); ++i) {
@@ -243,18 +243,14 @@ const char* versavis_stream_name(const versavis_stream* stream) {
 
 int versavis_next(versavis_stream* stream, versavis_item* item, int64_t timeout) {
     if (stream == nullptr || item == nullptr) return VERSAVIS_INVALID;
-    return guarded(nullptr, [&] {
-        return give(timeout > 0 ? stream->reader.next(nanoseconds(timeout)) : stream->reader.next(),
-                    *stream, *item);
-    });
+    return guarded(nullptr,
+                   [&] { return give(stream->reader.next(nanoseconds(timeout)), *stream, *item); });
 }
 
 int versavis_latest(versavis_stream* stream, versavis_item* item, int64_t timeout) {
     if (stream == nullptr || item == nullptr) return VERSAVIS_INVALID;
-    return guarded(nullptr, [&] {
-        return give(stream->reader.latest(nanoseconds(std::max<std::int64_t>(timeout, 0))), *stream,
-                    *item);
-    });
+    return guarded(
+        nullptr, [&] { return give(stream->reader.latest(nanoseconds(timeout)), *stream, *item); });
 }
 
 int versavis_seek(versavis_stream* stream, std::uint32_t to) {
@@ -378,8 +374,8 @@ int versavis_imu_window_between(versavis_imu_window* window, int64_t after, int6
                                 int64_t patience, versavis_imu_span* span) {
     if (window == nullptr || span == nullptr || upto < after) return VERSAVIS_INVALID;
     return guarded(nullptr, [&]() -> int {
-        const Duration most = nanoseconds(std::max<std::int64_t>(patience, 0));
-        const auto found = window->window.between(OutputTime{after}, OutputTime{upto}, most);
+        const auto found =
+            window->window.between(OutputTime{after}, OutputTime{upto}, nanoseconds(patience));
         if (!found) return static_cast<int>(found.error().why);
         fill(*span, *window, *found);
         return VERSAVIS_OK;
@@ -410,7 +406,7 @@ int versavis_sets_next(versavis_sets* sets, versavis_set* set, int64_t timeout) 
     if (sets == nullptr || set == nullptr) return VERSAVIS_INVALID;
     versavis_set_release(set);
     return guarded(nullptr, [&]() -> int {
-        auto made = sets->reader.next(nanoseconds(std::max<std::int64_t>(timeout, 0)));
+        auto made = sets->reader.next(nanoseconds(timeout));
         if (!made) return static_cast<int>(made.error().why);
         fill(*set, *sets, std::move(*made));
         return VERSAVIS_OK;

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <poll.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis.h"
@@ -25,8 +31,10 @@ struct CApi {
         return std::make_unique<ring::Writer>(
             *ring::Writer::create(directory.path(), {name, ring::StreamKind::frames, 16, 4, 4096}));
     }
-    static void frame(ring::Writer& writer, std::uint64_t tick, std::uint8_t fill = 0) {
+    static void frame(ring::Writer& writer, std::uint64_t tick, std::uint8_t fill = 0,
+                      std::uint32_t size = 48, std::int64_t late = 0, std::uint32_t flags = 0) {
         FrameMetadata metadata{};
+        metadata.flags = flags;
         metadata.set_tick(tick);
         metadata.trigger = tick + 1;
         metadata.width = 10;
@@ -37,15 +45,46 @@ struct CApi {
         metadata.epoch = 1;
         const auto slot = writer.acquire();
         REQUIRE(slot);
-        std::memset(writer.slot_data(*slot), fill, 48);
-        writer.publish(*slot, 48, OutputTime{static_cast<std::int64_t>(1000 + tick)},
+        std::memset(writer.slot_data(*slot), fill, size);
+        writer.publish(*slot, size, OutputTime{static_cast<std::int64_t>(1000 + tick) + late},
                        pack(metadata));
     }
-    versavis_stream* open(const versavis_options* options = nullptr) const {
+    ring::Writer make_events() const {
+        return *ring::Writer::create(directory.path(), {"events", ring::StreamKind::events, 16});
+    }
+    ring::Writer make_imu() const {
+        return *ring::Writer::create(directory.path(), {"imu0", ring::StreamKind::imu, 64});
+    }
+    /// A sample for each of these times, with its number.
+    static void samples(ring::Writer& imu, std::int64_t first, std::int64_t last,
+                        std::uint64_t number) {
+        ImuMetadata sample{};
+        for (std::int64_t time = first; time <= last; ++time) {
+            sample.number = number++;
+            imu.publish(OutputTime{time}, pack(sample));
+        }
+    }
+    versavis_stream* open(const versavis_options* options = nullptr,
+                          const char* name = "cam0") const {
         versavis_stream* stream = nullptr;
         versavis_error error{};
-        REQUIRE(versavis_open(instance.c_str(), "cam0", options, &stream, &error) == VERSAVIS_OK);
+        REQUIRE(versavis_open(instance.c_str(), name, options, &stream, &error) == VERSAVIS_OK);
         return stream;
+    }
+    versavis_sets* open_sets(const versavis_sets_options* options) const {
+        const char* const cameras[] = {"cam0", "cam1"};
+        versavis_sets* sets = nullptr;
+        REQUIRE(versavis_sets_open(instance.c_str(), cameras, 2, options, &sets, nullptr) ==
+                VERSAVIS_OK);
+        return sets;
+    }
+    /// How many mappings this process has of rings of the instance.
+    std::size_t mapped() const {
+        std::ifstream maps("/proc/self/maps");
+        std::size_t found = 0;
+        for (std::string line; std::getline(maps, line);)
+            found += line.find(directory.path().string()) != std::string::npos ? 1 : 0;
+        return found;
     }
 };
 
@@ -110,6 +149,145 @@ TEST_CASE_METHOD(CApi, "c_api: an item outlives its stream and its service") {
     CHECK(versavis_valid(&item) == 0);
 }
 
+TEST_CASE_METHOD(CApi, "c_api: what an item held is let go by the next, a pause, or its release") {
+    const std::size_t before = mapped();
+    versavis_stream* stream = open();
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    for (std::uint64_t number = 0; number < 2; ++number) {
+        frame(*camera, 1, 9);
+        REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+        CHECK(item.number == number);
+        CHECK(item.payload_size == 48);
+    }
+    const auto is_empty = [&] {
+        return item.payload == nullptr && item.payload_size == 0 && versavis_valid(&item) == 0;
+    };
+    CHECK(versavis_next(stream, &item, -1) == VERSAVIS_NOTHING);
+    CHECK(is_empty());
+    CHECK((item.number == 0 && item.time == 0 && item.kind == 0 && item.lost == 0));
+    frame(*camera, 2, 9);
+    REQUIRE(versavis_latest(stream, &item, -1) == VERSAVIS_OK);
+    CHECK(versavis_latest(stream, &item, -1) == VERSAVIS_NOTHING);
+    for (std::uint64_t tick = 3; tick < 30; ++tick) frame(*camera, tick);
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_LOST);
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(item.lost == 0);
+    versavis_close(stream);
+    CHECK(mapped() == before + 1);
+    versavis_image image{};
+    CHECK(versavis_view(&item, &image) == VERSAVIS_OK);
+    versavis_release(&item);
+    CHECK(mapped() == before);
+    CHECK(is_empty());
+    CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: an item without payload is whole, and a copy of nothing") {
+    ring::Writer events = make_events();
+    versavis_stream* stream = open(nullptr, "events");
+    CHECK(versavis_stream_kind(stream) == VERSAVIS_EVENTS);
+    EventMetadata event{};
+    event.kind = EventKind::pps;
+    event.value = 7;
+    events.publish(OutputTime{5}, pack(event));
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(item.kind == VERSAVIS_EVENTS);
+    CHECK(item.data.event.value == 7);
+    CHECK(versavis_event_name(item.data.event.kind) == std::string("pps"));
+    CHECK(item.payload == nullptr);
+    CHECK(item.payload_size == 0);
+    CHECK(versavis_valid(&item) == 1);
+    CHECK(versavis_copy(&item, nullptr, 0) == VERSAVIS_OK);
+    versavis_image image{};
+    CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
+    versavis_release(&item);
+    versavis_close(stream);
+}
+
+TEST_CASE_METHOD(CApi,
+                 "c_api: a frame of a byte is copied to where there is room, and is no image") {
+    versavis_stream* stream = open();
+    frame(*camera, 1, 9, 1);
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    std::uint8_t byte = 0;
+    CHECK(versavis_copy(&item, nullptr, 1) == VERSAVIS_INVALID);
+    CHECK(versavis_copy(&item, &byte, 0) == VERSAVIS_INVALID);
+    CHECK(versavis_copy(&item, &byte, 1) == VERSAVIS_OK);
+    CHECK(byte == 9);
+    versavis_image image{};
+    CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
+    versavis_release(&item);
+    versavis_close(stream);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: what is read of a service that has ended is stale") {
+    versavis_stream* stream = open();
+    frame(*camera, 1);
+    camera.reset();
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(item.stale == 1);
+    versavis_release(&item);
+    versavis_close(stream);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: each place in a stream, to begin with, to go to, and after a loss") {
+    ring::Writer events = make_events();
+    const std::uint32_t places[] = {VERSAVIS_DEFAULT, VERSAVIS_NEXT, VERSAVIS_LATEST,
+                                    VERSAVIS_MIDDLE, VERSAVIS_OLDEST};
+    std::vector<versavis_stream*> slow;
+    for (const std::uint32_t place : places) {
+        versavis_options options = VERSAVIS_OPTIONS_INIT;
+        options.after_loss = place;
+        slow.push_back(open(&options, "events"));
+    }
+    for (std::int64_t time = 0; time < 40; ++time) events.publish(OutputTime{time}, {});
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    const std::int64_t none = -1;
+    const auto next_of = [&](versavis_stream* stream) {
+        return versavis_next(stream, &item, 0) == VERSAVIS_OK ? item.time : none;
+    };
+    std::vector<std::int64_t> begun;
+    std::vector<std::int64_t> sought;
+    std::vector<std::int64_t> after_loss;
+    for (const std::uint32_t place : places) {
+        versavis_options options = VERSAVIS_OPTIONS_INIT;
+        options.start = place;
+        versavis_stream* stream = open(&options, "events");
+        begun.push_back(next_of(stream));
+        CHECK(versavis_seek(stream, place) == VERSAVIS_OK);
+        sought.push_back(next_of(stream));
+        versavis_close(stream);
+        CHECK(versavis_next(slow[place], &item, 0) == VERSAVIS_LOST);
+        const auto lost = static_cast<std::int64_t>(item.lost);
+        after_loss.push_back(next_of(slow[place]));
+        CHECK(lost == (after_loss.back() == none ? 40 : after_loss.back()));
+        versavis_close(slow[place]);
+    }
+    CHECK(begun == sought);
+    CHECK(begun[VERSAVIS_DEFAULT] == none);
+    CHECK(begun[VERSAVIS_NEXT] == none);
+    CHECK(begun[VERSAVIS_LATEST] == 39);
+    CHECK(begun[VERSAVIS_MIDDLE] < 39);
+    CHECK(begun[VERSAVIS_OLDEST] < begun[VERSAVIS_MIDDLE]);
+    CHECK(begun[VERSAVIS_OLDEST] >= 40 - 16);
+    CHECK(after_loss[VERSAVIS_DEFAULT] == begun[VERSAVIS_MIDDLE]);
+    for (const std::uint32_t place :
+         {VERSAVIS_NEXT, VERSAVIS_LATEST, VERSAVIS_MIDDLE, VERSAVIS_OLDEST})
+        CHECK(after_loss[place] == begun[place]);
+    versavis_release(&item);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: without an instance it is that of the environment") {
+    CHECK(test::in_process([&] {
+        ::setenv("VERSAVIS_INSTANCE", instance.c_str(), 1);
+        versavis_stream* stream = nullptr;
+        return versavis_open(nullptr, "cam0", nullptr, &stream, nullptr) == VERSAVIS_OK;
+    }));
+}
+
 TEST_CASE_METHOD(CApi, "c_api: where reading begins is its choice") {
     for (std::uint64_t tick = 1; tick <= 3; ++tick) frame(*camera, tick);
     versavis_options options = VERSAVIS_OPTIONS_INIT;
@@ -131,13 +309,20 @@ TEST_CASE_METHOD(CApi, "c_api: where reading begins is its choice") {
 
 TEST_CASE_METHOD(CApi, "c_api: what cannot be opened says why and what to do") {
     versavis_error error{};
-    versavis_stream* stream = nullptr;
+    versavis_stream* const before = open();
+    versavis_stream* stream = before;
+    CHECK(versavis_open(instance.c_str(), "none", nullptr, &stream, nullptr) == VERSAVIS_ERROR);
     CHECK(versavis_open(instance.c_str(), "none", nullptr, &stream, &error) == VERSAVIS_ERROR);
     CHECK_THAT(error.message,
                Catch::Contains("no such stream") && Catch::Contains("versavis list"));
     CHECK(stream == nullptr);
+    versavis_close(before);
     versavis_options odd = VERSAVIS_OPTIONS_INIT;
     odd.start = 77;
+    CHECK(versavis_open(instance.c_str(), "cam0", &odd, &stream, &error) == VERSAVIS_INVALID);
+    CHECK_THAT(error.message, Catch::Contains("is not a position"));
+    odd = VERSAVIS_OPTIONS_INIT;
+    odd.after_loss = 5;
     CHECK(versavis_open(instance.c_str(), "cam0", &odd, &stream, &error) == VERSAVIS_INVALID);
     odd = VERSAVIS_OPTIONS_INIT;
     odd.owner = 12345;
@@ -151,9 +336,48 @@ TEST_CASE_METHOD(CApi, "c_api: what cannot be opened says why and what to do") {
         CHECK(versavis_open(instance.c_str(), name, nullptr, &stream, &error) == VERSAVIS_ERROR);
         CHECK_THAT(error.message, Catch::Contains("not a name"));
     }
+    struct {
+        versavis_error error;
+        char behind[8];
+    } room{};
+    std::memset(&room, 'r', sizeof room);
     CHECK(versavis_open(instance.c_str(), std::string(2000, 'x').c_str(), nullptr, &stream,
-                        &error) == VERSAVIS_ERROR);
-    CHECK(std::strlen(error.message) < sizeof error.message);
+                        &room.error) == VERSAVIS_ERROR);
+    CHECK(std::string(room.error.message).size() == sizeof error.message - 1);
+    CHECK(std::string(room.behind, sizeof room.behind) == "rrrrrrrr");
+}
+
+TEST_CASE_METHOD(CApi, "c_api: root is an owner, too") {
+    if (::geteuid() == 0) {
+        REQUIRE(::chown(directory.path().c_str(), 12345, 12345) == 0);
+        REQUIRE(::chown((directory.path() / "cam0").c_str(), 12345, 12345) == 0);
+    }
+    versavis_options options = VERSAVIS_OPTIONS_INIT;
+    options.owner = 0;
+    versavis_stream* stream = nullptr;
+    versavis_error error{};
+    CHECK(versavis_open(instance.c_str(), "cam0", &options, &stream, &error) == VERSAVIS_ERROR);
+    CHECK_THAT(error.message, Catch::Contains("not to user 0"));
+}
+
+TEST_CASE_METHOD(CApi, "c_api: where memory is short, that is what is told") {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    return;  // there, a program ends that asks for too much
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+    return;
+#endif
+#endif
+    const std::string large(std::size_t{1} << 26U, 'x');
+    CHECK(test::in_process([&] {
+        const rlimit none{0, 0};
+        versavis_stream* stream = nullptr;
+        versavis_error error{};
+        return ::setrlimit(RLIMIT_AS, &none) == 0 &&
+               versavis_open(instance.c_str(), large.c_str(), nullptr, &stream, &error) ==
+                   VERSAVIS_NO_MEMORY &&
+               error.message[0] != '\0';
+    }));
 }
 
 TEST_CASE("c_api: NULL is refused, not followed") {
@@ -161,7 +385,9 @@ TEST_CASE("c_api: NULL is refused, not followed") {
     versavis_item item = VERSAVIS_ITEM_INIT;
     versavis_image image{};
     versavis_set set = VERSAVIS_SET_INIT;
-    CHECK(versavis_open(nullptr, nullptr, nullptr, &stream, nullptr) == VERSAVIS_INVALID);
+    versavis_error error{};
+    CHECK(versavis_open(nullptr, nullptr, nullptr, &stream, &error) == VERSAVIS_INVALID);
+    CHECK_THAT(error.message, Catch::Contains("is NULL"));
     CHECK(versavis_open(nullptr, "cam0", nullptr, nullptr, nullptr) == VERSAVIS_INVALID);
     CHECK(versavis_next(nullptr, &item, 0) == VERSAVIS_INVALID);
     CHECK(versavis_latest(nullptr, &item, 0) == VERSAVIS_INVALID);
@@ -184,8 +410,50 @@ TEST_CASE("c_api: NULL is refused, not followed") {
     versavis_sets_close(nullptr);
     versavis_set_release(nullptr);
     versavis_wait_set_free(nullptr);
-    for (int result = -4; result < 8; ++result)
-        CHECK(std::strlen(versavis_result_text(result)) > 0);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: NULL beside what is not is refused, too") {
+    const auto imu = make_imu();
+    const auto other = make("cam1");
+    versavis_stream* stream = open();
+    versavis_wait_set* waiting = versavis_wait_set_new();
+    versavis_sets* sets = open_sets(nullptr);
+    versavis_imu_window* window = nullptr;
+    REQUIRE(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, &window, nullptr) ==
+            VERSAVIS_OK);
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    frame(*camera, 1);
+    CHECK(versavis_next(stream, nullptr, 0) == VERSAVIS_INVALID);
+    CHECK(versavis_latest(stream, nullptr, 0) == VERSAVIS_INVALID);
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    versavis_image image{};
+    CHECK(versavis_view(&item, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_view(nullptr, &image) == VERSAVIS_INVALID);
+    CHECK(versavis_wait_set_add(waiting, nullptr, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_wait_set_add(nullptr, stream, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_sets_next(sets, nullptr, 0) == VERSAVIS_INVALID);
+    versavis_set_report report{};
+    CHECK(versavis_sets_report(sets, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_sets_report(nullptr, &report) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_between(window, 1, 2, 0, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, nullptr, nullptr) ==
+          VERSAVIS_INVALID);
+    versavis_release(&item);
+    versavis_imu_window_close(window);
+    versavis_imu_window_close(nullptr);
+    versavis_sets_close(sets);
+    versavis_wait_set_free(waiting);
+    versavis_close(stream);
+}
+
+TEST_CASE("c_api: each result has a sentence of its own, and others share one") {
+    std::set<std::string> texts{versavis_result_text(-77)};
+    for (int result = VERSAVIS_NO_MEMORY; result <= VERSAVIS_OVERTAKEN; ++result)
+        texts.insert(versavis_result_text(result));
+    CHECK(texts.size() == 10);
+    CHECK(texts.count("") == 0);
+    for (const int result : {VERSAVIS_NO_MEMORY - 1, VERSAVIS_OVERTAKEN + 1})
+        CHECK(versavis_result_text(result) == std::string(versavis_result_text(-77)));
 }
 
 TEST_CASE_METHOD(CApi, "c_api: several streams in one wait, and by descriptors [threads]",
@@ -209,7 +477,7 @@ TEST_CASE_METHOD(CApi, "c_api: several streams in one wait, and by descriptors [
 }
 
 TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
-    ring::Writer imu = *ring::Writer::create(directory.path(), {"imu0", ring::StreamKind::imu, 64});
+    ring::Writer imu = make_imu();
     ImuMetadata sample{};
     for (std::int64_t i = 0; i < 5; ++i) {
         sample.number = static_cast<std::uint64_t>(i == 3 ? i + 1 : i);
@@ -226,24 +494,32 @@ TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
     CHECK(span.covered == 1);
     CHECK(span.lost == 1);  // up to the one beyond
     CHECK(span.has_beyond == 1);
+    CHECK(span.beyond.time == 1003);
     CHECK(span.beyond.data.number == 4);
     REQUIRE(versavis_imu_window_between(window, 1002, 2000, 0, &span) == VERSAVIS_OK);
     CHECK(span.count == 2);
     CHECK(span.covered == 0);
     CHECK(span.has_beyond == 0);
+    CHECK(versavis_imu_window_between(window, 2000, 2000, -1, &span) == VERSAVIS_OK);
+    CHECK(span.count == 0);
     CHECK(versavis_imu_window_between(window, 2, 1, 0, &span) == VERSAVIS_INVALID);
     CHECK(versavis_imu_window_between(nullptr, 1, 2, 0, &span) == VERSAVIS_INVALID);
     versavis_imu_window_close(window);
     CHECK(versavis_imu_window_open(instance.c_str(), "cam0", nullptr, &window, &error) ==
           VERSAVIS_ERROR);
+    CHECK(window == nullptr);
     CHECK_THAT(error.message, Catch::Contains("another kind"));
+    versavis_options odd = VERSAVIS_OPTIONS_INIT;
+    odd.after_loss = 5;
+    CHECK(versavis_imu_window_open(instance.c_str(), "imu0", &odd, &window, &error) ==
+          VERSAVIS_INVALID);
     CHECK(versavis_imu_window_open(instance.c_str(), nullptr, nullptr, &window, &error) ==
           VERSAVIS_INVALID);
 }
 
 TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     const auto other = make("cam1");
-    ring::Writer imu = *ring::Writer::create(directory.path(), {"imu0", ring::StreamKind::imu, 64});
+    ring::Writer imu = make_imu();
     const char* const cameras[] = {"cam0", "cam1"};
     versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;
     options.imu = "imu0";
@@ -260,12 +536,15 @@ TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
         sample.number = static_cast<std::uint64_t>(i + 1);
         imu.publish(OutputTime{1000 + i}, pack(sample));
     }
-    frame(*camera, 3, 1);
+    frame(*camera, 3, 1, 48, -2);
     frame(*other, 3, 2);
     REQUIRE(versavis_sets_next(sets, &set, 0) == VERSAVIS_OK);
+    CHECK(set.life == set.frames[0].life);
     CHECK(set.tick == 3);
+    CHECK(set.epoch == 1);
     CHECK(set.present == 3);
-    CHECK(set.spread == 0);
+    CHECK(set.time == 1001);
+    CHECK(set.spread == 2);
     CHECK(static_cast<const std::uint8_t*>(set.frames[1].payload)[0] == 2);
     CHECK(versavis_valid(&set.frames[0]) == 1);
     CHECK(set.imu_count == 0);  // there was no set before
@@ -278,12 +557,136 @@ TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     versavis_set_report report{};
     CHECK(versavis_sets_report(sets, &report) == VERSAVIS_OK);
     CHECK(report.sets == 2);
+    CHECK(set.imu_lost == 0);
     CHECK(set.imu_covered == 1);
+    samples(imu, 1005, 1006, 8);  // two are missing
+    frame(*camera, 6);
+    frame(*other, 6);
+    REQUIRE(versavis_sets_next(sets, &set, 0) == VERSAVIS_OK);
+    REQUIRE(set.imu_count == 2);
+    CHECK(set.imu[1].time == 1006);
+    CHECK(set.imu_lost == 2);
     CHECK(versavis_sets_fd(sets, nullptr) >= 0);
-    CHECK(versavis_sets_next(sets, &set, 0) == VERSAVIS_NOTHING);
+    CHECK(versavis_sets_next(sets, &set, -1) == VERSAVIS_NOTHING);
     CHECK(set.present == 0);
+    CHECK(set.imu == nullptr);
+    CHECK(set.imu_count == 0);
     versavis_set_release(&set);
     versavis_sets_close(sets);
-    CHECK(versavis_sets_open(instance.c_str(), cameras, 17, &options, &sets, &error) ==
+}
+
+TEST_CASE_METHOD(CApi, "c_api: a set keeps its frames until it is released") {
+    const auto other = make("cam1");
+    const std::size_t before = mapped();
+    versavis_sets* sets = open_sets(nullptr);
+    frame(*camera, 3, 1);
+    frame(*other, 3, 2);
+    versavis_set set = VERSAVIS_SET_INIT;
+    REQUIRE(versavis_sets_next(sets, &set, 0) == VERSAVIS_OK);
+    versavis_sets_close(sets);
+    CHECK(mapped() == before + 2);
+    versavis_set_release(&set);
+    CHECK(mapped() == before);
+    CHECK(set.present == 0);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: sets that lack something, by the options") {
+    const auto other = make("cam1");
+    const ring::Writer imu = make_imu();
+    versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;
+    options.patience = 1;
+    versavis_sets* strict = open_sets(&options);
+    options.imu = "imu0";
+    versavis_sets* alone = open_sets(&options);
+    options.partial = 1;
+    options.suspect = 1;
+    versavis_sets* lenient = open_sets(&options);
+    frame(*camera, 2, 0, 48, 0, flag_suspect);
+    frame(*other, 2, 0, 48, 0, flag_suspect);
+    frame(*other, 3, 5);
+    versavis_set set = VERSAVIS_SET_INIT;
+    CHECK(versavis_sets_next(strict, &set, 0) == VERSAVIS_NOTHING);
+    versavis_set_report report{};
+    REQUIRE(versavis_sets_report(strict, &report) == VERSAVIS_OK);
+    CHECK(report.sets == 0);
+    CHECK(report.incomplete == 1);
+    CHECK(report.left_out == 2);
+    CHECK(report.lost == 0);
+    REQUIRE(versavis_sets_next(lenient, &set, 0) == VERSAVIS_OK);
+    CHECK(set.present == 3);
+    CHECK(set.imu_covered == 0);
+    REQUIRE(versavis_sets_next(lenient, &set, 0) == VERSAVIS_OK);
+    CHECK(set.present == 2);
+    CHECK(set.frames[0].payload == nullptr);
+    CHECK(static_cast<const std::uint8_t*>(set.frames[1].payload)[47] == 5);
+    frame(*camera, 4);
+    frame(*other, 4);
+    REQUIRE(versavis_sets_next(alone, &set, 0) == VERSAVIS_OK);
+    CHECK(set.tick == 4);
+    versavis_set_release(&set);
+    for (versavis_sets* sets : {strict, alone, lenient}) versavis_sets_close(sets);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: a set waits for its samples, unless told not to") {
+    const auto other = make("cam1");
+    const ring::Writer imu = make_imu();
+    versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;
+    options.imu = "imu0";
+    versavis_sets* sets = open_sets(&options);
+    versavis_set set = VERSAVIS_SET_INIT;
+    int result = VERSAVIS_OK;  // of a machine that stands still for 200 ms
+    for (std::uint64_t tick = 1; tick < 10 && result == VERSAVIS_OK; ++tick) {
+        frame(*camera, tick);
+        frame(*other, tick);
+        result = versavis_sets_next(sets, &set, 0);
+    }
+    CHECK(result == VERSAVIS_NOTHING);
+    versavis_set_release(&set);
+    versavis_sets_close(sets);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: sets of one to sixteen cameras that are there") {
+    std::vector<std::unique_ptr<ring::Writer>> writers;
+    std::vector<std::string> names;
+    for (int i = 0; i < 17; ++i) {
+        names.push_back("camera" + std::to_string(i));
+        writers.push_back(make(names.back()));
+    }
+    std::vector<const char*> cameras;
+    for (const std::string& name : names) cameras.push_back(name.c_str());
+    versavis_error error{};
+    versavis_set set = VERSAVIS_SET_INIT;
+    for (const std::size_t count : {1U, 16U}) {
+        versavis_sets* sets = nullptr;
+        REQUIRE(versavis_sets_open(instance.c_str(), cameras.data(), count, nullptr, &sets,
+                                   &error) == VERSAVIS_OK);
+        for (std::size_t i = 0; i < count; ++i) frame(*writers[i], count);
+        REQUIRE(versavis_sets_next(sets, &set, 0) == VERSAVIS_OK);
+        CHECK(set.present == (1U << count) - 1);
+        versavis_set_release(&set);
+        versavis_sets_close(sets);
+    }
+    const auto refused = [&](const char* const* those, std::size_t count,
+                             const versavis_sets_options* options = nullptr) {
+        auto* sets = reinterpret_cast<versavis_sets*>(&set);
+        const int result =
+            versavis_sets_open(instance.c_str(), those, count, options, &sets, &error);
+        CHECK((sets == nullptr || result == VERSAVIS_INVALID));
+        return result;
+    };
+    CHECK(refused(cameras.data(), 17) == VERSAVIS_INVALID);
+    CHECK_THAT(error.message, Catch::Contains("1 to 16 cameras"));
+    CHECK(refused(cameras.data(), 0) == VERSAVIS_INVALID);
+    CHECK(refused(nullptr, 1) == VERSAVIS_INVALID);
+    CHECK(versavis_sets_open(instance.c_str(), cameras.data(), 1, nullptr, nullptr, &error) ==
           VERSAVIS_INVALID);
+    cameras[1] = "none";
+    CHECK(refused(cameras.data(), 2) == VERSAVIS_ERROR);
+    CHECK_THAT(error.message, Catch::Contains("no such stream"));
+    cameras[1] = nullptr;
+    CHECK(refused(cameras.data(), 2) == VERSAVIS_INVALID);
+    versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;
+    options.streams.start = 5;
+    CHECK(refused(cameras.data(), 1, &options) == VERSAVIS_INVALID);
+    CHECK_THAT(error.message, Catch::Contains("is not a position"));
 }
