@@ -34,24 +34,18 @@ Unexpected<> not_handed(const std::filesystem::path& path) {
                    "does it still run? try again");
 }
 
-/// The descriptor that came with one byte; none: errno says why.
+/// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.
 File receive(int connection) {
-    char byte = 0;
-    iovec data{&byte, sizeof byte};
     alignas(cmsghdr) char room[CMSG_SPACE(sizeof(int))]{};
     msghdr message{};
-    message.msg_iov = &data;
-    message.msg_iovlen = 1;
     message.msg_control = room;
     message.msg_controllen = CMSG_LEN(sizeof(int));  // a second descriptor does not come in
-    const ssize_t size = ::recvmsg(connection, &message, MSG_CMSG_CLOEXEC);
-    const cmsghdr* rights = CMSG_FIRSTHDR(&message);
-    if (size < 0) return File(-1);
+    if (::recvmsg(connection, &message, MSG_CMSG_CLOEXEC) < 0) return {};
     errno = EPROTO;
-    if (rights == nullptr || rights->cmsg_level != SOL_SOCKET || rights->cmsg_type != SCM_RIGHTS ||
-        rights->cmsg_len != CMSG_LEN(sizeof(int)))
-        return File(-1);
-    int file = -1;
+    // Nothing but descriptors comes to a socket that asked for nothing else.
+    const cmsghdr* rights = CMSG_FIRSTHDR(&message);
+    if (rights == nullptr) return {};
+    int file = 0;
     std::memcpy(&file, CMSG_DATA(rights), sizeof file);
     return File(file);
 }
@@ -67,7 +61,7 @@ bool is_of(int connection, std::uint32_t owner) {
 
 bool is_sealed(int file) {
     const int found = ::fcntl(file, F_GET_SEALS);
-    return found >= 0 && (found & seals) == seals;
+    return found != -1 && (found & seals) == seals;
 }
 
 Expected<File> fetch_sealed(int socket, const std::filesystem::path& path, std::uint32_t owner) {
@@ -79,7 +73,7 @@ Expected<File> fetch_sealed(int socket, const std::filesystem::path& path, std::
     const std::string name = "/proc/self/fd/" + std::to_string(socket);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
-    name.copy(address.sun_path, sizeof address.sun_path - 1);
+    name.copy(address.sun_path, name.size());
     if (::connect(connection.descriptor(), reinterpret_cast<const sockaddr*>(&address),
                   sizeof address) != 0)
         return not_handed(path);

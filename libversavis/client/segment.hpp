@@ -42,8 +42,9 @@ FileId file_id(const std::filesystem::path& path);
 /// A file descriptor that closes itself.
 class File {
  public:
+    File() = default;  ///< none
     explicit File(int descriptor) : descriptor_(descriptor) {}
-    File(File&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    File(File&& other) noexcept { std::swap(descriptor_, other.descriptor_); }
     File& operator=(File&& other) noexcept {
         std::swap(descriptor_, other.descriptor_);
         return *this;
@@ -54,7 +55,7 @@ class File {
     explicit operator bool() const { return descriptor_ >= 0; }
 
  private:
-    int descriptor_;
+    int descriptor_ = -1;
 };
 
 /// A segment that is open, and what has its name: of a sealed one, a socket.

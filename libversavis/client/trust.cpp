@@ -54,14 +54,13 @@ bool may_own(std::uint32_t user, std::optional<std::uint32_t> named) {
 Expected<NamedFile> open_trusted(const std::filesystem::path& path,
                                  std::optional<std::uint32_t> owner) {
     const auto parent = path.parent_path();
-    const File directory(::open(parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    const auto name = path.filename();
+    constexpr int itself = O_NOFOLLOW | O_CLOEXEC;
+    const File directory(::open(parent.c_str(), O_PATH | O_CLOEXEC));
     if (!directory) return not_opened(path);
-    File file(::openat(directory.descriptor(), path.filename().c_str(),
-                       O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    File file(::openat(directory.descriptor(), name.c_str(), O_RDONLY | O_NONBLOCK | itself));
     const bool sealed = !file && errno == ENXIO;  // it is a socket
-    if (sealed)
-        file = File(::openat(directory.descriptor(), path.filename().c_str(),
-                             O_PATH | O_NOFOLLOW | O_CLOEXEC));
+    if (sealed) file = File(::openat(directory.descriptor(), name.c_str(), O_PATH | itself));
     if (!file) return not_opened(path);
     struct stat of_file {};
     struct stat of_directory {};
@@ -77,11 +76,11 @@ Expected<NamedFile> open_trusted(const std::filesystem::path& path,
                            (owner ? ", not to user " + std::to_string(*owner)
                                   : ", who is neither root, nor you, nor 'versavis'"),
                        "if the service runs as that user, name it in VERSAVIS_OWNER, or as owner");
-    const FileId name{of_file.st_dev, of_file.st_ino};
-    if (!sealed) return NamedFile{std::move(file), name};
+    const FileId id{of_file.st_dev, of_file.st_ino};
+    if (!sealed) return NamedFile{std::move(file), id};
     auto segment = fetch_sealed(file.descriptor(), path, of_file.st_uid);
     if (!segment) return Unexpected(segment.error());
-    return NamedFile{std::move(*segment), name};
+    return NamedFile{std::move(*segment), id};
 }
 
 }  // namespace versavis::ring

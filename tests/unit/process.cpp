@@ -7,8 +7,11 @@
 
 #include <array>
 #include <catch2/catch.hpp>
+#include <cerrno>
 
 #include "../support/in_process.hpp"
+#include "../support/temporary_directory.hpp"
+#include "engine/ring/writer.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
@@ -49,14 +52,66 @@ TEST_CASE("process: it is there, dead, or cannot be judged from here") {
     CHECK(presence(none) == Presence::dead);
     for (const std::uint32_t odd : {0U, 0x80000000U, 0xFFFFFFFFU}) {
         none.writer_pid = odd;
+        CHECK(quick_presence(none) == Presence::unknown);
         CHECK(presence(none) == Presence::unknown);
     }
+    none.writer_pid = 1;  // as a service in a container
+    CHECK(quick_presence(none) == Presence::there);
+    errno = ESRCH;  // of an earlier call
+    CHECK(quick_presence(later) == Presence::there);
     for (const std::uint64_t space : {std::uint64_t{0}, own_pid_namespace() + 1}) {
         Constants elsewhere = later;
         elsewhere.pid_namespace = space;
         CHECK(quick_presence(elsewhere) == Presence::unknown);
         CHECK(presence(elsewhere) == Presence::unknown);
     }
+}
+
+TEST_CASE("process: one that may not be asked is there, and one that cannot be seen is unknown") {
+    if (::geteuid() != 0) return;  // only root can become somebody else, or see another /proc
+    const Constants own = own_constants();
+    CHECK(in_process(
+        [&] { return ::seteuid(12345) == 0 && quick_presence(own) == Presence::there; }));
+    const test::TemporaryDirectory empty;
+    CHECK(in_process([&] {
+        const Constants seen = own_constants();
+        return ::chroot(empty.path().c_str()) == 0 && presence(seen) == Presence::unknown;
+    }));
+    CHECK(in_process([&] {
+        if (::chroot(empty.path().c_str()) != 0 || own_pid_namespace() != 0) return false;
+        Constants unknown = own;
+        unknown.pid_namespace = 0;  // as unknown as one's own
+        return quick_presence(unknown) == Presence::unknown;
+    }));
+}
+
+TEST_CASE("process: a writer lives whose stream is open and whose heart beats, unless it is dead") {
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto writer = *Writer::create(directory.path(), {"events", StreamKind::events, 8});
+    const auto path = directory.path() / "events";
+    auto mapping = *Mapping::open(path, Mapping::Access::read_write);
+    Header& header = mapping.header();
+    {
+        Pulse pulse;
+        CHECK(writer_lives(mapping, pulse));
+    }
+    ++header.writer_start_ticks;  // an earlier process had its number
+    mapping.read_constants();
+    {
+        // Its heart beats on another clock, so it is only asked for by its number.
+        const HostTime ahead = host_now() + seconds(500);
+        Pulse pulse;
+        header.heartbeat_ns = ahead.ns;
+        CHECK_FALSE(writer_lives(mapping, pulse));
+        header.heartbeat_ns = ahead.ns + 1;
+        CHECK(writer_lives(mapping, pulse));
+        header.state = static_cast<std::uint32_t>(WriterState::closed);
+        CHECK_FALSE(writer_lives(mapping, pulse));
+    }
+    header.state = static_cast<std::uint32_t>(WriterState::live);
+    header.heartbeat_ns = (host_now() - milliseconds(150)).ns;
+    Pulse pulse;
+    CHECK_FALSE(writer_lives(mapping, pulse));
 }
 
 TEST_CASE("process: a heart beats while its last beat is young") {

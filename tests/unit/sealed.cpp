@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -14,6 +15,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "../support/in_process.hpp"
 #include "../support/look.hpp"
@@ -231,11 +233,12 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
         std::filesystem::remove(path());
         return message;
     };
-    CHECK_THAT(told([](int) {}), Catch::Contains("was not handed over"));  // and that in a second
+    // It is waited for, and that a second at most.
+    CHECK_THAT(told([](int) {}), Catch::Contains("handed over by the service: Resource temp"));
     CHECK_THAT(told([](int connection) { ::shutdown(connection, SHUT_RDWR); }),
-               Catch::Contains("was not handed over"));
+               Catch::Contains("handed over by the service: Protocol error"));
     CHECK_THAT(told([](int connection) { send(connection, {}); }),
-               Catch::Contains("was not handed over"));
+               Catch::Contains("handed over by the service: Protocol error"));
     for (const std::vector<int>& files :
          {std::vector<int>{plain.descriptor()}, {soft.descriptor()}, {0, 1, 2}})
         CHECK_THAT(told([&](int connection) { send(connection, files); }),
@@ -247,11 +250,29 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
                Catch::Contains("frames"));  // empty: it cannot be mapped
 }
 
+TEST_CASE_METHOD(Instance, "sealed: where no descriptor is left to connect, that is what is told") {
+    const Writer writer = write();
+    CHECK(in_process([&] {
+        const rlimit few{64, 64};
+        if (::setrlimit(RLIMIT_NOFILE, &few) != 0) return false;
+        std::vector<File> files;
+        for (int file = ::dup(0); file >= 0; file = ::dup(0)) files.emplace_back(file);
+        files.pop_back();  // for the directory
+        files.pop_back();  // and what has the name in it
+        return refusal().find("the service: Too many open files") != std::string::npos;
+    }));
+}
+
 TEST_CASE_METHOD(Instance, "sealed: served by another user than its owner, or to another group") {
     if (::geteuid() != 0) return;  // only root can become somebody else
     REQUIRE(::chmod(directory.path().c_str(), 0755) == 0);
     {
         const Writer writer = write();
+        CHECK(in_process([&] {
+            return ::setegid(stranger) == 0 && ::seteuid(stranger) == 0 &&
+                   refusal().find("permission denied; join the group") != std::string::npos;
+        }));
+        REQUIRE(::chmod(path().c_str(), 0664) == 0);  // who may look at it may not connect
         CHECK(in_process([&] {
             return ::setegid(stranger) == 0 && ::seteuid(stranger) == 0 &&
                    refusal().find("permission denied; join the group") != std::string::npos;

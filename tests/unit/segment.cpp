@@ -1,10 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/segment.hpp"
 
+#include <fcntl.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
 #include <fstream>
+#include <string>
+#include <vector>
 
+#include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/process.hpp"
 #include "engine/ring/ending.hpp"
@@ -47,6 +63,31 @@ struct Copies {
 /// Bytes of the ring above: 16 descriptors behind the header, two generations, two slots.
 constexpr std::uint64_t total = 4 * page_size;
 
+/// From here on, this process runs on a Linux before 5.14.
+bool forget_to_populate() {
+    std::array<sock_filter, 4> program{
+        {{BPF_LD | BPF_W | BPF_ABS, 0, 0, offsetof(seccomp_data, nr)},
+         {BPF_JMP | BPF_JEQ | BPF_K, 0, 1, SYS_madvise},
+         {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ERRNO | EINVAL},
+         {BPF_RET | BPF_K, 0, 0, SECCOMP_RET_ALLOW}}};
+    const sock_fprog filter{program.size(), program.data()};
+    return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+           ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
+}
+
+/// How many of its pages are touched without waiting.
+std::size_t pages_at_hand(const Mapping& mapping) {
+    const File map(::open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC));
+    std::vector<std::uint64_t> pages(mapping.size() / page_size);
+    const auto first = reinterpret_cast<std::uintptr_t>(&mapping.header()) / page_size;
+    const auto size = static_cast<ssize_t>(pages.size() * sizeof pages[0]);
+    if (::pread(map.descriptor(), pages.data(), static_cast<std::size_t>(size),
+                static_cast<off_t>(first * sizeof pages[0])) != size)
+        return 0;
+    return static_cast<std::size_t>(std::count_if(
+        pages.begin(), pages.end(), [](std::uint64_t page) { return page >> 63U == 1; }));
+}
+
 }  // namespace
 
 TEST_CASE_METHOD(Copies,
@@ -65,6 +106,89 @@ TEST_CASE_METHOD(Copies,
     CHECK(offset(mapping->slot(0)) == 8192);
     CHECK(offset(mapping->slot(1)) == 12288);
     CHECK(is_own(mapping->constants()));
+}
+
+TEST_CASE_METHOD(Copies, "segment: what its header says is read once") {
+    const auto mapping = Mapping::open(directory.path() / "frames", Mapping::Access::read_write);
+    REQUIRE(mapping);
+    Header& header = mapping->header();
+    const Constants& constants = mapping->constants();
+    const std::uint64_t generation = header.generation;
+    CHECK(constants.generation == generation);
+    CHECK(constants.kind == StreamKind::frames);
+    CHECK(constants.slot_count == 2);
+    CHECK(constants.name.data() == std::string("frames"));
+    CHECK(constants.life == header.life);
+    CHECK(constants.pid_namespace == header.pid_namespace);
+    ++header.generation;
+    CHECK(constants.generation == generation);
+}
+
+TEST_CASE_METHOD(Copies, "segment: one that is older than life and namespace has none of both") {
+    const auto path = directory.path() / "changed";
+    for (const std::uint32_t minor : {4U, 5U, 6U}) {
+        changed(offsetof(Header, abi_minor), minor);
+        const auto mapping = Mapping::open(path, Mapping::Access::read_only);
+        REQUIRE(mapping);
+        CHECK((mapping->constants().life != 0) == (minor >= 5));
+        CHECK((mapping->constants().pid_namespace != 0) == (minor >= 5));
+    }
+}
+
+TEST_CASE_METHOD(Copies, "segment: it is known by the file that has its name") {
+    const auto path = directory.path() / "frames";
+    const auto mapping = Mapping::open(path, Mapping::Access::read_only);
+    REQUIRE(mapping);
+    struct stat file {};
+    REQUIRE(::stat(path.c_str(), &file) == 0);
+    CHECK(mapping->name() == FileId{file.st_dev, file.st_ino});
+    CHECK(file_id(path) == mapping->name());
+    std::filesystem::create_symlink("frames", directory.path() / "link");
+    CHECK(file_id(directory.path() / "link") != mapping->name());
+    CHECK(file_id(directory.path() / "none") == FileId{});
+}
+
+TEST_CASE_METHOD(Copies, "segment: who only reads needs no right to write") {
+    const auto path = directory.path() / "frames";
+    REQUIRE(::chmod(directory.path().c_str(), 0755) == 0);
+    REQUIRE(::chmod(path.c_str(), 0444) == 0);
+    CHECK(test::in_process([&] {
+        if (::geteuid() == 0 && ::seteuid(12345) != 0) return false;
+        return opens(path) && !Mapping::open(path, Mapping::Access::read_write);
+    }));
+}
+
+TEST_CASE("segment: all pages are at hand, also where the kernel must be asked for each") {
+    const test::TemporaryDirectory directory("/dev/shm");
+    const auto writer =
+        *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, 200, page_size});
+    const auto access = GENERATE(Mapping::Access::read_only, Mapping::Access::read_write);
+    // The next mapping usually ends where this page begins, which nobody may read.
+    void* guard = ::mmap(nullptr, page_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    const auto mapping = *Mapping::open(directory.path() / "frames", access);
+    CHECK(pages_at_hand(mapping) < 200);
+    CHECK(test::in_process([&] {
+        if (!forget_to_populate()) return false;
+        mapping.populate();
+        return pages_at_hand(mapping) == mapping.size() / page_size;
+    }));
+    mapping.populate();
+    CHECK(pages_at_hand(mapping) == mapping.size() / page_size);
+    ::munmap(guard, page_size);
+}
+
+TEST_CASE("segment: a file closes with its owner, whatever its number") {
+    CHECK_FALSE(File());
+    CHECK(test::in_process([] {
+        ::close(0);
+        {
+            File zero(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+            if (!zero || zero.descriptor() != 0) return false;
+            const File moved(std::move(zero));
+            if (zero || moved.descriptor() != 0) return false;  // NOLINT: what is left is none
+        }
+        return ::fcntl(0, F_GETFD) == -1 && ::fcntl(1, F_GETFD) != -1;
+    }));
 }
 
 TEST_CASE_METHOD(Copies, "segment: a size that is not the file's is refused") {
@@ -124,8 +248,14 @@ TEST_CASE_METHOD(Copies, "segment: a name has an end, the magic is whole, the la
     CHECK(opens(changed(offsetof(Header, name) + 62, 'x')));
     CHECK_FALSE(opens(changed(0, 'v')));
     CHECK_FALSE(opens(changed(7, 's')));
-    for (const std::uint32_t version : {0U, 2U})
-        CHECK_FALSE(opens_with(offsetof(Header, abi_major), version));
+    for (const std::uint32_t version : {0U, 2U}) {
+        const auto path = changed(offsetof(Header, abi_major), version);
+        const auto refused = Mapping::open(path, Mapping::Access::read_only);
+        REQUIRE_FALSE(refused);
+        CHECK_THAT(refused.error().message(),
+                   Catch::Contains("layout version " + std::to_string(version)) &&
+                       Catch::Contains("reads version 1"));
+    }
     CHECK(opens_with(offsetof(Header, abi_minor), 77U));
 }
 
@@ -134,6 +264,16 @@ TEST_CASE_METHOD(Copies, "segment: what cannot be mapped says why, and what to d
     REQUIRE_FALSE(missing);
     CHECK_THAT(missing.error().message(),
                Catch::Contains("cannot be opened") && Catch::Contains("is the service running?"));
+    const auto told = [&](const char* name) {
+        return Mapping::open(directory.path() / name, Mapping::Access::read_only).error().message();
+    };
+    directory.write("empty", "");
+    CHECK_THAT(told("empty"),
+               Catch::Contains("cannot be mapped") && Catch::Contains("is the service running?"));
+    std::filesystem::create_symlink("frames", directory.path() / "link");
+    CHECK_THAT(told("link"), Catch::Contains("cannot be opened"));
+    REQUIRE(::mkfifo((directory.path() / "pipe").c_str(), 0600) == 0);
+    CHECK_THAT(told("pipe"), Catch::Contains("is not a VersaVIS ring"));
 }
 
 TEST_CASE_METHOD(Copies, "segment: one that ends says so, and has news for who waits") {
