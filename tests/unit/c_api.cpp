@@ -27,9 +27,10 @@ struct CApi {
     std::string instance = std::filesystem::relative(directory.path(), "/dev/shm/versavis");
     std::unique_ptr<ring::Writer> camera = make("cam0");
 
-    std::unique_ptr<ring::Writer> make(const std::string& name) const {
+    std::unique_ptr<ring::Writer> make(const std::string& name,
+                                       ring::StreamKind kind = ring::StreamKind::frames) const {
         return std::make_unique<ring::Writer>(
-            *ring::Writer::create(directory.path(), {name, ring::StreamKind::frames, 16, 4, 4096}));
+            *ring::Writer::create(directory.path(), {name, kind, 16, 4, 4096}));
     }
     static void frame(ring::Writer& writer, std::uint64_t tick, std::uint8_t fill = 0,
                       std::uint32_t size = 48, std::int64_t late = 0, std::uint32_t flags = 0) {
@@ -216,6 +217,19 @@ TEST_CASE_METHOD(CApi,
     CHECK(versavis_copy(&item, &byte, 0) == VERSAVIS_INVALID);
     CHECK(versavis_copy(&item, &byte, 1) == VERSAVIS_OK);
     CHECK(byte == 9);
+    versavis_image image{};
+    CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
+    versavis_release(&item);
+    versavis_close(stream);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: a document is no image, whatever its words are") {
+    const auto status = make("status", ring::StreamKind::status);
+    versavis_stream* stream = open(nullptr, "status");
+    frame(*status, 1);
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(item.kind == VERSAVIS_STATUS);
     versavis_image image{};
     CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
     versavis_release(&item);
