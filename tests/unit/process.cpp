@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "client/process.hpp"
 
+#include <sched.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cerrno>
+#include <thread>
 
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
@@ -82,6 +84,19 @@ TEST_CASE("process: one that may not be asked is there, and one that cannot be s
         Constants unknown = own;
         unknown.pid_namespace = 0;  // as unknown as one's own
         return quick_presence(unknown) == Presence::unknown;
+    }));
+}
+
+TEST_CASE("process: the first one of a container knows its namespace, too") {
+    if (::geteuid() != 0) return;  // only root can make one
+    const std::uint64_t outside = own_pid_namespace();
+    CHECK(in_process([&] {
+        if (::unshare(CLONE_NEWPID) != 0) return true;  // nor may root everywhere
+        return in_process([&] {
+            std::uint64_t inside = 0;
+            std::thread([&] { inside = own_pid_namespace(); }).join();
+            return ::getpid() == 1 && inside != 0 && inside != outside;
+        });
     }));
 }
 

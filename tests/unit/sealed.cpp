@@ -229,7 +229,7 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
     const auto before = open_files();
     const auto told = [&](const std::function<void(int)>& answer) {
         const Peer peer(path(), answer);
-        const std::string message = refusal();
+        std::string message = refusal();
         std::filesystem::remove(path());
         return message;
     };

@@ -40,7 +40,7 @@ struct Copies {
     /// A copy of the ring with one number of its header changed.
     template <typename T>
     std::filesystem::path changed(std::size_t offset, T value) {
-        const auto path = directory.path() / "changed";
+        auto path = directory.path() / "changed";
         std::filesystem::copy_file(directory.path() / "frames", path,
                                    std::filesystem::copy_options::overwrite_existing);
         std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
