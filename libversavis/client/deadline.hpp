@@ -2,6 +2,7 @@
 // The end of a wait, however long somebody wants to wait.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "versavis/time.hpp"
@@ -10,10 +11,17 @@ namespace versavis {
 
 /// Now and `timeout`, or the end of time; now, if that is past.
 inline HostTime deadline_after(Duration timeout) {
-    const HostTime now = host_now();
-    if (timeout.ns <= 0) return now;
-    const bool endless = timeout.ns > INT64_MAX - now.ns;
-    return endless ? HostTime{INT64_MAX} : now + timeout;
+    HostTime deadline;
+    const bool endless =
+        __builtin_add_overflow(host_now().ns, std::max(timeout, Duration{}).ns, &deadline.ns);
+    return endless ? HostTime{INT64_MAX} : deadline;
 }
+
+/// What is left until then; nothing, when it has come.
+inline Duration left_until(HostTime deadline) {
+    return std::max(deadline - host_now(), Duration{});
+}
+
+inline bool is_over(HostTime deadline) { return left_until(deadline) == Duration{}; }
 
 }  // namespace versavis
