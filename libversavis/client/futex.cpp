@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <ctime>
 
 namespace versavis::ring {
@@ -20,39 +21,44 @@ constexpr std::int64_t second_ns = 1'000'000'000;
 // an idle program. Twice: items of the other streams are seen up to 2 ms late.
 constexpr std::int64_t blind_sleep_ns = 1'000'000;
 
+/// Kernels before 5.16 do not know of several words, and some containers do not let it through.
+bool cannot_wait_for_any(long result) {
+    return result == -1 && (errno == ENOSYS || errno == EPERM);
+}
+
 }  // namespace
 
 int futex_wake(const std::atomic<std::uint32_t>& word, int count) {
-    return static_cast<int>(syscall(SYS_futex, &word, FUTEX_WAKE, count, nullptr, nullptr, 0));
+    return static_cast<int>(syscall(SYS_futex, &word, FUTEX_WAKE, count));
 }
 
 void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
                 std::int64_t timeout_ns) {
     const timespec timeout{timeout_ns / second_ns, timeout_ns % second_ns};
-    syscall(SYS_futex, &word, FUTEX_WAIT, value, &timeout, nullptr, 0);
+    syscall(SYS_futex, &word, FUTEX_WAIT, value, &timeout);
 }
 
-void futex_wait_any(const FutexWord* words, std::size_t count, std::int64_t timeout_ns) {
+void futex_wait_any(const std::vector<FutexWord>& words, std::int64_t timeout_ns) {
     std::array<futex_waitv, most_futex_words> waiters{};
-    count = std::min(count, most_futex_words);
-    for (std::size_t i = 0; i < count; ++i) {
-        waiters[i].val = words[i].value;
-        waiters[i].uaddr = reinterpret_cast<std::uintptr_t>(words[i].word);
-        waiters[i].flags = FUTEX_32;
-    }
+    const auto count = static_cast<std::ptrdiff_t>(std::min(words.size(), waiters.size()));
+    std::transform(words.begin(), words.begin() + count, waiters.begin(), [](const FutexWord& one) {
+        futex_waitv waiter{};
+        waiter.val = one.value;
+        waiter.uaddr = reinterpret_cast<std::uintptr_t>(one.word);
+        waiter.flags = FUTEX_32;
+        return waiter;
+    });
     timespec until{};
     clock_gettime(CLOCK_MONOTONIC, &until);
     const std::int64_t ns = until.tv_nsec + timeout_ns;
     until.tv_sec += ns / second_ns;
     until.tv_nsec = ns % second_ns;
-    if (count == 0) {
-        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-        return;
-    }
-    const long woken = syscall(SYS_futex_waitv, waiters.data(), static_cast<unsigned>(count), 0,
-                               &until, CLOCK_MONOTONIC);
-    if (woken < 0 && (errno == ENOSYS || errno == EPERM))
-        futex_wait(*words[0].word, words[0].value, std::min(timeout_ns, blind_sleep_ns));
+    const long result = words.empty()
+                            ? clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr)
+                            : syscall(SYS_futex_waitv, waiters.data(), static_cast<unsigned>(count),
+                                      0, &until, CLOCK_MONOTONIC);
+    if (cannot_wait_for_any(result))
+        futex_wait(*words.front().word, words.front().value, std::min(timeout_ns, blind_sleep_ns));
 }
 
 }  // namespace versavis::ring

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace versavis::ring {
 
@@ -29,8 +30,9 @@ struct FutexWord {
 /// How many words one call of futex_wait_any can sleep on.
 constexpr std::size_t most_futex_words = 128;
 
-/// Sleeps until one of the words has no longer its value, or `timeout_ns` has passed; may also
-/// return early. Kernels before 5.16 cannot: there it sleeps on the first one, for a millisecond.
-void futex_wait_any(const FutexWord* words, std::size_t count, std::int64_t timeout_ns);
+/// Sleeps until one of the words, of the first 128 at most, has no longer its value, or
+/// `timeout_ns` has passed; may also return early. Kernels before 5.16 cannot: there it sleeps on
+/// the first one, for a millisecond.
+void futex_wait_any(const std::vector<FutexWord>& words, std::int64_t timeout_ns);
 
 }  // namespace versavis::ring

@@ -56,10 +56,9 @@ std::optional<std::size_t> WaitSet::wait(Duration timeout) {
             if (state_->watch) state_->watch->signal();
             return found;
         }
-        const std::int64_t left_ns = (deadline - host_now()).ns;
-        if (left_ns <= 0) break;
-        ring::futex_wait_any(state_->words.data(), state_->words.size(),
-                             std::min(left_ns, ring::longest_sleep_ns));
+        const Duration left = left_until(deadline);
+        if (left == Duration{}) break;
+        ring::futex_wait_any(state_->words, std::min(left.ns, ring::longest_sleep_ns));
     }
     if (state_->watch) arm();
     return std::nullopt;
@@ -68,11 +67,11 @@ std::optional<std::size_t> WaitSet::wait(Duration timeout) {
 void WaitSet::arm() {
     std::vector<ring::WatchTarget> targets;
     std::optional<HostTime> deadline = state_->deadline;
-    for (std::size_t i = 0; i < state_->readers.size(); ++i) {
-        const ring::Reader& reader = *state_->readers[i];
-        targets.push_back(reader.target(state_->words[i].value));
-        const auto retry = reader.retry();
-        if (retry && (!deadline || *retry < *deadline)) deadline = retry;
+    auto word = state_->words.begin();
+    for (const ring::Reader* reader : state_->readers) {
+        targets.push_back(reader->target((word++)->value));
+        const auto retry = reader->retry();
+        if (retry) deadline = std::min(*retry, deadline.value_or(*retry));
     }
     state_->watch->arm(std::move(targets), deadline);
 }

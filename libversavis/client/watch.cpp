@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstdint>
 #include <system_error>
+#include <utility>
 
+#include "client/deadline.hpp"
 #include "client/futex.hpp"
 #include "client/quiet_thread.hpp"
 
@@ -16,11 +19,11 @@ namespace versavis::ring {
 
 namespace {
 
-bool stirred(const WatchTarget& target, Pulse& pulse) {
+bool stirred(WatchTarget& target) {
     // SYNC 5: acquire, as in Reader::next().
     if (target.mapping->header().wake.load(std::memory_order_acquire) != target.seen) return true;
     return target.gone ? has_successor(target.path, target.mapping->name(), target.refused)
-                       : !writer_lives(*target.mapping, pulse);
+                       : !writer_lives(*target.mapping, target.pulse);
 }
 
 }  // namespace
@@ -45,32 +48,28 @@ Expected<std::unique_ptr<Watch>> Watch::start() {
 }
 
 Watch::~Watch() {
-    {
-        const std::lock_guard lock(mutex_);
-        stop_ = true;
-        version_.fetch_add(1);
-    }
-    armed_.notify_one();
-    futex_wake(version_, INT_MAX);
+    become(std::nullopt, true);
     if (thread_.joinable()) thread_.join();
 }
 
 void Watch::calm() {
-    eventfd_t count = 0;
+    eventfd_t count{};
     ::eventfd_read(event_.descriptor(), &count);
 }
 
 void Watch::signal() { ::eventfd_write(event_.descriptor(), 1); }
 
 void Watch::arm(std::vector<WatchTarget> targets, std::optional<HostTime> deadline) {
+    become(Watched{std::move(targets), deadline}, false);
+}
+
+void Watch::become(std::optional<Watched> watched, bool stop) {
     {
         const std::lock_guard lock(mutex_);
-        targets_ = std::move(targets);
-        deadline_ = deadline;
-        idle_ = false;
+        watched_ = std::move(watched);
+        stop_ = stop;
         version_.fetch_add(1);
     }
-    armed_.notify_one();
     futex_wake(version_, INT_MAX);
 }
 
@@ -78,37 +77,33 @@ bool Watch::outdated(std::uint32_t version) const { return version_.load() != ve
 
 void Watch::run() {
     std::unique_lock lock(mutex_);
-    for (;;) {
-        armed_.wait(lock, [this] { return stop_ || !idle_; });
-        if (stop_) return;
-        const auto targets = targets_;
-        const auto deadline = deadline_;
+    while (!stop_) {
         const std::uint32_t version = version_.load();
+        auto watched = watched_;
         lock.unlock();
-        keep(version, targets, deadline);
+        if (watched)
+            keep(version, std::move(*watched));
+        else
+            futex_wait(version_, version, INT64_MAX);
         lock.lock();
-        if (outdated(version)) continue;
-        idle_ = true;
+        if (!watched || outdated(version)) continue;
+        watched_.reset();
         signal();
     }
 }
 
 /// Returns when something happened, or the watch was armed anew.
-void Watch::keep(std::uint32_t version, const std::vector<WatchTarget>& targets,
-                 std::optional<HostTime> deadline) {
-    std::vector<Pulse> pulses;
+void Watch::keep(std::uint32_t version, Watched watched) const {
     std::vector<FutexWord> words{{&version_, version}};
-    for (const WatchTarget& target : targets) {
-        pulses.push_back(target.pulse);
+    for (const WatchTarget& target : watched.targets)
         words.push_back({&target.mapping->header().wake, target.seen});
-    }
+    const HostTime deadline = watched.deadline.value_or(HostTime{INT64_MAX});
     while (!outdated(version)) {
-        for (std::size_t i = 0; i < targets.size(); ++i)
-            if (stirred(targets[i], pulses[i])) return;
-        std::int64_t sleep_ns = longest_sleep_ns;
-        if (deadline) sleep_ns = std::min(sleep_ns, (*deadline - host_now()).ns);
-        if (sleep_ns <= 0) return;
-        futex_wait_any(words.data(), words.size(), sleep_ns);
+        for (WatchTarget& target : watched.targets)
+            if (stirred(target)) return;
+        const Duration left = left_until(deadline);
+        if (left == Duration{}) return;
+        futex_wait_any(words, std::min(left.ns, longest_sleep_ns));
     }
 }
 

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -23,10 +22,10 @@ namespace versavis::ring {
 struct WatchTarget {
     std::shared_ptr<const Mapping> mapping;
     std::filesystem::path path;
-    std::uint32_t seen = 0;  ///< value of `wake` before the reader looked, and found nothing
-    bool gone = false;       ///< it has told that the writer is gone: only a successor is news
-    FileId refused{};        ///< a file of this name that is no successor
-    Pulse pulse{};           ///< what the reader knows of the writer's heart
+    std::uint32_t seen{};  ///< value of `wake` before the reader looked, and found nothing
+    bool gone{};           ///< it has told that the writer is gone: only a successor is news
+    FileId refused{};      ///< a file of this name that is no successor
+    Pulse pulse{};         ///< what the reader knows of the writer's heart
 };
 
 /// True when there is a file of this name that its reader does not know.
@@ -53,19 +52,21 @@ class Watch {
     void arm(std::vector<WatchTarget> targets, std::optional<HostTime> deadline);
 
  private:
+    struct Watched {
+        std::vector<WatchTarget> targets;
+        std::optional<HostTime> deadline;
+    };
+
     explicit Watch(File event) : event_(std::move(event)) {}
+    void become(std::optional<Watched> watched, bool stop);
     void run();
-    void keep(std::uint32_t version, const std::vector<WatchTarget>& targets,
-              std::optional<HostTime> deadline);
+    void keep(std::uint32_t version, Watched watched) const;
     bool outdated(std::uint32_t version) const;
 
     File event_;
     std::mutex mutex_;
-    std::condition_variable armed_;
-    std::vector<WatchTarget> targets_;
-    std::optional<HostTime> deadline_;
-    std::atomic<std::uint32_t> version_{0};  ///< changes when the thread shall look up; its futex
-    bool idle_ = true;
+    std::optional<Watched> watched_;        ///< none: the thread sleeps
+    std::atomic<std::uint32_t> version_{};  ///< changes when the thread shall look up; its futex
     bool stop_ = false;
     std::thread thread_;
 };

@@ -2,6 +2,8 @@
 #include "versavis/wait_set.hpp"
 
 #include <poll.h>
+#include <pthread.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -14,7 +16,10 @@
 #include <string>
 #include <thread>
 
+#include "../support/in_process.hpp"
+#include "../support/sleep.hpp"
 #include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 
 using namespace versavis;
@@ -32,6 +37,9 @@ struct Streams {
         auto opened = Reader::open(directory.path() / name);
         REQUIRE(opened);
         return std::move(*opened);
+    }
+    Mapping map(const std::string& name) const {
+        return *Mapping::open(directory.path() / name, Mapping::Access::read_only);
     }
 };
 
@@ -66,6 +74,49 @@ TEST_CASE_METHOD(Streams, "wait_set: it names who has something, and takes turns
     CHECK(seen.size() == 2);
 }
 
+TEST_CASE_METHOD(Streams,
+                 "wait_set: turns begin with the first, and whoever has something has one") {
+    std::vector<Writer> writers;
+    std::vector<Reader> readers;
+    WaitSet set;
+    for (const char* name : {"a", "b", "c"}) {
+        writers.push_back(writer(name));
+        readers.push_back(reader(name));
+    }
+    for (Reader& one : readers) REQUIRE(set.add(one));
+    for (Writer& one : writers) one.publish({}, {});
+    for (std::size_t turn = 0; turn < 7; ++turn) CHECK(set.wait({}) == turn % 3);
+    for (Reader& one : readers) CHECK(one.next());
+    for (const std::size_t only : {1, 0, 2, 2, 1, 1, 0, 0}) {
+        writers[only].publish({}, {});
+        CHECK(set.wait({}) == only);
+        CHECK(readers[only].next());
+        CHECK_FALSE(set.wait({}));
+    }
+}
+
+TEST_CASE_METHOD(Streams, "wait_set: it sleeps on the words of all its streams [threads]",
+                 "[threads]") {
+    Writer a = writer("a");
+    Writer b = writer("b");
+    Reader of_a = reader("a");
+    Reader of_b = reader("b");
+    WaitSet set;
+    REQUIRE(set.add(of_a));
+    REQUIRE(set.add(of_b));
+    const bool by_descriptor = GENERATE(false, true);
+    std::thread waiting;
+    if (by_descriptor) {
+        REQUIRE(set.fd());
+        CHECK_FALSE(set.wait({}));
+    } else {
+        waiting = std::thread([&] { static_cast<void>(set.wait(seconds(60))); });
+    }
+    for (const char* name : {"a", "b", "a"}) CHECK(test::wake_sleeper(map(name).header().wake));
+    a.publish({}, {});
+    if (waiting.joinable()) waiting.join();
+}
+
 TEST_CASE_METHOD(Streams, "wait_set: each of its streams wakes it [threads]", "[threads]") {
     Writer a = writer("a");
     Writer b = writer("b");
@@ -89,6 +140,7 @@ TEST_CASE_METHOD(Streams, "wait_set: an end is news once, a successor again") {
     Reader of_a = reader("a");
     WaitSet set;
     REQUIRE(set.add(of_a));
+    CHECK(of_a.next().error().why == Pause::nothing);
     first.reset();
     CHECK(set.wait({}) == 0U);
     CHECK(of_a.next().error().why == Pause::gone);
@@ -109,6 +161,21 @@ TEST_CASE_METHOD(Streams, "wait_set: what cannot be followed is not news for eve
     CHECK(set.wait({}) == 0U);
     CHECK(of_a.next().error().why == Pause::gone);
     CHECK_FALSE(set.wait({}));
+}
+
+TEST_CASE_METHOD(Streams, "wait_set: a dead writer is news once, though its file stays") {
+    Writer writing = writer("a");
+    Reader of_a = reader("a");
+    WaitSet set;
+    REQUIRE(set.add(of_a));
+    writing.heartbeat(HostTime{0});
+    CHECK(set.wait(seconds(20)) == 0U);
+    CHECK(of_a.next().error().why == Pause::gone);
+    CHECK_FALSE(set.wait({}));
+    const auto descriptor = set.fd();
+    REQUIRE(descriptor);
+    CHECK_FALSE(set.wait({}));
+    CHECK_FALSE(readable(*descriptor, 50));
 }
 
 TEST_CASE_METHOD(Streams, "wait_set: its descriptor is readable until nothing is left [threads]",
@@ -135,6 +202,11 @@ TEST_CASE_METHOD(Streams, "wait_set: its descriptor is readable until nothing is
         CHECK_FALSE(set.wait({}));
         CHECK_FALSE(readable(*descriptor));
     }
+    for (int i = 0; i < 3; ++i) CHECK_FALSE(set.wait({}));  // who waits again waits for the same
+    CHECK_FALSE(readable(*descriptor, 50));
+    a.publish({}, {});
+    REQUIRE(readable(*descriptor, 20'000));
+    CHECK(of_a.next());
     set.set_deadline(host_now() + milliseconds(5));
     CHECK_FALSE(set.wait({}));
     CHECK(readable(*descriptor, 20'000));
@@ -163,9 +235,13 @@ TEST_CASE_METHOD(Streams,
     REQUIRE(readable(*descriptor, 20'000));
     CHECK(of_a.next().error().why == Pause::gone);
     CHECK_FALSE(readable(*descriptor));
-    const Writer second = writer("a");
+    Writer second = writer("a");
     REQUIRE(readable(*descriptor, 20'000));
     CHECK(of_a.next().error().why == Pause::restarted);
+    CHECK_FALSE(of_a.next());
+    second.publish({}, {});
+    REQUIRE(readable(*descriptor, 20'000));
+    CHECK(of_a.next());
 }
 
 TEST_CASE_METHOD(Streams, "wait_set: any time is a time to wait [threads]", "[threads]") {
@@ -212,6 +288,7 @@ TEST_CASE_METHOD(Streams, "wait_set: the library's threads take none of the prog
         std::uint64_t blocked = 0;
         status >> std::hex >> blocked;
         CHECK((blocked >> (SIGTERM - 1U) & 1U) == 1);
+        test::await_sleep(std::stoi(task.path().filename()));  // nothing is to be done
         ++own;
     }
     CHECK(own >= 1);
@@ -220,14 +297,19 @@ TEST_CASE_METHOD(Streams, "wait_set: the library's threads take none of the prog
 TEST_CASE_METHOD(Streams, "wait_set: a successor that could not be followed is tried again") {
     Writer writing = writer("a");
     Reader reading = reader("a");
-    const bool by_descriptor = GENERATE(false, true);
-    const int descriptor = by_descriptor ? *reading.fd() : -1;
+    enum class By { time, descriptor, set };
+    const By by = GENERATE(By::time, By::descriptor, By::set);
+    WaitSet set;
+    REQUIRE(set.add(reading));
+    set.set_deadline(host_now() + seconds(1000));
+    const int descriptor = by == By::time ? -1 : by == By::set ? *set.fd() : *reading.fd();
     REQUIRE(::chmod(directory.path().c_str(), 0777) == 0);  // nobody trusts that
     writing = writer("a");
     CHECK(reading.next().error().why == Pause::gone);
     CHECK(reading.next().error().why == Pause::gone);
     REQUIRE(::chmod(directory.path().c_str(), 0750) == 0);
-    if (by_descriptor) CHECK(readable(descriptor, 20'000));
+    if (by == By::set) static_cast<void>(set.wait({}));
+    if (by != By::time) CHECK(readable(descriptor, 20'000));
     CHECK(reading.next(seconds(20)).error().why == Pause::restarted);
 }
 
@@ -239,4 +321,38 @@ TEST_CASE_METHOD(Streams, "wait_set: too many streams are refused") {
     const auto refused = set.add(of_a);
     REQUIRE_FALSE(refused);
     CHECK_THAT(refused.error().message(), Catch::Contains("second WaitSet"));
+}
+
+namespace {
+
+/// True: a descriptor to wait by was refused, and why was said.
+bool is_refused(const Expected<int>& descriptor, const std::string& what) {
+    return !descriptor && descriptor.error().message().find(what) != std::string::npos;
+}
+
+/// From here on this process gets no thread: no stack is as large.
+bool forbid_threads() {
+    pthread_attr_t attributes;
+    ::pthread_attr_init(&attributes);
+    ::pthread_attr_setstacksize(&attributes, std::size_t{1} << 47U);
+    return ::pthread_setattr_default_np(&attributes) == 0;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Streams, "wait_set: where no descriptor or thread is to be had, that is told") {
+    const Writer a = writer("a");
+    Reader of_a = reader("a");
+    WaitSet set;
+    REQUIRE(set.add(of_a));
+    CHECK(test::in_process([&] {
+        const rlimit none{0, 0};
+        return ::setrlimit(RLIMIT_NOFILE, &none) == 0 &&
+               is_refused(set.fd(), "a descriptor to wait on") &&
+               is_refused(of_a.fd(), "a descriptor to wait on");
+    }));
+    CHECK(test::in_process([&] {
+        return forbid_threads() && is_refused(set.fd(), "a thread to wait in") &&
+               is_refused(of_a.fd(), "a thread to wait in");
+    }));
 }
