@@ -2,8 +2,9 @@
 #include "versavis/ring/reader.hpp"
 
 #include <algorithm>
-#include <ctime>
+#include <numeric>
 
+#include "client/clock_ns.hpp"
 #include "client/deadline.hpp"
 #include "client/futex.hpp"
 #include "client/process.hpp"
@@ -25,11 +26,7 @@ constexpr std::int64_t look_period_ns = 10'000'000;
 constexpr Duration retry_period = seconds(1);
 
 /// A few ns to read, and some ms coarse.
-std::int64_t coarse_now_ns() {
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
-    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
+std::int64_t coarse_now_ns() { return clock_ns(CLOCK_MONOTONIC_COARSE); }
 
 Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                                              const Options& options) {
@@ -40,11 +37,24 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                        "set 'sealed = true' in [memory] of the service's configuration");
     auto mapping = Mapping::open(*file, path, Mapping::Access::read_only);
     if (!mapping) return Unexpected(mapping.error());
+    mapping->populate();
     return std::make_shared<const Mapping>(std::move(*mapping));
 }
 
 Unexpected<NoItem> pause(Pause why, std::uint64_t lost = 0) {
     return Unexpected<NoItem>(NoItem{why, lost});
+}
+
+/// How far a descriptor of this sequence is ahead of the complete item; 0: it holds it.
+std::int64_t ahead_of(std::uint64_t number, std::uint64_t sequence) {
+    return static_cast<std::int64_t>(sequence - (2 * number + 2));
+}
+
+bool is(const Received& received, Pause why) { return !received && received.error().why == why; }
+
+/// Nothing that could be told at once, unless it is the first time.
+bool is_quiet(const Received& received) {
+    return is(received, Pause::nothing) || is(received, Pause::gone);
 }
 
 }  // namespace
@@ -63,9 +73,9 @@ std::string NoItem::message() const {
 /// What a reader remembers of its writer.
 struct Reader::Contact {
     Pulse pulse;
-    std::int64_t looked_ns = 0;  ///< coarse clock
-    bool alive = true;
-    bool told_gone = false;
+    std::int64_t looked_ns{};  ///< coarse clock
+    bool alive{};
+    bool told_gone = false;        ///< by the last look
     std::uint64_t read = 0;        ///< number behind that of the item that was handed out last
     std::unique_ptr<Watch> watch;  ///< once fd() was asked for
 
@@ -75,7 +85,7 @@ struct Reader::Contact {
     }
     /// When the file of this name that could not be followed is tried again; none: there is none.
     std::optional<HostTime> retry() const {
-        const bool waits = refused_ != FileId{} && host_now() < retry_;
+        const bool waits = refused_ != FileId{} && left_until(retry_) != Duration{};
         return waits ? std::optional(retry_) : std::nullopt;
     }
     FileId refused() const { return retry() ? refused_ : FileId{}; }
@@ -88,7 +98,6 @@ struct Reader::Contact {
 Expected<Reader> Reader::open(const std::filesystem::path& path, const Options& options) {
     auto mapping = map(path, options);
     if (!mapping) return Unexpected(mapping.error());
-    (*mapping)->populate();
     Reader reader(path, options, std::move(*mapping));
     reader.seek(options.start);
     reader.writer_alive();
@@ -142,27 +151,26 @@ bool Reader::writer_seen() {
 
 Reader::Look Reader::read(std::uint64_t number, Item& item) const {
     const Descriptor& descriptor = mapping_->descriptor(number);
-    const std::uint64_t complete = 2 * number + 2;
     // The item's second cache line comes along with the first, not after it.
-    __builtin_prefetch(&descriptor.metadata[metadata_words - 1]);
+    __builtin_prefetch(&descriptor.metadata.back());
     // SYNC 2: acquire here, release in Writer::write_descriptor(): the descriptor's words, the
     // payload and the slot's generation are at least as new as this item. Without it the words of
     // the item that lay here before could be taken for this one's.
-    const std::uint64_t sequence = descriptor.sequence.load(std::memory_order_acquire);
-    if (sequence != complete)
-        return static_cast<std::int64_t>(sequence - complete) < 0 ? Look::not_yet
-                                                                  : Look::overwritten;
+    const auto ahead = ahead_of(number, descriptor.sequence.load(std::memory_order_acquire));
+    if (ahead < 0) return Look::not_yet;
+    if (ahead != 0) return Look::overwritten;
     const std::uint64_t generation = descriptor.slot_generation.load(std::memory_order_relaxed);
     const std::uint64_t length_and_slot =
         descriptor.length_and_slot.load(std::memory_order_relaxed);
     item.time.ns = descriptor.output_time_ns.load(std::memory_order_relaxed);
-    for (std::size_t i = 0; i < metadata_words; ++i)
-        item.metadata[i] = descriptor.metadata[i].load(std::memory_order_relaxed);
+    std::transform(descriptor.metadata.begin(), descriptor.metadata.end(), item.metadata.begin(),
+                   [](const auto& word) { return word.load(std::memory_order_relaxed); });
     // SYNC 3: acquire fence here, release fence in Writer::write_descriptor(): if any word above
     // came from the next item, the sequence below is no longer this item's. Without it a mixture of
     // two descriptors would pass.
     std::atomic_thread_fence(std::memory_order_acquire);
-    if (descriptor.sequence.load(std::memory_order_relaxed) != complete) return Look::overwritten;
+    if (ahead_of(number, descriptor.sequence.load(std::memory_order_relaxed)) != 0)
+        return Look::overwritten;
 
     item.number = number;
     item.life = mapping_->constants().life;
@@ -186,7 +194,7 @@ std::uint64_t Reader::oldest() const {
     std::uint64_t lost = end - std::min(end, retained());
     std::uint64_t there = end;
     while (lost < there) {
-        const std::uint64_t middle = lost + (there - lost) / 2;
+        const std::uint64_t middle = std::midpoint(lost, there);
         if (readable(middle))
             there = middle;
         else
@@ -230,17 +238,18 @@ Received Reader::take() {
         case Look::ready: break;
     }
     contact_->read = ++next_;
-    contact_->told_gone = false;
     item.stale = !writer_seen();
     return item;
 }
 
 Received Reader::look() {
     auto received = take();
-    if (received || received.error().why != Pause::nothing || writer_seen()) return received;
-    received = take();  // published since the last look
-    if (received || received.error().why != Pause::nothing) return received;
-    return hand_over();
+    if (is(received, Pause::nothing) && !writer_seen()) {
+        received = take();  // published since the last look
+        if (is(received, Pause::nothing)) received = hand_over();
+    }
+    contact_->told_gone = is(received, Pause::gone);
+    return received;
 }
 
 Received Reader::hand_over() {
@@ -254,15 +263,12 @@ Received Reader::hand_over() {
     if (now.generation == before.generation || now.kind != before.kind) return pause(Pause::gone);
     // A writer that was taken for dead may have published once more before it was replaced.
     auto last = take();
-    if (last || last.error().why != Pause::nothing) return last;
+    if (!is(last, Pause::nothing)) return last;
     mapping_ = std::move(*successor);
-    mapping_->populate();
     next_ = 0;
-    contact_->read = 0;
-    contact_->pulse = {};
-    contact_->told_gone = false;
-    contact_->refuse({});
-    writer_alive();
+    Contact anew;
+    anew.watch = std::move(contact_->watch);
+    *contact_ = std::move(anew);
     return pause(Pause::restarted);
 }
 
@@ -270,11 +276,7 @@ std::optional<HostTime> Reader::retry() const { return contact_->retry(); }
 
 Received Reader::next() {
     auto received = look();
-    if (received) return received;
-    const Pause why = received.error().why;
-    if (contact_->watch && (why == Pause::nothing || why == Pause::gone)) received = settle();
-    if (!received && received.error().why == Pause::gone) contact_->told_gone = true;
-    return received;
+    return contact_->watch && is_quiet(received) ? settle() : received;
 }
 
 /// Nothing is there: the descriptor is made to wait for what comes from here on.
@@ -282,14 +284,10 @@ Received Reader::settle() {
     contact_->watch->calm();
     const std::uint32_t seen = wake_word().value;
     auto received = look();
-    const bool found =
-        received || received.error().why == Pause::lost || received.error().why == Pause::restarted;
-    if (found) {
+    if (is_quiet(received))
+        contact_->watch->arm({target(seen)}, retry());
+    else
         contact_->watch->signal();
-        return received;
-    }
-    contact_->told_gone = received.error().why == Pause::gone;
-    contact_->watch->arm({target(seen)}, retry());
     return received;
 }
 
@@ -309,9 +307,8 @@ WatchTarget Reader::target(std::uint32_t seen) const {
 /// True when next() has something new to tell.
 bool Reader::ready() {
     const auto not_there = [this] {
-        const Descriptor& descriptor = mapping_->descriptor(next_);
-        const std::uint64_t sequence = descriptor.sequence.load(std::memory_order_acquire);
-        return static_cast<std::int64_t>(sequence - (2 * next_ + 2)) < 0;
+        const auto& sequence = mapping_->descriptor(next_).sequence;
+        return ahead_of(next_, sequence.load(std::memory_order_acquire)) < 0;
     };
     if (!not_there()) return true;
     if (writer_seen()) return false;
@@ -335,13 +332,11 @@ Received Reader::next(Duration timeout) {
         const FutexWord word = wake_word();
         const bool told = contact_->told_gone;
         auto received = next();
-        if (received) return received;
-        const Pause why = received.error().why;
-        if (why == Pause::lost || why == Pause::restarted || (why == Pause::gone && !told))
-            return received;
-        const std::int64_t left_ns = (deadline - host_now()).ns;
-        if (left_ns <= 0) return received;
-        futex_wait(*word.word, word.value, std::min(left_ns, longest_sleep_ns));
+        const bool ends = contact_->told_gone && !told;
+        if (!is_quiet(received) || ends) return received;
+        const Duration left = left_until(deadline);
+        if (left == Duration{}) return received;
+        futex_wait(*word.word, word.value, std::min(left.ns, longest_sleep_ns));
     }
 }
 
@@ -349,9 +344,9 @@ void Reader::wait(Duration timeout) {
     const HostTime deadline = deadline_after(timeout);
     for (;;) {
         const FutexWord word = wake_word();
-        const std::int64_t left_ns = (deadline - host_now()).ns;
-        if (ready() || left_ns <= 0) return;
-        futex_wait(*word.word, word.value, std::min(left_ns, longest_sleep_ns));
+        const Duration left = left_until(deadline);
+        if (ready() || left == Duration{}) return;
+        futex_wait(*word.word, word.value, std::min(left.ns, longest_sleep_ns));
     }
 }
 

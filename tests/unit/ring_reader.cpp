@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where a reader begins, what it makes of a writer that died, lied or took back, and how it waits.
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstring>
@@ -17,6 +19,7 @@
 
 #include "../support/in_process.hpp"
 #include "../support/look.hpp"
+#include "../support/sleepers.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/futex.hpp"
 #include "client/segment.hpp"
@@ -71,16 +74,6 @@ long wakes_of_this_thread() {
     return usage.ru_nvcsw;
 }
 
-/// Until the thread of this number sleeps in the kernel.
-void await_sleep(pid_t thread) {
-    const std::string path = "/proc/self/task/" + std::to_string(thread) + "/stat";
-    for (std::string line; line.empty() || line[line.rfind(')') + 2] != 'S';) {
-        std::ifstream file(path);
-        std::getline(file, line);
-        std::this_thread::yield();
-    }
-}
-
 /// How long a thread waits for a change of `word` that `act` tells of.
 Duration slept_through(const std::atomic<std::uint32_t>& word, const std::function<void()>& act) {
     std::atomic<pid_t> number{0};
@@ -93,7 +86,7 @@ Duration slept_through(const std::atomic<std::uint32_t>& word, const std::functi
         slept = host_now() - begun;
     });
     while (number == 0) std::this_thread::yield();
-    await_sleep(number);
+    test::await_sleep(number);
     act();
     sleeper.join();
     return slept;
@@ -159,6 +152,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: where nothing is, the item says so") {
     CHECK(item.found == test::Found::nothing);
     CHECK(item.lost == 0);
     CHECK(item.number == 0);
+    CHECK(item.life == 0);
+    CHECK_FALSE(item.stale);
     CHECK(item.time.ns == 0);
     CHECK(item.payload.data() == nullptr);
     CHECK(item.payload.size() == 0);
@@ -173,6 +168,98 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ri
     CHECK(item.found == test::Found::item);
     CHECK(item.number == 16);
     CHECK(test::look(open("events").next()).found == test::Found::nothing);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: each place is where it says, and holds what is read next") {
+    Writer writer = events(64);
+    const auto first_from = [&](Position position) {
+        return test::look(open("events", {position}).next());
+    };
+    for (const Position position : {Position::oldest, Position::middle, Position::latest}) {
+        Reader early = open("events", {position});
+        CHECK(test::look(early.next()).found == test::Found::nothing);
+    }
+    for (std::uint64_t i = 0; i < 64; ++i) {
+        writer.publish(OutputTime{}, {i});
+        CHECK(first_from(Position::oldest).number == 0);  // nothing is about to be overwritten
+        CHECK(first_from(Position::latest).number == i);
+    }
+    for (std::uint64_t i = 64; i < 100; ++i) writer.publish(OutputTime{}, {i});
+    Reader from_oldest = open("events", {Position::oldest});
+    Reader from_middle = open("events", {Position::middle});
+    for (std::uint64_t i = 100; i < 104; ++i) writer.publish(OutputTime{}, {i});
+    const auto oldest = test::look(from_oldest.next());
+    CHECK(oldest.found == test::Found::item);
+    CHECK(oldest.number < 100 - 32);
+    CHECK(test::look(from_middle.next()).number == 100 - 32);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: the oldest item is found, however many were given back") {
+    constexpr std::uint64_t slots = 8;
+    for (std::uint64_t published = 0; published <= 2 * slots; ++published)
+        for (std::uint64_t taken = 0; taken <= slots; ++taken) {
+            Writer writer = frames(slots);
+            for (std::uint64_t i = 0; i < published; ++i) publish(writer, 10);
+            for (std::uint64_t i = 0; i < taken; ++i) REQUIRE(writer.acquire());
+            const std::uint64_t there = std::min({published, slots, slots - taken});
+            Reader reader = open("frames");
+            reader.seek(OutputTime{INT64_MIN});
+            const auto item = test::look(reader.next());
+            CHECK(item.found == (there == 0 ? test::Found::nothing : test::Found::item));
+            CHECK(item.number == (there == 0 ? 0 : published - there));
+        }
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: the middle is never where the writer is next") {
+    Writer writer = frames(8);
+    for (int i = 0; i < 8; ++i) publish(writer, 10);
+    for (int i = 0; i < 4; ++i) REQUIRE(writer.acquire());
+    Reader reader = open("frames", {Position::middle});
+    REQUIRE(writer.acquire());
+    CHECK(test::look(reader.next()).found == test::Found::item);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a time is sought, and so many items before it") {
+    Writer writer = events();
+    for (const std::int64_t time : {100, 300, 200, 400, 500}) writer.publish(OutputTime{time}, {});
+    Reader reader = open("events");
+    const auto first_from = [&](std::int64_t time, std::uint64_t earlier) {
+        reader.seek(OutputTime{time}, earlier);
+        return test::look(reader.next());
+    };
+    reader.seek(OutputTime{400});
+    CHECK(test::look(reader.next()).number == 3);
+    CHECK(first_from(250, 0).number == 3);  // an earlier one is not later than it
+    CHECK(first_from(401, 0).number == 4);
+    CHECK(first_from(400, 1).number == 2);
+    CHECK(first_from(400, 3).number == 0);
+    CHECK(first_from(400, 9).number == 0);
+    CHECK(first_from(INT64_MIN, 0).number == 0);
+    CHECK(first_from(501, 0).found == test::Found::nothing);
+    writer.publish(OutputTime{600}, {});
+    CHECK(test::look(reader.next()).number == 5);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: an item that is lost alone is passed over alone") {
+    Writer writer = frames(8);
+    Reader reader = open("frames");
+    for (int i = 0; i < 8; ++i) publish(writer, 10);
+    map("frames").generation(6) += 2;
+    for (std::uint64_t i = 0; i < 6; ++i) CHECK(test::look(reader.next()).number == i);
+    const auto lost = test::look(reader.next());
+    CHECK(lost.found == test::Found::lost);
+    CHECK(lost.lost == 1);
+    CHECK(test::look(reader.next()).number == 7);
+}
+
+TEST_CASE("ring_reader: each reason why there is no item has a sentence") {
+    const auto text = [](Pause why) { return NoItem{why, 7}.message(); };
+    CHECK_THAT(text(Pause::nothing), Catch::Contains("nothing new"));
+    CHECK_THAT(text(Pause::lost), Catch::Contains("7 items"));
+    CHECK_THAT(text(Pause::restarted), Catch::Contains("restarted"));
+    CHECK_THAT(text(Pause::gone), Catch::Contains("gone"));
+    CHECK(NoItem{}.why == Pause::nothing);
+    CHECK(NoItem{}.lost == 0);
 }
 
 TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one item is lost") {
@@ -227,7 +314,9 @@ TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies bef
     Writer writer = events();
     Reader reader = open("events");
     CHECK(test::look(reader.latest()).found == test::Found::nothing);
-    for (std::uint64_t i = 0; i < 5; ++i) writer.publish(OutputTime{}, {i});
+    writer.publish(OutputTime{}, {0});
+    CHECK(test::look(open("events").latest()).number == 0);
+    for (std::uint64_t i = 1; i < 5; ++i) writer.publish(OutputTime{}, {i});
     CHECK(test::look(reader.latest()).number == 4);
     CHECK(test::look(reader.latest()).found == test::Found::nothing);
     CHECK(test::look(open("events").latest()).number == 4);  // also what came before it opened
@@ -236,6 +325,108 @@ TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies bef
     CHECK(test::look(reader.latest(milliseconds(1))).found == test::Found::nothing);
     for (std::uint64_t i = 6; i < 40; ++i) writer.publish(OutputTime{}, {i});
     CHECK(test::look(reader.latest()).number == 39);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: the newest item is told lost where no newer one comes") {
+    Writer writer = frames(4);
+    Reader reader = open("frames");
+    publish(writer, 10);
+    for (int i = 0; i < 4; ++i) CHECK(writer.acquire());
+    CHECK(test::look(reader.latest()).found == test::Found::lost);
+    writer.publish(0, 10, OutputTime{}, {});
+    CHECK(test::look(reader.latest()).number == 1);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: what is read after the end is stale, after a restart not") {
+    auto writer = std::make_unique<Writer>(events());
+    Reader reader = open("events");
+    const std::uint64_t life = reader.life();
+    for (std::uint64_t i = 0; i < 3; ++i) writer->publish(OutputTime{}, {i});
+    const auto fresh = test::look(reader.next());
+    CHECK_FALSE(fresh.stale);
+    CHECK(life != 0);
+    CHECK(fresh.life == life);
+    writer.reset();
+    for (std::uint64_t i = 1; i < 3; ++i) {
+        const auto stale = test::look(reader.next());
+        CHECK(stale.number == i);
+        CHECK(stale.stale);
+    }
+    CHECK(test::look(reader.next()).found == test::Found::gone);
+    writer = std::make_unique<Writer>(events());
+    for (std::uint64_t i = 0; i < 3; ++i) writer->publish(OutputTime{}, {i});
+    CHECK(test::look(reader.next()).found == test::Found::restarted);
+    const auto newest = test::look(reader.latest());
+    CHECK(newest.number == 2);
+    CHECK_FALSE(newest.stale);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a loss is told though the writer has ended") {
+    auto writer = std::make_unique<Writer>(events());
+    Reader reader = open("events");
+    const bool by_descriptor = GENERATE(false, true);
+    if (by_descriptor) REQUIRE(reader.fd());
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
+    for (std::uint64_t i = 0; i < 20; ++i) writer->publish(OutputTime{}, {i});
+    writer.reset();
+    const auto lost = test::look(reader.next());
+    CHECK(lost.found == test::Found::lost);
+    CHECK(test::look(reader.next()).number == lost.lost);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a writer that falls silent is told each time, at once") {
+    Writer writer = events();
+    Reader reader = open("events");
+    const bool with_items = GENERATE(false, true);
+    for (int i = 0; i < 2; ++i) {
+        writer.heartbeat(host_now());
+        CHECK(reader.writer_alive());
+        if (with_items) {
+            writer.publish(OutputTime{}, {});
+            CHECK(test::look(reader.next()).found == test::Found::item);
+        }
+        CHECK(test::look(reader.next()).found == test::Found::nothing);
+        writer.heartbeat(HostTime{0});
+        CHECK(test::look(reader.next(nanoseconds(INT64_MAX))).found == test::Found::gone);
+    }
+}
+
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: a writer on another clock lives once its heart has beaten") {
+    Writer writer = events();
+    const HostTime far = host_now() - seconds(1000);
+    writer.heartbeat(far);
+    Reader reader = open("events");
+    writer.heartbeat(far + milliseconds(1));
+    CHECK(reader.writer_alive());
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a copy of a segment is no successor") {
+    auto writer = std::make_unique<Writer>(events());
+    Reader reader = open("events");
+    const auto copy = directory.path() / "copy";
+    std::filesystem::copy_file(directory.path() / "events", copy);
+    writer.reset();
+    std::filesystem::rename(copy, directory.path() / "events");
+    CHECK(test::look(reader.next()).found == test::Found::gone);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: all that it may read is in memory from the beginning") {
+    const Writer writer = frames(64);
+    const Reader reader = open("frames");
+    std::ifstream maps("/proc/self/smaps");
+    int found = 0;
+    for (std::string line; std::getline(maps, line);) {
+        if (line.find((directory.path() / "frames").string()) == std::string::npos) continue;
+        std::string size;
+        std::string resident;
+        for (std::string word; maps >> word && word != "Rss:";)
+            if (word == "Size:") maps >> size;
+        maps >> resident;
+        CHECK(resident == size);
+        ++found;
+    }
+    CHECK(found == 2);
 }
 
 TEST_CASE_METHOD(Streams,
@@ -349,6 +540,49 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {
     writer.publish(OutputTime{}, {});
     CHECK(test::look(reader.next(seconds(20))).found == test::Found::item);
     CHECK(test::look(reader.next({})).found == test::Found::nothing);
+    const HostTime begun_again = host_now();
+    reader.wait(milliseconds(30));
+    CHECK(host_now() - begun_again >= milliseconds(30));
+    writer.publish(OutputTime{}, {});
+    reader.wait(nanoseconds(INT64_MAX));
+    CHECK(test::look(reader.next()).found == test::Found::item);
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps on its stream's word [threads]",
+                 "[threads]") {
+    Writer writer = events();
+    Reader reader = open("events");
+    const Mapping mapping = map("events");
+    const bool for_an_item = GENERATE(true, false);
+    std::thread waiting([&] {
+        if (!for_an_item) reader.wait(seconds(60));
+        static_cast<void>(reader.next(seconds(60)));
+    });
+    CHECK(test::wake_sleeper(mapping.header().wake));
+    writer.publish(OutputTime{}, {});
+    waiting.join();
+}
+
+TEST_CASE_METHOD(Streams, "ring_reader: a descriptor forgets no item of a busy writer [threads]",
+                 "[threads]") {
+    constexpr std::uint64_t last = 20'000;
+    Writer writer = events(1024);
+    Reader reader = open("events");
+    const auto descriptor = reader.fd();
+    REQUIRE(descriptor);
+    std::thread writing([&] {
+        for (std::uint64_t i = 0; i < last; ++i) writer.publish(OutputTime{}, {i});
+    });
+    std::uint64_t seen = 0;
+    for (bool told = true; told && seen < last;) {
+        pollfd entry{*descriptor, POLLIN, 0};
+        told = ::poll(&entry, 1, 20'000) == 1;
+        const auto found = test::look(reader.next());
+        seen += found.found == test::Found::item ? 1 : found.lost;
+    }
+    writing.join();
+    CHECK(seen == last);
+    CHECK(test::look(reader.next()).found == test::Found::nothing);
 }
 
 TEST_CASE_METHOD(Streams,
