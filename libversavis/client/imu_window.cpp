@@ -57,9 +57,9 @@ bool ImuWindow::reaches(OutputTime time) const {
 
 /// What was forgotten is read from the ring again, where it still is.
 void ImuWindow::look_back(OutputTime after) {
-    const bool kept =
-        before_ ? before_->time <= after : !samples_.empty() && samples_.front().time <= after;
-    if (kept || (before_ == std::nullopt && samples_.empty())) return;
+    const ImuSample* oldest = samples_.empty() ? nullptr : &samples_.front();
+    if (before_) oldest = &*before_;
+    if (oldest == nullptr || oldest->time <= after) return;
     stream_.reader().seek(after, 1);  // and the one before, which shows that none is missing
     samples_.clear();
     before_.reset();
@@ -91,8 +91,8 @@ Expected<ImuSpan, NoItem> ImuWindow::between(OutputTime after, OutputTime upto, 
     const HostTime deadline = deadline_after(patience);
     for (;;) {
         if (auto collected = collect(); !collected) return Unexpected<NoItem>(collected.error());
-        const Duration left = deadline - host_now();
-        if (reaches(upto) || left <= Duration{}) return take(after, upto);
+        const Duration left = left_until(deadline);
+        if (reaches(upto) || left == Duration{}) return take(after, upto);
         stream_.reader().wait(left);
     }
 }

@@ -6,7 +6,9 @@
 #include <thread>
 #include <vector>
 
+#include "../support/sleepers.hpp"
 #include "../support/temporary_directory.hpp"
+#include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 
 using namespace versavis;
@@ -82,6 +84,11 @@ TEST_CASE_METHOD(Samples, "imu_window: samples that are missing are counted") {
     ImuWindow window = open();
     CHECK(window.between({100}, {400}, {})->lost == 4 + 2);  // up to the one beyond
     CHECK(window.between({300}, {350}, {})->lost == 0);
+    for (const std::uint64_t back : {0, 2}) {  // numbers that stand still or go back
+        number -= 1 + back;
+        add(static_cast<std::int64_t>(600 + 100 * back));
+    }
+    CHECK(window.between({500}, {800}, {})->lost == 0);
 }
 
 TEST_CASE_METHOD(Samples, "imu_window: it waits until the second instant is reached [threads]",
@@ -96,6 +103,52 @@ TEST_CASE_METHOD(Samples, "imu_window: it waits until the second instant is reac
     REQUIRE(span);
     CHECK(span->samples.size() == 49);
     CHECK(span->complete());
+}
+
+TEST_CASE_METHOD(Samples, "imu_window: one that waits sleeps on its stream's word [threads]",
+                 "[threads]") {
+    add(100);
+    ImuWindow window = open();
+    const auto ring =
+        *ring::Mapping::open(directory.path() / "imu", ring::Mapping::Access::read_only);
+    std::thread waiting([&] { static_cast<void>(window.between({100}, {200}, seconds(60))); });
+    CHECK(test::wake_sleeper(ring.header().wake));
+    add(200);
+    waiting.join();
+}
+
+TEST_CASE_METHOD(Samples, "imu_window: who is overtaken gets what there is at the next look") {
+    ImuWindow window = open();
+    REQUIRE(window.collect());
+    for (int i = 1; i <= 200; ++i) add(i);
+    REQUIRE(window.collect());
+    CHECK(window.reaches({200}));
+    CHECK_FALSE(window.reaches({201}));
+}
+
+TEST_CASE_METHOD(Samples, "imu_window: it holds more than the ring, and not all for ever") {
+    constexpr int published = 140'000;
+    ImuWindow window = open();
+    for (int i = 1; i <= published; ++i) {
+        add(i);
+        if (i % 32 == 0) REQUIRE(window.collect());
+        if (i == 200)  // the ring has forgotten it
+            for (const std::int64_t upto : {30, 20})
+                CHECK(window.between({10}, {upto}, {})->complete());
+    }
+    const auto kept = window.take({0}, {published});
+    CHECK(kept.samples.size() > 100'000);
+    CHECK(kept.samples.size() < published - 1000);
+    CHECK(kept.samples.back().time.ns == published);
+}
+
+TEST_CASE_METHOD(Samples, "imu_window: what lies before its beginning is found, too") {
+    for (int i = 1; i <= 100; ++i) add(i);
+    ImuWindow window = open();
+    REQUIRE(window.collect());
+    const auto span = window.between({40}, {50}, {});
+    CHECK(span->complete());
+    CHECK(span->samples.size() == 10);
 }
 
 TEST_CASE_METHOD(Samples, "imu_window: what was forgotten is found again while the ring holds it") {
@@ -122,4 +175,21 @@ TEST_CASE_METHOD(Samples, "imu_window: times of two epochs, or of two services, 
     REQUIRE_FALSE(restarted);
     CHECK(restarted.error().why == Pause::restarted);
     CHECK(times(*window.between({5}, {10}, {})) == Times{10});
+}
+
+TEST_CASE_METHOD(Samples, "imu_window: nothing of an epoch or service before is left in a span") {
+    const bool new_service = GENERATE(false, true);
+    for (int i = 1; i <= 5; ++i) add(100 * i);
+    ImuWindow window = open();
+    CHECK(window.between({200}, {300}, {})->complete());
+    if (new_service) {
+        writer = make();
+        CHECK(window.collect().error().why == Pause::restarted);
+        CHECK_FALSE(window.reaches({0}));
+    }
+    for (int i = 6; i <= 9; ++i) add(100 * i, new_service ? 1 : 2);
+    REQUIRE(window.collect());
+    const auto span = window.take({350}, {800});
+    CHECK(times(span) == Times{600, 700, 800});
+    CHECK_FALSE(span.covered);
 }
