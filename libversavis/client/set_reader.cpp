@@ -19,8 +19,9 @@ namespace {
 // Twice: items of so many more are held, which costs little, and most are overwritten anyway.
 constexpr std::size_t most_pending = 128;
 
-// Between two looks at the IMU while no set waits for its samples. Half: a reader whose cameras are
-// slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is overtaken.
+// Between two looks at the IMU at most, whether or not a set waits for its samples. Half: a reader
+// whose cameras are slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is
+// overtaken.
 constexpr Duration unwatched = milliseconds(100);
 
 // Losses of a camera that one look bears, as in ImuWindow.
@@ -62,7 +63,7 @@ struct SetReader::State {
     std::vector<std::optional<Key>> newest;  ///< of each camera
     std::optional<Key> finished;             ///< of the set before
     std::optional<OutputTime> last;          ///< latest stamp of the set before
-    std::uint64_t life = 0;
+    std::uint64_t life{};
     std::vector<bool> ended;  ///< of each camera: its stream is gone
     SetReport report;
 
@@ -111,7 +112,7 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
             continue;
         }
         report.lost += frame.error().lost;
-        losses += frame.error().why == Pause::lost ? 1 : 0;
+        if (frame.error().why == Pause::lost) ++losses;
         if (auto told = restarted(frame.error(), cameras[camera].reader().life())) return told;
         if (auto told = gone(frame.error(), camera)) return told;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
@@ -150,10 +151,8 @@ void SetReader::State::add(std::size_t camera, Frame frame) {
 
 /// True when nothing more can come: each camera is there, or went past it, or time is over.
 bool SetReader::State::decided(const Key& key, const Pending& set) const {
-    if (pending.size() > most_pending || set.give_up <= host_now()) return true;
-    for (std::size_t camera = 0; camera < cameras.size(); ++camera)
-        if (!set.frames[camera] && !(newest[camera] && key < *newest[camera])) return false;
-    return true;
+    return pending.size() > most_pending || is_over(set.give_up) ||
+           std::all_of(newest.begin(), newest.end(), [&](const auto& seen) { return seen >= key; });
 }
 
 FrameSet SetReader::State::finish(const Key& key, Pending set) {
@@ -190,8 +189,7 @@ std::optional<FrameSet> SetReader::State::ready() {
         OutputTime latest{INT64_MIN};
         for (const auto& frame : frames)
             if (frame) latest = std::max(latest, frame->time, std::less<>());
-        const bool patient = first->second.give_up > host_now();
-        if (imu && !imu->reaches(latest) && patient) return std::nullopt;
+        if (imu && !imu->reaches(latest) && !is_over(first->second.give_up)) return std::nullopt;
         if (!whole) ++report.incomplete;
         auto node = pending.extract(first);
         return finish(node.key(), std::move(node.mapped()));
@@ -202,7 +200,7 @@ std::optional<FrameSet> SetReader::State::ready() {
 std::optional<HostTime> SetReader::State::next_deadline() const {
     std::optional<HostTime> earliest;
     for (const auto& [key, set] : pending)
-        if (!earliest || set.give_up < *earliest) earliest = set.give_up;
+        earliest = std::min(set.give_up, earliest.value_or(set.give_up));
     return earliest;
 }
 
@@ -250,17 +248,15 @@ Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
         state_->waiting.set_deadline(give_up);
         const HostTime now = host_now();
         const bool idle = state_->pending.empty() && !state_->by_descriptor;
-        const HostTime until =
-            std::min(deadline, idle ? now + unwatched : give_up.value_or(deadline), std::less<>());
+        const HostTime until = std::min({deadline, give_up.value_or(deadline), now + unwatched});
         WaitSet& waiting = idle ? state_->cameras_waiting : state_->waiting;
         const bool found = waiting.wait(until - now).has_value();
-        const HostTime then = host_now();
-        const bool due = give_up && *give_up <= then;
+        const bool over = is_over(deadline);
+        const bool due = give_up && is_over(*give_up);
         // What is found when time is over is looked at once more, and no longer: streams may go on.
-        if (then >= deadline && !due && (!found || is_last))
-            return Unexpected<NoItem>(
-                NoItem{state_->any_ended() ? Pause::gone : Pause::nothing, 0});
-        is_last = then >= deadline;
+        if (over && !due && (!found || is_last))
+            return Unexpected<NoItem>(NoItem{state_->any_ended() ? Pause::gone : Pause::nothing});
+        is_last = over;
     }
 }
 
