@@ -19,7 +19,7 @@
 
 #include "../support/in_process.hpp"
 #include "../support/look.hpp"
-#include "../support/sleepers.hpp"
+#include "../support/sleep.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/futex.hpp"
 #include "client/segment.hpp"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "../support/sleepers.hpp"
+#include "../support/sleep.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
