@@ -531,6 +531,24 @@ TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
           VERSAVIS_INVALID);
 }
 
+TEST_CASE_METHOD(CApi,
+                 "c_api: of a service that was restarted, samples are told once to be others") {
+    auto first = std::make_unique<ring::Writer>(make_imu());
+    versavis_imu_window* window = nullptr;
+    REQUIRE(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, &window, nullptr) ==
+            VERSAVIS_OK);
+    samples(*first, 1000, 1004, 0);
+    versavis_imu_span span{};
+    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    first.reset();
+    ring::Writer second = make_imu();
+    samples(second, 1000, 1002, 0);
+    CHECK(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_RESTARTED);
+    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    CHECK(span.count == 2);
+    versavis_imu_window_close(window);
+}
+
 TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     const auto other = make("cam1");
     ring::Writer imu = make_imu();

@@ -163,9 +163,12 @@ TEST_CASE("segment: all pages are at hand, also where the kernel must be asked f
     const auto writer =
         *Writer::create(directory.path(), {"frames", StreamKind::frames, 16, 200, page_size});
     const auto access = GENERATE(Mapping::Access::read_only, Mapping::Access::read_write);
-    // The next mapping usually ends where this page begins, which nobody may read.
-    void* guard = ::mmap(nullptr, page_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    // A gap of its size, behind which nobody may read.
+    const auto size = std::filesystem::file_size(directory.path() / "frames");
+    void* gap = ::mmap(nullptr, size + page_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    REQUIRE(::munmap(gap, size) == 0);
     const auto mapping = *Mapping::open(directory.path() / "frames", access);
+    if (&mapping.header() != gap) WARN("not tested: what lies behind the last page");
     CHECK(pages_at_hand(mapping) < 200);
     CHECK(test::in_process([&] {
         if (!forget_to_populate()) return false;
@@ -174,7 +177,7 @@ TEST_CASE("segment: all pages are at hand, also where the kernel must be asked f
     }));
     mapping.populate();
     CHECK(pages_at_hand(mapping) == mapping.size() / page_size);
-    ::munmap(guard, page_size);
+    ::munmap(static_cast<std::byte*>(gap) + size, page_size);
 }
 
 TEST_CASE("segment: a file closes with its owner, whatever its number") {
