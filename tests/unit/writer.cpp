@@ -8,8 +8,10 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cerrno>
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -54,6 +56,19 @@ struct Memory {
     }
 };
 
+/// A look at a descriptor when the writer comes to read metadata that lie where none can be read.
+struct Look {
+    const std::atomic<std::uint64_t>* sequence;
+    void* page;
+    std::uint64_t seen;
+};
+Look during_publication{};
+
+void look_in_between(int) {
+    during_publication.seen = *during_publication.sequence;
+    ::mprotect(during_publication.page, page_size, PROT_READ);
+}
+
 std::uint64_t life_of(const std::filesystem::path& path) {
     return Mapping::open(path, Mapping::Access::read_only)->constants().life;
 }
@@ -75,6 +90,20 @@ TEST_CASE_METHOD(Memory, "writer: before the first item, no descriptor says that
     REQUIRE(mapping);
     for (std::uint64_t number = 9; number < 17; ++number)
         CHECK(mapping->descriptor(number).sequence == 2 * (number - 8) + 1);
+}
+
+TEST_CASE_METHOD(Memory, "writer: while an item is written, its descriptor says so") {
+    CHECK(in_process([&] {
+        Writer writer =
+            *Writer::create(directory.path(), {"later", StreamKind::events, 8, 0, 0, 9});
+        const auto mapping = Mapping::open(path("later"), Mapping::Access::read_only);
+        during_publication.sequence = &mapping->descriptor(9).sequence;
+        during_publication.page =
+            ::mmap(nullptr, page_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        std::signal(SIGSEGV, look_in_between);
+        writer.publish({}, *static_cast<const Metadata*>(during_publication.page));
+        return during_publication.seen == 2 * 9 + 1 && *during_publication.sequence == 2 * 9 + 2;
+    }));
 }
 
 TEST_CASE_METHOD(Memory, "writer: what lies under its temporary name is not used") {
@@ -139,6 +168,12 @@ TEST_CASE_METHOD(Memory, "writer: all rings of a process are of one life, those 
     const Writer told =
         *Writer::create(directory.path(), {"told", StreamKind::events, 8, 0, 0, 0, 1});
     CHECK(life_of(path("told")) == 1);
+}
+
+TEST_CASE_METHOD(Memory, "writer: where it would lie decides whether there is room for it") {
+    const Shape huge{"huge", StreamKind::frames, 8, 1024, std::uint64_t{1} << 40U};
+    CHECK_THAT(refusal(huge, false), Contains("free in its file system"));
+    CHECK_THAT(refusal(huge, true), Contains("free in this machine's memory"));
 }
 
 TEST_CASE_METHOD(Memory, "writer: where files may not be so large, it says so") {
@@ -223,6 +258,9 @@ TEST_CASE_METHOD(Memory, "writer: only what the dead have left gives way to a ne
 }
 
 TEST_CASE_METHOD(Memory, "writer: a ring whose successor gets no name goes on") {
+    std::filesystem::create_directory(path("taken"));
+    CHECK_THAT(Writer::create(directory.path(), {"taken", StreamKind::events, 8}).error().message(),
+               Contains("cannot be renamed into place: Is a directory"));
     CHECK(in_process([&] {
         Writer writer = *Writer::create(directory.path(), events);
         auto reader = Reader::open(path("events"));
