@@ -83,6 +83,7 @@ TEST_CASE_METHOD(Samples, "imu_window: samples that are missing are counted") {
     add(500, 1, 2);
     ImuWindow window = open();
     CHECK(window.between({100}, {400}, {})->lost == 4 + 2);  // up to the one beyond
+    CHECK(window.between({200}, {300}, {})->lost == 4);      // between the instant and the first
     CHECK(window.between({300}, {350}, {})->lost == 0);
     for (const std::uint64_t back : {0, 2}) {  // numbers that stand still or go back
         number -= 1 + back;
