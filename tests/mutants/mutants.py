@@ -128,6 +128,8 @@ class Processes:
             self.running.add(process)
         try:
             ended = self.ends_within(process, 5 * limit_s if limit_s else math.inf)
+            with self.lock:
+                self.kill(process)  # also what it left behind, while its number is still its own
             code = process.wait() if ended else -signal.SIGXCPU
         finally:
             with self.lock:

@@ -358,6 +358,14 @@ class Project(unittest.TestCase):
         self.assertEqual(code, -signal.SIGXCPU)
         self.assertLess(time.monotonic() - begin, 30)
 
+    def test_what_it_leaves_behind_is_ended_too(self):
+        with tempfile.TemporaryFile("w+") as output:
+            code = mutants.Processes().run(["sh", "-c", "sleep 600 & echo $!; exit 3"], output)
+            output.seek(0)
+            left = int(output.read())
+        self.assertEqual(code, 3)
+        self.assertTrue(self.ends(left))
+
     def test_memory_is_limited(self):
         for size, fails in ((1 << 20, False), (2 * mutants.MEMORY_LIMIT, True)):
             code = mutants.Processes().run([sys.executable, "-c", f"bytearray({size})"],
@@ -384,14 +392,16 @@ class Project(unittest.TestCase):
         self.assertEqual(tool.returncode, mutants.INTERRUPTED, output)
         self.assertIn("were not run.", output)
         for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
-            self.assertTrue(self.ends(path), path)
+            process = int(path.parent.name)
+            with contextlib.suppress(OSError):
+                if process != os.getpid() and str(self.root) in path.read_text():
+                    self.assertTrue(self.ends(process), path)
 
-    def ends(self, path):
+    @staticmethod
+    def ends(process):
         """What is about to end may do so."""
         try:
-            if path.parent.name == str(os.getpid()) or str(self.root) not in path.read_text():
-                return True
-            file = os.pidfd_open(int(path.parent.name))
+            file = os.pidfd_open(process)
         except OSError:
             return True
         try:
