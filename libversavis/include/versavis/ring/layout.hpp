@@ -97,8 +97,8 @@ static_assert(offsetof(Header, slots_at) == 96 && offsetof(Header, name) == 104)
 static_assert(offsetof(Header, life) == 168 && offsetof(Header, pid_namespace) == 176);
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
 static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
-static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128 &&
-              alignof(Descriptor) == 128 && offsetof(Descriptor, metadata) == 32);
+static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128);
+static_assert(alignof(Descriptor) == 128 && offsetof(Descriptor, metadata) == 32);
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);
 
