@@ -32,10 +32,6 @@ Outcomes memories(const Model& model) {
     return found;
 }
 
-constexpr auto relaxed = Order::relaxed;
-constexpr auto acquire = Order::acquire;
-constexpr auto release = Order::release;
-
 Program thread(const char* name) { return Program(name); }
 
 Outcomes message_passing(Order out, Order in) {

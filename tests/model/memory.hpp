@@ -21,6 +21,10 @@ inline constexpr std::size_t most_threads = 5;
 inline constexpr std::size_t register_count = 8;
 
 enum class Order : std::uint8_t { relaxed, acquire, release, both };
+inline constexpr auto relaxed = Order::relaxed;
+inline constexpr auto acquire = Order::acquire;
+inline constexpr auto release = Order::release;
+inline constexpr auto both = Order::both;
 bool acquires(Order order);
 bool releases(Order order);
 const char* name_of(Order order);

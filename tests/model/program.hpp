@@ -13,6 +13,9 @@
 
 namespace versavis::model {
 
+/// To be woken: all who sleep there.
+inline constexpr int everybody = most_threads;
+
 /// A number, or what makes one from the thread's registers: also names a location.
 class Value {
  public:

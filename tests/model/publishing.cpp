@@ -8,10 +8,6 @@ namespace versavis::model {
 
 namespace {
 
-constexpr auto relaxed = Order::relaxed;
-constexpr auto acquire = Order::acquire;
-constexpr auto release = Order::release;
-
 /// A reader's registers.
 enum : std::size_t { next, sequence, first, second, head, generation, slot };
 

@@ -9,15 +9,9 @@ namespace versavis::model {
 
 namespace {
 
-constexpr auto relaxed = Order::relaxed;
-constexpr auto acquire = Order::acquire;
-constexpr auto release = Order::release;
-constexpr auto both = Order::both;
-
 constexpr int state_live = 1;
 constexpr int state_closed = 2;
 constexpr int state_superseded = 3;
-constexpr int everybody = 9;
 constexpr int complete(int number) { return 2 * number + 2; }
 
 /// A segment; the words of a second one lie right behind those of the first.

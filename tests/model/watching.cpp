@@ -7,12 +7,6 @@ namespace versavis::model {
 
 namespace {
 
-constexpr auto relaxed = Order::relaxed;
-constexpr auto acquire = Order::acquire;
-constexpr auto release = Order::release;
-constexpr auto both = Order::both;
-
-constexpr int everybody = 9;
 constexpr int both_streams = 2;  // less: only the silent one
 
 /// One stream that stays silent, and one with items, which the set gets to know later.

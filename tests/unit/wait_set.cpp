@@ -43,6 +43,19 @@ struct Streams {
     }
 };
 
+struct TwoStreams : Streams {
+    Writer a = writer("a");
+    Writer b = writer("b");
+    Reader of_a = reader("a");
+    Reader of_b = reader("b");
+    WaitSet set;
+
+    TwoStreams() {
+        REQUIRE(set.add(of_a));
+        REQUIRE(set.add(of_b));
+    }
+};
+
 bool readable(int descriptor, int timeout_ms = 0) {
     pollfd entry{descriptor, POLLIN, 0};
     return ::poll(&entry, 1, timeout_ms) == 1 && entry.revents == POLLIN;
@@ -50,14 +63,7 @@ bool readable(int descriptor, int timeout_ms = 0) {
 
 }  // namespace
 
-TEST_CASE_METHOD(Streams, "wait_set: it names who has something, and takes turns") {
-    Writer a = writer("a");
-    Writer b = writer("b");
-    Reader of_a = reader("a");
-    Reader of_b = reader("b");
-    WaitSet set;
-    REQUIRE(set.add(of_a));
-    REQUIRE(set.add(of_b));
+TEST_CASE_METHOD(TwoStreams, "wait_set: it names who has something, and takes turns") {
     CHECK_FALSE(set.wait({}));
     CHECK_FALSE(set.wait(milliseconds(1)));
     b.publish({}, {});
@@ -95,15 +101,8 @@ TEST_CASE_METHOD(Streams,
     }
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: it sleeps on the words of all its streams [threads]",
+TEST_CASE_METHOD(TwoStreams, "wait_set: it sleeps on the words of all its streams [threads]",
                  "[threads]") {
-    Writer a = writer("a");
-    Writer b = writer("b");
-    Reader of_a = reader("a");
-    Reader of_b = reader("b");
-    WaitSet set;
-    REQUIRE(set.add(of_a));
-    REQUIRE(set.add(of_b));
     const bool by_descriptor = GENERATE(false, true);
     std::thread waiting;
     if (by_descriptor) {
@@ -117,14 +116,7 @@ TEST_CASE_METHOD(Streams, "wait_set: it sleeps on the words of all its streams [
     if (waiting.joinable()) waiting.join();
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: each of its streams wakes it [threads]", "[threads]") {
-    Writer a = writer("a");
-    Writer b = writer("b");
-    Reader of_a = reader("a");
-    Reader of_b = reader("b");
-    WaitSet set;
-    REQUIRE(set.add(of_a));
-    REQUIRE(set.add(of_b));
+TEST_CASE_METHOD(TwoStreams, "wait_set: each of its streams wakes it [threads]", "[threads]") {
     for (int i = 0; i < 200; ++i) {
         Writer& chosen = i % 2 == 0 ? a : b;
         std::thread writing([&] { chosen.publish({}, {}); });
@@ -178,15 +170,8 @@ TEST_CASE_METHOD(Streams, "wait_set: a dead writer is news once, though its file
     CHECK_FALSE(readable(*descriptor, 1500));  // nor is it looked at again
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: its descriptor is readable until nothing is left [threads]",
+TEST_CASE_METHOD(TwoStreams, "wait_set: its descriptor is readable until nothing is left [threads]",
                  "[threads]") {
-    Writer a = writer("a");
-    Writer b = writer("b");
-    Reader of_a = reader("a");
-    Reader of_b = reader("b");
-    WaitSet set;
-    REQUIRE(set.add(of_a));
-    REQUIRE(set.add(of_b));
     const auto descriptor = set.fd();
     REQUIRE(descriptor);
     CHECK(readable(*descriptor));
