@@ -93,8 +93,29 @@ void check_exposure_feature(TableReader& reader, std::string_view key, const tom
         reader.fail(key, hidden->what, hidden->cure);
 }
 
-void read_features(TableReader& reader, const toml::table& table, CameraConfiguration& camera) {
+/// Features that the service sets, with the key that says what to.
+const std::pair<std::string_view, const char*> own_features[]{
+    {"TriggerMode", "trigger"},
+    {"TriggerSource", "trigger_line"},
+    {"TriggerActivation", "trigger_inverted"},
+    {"ExposureMode", "exposure"}};
+
+/// What is below [camera.features] and belongs above it, or contradicts what is there.
+void check_feature_name(TableReader& reader, const TableReader& camera_keys, std::string_view key,
+                        const CameraConfiguration& camera) {
+    if (camera_keys.knows(key))
+        return reader.fail(key, fmt::format("'{}' is a key of the camera, and no feature", key),
+                           "move it above [camera.features]");
+    for (const auto& [feature, own] : own_features)
+        if (key == feature && camera.trigger == TriggerSource::board)
+            reader.fail(key, fmt::format("'{}' is set by the service, as '{}' says", key, own),
+                        fmt::format("set '{}' of the camera instead", own));
+}
+
+void read_features(TableReader& reader, const TableReader& camera_keys, const toml::table& table,
+                   CameraConfiguration& camera) {
     for (const auto& [key, node] : table) {
+        check_feature_name(reader, camera_keys, key.str(), camera);
         check_exposure_feature(reader, key.str(), node, camera);
         std::ostringstream text;
         if (const auto* string = node.as_string())
@@ -177,6 +198,7 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
                                      {"end", pairing::Instant::end}});
     reader.read("camera_clock", camera.camera_clock);
     reader.read("chunks", camera.chunks);
+    reader.read("keep_settings", camera.keep_settings);
     reader.read("ptp", camera.ptp);
     reader.read("max_temperature_c", camera.max_temperature_c, 0, 200);
     reader.read("link_mbps", camera.link_mbps, 0, 1e6);
@@ -184,7 +206,7 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     reader.read("check_exposure", camera.check_exposure);
     if (const toml::table* table = reader.table("features")) {
         TableReader features(file, *table, "[camera.features]");
-        read_features(features, *table, camera);
+        read_features(features, reader, *table, camera);
     }
     return camera;
 }

@@ -250,6 +250,11 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
     check(camera + "glitch_us = 0\n", "'glitch_us' must be a number from 0.1 to 25.5 us, and is 0");
     check(camera + "glitch_us = 26\n", "from 0.1 to 25.5 us, and is 26");
     check(camera + "glitch = 5\n", "unknown key 'glitch'; did you mean 'glitch_us'?");
+    check(camera + "[camera.features]\nrate_hz = 30\n", "move it above [camera.features]");
+    check(camera + "[camera.features]\nTriggerMode = \"Off\"\n", "set 'trigger' of the camera");
+    check(camera + "[camera.features]\nTriggerSource = \"Line1\"\n", "set 'trigger_line' of");
+    check("[ports]\npps = \"on\"\n", "unknown key 'pps'; remove it");
+    check("[clock]\npps = \"on\"\n", "and is 'on'; see ");
     check("[[imu]]\nbus = \"usb\"\n", "must be one of spi, i2c, and is 'usb'");
     check("[[imu]]\nbusses = \"spi\"\n", "unknown key 'busses'; did you mean 'bus'?");
     check("[[imu]]\ni2c_adress = 0x69\n", "did you mean 'i2c_address'?");

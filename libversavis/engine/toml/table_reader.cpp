@@ -39,8 +39,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-/// The one of `names` that was probably meant; whoever left out the unit meant the name that
-/// begins the same.
+/// One letter of so many may be wrong for a name to be probably meant. At half, "on" would mean
+/// "off"; at twice, a plural is taken for another word.
+constexpr std::size_t letters_of_a_typo = 2;
+
+/// The one of `names` that was probably meant; none is near: empty. Whoever left out the unit meant
+/// the name that begins the same.
 std::string nearest(std::string_view meant, const std::vector<std::string>& names) {
     const std::string text = clipped(meant);
     const auto distance = [&](const std::string& name) {
@@ -49,7 +53,8 @@ std::string nearest(std::string_view meant, const std::vector<std::string>& name
     const auto closer = [&](const std::string& a, const std::string& b) {
         return distance(a) < distance(b);
     };
-    return *std::min_element(names.begin(), names.end(), closer);
+    const auto best = std::min_element(names.begin(), names.end(), closer);
+    return best == names.end() || distance(*best) > text.size() / letters_of_a_typo ? "" : *best;
 }
 
 TomlPlace place(const std::string& path, const toml::source_region& source) {
@@ -224,8 +229,8 @@ std::optional<std::size_t> TableReader::find_choice(std::string_view key,
     const auto found = text ? std::find(names.begin(), names.end(), *text) : names.end();
     if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
     refuse(key, fmt::format("one of {}", fmt::join(names, ", ")));
-    if (text)
-        file_.problems.back().cure = fmt::format("did you mean \"{}\"?", nearest(*text, names));
+    if (const std::string meant = text ? nearest(*text, names) : ""; !meant.empty())
+        file_.problems.back().cure = fmt::format("did you mean \"{}\"?", meant);
     return std::nullopt;
 }
 
@@ -240,6 +245,7 @@ std::vector<const toml::table*> TableReader::tables(std::string_view key) {
     const toml::node* node = find(key);
     if (node == nullptr) return found;
     const toml::array* array = node->as_array();
+    if (array != nullptr && array->empty()) return found;
     if (array == nullptr || !array->is_homogeneous(toml::node_type::table)) {
         refuse(key, fmt::format("an array of tables: [[{}]]", key));
         return found;
@@ -248,13 +254,20 @@ std::vector<const toml::table*> TableReader::tables(std::string_view key) {
     return found;
 }
 
+bool TableReader::knows(std::string_view key) const {
+    return std::find(known_.begin(), known_.end(), key) != known_.end();
+}
+
 void TableReader::finish() {
-    for (const auto& [key, node] : table_)
-        if (std::find(known_.begin(), known_.end(), key.str()) == known_.end())
-            file_.problems.push_back(
-                {place(file_.path, key.source()), title_, std::string(key.str()),
-                 fmt::format("unknown key '{}'", clipped(key.str())),
-                 fmt::format("did you mean '{}'?", nearest(key.str(), known_))});
+    for (const auto& [key, node] : table_) {
+        if (knows(key.str())) continue;
+        const std::string meant = nearest(key.str(), known_);
+        file_.problems.push_back({place(file_.path, key.source()), title_, std::string(key.str()),
+                                  fmt::format("unknown key '{}'", clipped(key.str())),
+                                  meant.empty()
+                                      ? fmt::format("remove it; the keys are in {}", file_.manual)
+                                      : fmt::format("did you mean '{}'?", meant)});
+    }
 }
 
 TomlEntry TableReader::entry() const {

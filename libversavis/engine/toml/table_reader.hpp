@@ -71,6 +71,9 @@ class TableReader {
     std::vector<const toml::table*> tables(std::string_view key);
 
     bool has(std::string_view key) const { return table_.contains(key); }
+
+    /// True for a key that was asked for.
+    bool knows(std::string_view key) const;
     void fail(std::string_view key, const std::string& what, const std::string& cure = {});
     void finish();
 
