@@ -212,10 +212,16 @@ std::uint64_t AravisStream::block_id(ArvBuffer* buffer) {
 }
 
 Duration AravisStream::chunk_exposure(ArvBuffer* buffer) const {
-    if (!chunk_parser_ || arv_buffer_has_chunks(buffer) == FALSE) return {};
+    if (!chunk_parser_ || setup_.chunk_exposure.empty() || arv_buffer_has_chunks(buffer) == FALSE)
+        return {};
     GlibError error;
-    const double us = arv_chunk_parser_get_float_value(chunk_parser_.get(), buffer,
-                                                       "ChunkExposureTime", error.out());
+    const char* feature = setup_.chunk_exposure.c_str();
+    const double value =
+        setup_.chunk_is_integer
+            ? static_cast<double>(arv_chunk_parser_get_integer_value(chunk_parser_.get(), buffer,
+                                                                     feature, error.out()))
+            : arv_chunk_parser_get_float_value(chunk_parser_.get(), buffer, feature, error.out());
+    const double us = value * setup_.chunk_exposure_unit_us;
     return error.set() ? Duration{} : Duration{std::llround(us * 1e3)};
 }
 

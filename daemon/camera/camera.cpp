@@ -218,24 +218,36 @@ CameraResult<> Camera::session() {
 }
 
 CameraResult<> Camera::set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost) {
-    auto setup = set_up_camera(camera, configuration_, environment_.presets);
+    AravisNodeMap nodes(arv_camera_get_device(camera));
+    CameraSetup setup;
+    const auto done = set_up_camera(camera, nodes, configuration_, environment_.presets, setup);
     set_setting_up_since({});
-    if (!setup && control_lost)
+    if (!done && control_lost)
         return problem(CameraState::silent,
                        {configuration_.device, "disappeared while it was being set up", ""});
-    if (!setup) return problem(CameraState::misconfigured, setup.error());
+    describe(setup);
+    if (!done) return problem(CameraState::misconfigured, done.error());
     without_clock_ = clock_stands_;
-    setup->has_clock = setup->has_clock && !without_clock_;
-    describe(*setup);
-    return stream(camera, *setup, control_lost);
+    setup.has_clock = setup.has_clock && !without_clock_;
+    return stream(camera, nodes, setup, control_lost);
 }
 
 void Camera::describe(const CameraSetup& setup) {
+    std::vector<std::string> refusals;
+    for (const StepResult& step : setup.steps)
+        if (!step.needed &&
+            (step.outcome == StepOutcome::refused || step.outcome == StepOutcome::differs))
+            refusals.push_back(step.node() + ": " + step.reason);
     const std::lock_guard lock(mutex_);
     report_.vendor = setup.vendor;
     report_.model = setup.model;
     report_.serial = setup.serial;
     report_.preset = setup.preset;
+    report_.steps = setup.steps;
+    if (refusals == refusals_) return;
+    for (const std::string& refusal : refusals)
+        log(LogLevel::info, configuration_.name, "not set, and not needed: {}", refusal);
+    refusals_ = std::move(refusals);
 }
 
 /// The board and the status learn it before Aravis takes its time to let the camera go.
@@ -244,7 +256,7 @@ void Camera::lose() {
     hooks_.lost();
 }
 
-CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
+CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const CameraSetup& setup,
                               const std::atomic<bool>& control_lost) {
     const auto failed = [](const Error& error) { return problem(CameraState::failed, error); };
     pipeline_.set_line_delays(setup.lines);
@@ -252,13 +264,14 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
                                       setup.stamp_instant);
         !done)
         return failed(done.error());
-    ArvDevice* device = arv_camera_get_device(camera);
-    const Duration exposure = fixed_exposure(device, setup);
+    watched_ = setup.watched;
+    exposure_feature_ = setup.exposure_feature;
+    const Duration exposure = fixed_exposure(nodes, exposure_feature_);
     pipeline_.set_camera_exposure(exposure, {});  // it takes no frame yet
+    camera_exposure_ = exposure;
     if (configuration_.auto_exposure.enabled) {
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
-        exposure_feature_ = setup.exposure_feature;
     }
     Object<ArvChunkParser> chunks;
     if (setup.chunks) {
@@ -269,7 +282,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
     auto stream = AravisStream::create(camera, configuration_, setup, pipeline_, meter_.get(),
                                        std::move(chunks), environment_.patient);
     if (!stream) return failed(stream.error());
-    plan_bandwidth(camera, setup.payload);
+    plan_bandwidth(camera, nodes, setup.payload);
     GlibError error;
     arv_camera_start_acquisition(camera, error.out());
     if (error.set()) return failed({configuration_.name, "does not start: " + error.text(), ""});
@@ -280,7 +293,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
     set_state(CameraState::streaming, "");
     streaming_ = true;
     hooks_.streaming();
-    auto ended = watch(camera, **stream, control_lost);
+    auto ended = watch(camera, nodes, **stream, control_lost);
     lose();
     if (!ended) {
         set_state(ended.error().state, ended.error().error.message());
@@ -297,7 +310,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, const CameraSetup& setup,
 }
 
 /// Cameras on one link are told how long to pause between packets.
-void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
+void Camera::plan_bandwidth(ArvCamera* camera, AravisNodeMap& nodes, std::uint64_t payload) {
     ArvDevice* device = arv_camera_get_device(camera);
     packet_delay_ = Duration{-1};  // what it was left with is unknown
     if (!ARV_IS_GV_DEVICE(device)) return;
@@ -318,7 +331,7 @@ void Camera::plan_bandwidth(ArvCamera* camera, std::uint64_t payload) {
         const std::lock_guard lock(mutex_);
         report_.packet_size = packet_size;
     }
-    do_housekeeping(camera);
+    do_housekeeping(camera, nodes);
 }
 
 bool Camera::silent(HostTime began) const {
@@ -327,7 +340,7 @@ bool Camera::silent(HostTime began) const {
     return pipeline_.unanswered_triggers() > triggers_of_silence && since > time_of_silence;
 }
 
-CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
+CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStream& stream,
                              const std::atomic<bool>& control_lost) {
     Health health;
     health.received = pipeline_.report().received;
@@ -339,10 +352,10 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisStream& stream,
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});
         if (auto good = examine(stream, health); !good) return good;
-        if (exposure_) control_exposure(arv_camera_get_device(camera));
+        if (exposure_) control_exposure(nodes);
         if (host_now() < housekeeping) continue;
         housekeeping = host_now() + housekeeping_interval;
-        do_housekeeping(camera);
+        do_housekeeping(camera, nodes);
     }
     return {};
 }
@@ -396,17 +409,38 @@ bool Camera::restarted(Health& health) const {
     return privilege && (*privilege & gvcp_controlled) == 0;
 }
 
+/// What reads otherwise than it was set up, as a hint; empty: nothing does.
+std::string Camera::changed_settings(const AravisNodeMap& nodes) {
+    std::string hint;
+    for (const auto& [feature, value] : watched_) {
+        const bool own = feature == exposure_feature_ && exposure_ != nullptr;
+        const std::string now = own ? value : nodes.read(feature);
+        if (now.empty() || same_value(now, value)) continue;
+        hint = fmt::format(
+            "{} changed from {} to {}, not by this service: close the program that "
+            "set it, or power the camera off and on",
+            feature, value, now);
+    }
+    // The exposure as it is now is what frames must show.
+    if (exposure_ == nullptr && !exposure_feature_.empty())
+        if (const Duration exposure = fixed_exposure(nodes, exposure_feature_);
+            exposure != camera_exposure_) {
+            camera_exposure_ = exposure;
+            pipeline_.set_camera_exposure(exposure, host_now());
+        }
+    return hint;
+}
+
 /// What changes slowly: temperature, and the share of the link as other cameras come and go.
-void Camera::do_housekeeping(ArvCamera* camera) {
+void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
     const bool network = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
     const BandwidthShare share = environment_.bandwidth.share(configuration_.name);
     if (network && share.packet_delay != packet_delay_) {
         arv_camera_gv_set_packet_delay(camera, share.packet_delay.ns, nullptr);
         packet_delay_ = share.packet_delay;
     }
-    const double temperature =
-        read_number(arv_camera_get_device(camera), "DeviceTemperature").value_or(0);
-    std::string hint;
+    const double temperature = nodes.read_number("DeviceTemperature").value_or(0);
+    std::string hint = changed_settings(nodes);
     if (!share.fits())
         hint = fmt::format(
             "the link carries {:.0f} Mbit/s but its cameras need {:.0f}: lower rate, size or "
@@ -431,17 +465,16 @@ void Camera::do_housekeeping(ArvCamera* camera) {
 
 /// The board learns of an exposure before the camera does: it is on the way when the camera takes
 /// it.
-void Camera::control_exposure(ArvDevice* device) {
+void Camera::control_exposure(AravisNodeMap& nodes) {
     const auto seen = meter_->newest(exposure_holds_);
     const auto wanted = seen ? exposure_->update(*seen) : std::nullopt;
     if (!wanted) return;
     hooks_.exposure(*wanted);
     pipeline_.set_camera_exposure(*wanted, host_now());
-    GlibError error;
-    arv_device_set_float_feature_value(device, exposure_feature_.c_str(),
-                                       static_cast<double>(wanted->ns) * 1e-3, error.out());
-    if (error.set()) {
-        log(LogLevel::warning, configuration_.name, "exposure cannot be set: {}", error.text());
+    const std::string exposure_us = fmt::format("{}", static_cast<double>(wanted->ns) * 1e-3);
+    if (const auto done = nodes.set(exposure_feature_, exposure_us); !done) {
+        log(LogLevel::warning, configuration_.name, "exposure cannot be set: {}",
+            done.error().message());
         pipeline_.set_camera_exposure({}, host_now());
     }
     const double period_ns = 1e9 / configuration_.rate_hz;

@@ -21,18 +21,18 @@
 #include "camera/device_claims.hpp"
 #include "camera/gvcp.hpp"
 #include "camera/patient_work.hpp"
+#include "camera/preset_run.hpp"
 #include "camera/retry.hpp"
 #include "configuration/configuration.hpp"
 #include "stream/camera_pipeline.hpp"
 
 struct _ArvCamera;  // NOLINT(bugprone-reserved-identifier): Aravis names it so
 using ArvCamera = _ArvCamera;
-struct _ArvDevice;  // NOLINT(bugprone-reserved-identifier)
-using ArvDevice = _ArvDevice;
 
 namespace versavis::daemon {
 
 struct CameraSetup;
+class AravisNodeMap;
 class AravisStream;
 
 struct CameraReport {
@@ -43,6 +43,7 @@ struct CameraReport {
     std::string model;
     std::string serial;
     std::string preset;
+    std::vector<StepResult> steps;  ///< of the preset
     std::uint64_t connections = 0;
     std::uint32_t packet_size = 0;
     BandwidthShare bandwidth;
@@ -98,18 +99,19 @@ class Camera {
     void run();
     CameraResult<> session();
     CameraResult<> set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost);
-    CameraResult<> stream(ArvCamera* camera, const CameraSetup& setup,
+    CameraResult<> stream(ArvCamera* camera, AravisNodeMap& nodes, const CameraSetup& setup,
                           const std::atomic<bool>& control_lost);
-    CameraResult<> watch(ArvCamera* camera, AravisStream& stream,
+    CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStream& stream,
                          const std::atomic<bool>& control_lost);
     CameraResult<> examine(AravisStream& stream, Health& health);
     void explain(CameraProblem& ended);
     bool wait_to_retry(CameraState why);
     bool answers(Duration patience) const;
     bool restarted(Health& health) const;
-    void plan_bandwidth(ArvCamera* camera, std::uint64_t payload);
-    void do_housekeeping(ArvCamera* camera);
-    void control_exposure(ArvDevice* device);
+    void plan_bandwidth(ArvCamera* camera, AravisNodeMap& nodes, std::uint64_t payload);
+    void do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes);
+    std::string changed_settings(const AravisNodeMap& nodes);
+    void control_exposure(AravisNodeMap& nodes);
     bool silent(HostTime began) const;
     void describe(const CameraSetup& setup);
     void lose();
@@ -133,6 +135,10 @@ class Camera {
     std::unique_ptr<FrameMeter> meter_;
     std::unique_ptr<AutoExposure> exposure_;
     std::string exposure_feature_;
+    Duration camera_exposure_;  ///< as it is set; 0: it varies
+    std::vector<std::pair<std::string, std::string>>
+        watched_;                        ///< features, and the values that they were set up with
+    std::vector<std::string> refusals_;  ///< that were logged
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
     Retry retry_;

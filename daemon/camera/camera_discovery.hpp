@@ -8,10 +8,10 @@
 #include <optional>
 #include <string>
 
+#include "camera/aravis_node_map.hpp"
 #include "camera/camera_state.hpp"
 #include "camera/description_vetting.hpp"
 #include "camera/device_claims.hpp"
-#include "camera/genicam.hpp"
 #include "camera/gvcp.hpp"
 
 namespace versavis::daemon {

@@ -12,8 +12,8 @@
 namespace versavis::daemon {
 
 const std::vector<std::string> preset_groups{
-    "trigger",        "strobe",      "free_run", "fixed_exposure",
-    "exposure_limit", "pulse_width", "chunks",   "ptp"};
+    "default_settings", "known_state",    "trigger",     "strobe", "free_run",
+    "fixed_exposure",   "exposure_limit", "pulse_width", "chunks", "ptp"};
 
 namespace {
 
@@ -55,6 +55,41 @@ PresetLine read_line(TableReader& reader) {
     return line;
 }
 
+/// Most microseconds that a unit of a chunk may have: a second. At half, still all known units; at
+/// twice, a period in milliseconds by mistake is taken for a unit.
+constexpr double longest_unit_us = 1e6;
+
+PresetStep read_step(TableReader& reader) {
+    PresetStep step;
+    reader.read("set", step.features);
+    reader.read("to", step.values);
+    reader.read("needed", step.needed);
+    if (step.features.empty() || step.values.empty())
+        reader.fail("set", "a step needs 'set' and 'to'", "give a list of names for each");
+    return step;
+}
+
+/// Steps that share what is selected for them.
+std::vector<PresetStep> read_steps(TomlFile& file, const toml::table& table) {
+    TableReader reader(file, table);
+    std::vector<std::string> selection;
+    reader.read("select", selection);
+    if (!selection.empty() && selection.size() != 2)
+        reader.fail("select", "'select' needs a selector and its value");
+    std::vector<PresetStep> steps;
+    for (const toml::table* entry : reader.tables("steps")) {
+        TableReader step_reader(file, *entry);
+        steps.push_back(read_step(step_reader));
+        step_reader.finish();
+        if (selection.size() != 2) continue;
+        steps.back().selector = selection[0];
+        steps.back().selected = selection[1];
+    }
+    if (steps.empty()) reader.fail("steps", "there are no 'steps'", "give a list of them");
+    reader.finish();
+    return steps;
+}
+
 Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     const auto root = parse_toml(path.string());
     if (!root) return Unexpected(root.error());
@@ -64,9 +99,14 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     TableReader reader(file, *root);
     reader.read("vendors", preset.vendors);
     reader.read("models", preset.models);
-    reader.read("trigger_line", preset.trigger_line);
-    reader.read("strobe_line", preset.strobe_line);
+    reader.read("triggers", preset.triggers);
+    reader.read("trigger_lines", preset.trigger_lines);
+    reader.read("strobe_lines", preset.strobe_lines);
+    reader.read("line_inverter", preset.line_inverter);
     reader.read("exposure_time", preset.exposure_time);
+    reader.read("chunk_selector", preset.chunk_selector);
+    reader.read("chunk_exposure", preset.chunk_exposure);
+    reader.read("chunk_exposure_unit_us", preset.chunk_exposure_unit_us, 0, longest_unit_us);
     reader.choose<pairing::Instant>("stamp_instant", preset.stamp_instant,
                                     {{"start", pairing::Instant::start},
                                      {"middle", pairing::Instant::middle},
@@ -76,51 +116,36 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
         preset.lines.push_back(read_line(line_reader));
         line_reader.finish();
     }
-    for (const std::string& group : preset_groups)
-        for (const toml::table* table : reader.tables(group)) {
-            TableReader step_reader(file, *table);
-            PresetStep step;
-            step_reader.read("set", step.features);
-            step_reader.read("to", step.values);
-            step_reader.read("optional", step.optional);
-            if (step.features.empty() || step.values.empty())
-                step_reader.fail("set", "a step needs 'set' and 'to'",
-                                 "give a list of names for each");
-            step_reader.finish();
-            preset.groups[group].push_back(std::move(step));
-        }
+    for (const std::string& group : preset_groups) {
+        if (reader.has(group)) preset.groups[group];  // an empty one is stated, too
+        for (const toml::table* table : reader.tables(group))
+            for (PresetStep& step : read_steps(file, *table))
+                preset.groups[group].push_back(std::move(step));
+    }
     reader.finish();
     if (auto read = file.result(); !read) return Unexpected(read.error());
     return preset;
 }
 
-std::string filled(std::string text, const std::map<std::string, std::string>& variables) {
-    for (const auto& [name, value] : variables) {
-        const std::string mark = "{" + name + "}";
-        if (const auto at = text.find(mark); at != std::string::npos)
-            text.replace(at, mark.size(), value);
-    }
-    return text;
+/// The directory's own, or that of this program.
+Expected<CameraPreset> load_base(const std::filesystem::path& directory) {
+    const std::string file = base_preset + ".toml";
+    const bool own = std::filesystem::exists(directory / file);
+    return load_preset((own ? directory : default_preset_directory()) / file);
 }
 
-std::optional<std::string> first_feature(const PresetStep& step, const FeatureBook& camera) {
-    const auto found =
-        std::find_if(step.features.begin(), step.features.end(),
-                     [&](const std::string& feature) { return camera.has(feature); });
-    return found == step.features.end() ? std::nullopt : std::optional(*found);
-}
-
-/// The first value that an enumeration has; any other feature takes the first.
-std::optional<std::string> first_value(const PresetStep& step, const std::string& feature,
-                                       const std::map<std::string, std::string>& variables,
-                                       const FeatureBook& camera) {
-    const auto entries = camera.entries(feature);
-    for (const std::string& value : step.values) {
-        const std::string text = filled(value, variables);
-        if (entries.empty() || std::find(entries.begin(), entries.end(), text) != entries.end())
-            return text;
-    }
-    return std::nullopt;
+/// What the preset does not state is as in the base.
+void complete(CameraPreset& preset, const CameraPreset& base) {
+    const auto inherit = [](auto& own, const auto& inherited) {
+        if (own.empty()) own = inherited;
+    };
+    inherit(preset.triggers, base.triggers);
+    inherit(preset.trigger_lines, base.trigger_lines);
+    inherit(preset.strobe_lines, base.strobe_lines);
+    inherit(preset.exposure_time, base.exposure_time);
+    inherit(preset.chunk_selector, base.chunk_selector);
+    inherit(preset.chunk_exposure, base.chunk_exposure);
+    preset.groups.insert(base.groups.begin(), base.groups.end());
 }
 
 }  // namespace
@@ -143,6 +168,9 @@ Expected<std::vector<CameraPreset>> load_presets(const std::filesystem::path& di
     if (presets.empty())
         return failure(directory.string(), "there are no camera presets",
                        "install them, or set 'preset_directory' in the configuration");
+    const auto base = load_base(directory);
+    if (!base) return Unexpected(base.error());
+    for (CameraPreset& preset : presets) complete(preset, *base);
     // By vendor and model first, then by vendor, then for any; among equals by name.
     std::sort(presets.begin(), presets.end(), [](const CameraPreset& a, const CameraPreset& b) {
         const auto rank = [](const CameraPreset& p) {
@@ -168,31 +196,6 @@ Expected<CameraPreset> choose_preset(const std::vector<CameraPreset>& presets,
         "preset",
         fmt::format("there is no preset '{}' for this camera ({} {})", name, vendor, model),
         fmt::format("use one of: auto, {}", fmt::join(names, ", ")));
-}
-
-Expected<std::vector<PresetAction>> plan(const CameraPreset& preset, const std::string& group,
-                                         const std::map<std::string, std::string>& variables,
-                                         const FeatureBook& camera) {
-    std::vector<PresetAction> actions;
-    std::vector<std::string> problems;
-    const auto steps = preset.groups.find(group);
-    if (steps == preset.groups.end()) return actions;
-    for (const PresetStep& step : steps->second) {
-        const auto feature = first_feature(step, camera);
-        const auto value = feature ? first_value(step, *feature, variables, camera) : std::nullopt;
-        if (value)
-            actions.push_back({*feature, *value, step.optional});
-        else if (!step.optional && !feature)
-            problems.push_back(fmt::format("it has no {}", fmt::join(step.features, " or ")));
-        else if (!step.optional)
-            problems.push_back(fmt::format("{} knows only {}", *feature,
-                                           fmt::join(camera.entries(*feature), ", ")));
-    }
-    if (problems.empty()) return actions;
-    return failure(
-        fmt::format("preset {}, {}", preset.name, group),
-        fmt::format("does not fit this camera: {}", fmt::join(problems, "; ")),
-        "set 'trigger_line' and 'strobe_line', another 'preset', or the features by name");
 }
 
 }  // namespace versavis::daemon

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How a family of cameras is set up, read from data files (daemon/camera/presets/), and checked
-// before it is used.
+// How a family of cameras is set up, read from data files (daemon/camera/presets/): one for cameras
+// that keep to the standard, and for each maker what differs.
 #pragma once
 
 #include <filesystem>
@@ -15,12 +15,15 @@
 
 namespace versavis::daemon {
 
-/// Sets the first of the features that the camera has to the first of the values that it knows.
+/// Sets the first of the features that the camera has to the first of the values that it takes.
+/// A text may be {trigger}, {trigger_line}, {strobe_line}, {edge}, {line_inverter}, {chunk} or
+/// {max_exposure_us}; the value "min" is the lowest that the camera allows.
 struct PresetStep {
+    std::string selector;  ///< is set first, to `selected`, where the camera has it
+    std::string selected;
     std::vector<std::string> features;
-    std::vector<std::string>
-        values;             ///< may hold {trigger_line}, {strobe_line}, {edge}, {max_exposure_us}
-    bool optional = false;  ///< a camera may lack or refuse it
+    std::vector<std::string> values;
+    bool needed = false;  ///< else a camera may lack or refuse it
 };
 
 enum class LineKind { opto, direct };
@@ -39,19 +42,30 @@ struct CameraPreset {
     std::string name;
     std::vector<std::string>
         vendors;  ///< parts of the camera's vendor name, in small letters; empty: any
-    std::vector<std::string> models;  ///< parts of its model name; empty: any
-    std::string trigger_line;
-    std::string strobe_line;
+    std::vector<std::string> models;         ///< parts of its model name; empty: any
+    std::vector<std::string> triggers;       ///< TriggerSelector: the first that the model has
+    std::vector<std::string> trigger_lines;  ///< the same of its lines
+    std::vector<std::string> strobe_lines;
+    bool line_inverter = false;  ///< makes the exposure line active high
     std::vector<std::string>
         exposure_time;  ///< feature in microseconds: the first that the camera has
+    std::vector<std::string> chunk_selector;  ///< of the chunk with the exposure time ...
+    std::vector<std::string> chunk_exposure;  ///< ... and the feature that has its value
+    double chunk_exposure_unit_us = 1;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< what its stamps are of
     std::vector<PresetLine> lines;
-    std::map<std::string, std::vector<PresetStep>> groups;  ///< by preset_groups
+    std::map<std::string, std::vector<PresetStep>>
+        groups;  ///< by preset_groups; empty: these cameras have no such thing
 };
 
-/// trigger: by a line; strobe: the exposure on a line; free_run: without triggers; pulse_width: the
-/// trigger's length is the exposure's; chunks: exposure time with each frame; ptp; fixed_exposure:
-/// no auto exposure; exposure_limit: the longest that the camera's own auto exposure takes.
+/// The preset of cameras that keep to the standard. Others take from it what they do not state.
+inline const std::string base_preset = "generic";
+
+/// default_settings: as after power-up; known_state: nothing that another program left behind takes
+/// part in the timing; trigger: by a line; strobe: the exposure on a line; free_run: without
+/// triggers; pulse_width: the trigger's length is the exposure's; chunks: exposure time with each
+/// frame; ptp; fixed_exposure: no auto exposure; exposure_limit: the longest that the camera's own
+/// auto exposure takes.
 extern const std::vector<std::string> preset_groups;
 
 /// Where the presets are that belong to this program.
@@ -64,26 +78,5 @@ Expected<std::vector<CameraPreset>> load_presets(const std::filesystem::path& di
 Expected<CameraPreset> choose_preset(const std::vector<CameraPreset>& presets,
                                      const std::string& name, const std::string& vendor,
                                      const std::string& model);
-
-/// What a camera's description says of a feature.
-class FeatureBook {
- public:
-    virtual ~FeatureBook() = default;
-    virtual bool has(const std::string& feature) const = 0;
-    /// Values of an enumeration; empty for other features.
-    virtual std::vector<std::string> entries(const std::string& feature) const = 0;
-};
-
-struct PresetAction {
-    std::string feature;
-    std::string value;
-    bool optional = false;
-};
-
-/// The steps of a group as actions for this camera. Error: all that the camera lacks, with what it
-/// has.
-Expected<std::vector<PresetAction>> plan(const CameraPreset& preset, const std::string& group,
-                                         const std::map<std::string, std::string>& variables,
-                                         const FeatureBook& camera);
 
 }  // namespace versavis::daemon

@@ -27,18 +27,6 @@ constexpr std::uint64_t most_bytes_per_pixel = 8;
 /// more for a camera that lies.
 constexpr std::uint64_t largest_extra = 1 << 20;
 
-class DeviceBook final : public FeatureBook {
- public:
-    explicit DeviceBook(ArvDevice* device) : device_(device) {}
-    bool has(const std::string& feature) const override { return has_feature(device_, feature); }
-    std::vector<std::string> entries(const std::string& feature) const override {
-        return enumeration_entries(device_, feature);
-    }
-
- private:
-    ArvDevice* device_;
-};
-
 /// What the camera says of itself; empty when it does not.
 std::string name_of(ArvCamera* camera, const char* (*get)(ArvCamera*, GError**)) {
     GlibError error;
@@ -76,10 +64,11 @@ Expected<std::uint64_t> payload_of(ArvCamera* camera, const CameraConfiguration&
                    "on");
 }
 
-/// Groups of the preset, in the order that cameras need: the trigger mode last, then the output
-/// lines.
+/// Groups of the preset, in the order that cameras need.
 std::vector<std::string> wanted_groups(const CameraConfiguration& configuration) {
     std::vector<std::string> groups;
+    if (!configuration.keep_settings) groups.emplace_back("default_settings");
+    groups.emplace_back("known_state");
     if (configuration.chunks) groups.emplace_back("chunks");
     if (configuration.ptp) groups.emplace_back("ptp");
     if (configuration.auto_exposure.enabled) groups.emplace_back("fixed_exposure");
@@ -94,102 +83,126 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
     return groups;
 }
 
-std::string own_or(const std::string& own, const std::string& usual) {
-    return own.empty() ? usual : own;
-}
-
-/// The exposure output that the camera has, which is selected last.
-std::string strobe_line(const CameraPreset& preset, const CameraConfiguration& configuration,
-                        const std::vector<PresetAction>& actions) {
-    std::string line = own_or(configuration.strobe_line, preset.strobe_line);
-    for (const PresetAction& action : actions)
-        if (action.feature == "LineSelector") line = action.value;
-    return line;
-}
-
-Expected<std::vector<PresetAction>> plan_all(const CameraPreset& preset,
-                                             const CameraConfiguration& configuration,
-                                             ArvDevice* device) {
-    const std::map<std::string, std::string> variables{
-        {"trigger_line", own_or(configuration.trigger_line, preset.trigger_line)},
-        {"strobe_line", own_or(configuration.strobe_line, preset.strobe_line)},
-        {"max_exposure_us", fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))},
-        {"edge", configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}};
-    std::vector<PresetAction> actions;
-    for (const std::string& group : wanted_groups(configuration)) {
-        const auto steps = preset.groups.find(group);
-        const bool asked_for = group == "chunks" || group == "ptp" || group == "pulse_width";
-        if (steps == preset.groups.end() && asked_for)
+/// Error: what is asked for, these cameras do not have.
+Expected<> check_groups(const CameraPreset& preset, const CameraConfiguration& configuration) {
+    for (const std::string& group : wanted_groups(configuration))
+        if ((group == "chunks" || group == "ptp" || group == "pulse_width") &&
+            preset.groups.at(group).empty())
             return failure(fmt::format("preset {}", preset.name),
                            fmt::format("these cameras have no '{}'", group),
                            "remove the key that asks for it, or set the features by name");
-        auto planned = plan(preset, group, variables, DeviceBook(device));
-        if (!planned) return planned;
-        actions.insert(actions.end(), planned->begin(), planned->end());
-    }
-    return actions;
+    return {};
 }
 
-Expected<> carry_out(ArvDevice* device, const std::vector<PresetAction>& actions) {
-    for (const PresetAction& action : actions)
-        if (auto done = set_feature(device, action.feature, action.value);
-            !done && !action.optional)
-            return done;
-    return {};
+/// The configuration's choice, else those of the preset.
+std::vector<std::string> own_or(const std::string& own, const std::vector<std::string>& usual) {
+    return own.empty() ? usual : std::vector{own};
+}
+
+PresetVariables variables_of(const CameraPreset& preset, const CameraConfiguration& configuration) {
+    return {{"trigger", preset.triggers},
+            {"trigger_line", own_or(configuration.trigger_line, preset.trigger_lines)},
+            {"strobe_line", own_or(configuration.strobe_line, preset.strobe_lines)},
+            {"chunk", preset.chunk_selector},
+            {"line_inverter", {preset.line_inverter ? "true" : "false"}},
+            {"max_exposure_us", {fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))}},
+            {"edge", {configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}}};
+}
+
+/// The first of the features that the camera's description has; empty: none.
+std::string first_of(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
+    const auto found = std::find_if(features.begin(), features.end(),
+                                    [&](const std::string& name) { return nodes.has(name); });
+    return found == features.end() ? "" : *found;
+}
+
+/// What was set, as it reads now, with the exposure: where it changes, somebody else, or the camera
+/// itself, changed it.
+std::vector<std::pair<std::string, std::string>> watched(const AravisNodeMap& nodes,
+                                                         const std::vector<StepResult>& steps,
+                                                         const std::string& exposure_feature) {
+    std::vector<std::pair<std::string, std::string>> features;
+    const auto add = [&](const std::string& feature) {
+        const bool known = std::any_of(features.begin(), features.end(),
+                                       [&](const auto& entry) { return entry.first == feature; });
+        const std::string value = known || feature.empty() ? "" : nodes.read(feature);
+        if (!value.empty()) features.emplace_back(feature, value);
+    };
+    for (const StepResult& step : steps)
+        if ((step.group == "trigger" || step.group == "strobe") && step.outcome == StepOutcome::set)
+            add(step.feature);
+    add("ExposureAuto");
+    if (nodes.read("ExposureAuto") == "Off" || nodes.read("ExposureAuto").empty())
+        add(exposure_feature);
+    return features;
+}
+
+/// Whether the camera has a clock of its own: without a tick frequency Aravis silently puts the
+/// host's time in its place.
+bool has_clock(ArvDevice* device) {
+    GlibError error;
+    return !ARV_IS_GV_DEVICE(device) ||
+           arv_gv_device_get_timestamp_tick_frequency(ARV_GV_DEVICE(device), error.out()) != 0;
 }
 
 }  // namespace
 
-Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration& configuration,
-                                    const std::vector<CameraPreset>& presets) {
-    ArvDevice* device = arv_camera_get_device(camera);
-    CameraSetup setup;
+Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
+                                const std::vector<CameraPreset>& presets, CameraSetup& setup) {
     setup.vendor = name_of(camera, arv_camera_get_vendor_name);
     setup.model = name_of(camera, arv_camera_get_model_name);
     setup.serial = name_of(camera, arv_camera_get_device_serial_number);
-    auto preset = choose_preset(presets, configuration.preset, setup.vendor, setup.model);
+    auto chosen = choose_preset(presets, preset, setup.vendor, setup.model);
+    if (chosen) setup.preset = chosen->name;
+    return chosen;
+}
+
+Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
+                         const CameraConfiguration& configuration,
+                         const std::vector<CameraPreset>& presets, CameraSetup& setup) {
+    const auto preset = identify(camera, configuration.preset, presets, setup);
     if (!preset) return Unexpected(preset.error());
-    setup.preset = preset->name;
     setup.stamp_instant = configuration.stamp_instant == pairing::Instant::unknown
                               ? preset->stamp_instant
                               : configuration.stamp_instant;
-    const auto exposure =
-        std::find_if(preset->exposure_time.begin(), preset->exposure_time.end(),
-                     [&](const std::string& name) { return has_feature(device, name); });
-    if (exposure != preset->exposure_time.end()) setup.exposure_feature = *exposure;
-    const auto actions = plan_all(*preset, configuration, device);
-    if (!actions) return Unexpected(actions.error());
-    setup.lines = line_delays(*preset, configuration,
-                              own_or(configuration.trigger_line, preset->trigger_line),
-                              strobe_line(*preset, configuration, *actions));
+    setup.exposure_feature = first_of(nodes, preset->exposure_time);
+    setup.chunk_exposure = first_of(nodes, preset->chunk_exposure);
+    setup.chunk_exposure_unit_us = preset->chunk_exposure_unit_us;
+    setup.chunk_is_integer = nodes.is_integer(setup.chunk_exposure);
 
     arv_camera_stop_acquisition(camera, nullptr);  // somebody may have left it running
-    set_if_available(device, "AcquisitionMode", "Continuous");
-    if (auto done = carry_out(device, *actions); !done) return Unexpected(done.error());
+    if (auto has_all = check_groups(*preset, configuration); !has_all) return has_all;
+    PresetRun run(*preset, nodes, variables_of(*preset, configuration));
+    for (const std::string& group : wanted_groups(configuration)) run.carry_out(group);
     // One that cannot be told its rate keeps its own, and is held against the configured one.
     if (configuration.trigger == TriggerSource::free_run)
         arv_camera_set_frame_rate(camera, configuration.rate_hz, nullptr);
+    setup.steps = run.results();
+    if (auto good = run.verdict(); !good) return good;
     for (const auto& [name, value] : configuration.features)
-        if (auto done = set_feature(device, name, value); !done) return Unexpected(done.error());
+        if (auto done = nodes.set(name, value); !done) return done;
+    run.read_back();
+    setup.steps = run.results();
+    setup.lines = line_delays(*preset, configuration, run.variable("trigger_line"),
+                              run.variable("strobe_line"));
+    setup.watched = watched(nodes, setup.steps, setup.exposure_feature);
+    if (auto good = run.verdict(); !good) return good;
 
     setup.chunks = configuration.chunks;
     const auto payload = payload_of(camera, configuration);
     if (!payload) return Unexpected(payload.error());
     setup.payload = *payload;
-    // Without a tick frequency Aravis silently puts the host's time in the place of the camera's.
-    GlibError error;
-    setup.has_clock = !ARV_IS_GV_DEVICE(device) || arv_gv_device_get_timestamp_tick_frequency(
-                                                       ARV_GV_DEVICE(device), error.out()) != 0;
-    return setup;
+    setup.has_clock = has_clock(arv_camera_get_device(camera));
+    return {};
 }
 
-Duration fixed_exposure(ArvDevice* device, const CameraSetup& setup) {
-    const std::string automatic = read_text(device, "ExposureAuto");
-    const std::string mode = read_text(device, "ExposureMode");
+Duration fixed_exposure(const AravisNodeMap& nodes, const std::string& feature) {
+    const std::string automatic = nodes.read("ExposureAuto");
+    const std::string mode = nodes.read("ExposureMode");
     const bool fixed =
         (automatic.empty() || automatic == "Off") && (mode.empty() || mode == "Timed");
-    if (!fixed || setup.exposure_feature.empty()) return {};
-    return {std::llround(read_number(device, setup.exposure_feature).value_or(0) * 1e3)};
+    if (!fixed || feature.empty()) return {};
+    return {std::llround(nodes.read_number(feature).value_or(0) * 1e3)};
 }
 
 }  // namespace versavis::daemon

@@ -2,9 +2,10 @@
 // Sets up an open camera by its preset and configuration, all of it checked before the first frame.
 #pragma once
 
+#include "camera/aravis_node_map.hpp"
 #include "camera/camera_preset.hpp"
-#include "camera/genicam.hpp"
 #include "camera/line_delays.hpp"
+#include "camera/preset_run.hpp"
 #include "configuration/configuration.hpp"
 #include "versavis/time.hpp"
 
@@ -17,19 +18,31 @@ struct CameraSetup {
     std::string serial;
     std::string preset;
     LineDelays lines;
+    std::vector<StepResult> steps;  ///< of the preset
+    std::vector<std::pair<std::string, std::string>>
+        watched;                   ///< features with the values that must stay as they are
     std::string exposure_feature;  ///< in microseconds; empty: it has none
-    std::uint64_t payload = 0;     ///< bytes of a frame, chunks included
-    bool chunks = false;           ///< frames carry their exposure time
-    bool has_clock = true;         ///< its time stamps are its own, not the host's
+    std::string chunk_exposure;    ///< the same of each frame, in units of ...
+    double chunk_exposure_unit_us = 1;
+    bool chunk_is_integer = false;
+    std::uint64_t payload = 0;  ///< bytes of a frame, chunks included
+    bool chunks = false;        ///< frames carry their exposure time
+    bool has_clock = true;      ///< its time stamps are its own, not the host's
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by configuration or preset
 };
 
-/// Errors name the feature and what the camera allows, or all that the preset expects and the
-/// camera lacks.
-Expected<CameraSetup> set_up_camera(ArvCamera* camera, const CameraConfiguration& configuration,
-                                    const std::vector<CameraPreset>& presets);
+/// Names the camera in `setup`, and chooses its preset.
+Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
+                                const std::vector<CameraPreset>& presets, CameraSetup& setup);
 
-/// Exposure time as it is set; zero when the camera changes it by itself, or does not tell.
-Duration fixed_exposure(ArvDevice* device, const CameraSetup& setup);
+/// `setup` holds what was found and done, also after an error. Errors name the feature and what the
+/// camera allows, or all that the preset needs and the camera lacks or does not keep.
+Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
+                         const CameraConfiguration& configuration,
+                         const std::vector<CameraPreset>& presets, CameraSetup& setup);
+
+/// Exposure time as `feature` has it, in microseconds; zero when the camera changes it by itself,
+/// or does not say.
+Duration fixed_exposure(const AravisNodeMap& nodes, const std::string& feature);
 
 }  // namespace versavis::daemon

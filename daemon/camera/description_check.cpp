@@ -2,20 +2,21 @@
 #include "camera/description_check.hpp"
 
 #include <arv.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <signal.h>
+#include <strings.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <array>
-#include <charconv>
 #include <fstream>
-#include <map>
-#include <set>
 #include <string_view>
+#include <utility>
 
-#include "camera/genicam.hpp"
+#include "camera/aravis_node_map.hpp"
+#include "camera/description_graph.hpp"
 
 namespace versavis::daemon {
 
@@ -25,160 +26,12 @@ namespace {
 /// take twice the memory.
 constexpr std::size_t largest_text = 24 << 20;
 
-/// Steps from a feature down to its registers. Cameras need about ten. At half, still twice what is
-/// needed; at twice, still far from the end of a stack.
-constexpr unsigned deepest_chain = 50;
-
-/// Nodes that are looked at to know one value. Cameras need hundreds at most. At half, elaborate
-/// ones might be refused; at twice, one value may take twice the time.
-constexpr std::uint64_t most_steps = 20'000;
-
-/// Bytes of one register. At half, tables of cameras could be refused; at twice, twice the memory.
-constexpr std::int64_t longest_register = 1 << 20;
-
 /// Memory and time of the probe. At half, large descriptions are refused; at twice, so much more
 /// may be needed in the service, which parses what was found good.
 constexpr rlim_t probe_memory = 128 << 20;
 constexpr rlim_t probe_seconds = 5;
 
-/// What is needed for a value; the rest says whether, and within what limits, it may be used.
-bool needed_for_value(const std::string& tag) {
-    static const std::set<std::string> tags{"pValue",        "pVariable",    "pAddress",
-                                            "pIndex",        "pLength",      "pValueIndexed",
-                                            "pValueDefault", "pCommandValue"};
-    return tags.count(tag) != 0;
-}
-
-bool needed_for_limits(const std::string& tag) {
-    static const std::set<std::string> tags{"pMin",         "pMax",           "pInc",
-                                            "pIsAvailable", "pIsImplemented", "pIsLocked"};
-    return tags.count(tag) != 0;
-}
-
-std::string text_of(ArvDomNode* node) {
-    std::string text;
-    for (ArvDomNode* child = arv_dom_node_get_first_child(node); child != nullptr;
-         child = arv_dom_node_get_next_sibling(child))
-        if (ARV_IS_DOM_TEXT(child))
-            text += arv_dom_character_data_get_data(ARV_DOM_CHARACTER_DATA(child));
-    const auto from = text.find_first_not_of(" \t\r\n");
-    return from == std::string::npos
-               ? ""
-               : text.substr(from, text.find_last_not_of(" \t\r\n") - from + 1);
-}
-
-struct Feature {
-    std::vector<std::string> parts;  ///< what must be known first
-    std::vector<std::string> lengths;
-    std::string constant;
-};
-
-/// Limits of a feature, and whether it may be used: apart from its value, because the limits of
-/// width and offset name each other's values.
-std::string limits_of(const std::string& feature) { return feature + " (limits)"; }
-
-/// All features by name, and what they refer to.
-class Graph {
- public:
-    void add(ArvDomNode* node, const std::string& owner) {
-        for (ArvDomNode* child = arv_dom_node_get_first_child(node); child != nullptr;
-             child = arv_dom_node_get_next_sibling(child)) {
-            if (ARV_IS_GC_FEATURE_NODE(child))
-                add_feature(child, owner);
-            else if (ARV_IS_GC_PROPERTY_NODE(child))
-                add_property(owner, child);
-            else
-                add(child, owner);
-        }
-    }
-
-    Expected<> check() {
-        for (const auto& [name, feature] : features_) {
-            if (auto good = check_lengths(name, feature); !good) return good;
-            if (auto steps = cost(name); !steps) return Unexpected(steps.error());
-        }
-        return {};
-    }
-
- private:
-    struct Cost {
-        std::uint64_t steps = 1;
-        unsigned depth = 1;
-    };
-
-    void add_feature(ArvDomNode* node, const std::string& owner) {
-        const char* given = arv_gc_feature_node_get_name(ARV_GC_FEATURE_NODE(node));
-        const std::string tag = arv_dom_node_get_node_name(node);
-        // Structures have no name: each gets one of its own, to be found by its entries.
-        const std::string name = given != nullptr     ? given
-                                 : tag == "StructReg" ? fmt::format("StructReg {}", ++structures_)
-                                                      : "";
-        if (name.empty() || tag == "EnumEntry" || tag == "Group") return add(node, owner);
-        if (tag == "StructEntry")  // its register is that of the structure
-            features_[name].parts.push_back(owner);
-        else if (!owner.empty())
-            features_[owner].parts.push_back(name);
-        add(node, name);
-    }
-
-    void add_property(const std::string& owner, ArvDomNode* property) {
-        const std::string tag = arv_dom_node_get_node_name(property);
-        const std::string text = text_of(property);
-        if (needed_for_value(tag)) features_[owner].parts.push_back(text);
-        // A variable "X.Max" is a limit of what it names.
-        const char* name = tag == "pVariable"
-                               ? arv_gc_property_node_get_name(ARV_GC_PROPERTY_NODE(property))
-                               : nullptr;
-        if (name != nullptr && std::string_view(name).find('.') != std::string_view::npos)
-            features_[owner].parts.push_back(limits_of(text));
-        if (tag == "pValue") features_[limits_of(owner)].parts.push_back(limits_of(text));
-        if (needed_for_limits(tag)) features_[limits_of(owner)].parts.push_back(text);
-        if (tag == "Length" || tag == "pLength") features_[owner].lengths.push_back(text);
-        if (tag == "Value") features_[owner].constant = text;
-    }
-
-    /// A length that the camera may change is none: memory is taken by it before it is known.
-    Expected<> check_lengths(const std::string& name, const Feature& feature) const {
-        for (std::string text : feature.lengths) {
-            if (const auto other = features_.find(text); other != features_.end())
-                text = other->second.parts.empty() ? other->second.constant : "a variable";
-            char* end = nullptr;
-            const std::int64_t length = g_ascii_strtoll(text.c_str(), &end, 0);
-            if (text.empty() || *end != '\0' || length < 1 || length > longest_register)
-                return failure(name, fmt::format("a register of '{}' bytes", text));
-        }
-        return {};
-    }
-
-    Expected<Cost> cost(const std::string& name) {
-        const auto known = costs_.find(name);
-        if (known != costs_.end() && known->second.steps == 0)
-            return failure(name, "its value leads back to itself");
-        if (known != costs_.end()) return known->second;
-        const auto feature = features_.find(name);
-        if (feature == features_.end()) return Cost{};
-        if (++depth_ > deepest_chain) return failure(name, "its value is nested too deep");
-        costs_[name].steps = 0;  // being looked at
-        Cost sum;
-        for (const std::string& other : feature->second.parts) {
-            auto part = cost(other);
-            if (!part) return part;
-            sum.steps = std::min(sum.steps + part->steps, most_steps + 1);
-            sum.depth = std::max(sum.depth, part->depth + 1);
-        }
-        --depth_;
-        if (sum.steps > most_steps) return failure(name, "its value takes too many steps");
-        if (sum.depth > deepest_chain) return failure(name, "its value is nested too deep");
-        return costs_[name] = sum;
-    }
-
-    std::map<std::string, Feature> features_;
-    std::map<std::string, Cost> costs_;
-    unsigned depth_ = 0;
-    unsigned structures_ = 0;
-};
-
-/// What a zip holds, its first file. Aravis trusts the sizes in it: that is why this runs apart.
+/// The description in a zip. Aravis trusts the sizes in it: that is why this runs apart.
 Expected<std::string> unzip(const Description& description) {
     const std::unique_ptr<ArvZip, decltype(&arv_zip_free)> zip(
         arv_zip_new(description.bytes.data(), description.bytes.size()), arv_zip_free);
@@ -195,23 +48,12 @@ Expected<std::string> unzip(const Description& description) {
     return std::string(static_cast<const char*>(text.get()), size);
 }
 
-/// Aravis does not give out the attribute that makes an index depend on another feature: it becomes
-/// an element.
-std::string with_offsets_as_variables(const std::string& text) {
-    constexpr std::string_view attribute = "pOffset";
-    std::string result;
-    std::size_t copied = 0;
-    for (std::size_t at = text.find(attribute); at != std::string::npos;
-         at = text.find(attribute, at + 1)) {
-        const std::size_t element = text.rfind('<', at);
-        const std::size_t from = text.find_first_of("\"'", at);
-        const std::size_t to = from == std::string::npos ? from : text.find(text[from], from + 1);
-        if (to == std::string::npos || element == std::string::npos || element < copied) continue;
-        result += text.substr(copied, element - copied) + "<pVariable>" +
-                  text.substr(from + 1, to - from - 1) + "</pVariable>";
-        copied = element;
-    }
-    return result + text.substr(copied);
+/// False: a directory, or what macOS adds to an archive.
+bool is_description(ArvZipFile* file) {
+    const std::string_view path = arv_zip_file_get_name(file);
+    const std::string_view name = path.substr(path.find_last_of('/') + 1);
+    return name.size() > 4 && strcasecmp(name.substr(name.size() - 4).data(), ".xml") == 0 &&
+           !name.starts_with("._");
 }
 
 /// `used` bytes are taken already: by the program, and by the sanitizer that it may run under.
@@ -224,6 +66,25 @@ void limit_memory() {
 }
 
 }  // namespace
+
+}  // namespace versavis::daemon
+
+/// Replaces Aravis' function of this name, also where Aravis calls it: Aravis parses the first file
+/// of the list, which is the last of the archive. Cameras' archives may hold other files.
+extern "C" const GSList* arv_zip_get_file_list(ArvZip* zip) {
+    using Function = const GSList* (*)(ArvZip*);
+    static const auto aravis =
+        reinterpret_cast<Function>(::dlsym(RTLD_NEXT, "arv_zip_get_file_list"));
+    auto* files = const_cast<GSList*>(aravis(zip));
+    for (GSList* file = files; file != nullptr; file = file->next)
+        if (versavis::daemon::is_description(static_cast<ArvZipFile*>(file->data))) {
+            std::swap(files->data, file->data);
+            break;
+        }
+    return files;
+}
+
+namespace versavis::daemon {
 
 Expected<> check_description(const Description& description) {
     std::string text(description.bytes.begin(), description.bytes.end());
@@ -239,12 +100,10 @@ Expected<> check_description(const Description& description) {
         return failure("description", "is cut off");
     if (text.find("<!ENTITY") != std::string::npos)
         return failure("description", "defines entities");
-    text = with_offsets_as_variables(text);
+    text = expose_index_offsets(text);
     const Object<ArvGc> parsed(arv_gc_new(nullptr, text.data(), text.size()));
     if (!ARV_IS_GC(parsed.get())) return failure("description", "is not valid XML");
-    Graph graph;
-    graph.add(ARV_DOM_NODE(parsed.get()), "");
-    return graph.check();
+    return DescriptionGraph(parsed.get()).check();
 }
 
 int run_description_probe(bool zipped) {

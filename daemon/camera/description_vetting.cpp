@@ -19,21 +19,30 @@ namespace versavis::daemon {
 namespace {
 
 /// First line of the file: what was found good by other rules is looked at again.
-constexpr const char* file_header = "versavis camera descriptions 1";
+constexpr const char* file_header = "versavis camera descriptions 2";
 
 /// The most that are kept. At half, more cameras than anybody has; at twice, a device that sends
 /// another one each time fills twice the disk.
 constexpr std::size_t most_kept = 1000;
 
-/// Until a probe is killed. At half, slow machines refuse large descriptions; at twice, a hostile
-/// one is refused later.
-constexpr Duration probe_time = seconds(10);
+/// Until a probe is killed that has not used up its CPU time. At half, a host that is busy at boot
+/// asks twice; at twice, a probe that hangs is noticed later.
+constexpr Duration probe_patience = seconds(60);
+
+/// Probes of one description that may use up their CPU time. At half, a host that is throttled
+/// refuses a good one; at twice, a hostile one takes twice the time.
+constexpr unsigned slow_probes = 3;
 
 /// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits longer.
 constexpr Duration look_interval = milliseconds(20);
 
 /// The most that a probe says.
 constexpr std::size_t longest_reason = 500;
+
+struct Verdict {
+    std::string refused;  ///< why; empty: nothing is wrong
+    bool slow = false;    ///< perhaps because this host is
+};
 
 /// A child with its standard input and output; killed when nobody waits for it any more.
 class Probe {
@@ -78,9 +87,9 @@ class Probe {
 
     bool runs() const { return pid_ > 0; }
 
-    /// Sends all, and receives what it says until it is done. False: it takes too long.
+    /// Sends all, and receives what it says until it is done. False: it does not end.
     bool talk(const std::vector<std::uint8_t>& bytes, const Cancelled& cancelled) {
-        const HostTime deadline = host_now() + probe_time;
+        const HostTime deadline = host_now() + probe_patience;
         for (std::size_t sent = 0; host_now() < deadline && !cancelled();) {
             const bool sending = sent < bytes.size();
             pollfd polled{socket_, static_cast<short>(sending ? POLLIN | POLLOUT : POLLIN), 0};
@@ -102,16 +111,18 @@ class Probe {
         return false;
     }
 
-    /// Empty: it found nothing wrong.
-    std::string verdict() {
+    Verdict verdict() {
         int status = 0;
         ::waitpid(pid_, &status, 0);
         pid_ = -1;
-        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
-        if (WIFEXITED(status) && !said_.empty()) return said_.substr(0, said_.find_first_of('\n'));
-        return WIFSIGNALED(status)
-                   ? fmt::format("it ends its reader with signal {}", WTERMSIG(status))
-                   : "it ends its reader";
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+        if (WIFEXITED(status) && !said_.empty())
+            return {said_.substr(0, said_.find_first_of('\n'))};
+        if (!WIFSIGNALED(status)) return {"it ends its reader"};
+        // The limit of CPU time is one of SIGKILL, too.
+        if (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL)
+            return {"reading it takes too much CPU time", true};
+        return {fmt::format("it ends its reader with signal {}", WTERMSIG(status))};
     }
 
  private:
@@ -138,8 +149,16 @@ std::optional<std::string> DescriptionVetting::known(const std::string& hash) co
     return refused != refused_.end() ? std::optional(refused->second) : std::nullopt;
 }
 
-void DescriptionVetting::keep(const std::string& hash) {
+/// What is slow is checked again some times: the host may have been throttled.
+void DescriptionVetting::remember(const std::string& hash, const std::string& refused, bool slow) {
     const std::lock_guard lock(mutex_);
+    if (refused.empty()) return keep(hash);
+    if (slow && ++slow_[hash] < slow_probes) return;
+    if (refused_.size() >= most_kept) refused_.clear();
+    refused_[hash] = refused;
+}
+
+void DescriptionVetting::keep(const std::string& hash) {
     if (good_.size() >= most_kept) good_.clear();
     good_.insert(hash);
     const std::filesystem::path part = file_.string() + ".part";
@@ -154,25 +173,25 @@ void DescriptionVetting::keep(const std::string& hash) {
 Expected<> DescriptionVetting::vet(const std::string& camera, const Description& description,
                                    const Cancelled& cancelled) {
     const std::string hash = hash_of(description) + (description.zipped ? " zip" : " xml");
-    auto verdict = known(hash);
-    if (!verdict) {
+    auto refused = known(hash);
+    if (!refused) {
         Probe probe(program_, description.zipped);
         if (!probe.runs())
             return failure(camera, "its description cannot be checked: no probe process",
                            "allow the service to start processes");
-        const bool done = probe.talk(description.bytes, cancelled);
-        if (!done && cancelled()) return failure(camera, "the check was stopped");
-        verdict = done ? probe.verdict() : "it keeps its reader busy";
-        if (verdict->empty()) {
-            keep(hash);
-        } else {
-            const std::lock_guard lock(mutex_);
-            if (refused_.size() >= most_kept) refused_.clear();
-            refused_[hash] = *verdict;
-        }
+        if (!probe.talk(description.bytes, cancelled))
+            return failure(camera,
+                           cancelled() ? "the check was stopped"
+                                       : fmt::format("the check of its description does not end "
+                                                     "within {} s",
+                                                     probe_patience.ns / seconds(1).ns),
+                           "this host is busy; the check is tried again");
+        const Verdict verdict = probe.verdict();
+        refused = verdict.refused;
+        remember(hash, verdict.refused, verdict.slow);
     }
-    if (verdict->empty()) return {};
-    return failure(camera, "its description is refused: " + *verdict,
+    if (refused->empty()) return {};
+    return failure(camera, "its description is refused: " + *refused,
                    "ask its maker for another firmware, or take it off the network");
 }
 

@@ -27,6 +27,7 @@ class DescriptionVetting {
 
  private:
     std::optional<std::string> known(const std::string& hash) const;
+    void remember(const std::string& hash, const std::string& refused, bool slow);
     void keep(const std::string& hash);
 
     std::filesystem::path program_;
@@ -34,6 +35,7 @@ class DescriptionVetting {
     mutable std::mutex mutex_;
     std::set<std::string> good_;
     std::map<std::string, std::string> refused_;  ///< and why, for this life
+    std::map<std::string, unsigned> slow_;        ///< probes that used up their CPU time
 };
 
 /// This program.

@@ -95,7 +95,7 @@ void use_named_preset(const std::vector<CameraPreset>& presets, CameraConfigurat
                      [&](const CameraPreset& preset) { return preset.name == camera.preset; });
     if (found == presets.end() || camera.latency_us != 0) return;
     const std::string& line =
-        camera.trigger_line.empty() ? found->trigger_line : camera.trigger_line;
+        camera.trigger_line.empty() ? found->trigger_lines.front() : camera.trigger_line;
     camera.latency_us = static_cast<double>(trigger_delay(*found, camera, line).delay.ns) * 1e-3;
 }
 

@@ -92,6 +92,7 @@ struct CameraConfiguration {
     bool exposure_by_pulse =
         false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
     bool chunks = false;
+    bool keep_settings = false;  ///< the camera's own, rather than its defaults
     bool ptp = false;
     AutoExposureConfiguration auto_exposure;
     double max_temperature_c = 75;

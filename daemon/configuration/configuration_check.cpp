@@ -346,7 +346,7 @@ void check_preset(const CameraConfiguration& camera, const std::vector<CameraPre
         {"ptp", "ptp", camera.ptp},
         {"exposure", "pulse_width", camera.exposure_by_pulse}};
     for (const auto& [key, group, wanted] : asked)
-        if (wanted && preset->groups.count(group) == 0)
+        if (wanted && preset->groups.at(group).empty())
             findings.add(camera.entry, key,
                          fmt::format("cameras of preset '{}' have no '{}'", preset->name, group),
                          "remove the key, or set the features by name in [camera.features]");

@@ -117,6 +117,24 @@ json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
             {"grid_error_ns", grid.error.ns}};
 }
 
+json step_json(const StepResult& step) {
+    return {{"group", step.group},
+            {"node", step.node()},
+            {"wanted", step.wanted},
+            {"actual", step.actual.empty() ? json(nullptr) : json(step.actual)},
+            {"outcome", to_string(step.outcome)},
+            {"needed", step.needed},
+            {"reason", step.reason}};
+}
+
+/// What the preset set, or could not set; not what the camera lacks and need not have.
+json setup_json(const std::vector<StepResult>& steps) {
+    json setup = json::array();
+    for (const StepResult& step : steps)
+        if (step.needed || step.outcome != StepOutcome::left_out) setup.push_back(step_json(step));
+    return setup;
+}
+
 json camera_json(const CameraStatus& status) {
     const CameraReport& camera = status.camera;
     const PipelineReport& pipeline = status.pipeline;
@@ -130,6 +148,7 @@ json camera_json(const CameraStatus& status) {
             {"stamp_instant", pairing::to_string(pipeline.stamp_instant)},
             {"vendor", camera.vendor},
             {"preset", camera.preset},
+            {"setup", setup_json(camera.steps)},
             {"temperature_c", camera.temperature_c},
             {"needed_mbps", camera.bandwidth.needed_mbps},
             {"link_needed_mbps", camera.bandwidth.link_needed_mbps},

@@ -12,20 +12,6 @@ using namespace versavis::daemon;
 
 namespace {
 
-class Book final : public FeatureBook {
- public:
-    explicit Book(std::map<std::string, std::vector<std::string>> features)
-        : features_(std::move(features)) {}
-    bool has(const std::string& feature) const override { return features_.count(feature) != 0; }
-    std::vector<std::string> entries(const std::string& feature) const override {
-        const auto found = features_.find(feature);
-        return found == features_.end() ? std::vector<std::string>{} : found->second;
-    }
-
- private:
-    std::map<std::string, std::vector<std::string>> features_;
-};
-
 std::vector<CameraPreset> all() {
     auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/camera/presets");
     REQUIRE(presets);
@@ -36,41 +22,6 @@ std::string chosen(const std::string& vendor, const std::string& model) {
     const auto preset = choose_preset(all(), "auto", vendor, model);
     REQUIRE(preset);
     return preset->name;
-}
-
-const std::map<std::string, std::string> variables{
-    {"trigger_line", "Line0"}, {"strobe_line", "Line1"}, {"edge", "RisingEdge"}};
-
-/// As a camera of the family describes itself, by its maker's feature list.
-const Book blackfly_s({{"TriggerSelector", {"AcquisitionStart", "FrameStart", "FrameBurstStart"}},
-                       {"TriggerMode", {"Off", "On"}},
-                       {"TriggerSource", {"Software", "Line0", "Line1", "Line2", "Line3"}},
-                       {"TriggerActivation",
-                        {"LevelLow", "LevelHigh", "FallingEdge", "RisingEdge", "AnyEdge"}},
-                       {"TriggerOverlap", {"Off", "ReadOut", "PreviousFrame"}},
-                       {"TriggerDelay", {}},
-                       {"ExposureMode", {"Timed", "TriggerWidth"}},
-                       {"AutoExposureExposureTimeUpperLimit", {}},
-                       {"AcquisitionFrameRateEnable", {}},
-                       {"LineSelector", {"Line0", "Line1", "Line2", "Line3"}},
-                       {"LineMode", {"Input", "Output"}},
-                       {"LineInverter", {}},
-                       {"LineSource", {"Off", "ExposureActive", "FrameTriggerWait"}}});
-
-const Book mako({{"TriggerSelector", {"FrameStart", "AcquisitionStart"}},
-                 {"TriggerMode", {"Off", "On"}},
-                 {"TriggerSource", {"Freerun", "Line1", "Line2", "FixedRate", "Software"}},
-                 {"TriggerActivation", {"RisingEdge", "FallingEdge"}},
-                 {"TriggerOverlap", {"Off", "PreviousFrame"}},
-                 {"SyncOutSelector", {"SyncOut1", "SyncOut2"}},
-                 {"SyncOutSource", {"GPO", "Exposing", "Imaging"}},
-                 {"SyncOutPolarity", {"Normal", "Invert"}}});
-
-std::string value_of(const std::vector<PresetAction>& actions, const std::string& feature) {
-    std::string value;
-    for (const PresetAction& action : actions)
-        if (action.feature == feature) value = action.value;
-    return value;
 }
 
 }  // namespace
@@ -86,60 +37,49 @@ TEST_CASE("camera_preset: each family is known by what its cameras call themselv
     CHECK(chosen("Allied Vision", "1800 U-158m") == "alvium");
     CHECK(chosen("The Imaging Source Europe GmbH", "DMK 33GX264") == "imaging-source");
     CHECK(chosen("Teledyne DALSA", "Nano-C2420") == "dalsa");
+    CHECK(chosen("Point Grey Research", "Blackfly S BFS-PGE-13Y3M") == "flir");
+    CHECK(chosen("FLIR", "Oryx ORX-10G-51S5M") == "flir-oryx");
+    CHECK(chosen("FLIR Systems AB", "FLIR AX5") == "generic");
+    CHECK(chosen("Hikrobot", "MV-CA013-A0GM") == "hikrobot");
+    CHECK(chosen("Daheng Imaging", "MER-131-75GM") == "daheng");
+    CHECK(chosen("SVS-VISTEK GmbH", "evo4050") == "svs-vistek");
+    CHECK(chosen("Baumer Optronic", "HXG20") == "baumer");
+    CHECK(chosen("IDS Imaging Development Systems GmbH", "GV-5860") == "ids");
+    CHECK(chosen("JAI Corporation", "GO-5000M-PGE") == "jai");
+    CHECK(chosen("Imperx", "GEV-B1020C") == "imperx");
     CHECK(chosen("Somebody", "Else") == "generic");
     CHECK(choose_preset(all(), "lucid", "Basler", "a")->name == "lucid");
     CHECK_THAT(choose_preset(all(), "lucied", "a", "b").error().message(),
                Catch::Contains("one of: auto, "));
 }
 
-TEST_CASE("camera_preset: steps become what this camera has") {
-    const auto flir = choose_preset(all(), "flir", "", "");
-    auto actions = plan(*flir, "trigger", variables, blackfly_s);
-    REQUIRE(actions);
-    CHECK(actions->back().feature == "TriggerMode");
-    CHECK(actions->back().value == "On");
-    CHECK(value_of(*actions, "TriggerSource") == "Line0");
-    CHECK(value_of(*actions, "TriggerOverlap") == "ReadOut");
-    CHECK(value_of(*actions, "TriggerSelector") == "FrameStart");
-    CHECK(value_of(*actions, "AcquisitionFrameRateEnable") == "false");
-    CHECK(value_of(*plan(*flir, "strobe", variables, blackfly_s), "LineSource") ==
-          "ExposureActive");
-    CHECK(value_of(*plan(*flir, "exposure_limit", {{"max_exposure_us", "45000"}}, blackfly_s),
-                   "AutoExposureExposureTimeUpperLimit") == "45000");
-    CHECK(value_of(*plan(*flir, "pulse_width", variables, blackfly_s), "ExposureMode") ==
-          "TriggerWidth");
-
-    const auto allied = choose_preset(all(), "allied-vision-gige", "", "");
-    const std::map<std::string, std::string> lines{
-        {"trigger_line", "Line1"}, {"strobe_line", "SyncOut1"}, {"edge", "RisingEdge"}};
-    CHECK(plan(*allied, "trigger", lines, mako));
-    CHECK(value_of(*plan(*allied, "strobe", lines, mako), "SyncOutSource") == "Exposing");
-}
-
-TEST_CASE("camera_preset: all that a camera lacks is said at once") {
-    const auto flir = choose_preset(all(), "flir", "", "");
-    const auto actions = plan(*flir, "strobe", variables, mako);
-    REQUIRE_FALSE(actions);
-    CHECK_THAT(actions.error().message(), Catch::Contains("no LineSelector") &&
-                                              Catch::Contains("no LineSource") &&
-                                              Catch::Contains("preset"));
-    const std::map<std::string, std::string> wrong{
-        {"trigger_line", "Line7"}, {"strobe_line", "Line1"}, {"edge", "RisingEdge"}};
-    CHECK_THAT(plan(*flir, "trigger", wrong, blackfly_s).error().message(),
-               Catch::Contains("TriggerSource knows only Software, Line0"));
+TEST_CASE("camera_preset: makers state what differs, and take the rest from the base") {
+    const auto base = choose_preset(all(), base_preset, "", "");
+    const auto hikrobot = choose_preset(all(), "hikrobot", "", "");
+    REQUIRE((base && hikrobot));
+    CHECK(hikrobot->strobe_lines.front() == "Line1");
+    CHECK(hikrobot->groups.at("trigger").size() == base->groups.at("trigger").size());
+    CHECK(hikrobot->chunk_exposure == base->chunk_exposure);
+    CHECK(choose_preset(all(), "allied-vision-gige", "", "")->groups.at("chunks").empty());
+    CHECK(choose_preset(all(), "daheng", "", "")->line_inverter);
+    CHECK_FALSE(base->line_inverter);
 }
 
 TEST_CASE("camera_preset: errors of preset files name line and key") {
     test::TemporaryDirectory directory;
     CHECK_THAT(load_presets(directory.path()).error().message(),
                Catch::Contains("no camera presets"));
-    directory.write(
-        "bad.toml",
-        "vendors = [\"a\"]\n[[trigger]]\nset = [\"A\"]\nto = [\"B\"]\noptinal = true\n");
+    directory.write("bad.toml",
+                    "vendors = [\"a\"]\n[[trigger]]\nsteps = [{ set = [\"A\"], to = [\"B\"], neded "
+                    "= true }]\n");
     const std::string message = load_presets(directory.path()).error().message();
-    CHECK_THAT(message, Catch::Contains("bad.toml") && Catch::Contains("optional"));
-    directory.write("bad.toml", "[[trigger]]\nset = [\"A\"]\n");
+    CHECK_THAT(message, Catch::Contains("bad.toml") && Catch::Contains("needed"));
+    directory.write("bad.toml", "[[trigger]]\nsteps = [{ set = [\"A\"] }]\n");
     CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("'set' and 'to'"));
+    directory.write("bad.toml", "[[trigger]]\nset = [\"A\"]\n");
+    CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("'steps'"));
+    directory.write("bad.toml", "[[trigger]]\nselect = [\"A\"]\n");
+    CHECK_THAT(load_presets(directory.path()).error().message(), Catch::Contains("a selector and"));
 }
 
 TEST_CASE("camera_preset: lines are direct where the camera has such, and have their delays") {
@@ -147,9 +87,9 @@ TEST_CASE("camera_preset: lines are direct where the camera has such, and have t
         INFO(name);
         const auto preset = choose_preset(all(), name, "", "");
         REQUIRE(preset);
-        const auto strobe =
-            std::find_if(preset->lines.begin(), preset->lines.end(),
-                         [&](const PresetLine& line) { return line.name == preset->strobe_line; });
+        const auto strobe = std::find_if(
+            preset->lines.begin(), preset->lines.end(),
+            [&](const PresetLine& line) { return line.name == preset->strobe_lines.front(); });
         REQUIRE(strobe != preset->lines.end());
         CHECK((strobe->kind == LineKind::direct) == (std::string(name) != "basler"));
         REQUIRE((strobe->output_rising && strobe->output_falling));

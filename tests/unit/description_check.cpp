@@ -69,17 +69,27 @@ TEST_CASE("description_check: what takes too long to evaluate is refused") {
     CHECK_THAT(verdict(with(chain)), Catch::Contains("nested too deep"));
 }
 
-TEST_CASE("description_check: registers have a bounded and constant length") {
-    const auto reg = [](const std::string& length) {
-        return with("<StringReg Name=\"A\"><Address>0</Address>" + length + "</StringReg>" +
-                    "<Integer Name=\"L\"><Value>64</Value></Integer>"
-                    "<Integer Name=\"V\"><pValue>L</pValue></Integer>");
+TEST_CASE("description_check: registers have a bounded length, constant where Aravis reads them") {
+    const auto reg = [](const std::string& name, const std::string& length) {
+        return with("<StringReg Name=\"" + name + "\"><Address>0</Address>" + length +
+                    "</StringReg><Integer Name=\"L\"><Value>64</Value></Integer>"
+                    "<IntReg Name=\"V\"><Value>64</Value><Address>4</Address><Length>4</Length>"
+                    "</IntReg>");
     };
-    CHECK(verdict(reg("<Length>64</Length>")) == "good");
-    CHECK(verdict(reg("<pLength>L</pLength>")) == "good");
+    CHECK(verdict(reg("A", "<Length>64</Length>")) == "good");
+    CHECK(verdict(reg("A", "<pLength>L</pLength>")) == "good");
+    CHECK(verdict(reg("A", "<pLength>V</pLength>")) == "good");  // refused when it is used
     for (const char* length : {"<Length>0</Length>", "<Length>-1</Length>", "<Length>x</Length>",
-                               "<Length>0x7fffffffffffffff</Length>", "<pLength>V</pLength>"})
-        CHECK_THAT(verdict(reg(length)), Catch::Contains("a register of"));
+                               "<Length>0x7fffffffffffffff</Length>"})
+        CHECK_THAT(verdict(reg("A", length)), Catch::Contains("a register of"));
+    CHECK(verdict(reg("DeviceVendorName", "<pLength>L</pLength>")) == "good");
+    CHECK_THAT(verdict(reg("DeviceVendorName", "<pLength>V</pLength>")),
+               Catch::Contains("another register"));
+    CHECK_THAT(verdict(with("<IntReg Name=\"B\"><Length>4</Length><pIndex pOffset=\"C\">D</pIndex>"
+                            "</IntReg><IntReg Name=\"C\"><Address>0</Address><pLength>D</pLength>"
+                            "</IntReg><IntReg Name=\"D\"><Address>4</Address><Length>4</Length>"
+                            "</IntReg>")),
+               Catch::Contains("another register"));
 }
 
 TEST_CASE("description_check: what is no whole description is refused") {

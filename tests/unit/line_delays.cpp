@@ -13,7 +13,7 @@ namespace {
 CameraPreset preset() {
     CameraPreset made;
     made.name = "maker";
-    made.trigger_line = "In";
+    made.trigger_lines = {"In"};
     PresetLine input;
     input.name = "In";
     input.input_rising = EdgeDelay{microseconds(6), microseconds(1)};
