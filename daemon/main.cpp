@@ -8,7 +8,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
+#include <fstream>
 
+#include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "configuration/configuration.hpp"
 #include "configuration/problem_report.hpp"
@@ -102,6 +104,64 @@ int run(const std::string& path) {
     ::_exit(EX_OK);  // its thread uses what a return would destroy
 }
 
+struct ProbeOptions {
+    std::string device;  ///< or "all"
+    std::string configuration;
+    std::string bundle;
+    bool json = false;
+};
+
+/// The camera as the file has it, or as a configuration with only this device would.
+CameraConfiguration camera_to_probe(const std::string& device, const std::string& path) {
+    CameraConfiguration camera;
+    camera.name = camera.device = device;
+    camera.max_exposure_us = 1e6 / camera.rate_hz;
+    const auto configuration = path.empty() ? Expected<Configuration, TomlProblems>(Configuration{})
+                                            : load_configuration(path);
+    if (!configuration) return camera;
+    for (const CameraConfiguration& known : configuration->cameras)
+        if (known.device == device || known.name == device) return known;
+    return camera;
+}
+
+int write_bundle(const std::string& path, const std::string& text) {
+    std::ofstream file(path);
+    file << text << '\n';
+    file.close();
+    if (file) return EX_OK;
+    fmt::print(stderr, "{}: cannot be written; check its directory and permissions\n", path);
+    return EX_CANTCREAT;
+}
+
+/// Sets up one camera or all, and reports. The exit code says whether all of them are ready.
+int probe(const ProbeOptions& options) {
+    if (!options.configuration.empty())
+        if (const auto read = load_configuration(options.configuration); !read) {
+            log_problems(read.error());
+            return EX_CONFIG;
+        }
+    const auto devices =
+        options.device == "all" ? list_cameras() : std::vector<std::string>{options.device};
+    if (devices.empty()) {
+        fmt::print(stderr, "no camera answers; check cables and power, or name an address\n");
+        return EX_UNAVAILABLE;
+    }
+    int code = EX_OK;
+    std::string all;
+    for (const std::string& device : devices) {
+        const bool whole = !options.bundle.empty();
+        const ProbeReport report = probe_camera(camera_to_probe(device, options.configuration),
+                                                default_preset_directory(), whole);
+        if (!report.problem.empty()) code = EX_UNAVAILABLE;
+        fmt::print("{}", options.json ? to_json(report) + "\n" : to_text(report));
+        std::fflush(stdout);
+        if (whole) all += (all.empty() ? "" : ",\n") + to_json(report);
+    }
+    if (options.bundle.empty()) return code;
+    const int written = write_bundle(options.bundle, "[" + all + "]");
+    return written == EX_OK ? code : written;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -114,7 +174,13 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     CLI::Option* check_config =
         app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
-    app.add_flag("--json", as_json, "Tell it in JSON")->needs(check_config);
+    app.add_flag("--json", as_json, "As JSON");
+    ProbeOptions probe_options;
+    app.add_option("--probe-camera", probe_options.device,
+                   "Set up one camera (address, serial number or name), or 'all', and report")
+        ->excludes(check_config);
+    app.add_option("--bundle", probe_options.bundle,
+                   "Also write description, values and a draft of a preset to this file");
     std::string description;  // for the service itself
     app.add_option("--probe-description", description)->group("");
     app.set_version_flag("--version", VERSAVIS_VERSION);
@@ -124,5 +190,10 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
+    if (!probe_options.device.empty()) {
+        probe_options.json = as_json;
+        if (app.count("--config") > 0) probe_options.configuration = path;
+        return probe(probe_options);
+    }
     return check_only ? check(path, as_json) : run(path);
 }

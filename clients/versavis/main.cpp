@@ -11,6 +11,7 @@
 #include <iostream>
 
 #include "board/board_commands.hpp"
+#include "camera/camera_commands.hpp"
 #include "clock/clock.hpp"
 #include "evaluate/evaluate_commands.hpp"
 #include "pairing/pair_replay.hpp"
@@ -127,6 +128,8 @@ int main(int argc, char** argv) {
 
     client::BoardCommands board(app, [] { return stop_requested != 0; });
 
+    client::CameraCommands camera(app);
+
     client::ProcessCommand process(app, [] { return stop_requested != 0; });
 
     client::FileCommands files(app, [] { return stop_requested != 0; });
@@ -170,6 +173,7 @@ int main(int argc, char** argv) {
     }
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
+    if (camera.chosen()) return camera.run();
     if (recorder.chosen()) return recorder.run(instance);
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
     if (evaluate.chosen()) return evaluate.run();
