@@ -18,7 +18,9 @@ namespace {
 /// Exposures of 2 ms at these ticks of 50 ms, and the frames of some of them.
 class Bench {
  public:
-    explicit Bench(const std::vector<int>& ticks) : exposures(Limits{}.period) {
+    /// The exposure line stayed silent at the triggers that were `ignored`.
+    explicit Bench(const std::vector<int>& ticks, const std::vector<std::uint64_t>& ignored = {})
+        : exposures(Limits{}.period) {
         std::uint64_t trigger = 0;
         for (const int tick : ticks) {
             Exposure exposure;
@@ -26,8 +28,20 @@ class Bench {
             exposure.start = BoardTime{1'000'000'000 + tick * 50'000'000LL};
             exposure.end = exposure.start + milliseconds(2);
             exposure.end_on_host = exposure.earliest_on_host = HostTime{exposure.end.ns};
+            exposure.exposed = std::find(ignored.begin(), ignored.end(), trigger) == ignored.end();
             exposures.add(exposure);
         }
+    }
+
+    /// There is no exposure line.
+    void forget_lines() {
+        ExposureLog unseen(Limits{}.period);
+        for (std::size_t i = 0; i < exposures.size(); ++i) {
+            Exposure exposure = exposures[i].exposure;
+            exposure.kind = StampKind::trigger_edge;
+            unseen.add(exposure);
+        }
+        exposures = unseen;
     }
 
     /// The frame of the exposure with this number.
@@ -196,14 +210,19 @@ TEST_CASE("alignment: triggers that a camera may have ignored are silent, or wit
 
 TEST_CASE("alignment: ids count triggers, or those that were taken, and else it takes faults") {
     const Record from = recorded(10, 10);
-    for (const auto& [step, faults] :
-         {std::pair{0U, 2U}, {1U, 2U}, {2U, 2U}, {3U, 2U}, {4U, 1U}, {5U, 0U}, {6U, 2U}})
+    for (const auto& [step, faults] : {std::pair{0U, impossible_step},
+                                       {1U, 4U},
+                                       {2U, 3U},
+                                       {3U, 2U},
+                                       {4U, 1U},
+                                       {5U, 0U},
+                                       {6U, impossible_step}})
         CHECK(step_faults(step, from, recorded(15, 15)) == faults);
     for (const auto& [step, faults] :
-         {std::pair{1U, 2U}, {2U, 1U}, {3U, 0U}, {4U, 0U}, {5U, 0U}, {6U, 2U}})
+         {std::pair{1U, 2U}, {2U, 1U}, {3U, 0U}, {4U, 0U}, {5U, 0U}, {6U, impossible_step}})
         CHECK(step_faults(step, from, recorded(15, 14, 1)) == faults);
-    CHECK(step_faults(1, from, recorded(10, 10)) == 2);
-    CHECK(step_faults(1, from, recorded(9, 9)) == 2);
+    CHECK(step_faults(1, from, recorded(10, 10)) == impossible_step);
+    CHECK(step_faults(1, from, recorded(9, 9)) == impossible_step);
     CHECK(step_faults(1, from, recorded(11, 11)) == 0);
     CHECK(faults_to_refute == 2);
 }
@@ -306,8 +325,9 @@ TEST_CASE("alignment: an exposure has one frame at most, and none that it had be
 
 TEST_CASE("alignment: a trigger that goes back takes more faults than are borne") {
     CHECK(step_faults(static_cast<std::uint64_t>(-3), recorded(5, 5), recorded(2, 2)) ==
-          faults_to_refute);
-    CHECK(step_faults(0, recorded(5, 5), recorded(5, 5)) == faults_to_refute);
+          impossible_step);
+    CHECK(step_faults(0, recorded(5, 5), recorded(5, 5)) == impossible_step);
+    CHECK(impossible_step > unseen_faults_to_refute);
 }
 
 TEST_CASE("alignment: one fault leaves it open") {
@@ -316,6 +336,24 @@ TEST_CASE("alignment: one fault leaves it open") {
     CHECK(bench.align().size() == 6);
     for (std::size_t i = 4; i < 6; ++i) --bench.frames[i].block_id;  // one that nobody counted
     CHECK(bench.align().empty());
+}
+
+TEST_CASE("alignment: where no line shows what was taken, a start takes eight frames") {
+    Bench bench({0, 1, 3, 4, 7, 8, 10, 11, 14});
+    bench.forget_lines();
+    for (const std::uint64_t trigger : {1, 2, 3, 4, 5, 6, 7}) bench.frame(trigger);
+    CHECK(bench.align().empty());
+    bench.frame(8);
+    CHECK(bench.align().size() == 8);
+}
+
+TEST_CASE("alignment: a trigger whose line was silent has no frame to lose") {
+    // The camera takes those that come 100 ms after another at least: its gaps are 3, 4, 3, 4.
+    for (const bool seen : {true, false}) {
+        Bench bench({0, 1, 3, 4, 7, 8, 10, 11, 14}, seen ? Triggers{2, 4, 6, 8} : Triggers{});
+        for (const std::uint64_t trigger : {1, 3, 5, 7, 9}) bench.frame(trigger);
+        CHECK(bench.align() == (seen ? Triggers{1, 3, 5, 7, 9} : Triggers{}));
+    }
 }
 
 TEST_CASE("alignment: one that takes a fault keeps another from being the only one") {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 namespace versavis::test {
 
@@ -34,6 +35,19 @@ WorldSettings variation(std::uint64_t seed) {
     settings.other_exposure = milliseconds(3);
     settings.switched_every = 1 + seed % 40;
     return settings;
+}
+
+void answer_unevenly(WorldSettings& settings, std::mt19937_64& random) {
+    const auto chance = [&](double most) {
+        return random() % 2 == 0 ? 0 : std::uniform_real_distribution<>(0, most)(random);
+    };
+    settings.ignored = chance(0.6);
+    // Without a clock, a second frame that comes a period late is like the next trigger's.
+    if (settings.clock != CameraClock::absent) settings.doubled = chance(0.3);
+    const Duration period{std::llround(1e9 / settings.rate_hz)};
+    if (random() % 3 == 0)
+        settings.shortest_period =
+            period * static_cast<std::int64_t>(1 + random() % 4) + period / 5 - milliseconds(1);
 }
 
 std::uint64_t end_after(std::uint64_t last_fault, double rate_hz) {
@@ -95,7 +109,7 @@ std::vector<Row> run_matrix(unsigned seeds) {
 }
 
 Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
-                  const std::function<void(const Totals&)>& progress) {
+                  const std::function<void(const Totals&)>& progress, Answers answers) {
     Totals totals;
     for (; totals.faults < faults; ++seed) {
         std::mt19937_64 random(seed);
@@ -112,6 +126,7 @@ Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
                 settings.faults[pulse] = kind;
         }
         settings.pulses = end_after(pulse, settings.rate_hz);
+        if (answers == Answers::unevenly) answer_unevenly(settings, random);
         totals.add(settings, run_world(settings));
         if (progress) progress(totals);
     }

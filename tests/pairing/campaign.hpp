@@ -40,9 +40,16 @@ struct Row {
 /// Each kind of fault x width of ids x camera clock x rate, with `seeds` variations of the rest.
 std::vector<Row> run_matrix(unsigned seeds);
 
-/// Faults of all kinds at random, close together at times. `progress` is told after each world.
+/// How the cameras of random worlds answer triggers.
+enum class Answers {
+    each,     ///< one frame for each, but for faults
+    unevenly  ///< they also ignore every n-th or random ones, or send frames twice
+};
+
+/// Faults of all kinds at random, close together at times. `progress` is called after each world.
 Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
-                  const std::function<void(const Totals&)>& progress = {});
+                  const std::function<void(const Totals&)>& progress = {},
+                  Answers answers = Answers::each);
 
 /// The value that `share` of them do not exceed; zero without any.
 Duration quantile(std::vector<Duration> values, double share);

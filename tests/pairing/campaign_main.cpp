@@ -40,16 +40,18 @@ int main(int argc, char** argv) {
         fmt::print("\r{} of {} faults ", totals.faults, faults);
         std::fflush(stdout);
     };
-    for (const CameraClock clock :
-         {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
-        const Totals totals = run_random(faults, seed, clock, progress);
-        fmt::print("{}{}", terminal ? "\r" : "",
-                   to_text(fmt::format("all at random, {}", to_string(clock)), totals));
-        for (const std::uint64_t bad : totals.wrong_seeds)
-            fmt::print("  wrong with seed {}\n", bad);
-        std::fflush(stdout);
-        wrong += totals.wrong;
-    }
+    for (const Answers answers : {Answers::each, Answers::unevenly})
+        for (const CameraClock clock :
+             {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
+            const Totals totals = run_random(faults, seed, clock, progress, answers);
+            const char* all = answers == Answers::each ? "all at random" : "answered unevenly";
+            fmt::print("{}{}", terminal ? "\r" : "",
+                       to_text(fmt::format("{}, {}", all, to_string(clock)), totals));
+            for (const std::uint64_t bad : totals.wrong_seeds)
+                fmt::print("  wrong with seed {}\n", bad);
+            std::fflush(stdout);
+            wrong += totals.wrong;
+        }
     fmt::print("{} frames were published with a wrong trigger\n", wrong);
     return wrong == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }

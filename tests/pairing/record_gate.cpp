@@ -219,6 +219,27 @@ TEST_CASE("record_gate: a record that does not say when it came teaches nothing 
     CHECK_FALSE(gate.accepts(soon));
 }
 
+TEST_CASE("record_gate: a silent line is reported late, and says nothing about the link") {
+    RecordGate gate = gate_after(5);
+    Exposure silent = record(6, 6);
+    silent.exposed = false;
+    silent.recorded = silent.recorded + milliseconds(50);
+    gate.take(silent);
+    CHECK(gate.live());
+    CHECK(gate.prompt());
+    // A late record is followed by one of a silent line: the link may still hold records up.
+    Exposure late = record(7, 7);
+    late.recorded = late.recorded + milliseconds(50);
+    gate.take(late);
+    silent = record(8, 8);
+    silent.exposed = false;
+    silent.recorded = silent.recorded + milliseconds(50);
+    gate.take(silent);
+    CHECK_FALSE(gate.live());
+    gate.take(record(9, 9));
+    CHECK(gate.live());
+}
+
 TEST_CASE("record_gate: one that comes much sooner is believed when four agree with it") {
     const auto after = [](std::uint64_t quick) {
         RecordGate gate{Limits{}};

@@ -23,6 +23,8 @@ constexpr HostTime begin{1'000'000'000};
 constexpr Duration tick_of_service = milliseconds(50);
 constexpr Duration command_delay = milliseconds(2);
 constexpr Duration missing_packets_timeout = milliseconds(110);
+constexpr Duration shortest_start_patience = milliseconds(2);  // of the firmware
+constexpr Duration longest_start_patience = milliseconds(50);
 constexpr double board_drift = 20e-6;
 constexpr double camera_drift = 100e-6;
 constexpr int frames_in_camera = 3;
@@ -165,7 +167,8 @@ class World final : private pairing::Outcome {
         if (!board_alive_) return;
         const bool crowded =
             link_busy_ - now_ > frame_on_link() * (frames_in_camera - 1) && settings_.link_load > 0;
-        const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored && !crowded;
+        const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored && !crowded &&
+                           !busy() && !(settings_.ignored > 0 && chance(settings_.ignored));
         const bool lost = fault_ == FaultKind::record_lost;
         const HostTime start = now_ + microseconds(20);
         const Truth truth{life_, trigger_, pulses_, !lost,
@@ -178,7 +181,7 @@ class World final : private pairing::Outcome {
         if (!settings_.strobe) exposure.kind = StampKind::trigger_edge;
         exposure.exposed =
             takes || !settings_.strobe || swapped_ || (crowded && settings_.drops_after_exposure);
-        const HostTime sent = start + exposure_;
+        const HostTime sent = start + (exposure.exposed ? exposure_ : start_patience());
         if (fault_ == FaultKind::lying_record) lie(exposure);
         if (!lost) send_record(exposure, sent);
         if (!swapped_) expose(start, truth, takes);
@@ -189,6 +192,11 @@ class World final : private pairing::Outcome {
         if (settings_.exposure.ns != 0) return;
         exposure_ = std::clamp(exposure_ + between(-exposure_ / 10, exposure_ / 10), period_ / 50,
                                period_ / 3);
+    }
+
+    /// How long the board waits for an exposure line that stays silent.
+    Duration start_patience() const {
+        return std::clamp(period_, shortest_start_patience, longest_start_patience);
     }
 
     BoardTime to_board(HostTime host) const {
@@ -255,6 +263,13 @@ class World final : private pairing::Outcome {
     }
 
     // --- the camera
+    /// It still exposes, or reads out, for a trigger that it took.
+    bool busy() {
+        if (now_ < free_at_) return true;
+        free_at_ = now_ + settings_.shortest_period;
+        return false;
+    }
+
     /// `takes`: it exposes; when it does not, its counter may go on.
     void expose(HostTime start, const Truth& truth, bool takes) {
         if (camera_dead_) return;
@@ -286,6 +301,8 @@ class World final : private pairing::Outcome {
         else
             arrives = frames_free_ = std::max(frames_free_, arrives);
         deliver(id, start, arrives, truth);
+        if (settings_.doubled > 0 && chance(settings_.doubled))
+            deliver(next_id_++, start, frames_free_ = arrives + milliseconds(1), truth);
     }
 
     /// What the camera stamps of this exposure, in any time.
@@ -508,6 +525,7 @@ class World final : private pairing::Outcome {
     std::uint64_t camera_power_ = 0;
     std::uint64_t next_id_;
     std::int64_t camera_offset_ = 5'000'000'000'000;
+    HostTime free_at_;
     HostTime frames_free_;
     HostTime link_busy_;
 

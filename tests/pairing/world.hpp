@@ -65,7 +65,10 @@ struct WorldSettings {
     double held_records = 0;  ///< share of records that the link holds up, by two periods at most
     double link_load = 0;     ///< time that a frame takes on the link, in periods; above 1 frames
                               ///< queue in the camera, and triggers are lost when three wait
-    bool drops_after_exposure = false;          ///< ... not ignored, but exposed and then dropped
+    bool drops_after_exposure = false;  ///< ... not ignored, but exposed and then dropped
+    Duration shortest_period;  ///< triggers that come sooner after one that was taken are ignored
+    double ignored = 0;        ///< share of triggers that the camera ignores
+    double doubled = 0;        ///< share of triggers that it answers with two frames
     std::map<std::uint64_t, FaultKind> faults;  ///< by the number of the pulse at which they happen
     std::uint64_t pulses = 300;
 };

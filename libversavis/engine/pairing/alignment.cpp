@@ -43,6 +43,10 @@ constexpr double length_tolerance_share = 0.05;
 // frame is likelier.
 constexpr std::size_t frames_by_clock = 5;
 
+// The same where nobody sees which triggers the camera ignores. At half a camera that ignores one
+// trigger in five gets wrong pairs; at twice such starts take longer than the pattern.
+constexpr std::size_t unseen_frames_by_clock = 8;
+
 // Frames that a start needs by arrival, a second apart. At half (2) one stray frame imitates the
 // single gap, and pairs are wrong; at twice such a start takes six seconds.
 constexpr std::size_t frames_by_arrival = 3;
@@ -65,7 +69,12 @@ class Search {
           exposures_(exposures),
           instant_(instant),
           limits_(limits),
-          gap_ns_(exposures.smallest_gap_ns()) {}
+          gap_ns_(exposures.smallest_gap_ns()),
+          takes_seen_(exposures.takes_seen()) {}
+
+    unsigned faults_to_refute() const {
+        return takes_seen_ ? pairing::faults_to_refute : unseen_faults_to_refute;
+    }
 
     /// Differences of the clocks that bring some frame and some exposure together.
     std::vector<std::int64_t> candidates() const {
@@ -112,17 +121,23 @@ class Search {
 
     /// Regular triggers prove nothing: the true exposures may be those whose records are missing at
     /// either end. Only a gap with a frame at both ends counts: where one was lost, two gaps of the
-    /// pattern may be as long as two others.
+    /// pattern may be as long as two others. A trigger whose exposure line stayed silent has none
+    /// to lose.
     bool irregular(const std::vector<std::uint64_t>& triggers) const {
         const auto has_frame = [&](const Exposure& exposure) {
             return std::binary_search(triggers.begin(), triggers.end(), exposure.trigger);
         };
         std::vector<std::int64_t> gaps;
-        for (std::size_t i = 1; i < exposures_.size(); ++i) {
-            const Exposure& before = exposures_[i - 1].exposure;
-            const Exposure& after = exposures_[i].exposure;
-            if (after.trigger == before.trigger + 1 && has_frame(before) && has_frame(after))
-                gaps.push_back((after.start - before.start).ns);
+        const Exposure* before = nullptr;  // of the exposures, all known since then
+        std::uint64_t next = 0;
+        for (std::size_t i = 0; i < exposures_.size(); ++i) {
+            const Exposure& exposure = exposures_[i].exposure;
+            if (exposure.trigger != next) before = nullptr;
+            next = exposure.trigger + 1;
+            if (!exposure.exposed) continue;
+            if (before != nullptr && has_frame(*before) && has_frame(exposure))
+                gaps.push_back((exposure.start - before->start).ns);
+            before = &exposure;
         }
         if (gaps.empty()) return false;
         const std::int64_t usual =
@@ -167,13 +182,18 @@ class Search {
             else
                 kept.push_back(triggers[i]);
         }
-        const bool proof = kept.size() >= frames_for_proof(instant_ != Instant::arrival) &&
+        const bool proof = kept.size() >= frames_needed() &&
                            (instant_ != Instant::arrival ? irregular(kept) : separated(kept));
         return proof ? triggers : std::vector<std::uint64_t>{};
     }
 
  private:
     std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
+
+    std::size_t frames_needed() const {
+        const bool by_clock = instant_ != Instant::arrival;
+        return by_clock && !takes_seen_ ? unseen_frames_by_clock : frames_for_proof(by_clock);
+    }
 
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
@@ -186,6 +206,7 @@ class Search {
     Instant instant_;
     const Limits& limits_;
     std::int64_t gap_ns_;
+    bool takes_seen_;
 };
 
 }  // namespace
@@ -203,12 +224,12 @@ std::uint64_t perhaps_not_taken(const Record& from, const Record& to) {
 }
 
 unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to) {
-    if (to.exposure.trigger <= from.exposure.trigger) return faults_to_refute;
+    if (to.exposure.trigger <= from.exposure.trigger) return impossible_step;
     const std::uint64_t sent = to.exposure.trigger - from.exposure.trigger;
-    if (id_step == 0 || id_step > sent) return faults_to_refute;
+    if (id_step == 0 || id_step > sent) return impossible_step;
     const std::uint64_t taken = sent - perhaps_not_taken(from, to);
     return taken > id_step
-               ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, faults_to_refute))
+               ? static_cast<unsigned>(std::min<std::uint64_t>(taken - id_step, impossible_step))
                : 0;
 }
 
@@ -233,7 +254,7 @@ std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const Expos
         const Search search(frames, exposures, instant, limits);
         for (const std::int64_t difference : search.candidates()) {
             auto alignment = search.explain(difference);
-            if (!alignment || alignment->faults >= faults_to_refute) continue;
+            if (!alignment || alignment->faults >= search.faults_to_refute()) continue;
             if (alignment->faults > 0 || alignment->unknown) return {};
             // Neighbouring differences may lead to the same, and so may the instants.
             if (found && found->triggers != alignment->triggers) return {};

@@ -39,6 +39,13 @@ struct Limits {
 // leave a wrong alignment as the only one; at twice (4) more starts stay undecided.
 inline constexpr unsigned faults_to_refute = 2;
 
+// The same where no exposure line shows which triggers the camera took. At half a camera that
+// ignores one trigger in five gets wrong pairs; at twice starts amid other triggers take longer.
+inline constexpr unsigned unseen_faults_to_refute = 4;
+
+// Faults of a step of the ids that no ignored trigger explains: more than rule out any alignment.
+inline constexpr unsigned impossible_step = 100;
+
 bool arrival_possible(const Limits& limits, const Arrival& arrival, const Exposure& exposure);
 
 /// Triggers after `from`, down to `to`, that the camera may not have taken: their exposure line

@@ -35,17 +35,22 @@ void ExposureLog::add(const Exposure& exposure, bool prompt) {
         length = std::min(told, last_length_);
     records_.push_back({exposure, exposure.start + length, exposure.end_on_host - (told - length),
                         false, recorded_, silent_, prompt});
-    if (prompt) explain_late_ones();
+    if (prompt && exposure.exposed) explain_late_ones();
     measure();
 }
 
 /// Records that the link held up come together with the first that it did not. Those of a board
-/// whose time was set back, and forward again, come as far apart as their exposures.
+/// whose time was set back, and forward again, come as far apart as their exposures. Those of a
+/// silent line come when the board has waited long enough for a start.
 void ExposureLog::explain_late_ones() {
     const Duration together{part_of(period_.ns, held_up_together)};
-    for (std::size_t i = records_.size() - 1; i > 0 && !records_[i - 1].prompt; --i) {
-        if (records_[i].exposure.recorded - records_[i - 1].exposure.recorded >= together) return;
-        records_[i - 1].prompt = true;
+    HostTime after = records_.back().exposure.recorded;
+    for (std::size_t i = records_.size() - 1; i > 0; --i) {
+        Record& before = records_[i - 1];
+        if (!before.exposure.exposed) continue;
+        if (before.prompt || after - before.exposure.recorded >= together) return;
+        before.prompt = true;
+        after = before.exposure.recorded;
     }
 }
 
@@ -108,6 +113,12 @@ bool ExposureLog::lost_near(Instant instant, std::int64_t instant_ns,
         before = record.exposure.trigger;
     }
     return false;
+}
+
+bool ExposureLog::takes_seen() const {
+    return std::none_of(records_.begin(), records_.end(), [](const Record& record) {
+        return record.exposure.exposed && record.exposure.kind == StampKind::trigger_edge;
+    });
 }
 
 }  // namespace versavis::pairing

@@ -51,6 +51,9 @@ class ExposureLog {
     /// newest trigger that is known from before the log begins.
     bool lost_near(Instant instant, std::int64_t instant_ns, std::uint64_t before_first) const;
 
+    /// False: no exposure line shows which triggers the camera took.
+    bool takes_seen() const;
+
     /// Smallest distance of neighbouring exposures, at most the period. Always above zero.
     std::int64_t smallest_gap_ns() const { return smallest_gap_.ns; }
 

@@ -69,7 +69,8 @@ bool RecordGate::too_early(const Exposure& exposure) const {
 }
 
 bool RecordGate::live() const {
-    return !newest_ || apart_ns(newest_->earliest_on_host, late_until_) <= earliest_ns();
+    return !newest_exposed_ ||
+           apart_ns(newest_exposed_->earliest_on_host, late_until_) <= earliest_ns();
 }
 
 bool RecordGate::accepts(const Exposure& exposure) const {
@@ -77,20 +78,23 @@ bool RecordGate::accepts(const Exposure& exposure) const {
 }
 
 void RecordGate::take(const Exposure& exposure) {
-    if (exposure.recorded.ns != 0) {
-        const std::int64_t delay_ns = (exposure.recorded - exposure.earliest_on_host).ns;
-        const double since_ns = newest_ ? apart_ns(newest_->start, exposure.start) : 0;
-        const bool first = !least_delay_ns_;
-        const std::int64_t least_ns = least_delay_ns_.value_or(delay_ns) +
-                                      std::llround(delay_forgotten * std::max(since_ns, 0.0));
-        confirmed_ = delay_ns < least_ns - part_of(period_.ns, off_delay) ? 0 : confirmed_ + 1;
-        least_delay_ns_ = std::min(least_ns, delay_ns);
-        const std::int64_t late_ns = delay_ns - *least_delay_ns_;
-        prompt_ = delay_ns <= latest_.ns && late_ns <= part_of(period_.ns, off_delay);
-        if (first || delay_ns > latest_.ns || late_ns > tolerance_ns())
-            late_until_ = exposure.recorded;
-    }
     newest_ = exposure;
+    if (!exposure.exposed) return;
+    if (exposure.recorded.ns != 0) learn_delay(exposure);
+    newest_exposed_ = exposure;
+}
+
+void RecordGate::learn_delay(const Exposure& exposure) {
+    const std::int64_t delay_ns = (exposure.recorded - exposure.earliest_on_host).ns;
+    const double since_ns = newest_exposed_ ? apart_ns(newest_exposed_->start, exposure.start) : 0;
+    const bool first = !least_delay_ns_;
+    const std::int64_t least_ns = least_delay_ns_.value_or(delay_ns) +
+                                  std::llround(delay_forgotten * std::max(since_ns, 0.0));
+    confirmed_ = delay_ns < least_ns - part_of(period_.ns, off_delay) ? 0 : confirmed_ + 1;
+    least_delay_ns_ = std::min(least_ns, delay_ns);
+    const std::int64_t late_ns = delay_ns - *least_delay_ns_;
+    prompt_ = delay_ns <= latest_.ns && late_ns <= part_of(period_.ns, off_delay);
+    if (first || delay_ns > latest_.ns || late_ns > tolerance_ns()) late_until_ = exposure.recorded;
 }
 
 }  // namespace versavis::pairing

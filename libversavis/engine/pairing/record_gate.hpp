@@ -22,7 +22,8 @@ class RecordGate {
 
     bool accepts(const Exposure& exposure) const;
 
-    /// The newest good record from here on.
+    /// The newest good record from here on. One of a silent line says nothing about the link: the
+    /// board waits for a start before it sends one.
     void take(const Exposure& exposure);
 
     /// These are one after the other, by one clock.
@@ -47,11 +48,13 @@ class RecordGate {
     std::int64_t tolerance_ns() const;
     double earliest_ns() const;
     bool too_early(const Exposure& exposure) const;
+    void learn_delay(const Exposure& exposure);
 
     Duration period_;
     Duration earliest_;
     Duration latest_;
     std::optional<Exposure> newest_;
+    std::optional<Exposure> newest_exposed_;
     std::optional<std::int64_t> least_delay_ns_;  ///< on the way to the host
     int confirmed_ = 0;                           ///< records that took no less, in a row
     bool prompt_ = true;
