@@ -60,6 +60,19 @@ void CameraPipeline::begin_anew() {
     middles_.clear();  // of numbers that may come again
 }
 
+/// Its clock does not count nanoseconds: arrivals alone say what exposures the frames are of.
+void CameraPipeline::pair_without_clock() {
+    limits_.camera_clock = false;
+    if (!triggered()) return;
+    begin_anew();
+    pairing_.set_limits(limits_);
+    tell(limits_);
+    unsaid_.push_back({LogLevel::warning,
+                       fmt::format("its clock runs {:.4g} times as fast as it says: frames are "
+                                   "paired without it",
+                                   answers_.report().clock_rate)});
+}
+
 void CameraPipeline::count_refusal(EventReason reason) {
     const auto number = static_cast<std::size_t>(reason);
     if (number < report_.refused.size()) ++report_.refused[number];
@@ -87,6 +100,7 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     if (*ring) before = frames_.use(std::move(**ring));
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     limits_.stamped = stamp_instant;
+    answers_.begin_anew();
     pairing_.set_limits(limits_);
     tell(limits_);
     report_.last_proof = host_now();
@@ -120,6 +134,8 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     ++report_.received;
     report_.last_frame = report_.last_sign = arrival.arrived;
     triggers_.answered();
+    answers_.arrived(arrival);
+    if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
     if (triggered()) return tell(arrival);
     ++report_.published;
     frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), false);
@@ -134,6 +150,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     ++report_.triggers;
     triggers_.recorded(record.trigger, received);
     report_.measured = measured(record);
+    answers_.recorded(record);
     if (!report_.measured) ++report_.unmeasured;
     const bool started = record.start_ns != wire::no_time;
     report_.start_delay = {started ? record.start_ns - record.trigger_ns : 0};
@@ -352,6 +369,7 @@ PipelineReport CameraPipeline::report() {
     report_.exposure_contradicted = check_.contradicted();
     report_.lines = completion_.line_delays();
     report_.edges = edges_.report();
+    report_.answers = answers_.report();
     return report_;
 }
 

@@ -13,6 +13,7 @@
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
 #include "log.hpp"
+#include "stream/answer_watch.hpp"
 #include "stream/edge_difference.hpp"
 #include "stream/event_journal.hpp"
 #include "stream/evidence_recorder.hpp"
@@ -56,6 +57,7 @@ struct PipelineReport {
     bool exposure_contradicted = false;  ///< the two differ
     LineDelays lines;
     EdgeReport edges;
+    AnswerReport answers;
 };
 
 /// Thread-safe. Whoever completes a pair publishes it.
@@ -131,6 +133,7 @@ class CameraPipeline final : private pairing::Outcome {
 
     void tell(const pairing::Evidence& evidence);
     void begin_anew();
+    void pair_without_clock();
     std::optional<Doubt> doubt(const wire::Exposure& record, HostTime received);
     void note(const wire::Exposure& record, const Doubt& doubt);
     void adopt_step(const wire::Exposure& record, const Doubt& doubt);
@@ -155,6 +158,7 @@ class CameraPipeline final : private pairing::Outcome {
     ExposureCompletion completion_;
     ExposureCheck check_;
     EdgeDifference edges_;
+    AnswerWatch answers_;
     TriggerWatch triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;

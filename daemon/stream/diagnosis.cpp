@@ -50,6 +50,10 @@ constexpr std::uint32_t common_packet = 1500;
 constexpr Duration quiet_time = milliseconds(300);
 constexpr int quiet_periods = 5;
 
+/// A camera that restarts is back within so long, mostly. At half, its trigger cable is blamed
+/// meanwhile; at twice, a cable that broke is named six seconds later.
+constexpr Duration restart_time = seconds(6);
+
 bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
 
 struct CameraView {
@@ -138,6 +142,100 @@ bool exposes_not(const CameraView& camera) {
     return camera.triggered() && camera.strobe() && camera.quiet() &&
            !camera.it.pipeline.measured &&
            some(camera.it.recent.unmeasured, camera.it.recent.triggers);
+}
+
+/// One that delivered a moment ago may be restarting.
+std::string not_exposing_hint(const CameraView& camera) {
+    const Duration quiet = camera.all.now - camera.it.pipeline.last_sign;
+    if (camera.it.delivery.ever && quiet < restart_time)
+        return fmt::format(
+            "it has not answered a trigger for {:.1f} s, and may be restarting: if it does not "
+            "come "
+            "back, check its power",
+            static_cast<double>(quiet.ns) * 1e-9);
+    return fmt::format(
+        "triggers are sent but it does not expose: check that its trigger "
+        "cable is on output {}, and TriggerSource",
+        camera.it.configuration.output);
+}
+
+/// By the exposure line, and as many frames are missing.
+bool ignores_triggers(const CameraView& camera) {
+    const PipelineReport& recent = camera.it.recent;
+    return camera.triggered() && camera.strobe() && !camera.full() && camera.frames() > 0 &&
+           some(recent.answers.ignored, recent.triggers) &&
+           camera.frames() + recent.answers.ignored <= recent.triggers + 2;
+}
+
+bool takes_every_nth(const CameraView& camera) {
+    return camera.triggered() && !camera.full() && camera.frames() > 0 &&
+           camera.it.pipeline.answers.every > 1;
+}
+
+std::string ordinal(std::uint64_t number) {
+    return fmt::format("{}{}", number, number == 2 ? "nd" : number == 3 ? "rd" : "th");
+}
+
+std::string in_ms(Duration duration) {
+    return fmt::format("{:.4g} ms", static_cast<double>(duration.ns) * 1e-6);
+}
+
+/// It was ready for those that it took, and not for the one before.
+std::string every_nth_hint(const CameraView& camera) {
+    const AnswerReport& answers = camera.it.pipeline.answers;
+    const double rate_hz = camera.it.configuration.rate_hz / static_cast<double>(answers.every);
+    return fmt::format(
+        "takes every {} trigger: exposure ({}) and readout need more than {}, and at most {}: "
+        "lower "
+        "'rate_hz' to {:.4g}, shorten ExposureTime, or set TriggerOverlap to ReadOut",
+        ordinal(answers.every), in_ms(camera.exposure()),
+        in_ms(camera.period() * static_cast<std::int64_t>(answers.every - 1)),
+        in_ms(answers.shortest), rate_hz);
+}
+
+std::string ignored_hint(const CameraView& camera) {
+    const PipelineReport& recent = camera.it.recent;
+    return fmt::format(
+        "ignores {:.0f} % of triggers: {} of the last {}; it may still be exposing or reading out, "
+        "or miss the pulses: lower 'rate_hz' or ExposureTime, check the trigger cable",
+        100 * share(recent.answers.ignored, recent.triggers), recent.answers.ignored,
+        recent.triggers);
+}
+
+bool sends_too_many(const CameraView& camera) {
+    const std::uint64_t triggers = camera.it.recent.triggers;
+    return camera.triggered() && !camera.full() && triggers > 0 && camera.frames() > triggers + 1 &&
+           some(camera.frames() - triggers, triggers);
+}
+
+/// Ids that do not count prove nothing.
+bool ids_fail(const CameraView& camera) {
+    const AnswerReport& answers = camera.it.recent.answers;
+    return camera.triggered() && !camera.full() &&
+           (answers.ids_restarted > 0 || some(answers.ids_repeated, camera.frames()));
+}
+
+std::string ids_hint(const CameraView& camera) {
+    const AnswerReport& answers = camera.it.recent.answers;
+    if (all_of(answers.ids_repeated + 1, camera.frames()))
+        return fmt::format(
+            "{} frames arrived, all with block id {}: they cannot be proved; update the camera's "
+            "firmware",
+            camera.frames(), answers.block_id);
+    return fmt::format(
+        "of the last {} frames {} repeat the block id of the one before, and ids began again {} "
+        "times: these frames are withheld; update the camera's firmware",
+        camera.frames(), answers.ids_repeated, answers.ids_restarted);
+}
+
+std::string clock_hint(const CameraView& camera) {
+    const double rate = camera.it.pipeline.answers.clock_rate;
+    if (rate == 1) return "";
+    return fmt::format(
+        "its clock runs {:.4g} times as fast as it says, so frames are paired by their arrival: "
+        "set "
+        "camera_clock = false, or update its firmware",
+        rate);
 }
 
 bool frames_missing(const CameraView& camera) {
@@ -297,14 +395,12 @@ constexpr Rule camera_rules[] = {
          return fmt::format("{} frames found no free slot: raise 'slots' and 'buffers'",
                             c.it.recent.no_buffer);
      }},
-    {Fault::no_exposure, exposes_not,
-     [](const CameraView& c) {
-         return fmt::format(
-             "triggers are sent but it does not expose: check that its trigger "
-             "cable is on output {}, and TriggerSource",
-             c.it.configuration.output);
-     }},
+    {Fault::no_exposure, exposes_not, not_exposing_hint},
     {Fault::no_frames, all_frames_missing, missing_hint},
+    {Fault::camera_clock,
+     [](const CameraView& c) { return c.triggered() && !c.full() && !clock_hint(c).empty(); },
+     clock_hint},
+    {Fault::rate_too_high, takes_every_nth, every_nth_hint},
     // A start in progress looks like what follows.
     {Fault::starting, [](const CameraView& c) { return c.starting(); },
      [](const CameraView& /*c*/) {
@@ -352,6 +448,15 @@ constexpr Rule camera_rules[] = {
              "'strobe_line' and its LineSource, or set check_exposure = false",
              c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
      }},
+    {Fault::double_frames, sends_too_many,
+     [](const CameraView& c) {
+         return fmt::format(
+             "sends {} frames for {} triggers: none of the surplus is proved; set "
+             "AcquisitionFrameCount and burst count to 1, and check the trigger line for bounces",
+             c.frames(), c.it.recent.triggers);
+     }},
+    {Fault::block_ids, ids_fail, ids_hint},
+    {Fault::triggers_ignored, ignores_triggers, ignored_hint},
     {Fault::unproved, not_followed, unproved_hint},
     {Fault::rate_too_high,
      [](const CameraView& c) {
@@ -449,7 +554,11 @@ const char* to_string(Fault fault) {
         case Fault::strobe_inverted: return "strobe_inverted";
         case Fault::no_exposure: return "no_exposure";
         case Fault::no_frames: return "no_frames";
+        case Fault::camera_clock: return "camera_clock";
         case Fault::rate_too_high: return "rate_too_high";
+        case Fault::triggers_ignored: return "triggers_ignored";
+        case Fault::double_frames: return "double_frames";
+        case Fault::block_ids: return "block_ids";
         case Fault::strobe_missing: return "strobe_missing";
         case Fault::line_delays: return "line_delays";
         case Fault::wrong_exposure: return "wrong_exposure";
@@ -549,7 +658,10 @@ Diagnosis diagnose(const CameraStatus& status, const Status& all) {
     const Rule* rule =
         std::find_if(std::begin(camera_rules), std::end(camera_rules),
                      [&](const Rule& candidate) { return candidate.applies(camera); });
-    if (rule == std::end(camera_rules)) return conclude(Fault::none, status.camera.hint, true, {});
+    if (rule == std::end(camera_rules)) {
+        const std::string& own = status.camera.hint;
+        return conclude(Fault::none, own.empty() ? clock_hint(camera) : own, true, {});
+    }
     const Duration patience = start_patience + camera.period() * start_periods;
     return conclude(rule->fault, rule->hint(camera), status.delivery.ever,
                     all.now - all.started < patience);

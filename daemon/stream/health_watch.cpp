@@ -29,6 +29,9 @@ PipelineReport difference(PipelineReport now, const PipelineReport& before) {
     now.triggers -= before.triggers;
     now.unmeasured -= before.unmeasured;
     now.suspect -= before.suspect;
+    now.answers.ignored -= before.answers.ignored;
+    now.answers.ids_repeated -= before.answers.ids_repeated;
+    now.answers.ids_restarted -= before.answers.ids_restarted;
     for (std::size_t i = 0; i < now.refused.size(); ++i) now.refused[i] -= before.refused[i];
     return now;
 }

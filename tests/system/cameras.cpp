@@ -94,6 +94,27 @@ TEST_CASE(
     CHECK(reasons(stack, "cam2").count(EventReason::trigger_ignored) == 1);
 }
 
+TEST_CASE("cameras: one that takes every n-th trigger delivers each frame, and says so") {
+    StackSettings settings{"everynth", 61, 3, 20, "", "", ""};
+    settings.scenarios = {"shortest_period_us = 61000",
+                          "shortest_period_us = 111000\nids_count_ignored = true", ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const std::string found[] = {"takes every 2nd trigger", "takes every 3rd trigger", ""};
+    stack.wait_for_status([&](const auto& s) {
+        for (std::size_t i = 0; i < std::size(found); ++i)
+            if (s["cameras"][i]["hint"].template get<std::string>().find(found[i]) != 0 ||
+                s["cameras"][i]["pairing"] != "locked")
+                return false;
+        return s["cameras"][2]["health"] == "ok";
+    });
+    const auto verdict = judge(stack, 4);
+    CHECK(verdict.streams.at("cam0").rate_hz == Approx(10).margin(0.3));
+    CHECK(verdict.streams.at("cam1").rate_hz == Approx(20.0 / 3).margin(0.3));
+    CHECK(verdict.streams.at("cam2").rate_hz == Approx(20).margin(0.5));
+}
+
 TEST_CASE("cameras: swapped trigger cables are never published, and said") {
     StackSettings settings{"swapped", 51, 2, 20, "", "", ""};
     settings.swapped = true;

@@ -268,6 +268,66 @@ TEST_CASE("diagnosis: an exposure longer than the period, and a rate that the ca
     check(bench.camera(), Fault::exposure_too_long, "60000 us");
 }
 
+TEST_CASE("diagnosis: a camera that takes every n-th trigger says so from the start on") {
+    Bench bench;
+    bench.cam().delivery = {false, false, false, now - seconds(1), 10};
+    bench.cam().recent.received = bench.cam().recent.published = 10;
+    bench.cam().recent.unmeasured = bench.cam().recent.answers.ignored = 10;
+    bench.cam().pipeline.answers.every = 2;
+    bench.cam().pipeline.answers.shortest = milliseconds(100);
+    check(bench.camera(), Fault::rate_too_high,
+          "takes every 2nd trigger: exposure (3 ms) and readout need more than 50 ms, and at most "
+          "100 ms: lower 'rate_hz' to 10,");
+    bench.cam().pipeline.answers.every = 3;
+    bench.cam().pipeline.answers.shortest = milliseconds(150);
+    check(bench.camera(), Fault::rate_too_high, "every 3rd trigger");
+}
+
+TEST_CASE("diagnosis: triggers ignored at random, and frames that nobody asked for, in numbers") {
+    Bench bench;
+    bench.cam().delivery = {false, true, false, now - seconds(50), 16};
+    bench.cam().recent.received = bench.cam().recent.published = 16;
+    bench.cam().recent.unmeasured = bench.cam().recent.answers.ignored = 4;
+    check(bench.camera(), Fault::triggers_ignored, "ignores 20 % of triggers: 4 of the last 20;");
+    bench.cam().recent.received = 20;  // its line is what is silent
+    check(bench.camera(), Fault::strobe_missing, "exposure line");
+    bench.cam().recent.received = 40;
+    check(bench.camera(), Fault::double_frames, "sends 40 frames for 20 triggers");
+}
+
+TEST_CASE("diagnosis: block ids that do not count") {
+    Bench bench;
+    bench.refuse(EventReason::unproved, 20);
+    AnswerReport& answers = bench.cam().recent.answers;
+    answers.ids_repeated = 20;
+    answers.block_id = 1;
+    check(bench.camera(), Fault::block_ids, "20 frames arrived, all with block id 1");
+    answers.ids_repeated = 0;
+    answers.ids_restarted = 2;
+    check(bench.camera(), Fault::block_ids, "ids began again 2 times");
+}
+
+TEST_CASE("diagnosis: a clock in another unit is a remark when frames are paired without it") {
+    Bench bench;
+    bench.cam().pipeline.answers.clock_rate = 8;
+    CHECK(bench.camera().health == Health::ok);
+    CHECK_THAT(bench.camera().hint, Contains("its clock runs 8 times as fast as it says"));
+    bench.refuse(EventReason::unproved, 20);
+    check(bench.camera(), Fault::camera_clock, "camera_clock = false");
+}
+
+TEST_CASE("diagnosis: one that may be restarting is not blamed on its trigger cable") {
+    Bench bench;
+    bench.cam().delivery = {false, true, true, now - seconds(50), 0};
+    bench.cam().recent = {};
+    bench.cam().recent.triggers = bench.cam().recent.unmeasured = 20;
+    bench.cam().pipeline.measured = false;
+    bench.cam().pipeline.last_sign = now - milliseconds(5900);
+    check(bench.camera(), Fault::no_exposure, "for 5.9 s, and may be restarting");
+    bench.cam().pipeline.last_sign = now - milliseconds(6100);
+    check(bench.camera(), Fault::no_exposure, "trigger cable is on output 0");
+}
+
 TEST_CASE("diagnosis: an inverted exposure line rises where the exposure ends") {
     Bench bench;
     bench.cam().recent.unmeasured = 20;
@@ -281,7 +341,7 @@ TEST_CASE("diagnosis: an inverted exposure line rises where the exposure ends") 
 
 TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which one is it?") {
     Bench trigger;
-    trigger.cam().delivery.full = false;
+    trigger.cam().delivery = {false, false, false, now - seconds(59), 0};
     trigger.cam().recent.received = trigger.cam().recent.published = 0;
     trigger.cam().recent.unmeasured = 20;
     trigger.cam().pipeline.measured = false;
