@@ -2,12 +2,16 @@
 #include "camera/aravis_stream.hpp"
 
 #include <fmt/format.h>
+#include <linux/filter.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
+
+#include "camera/receive_mode.hpp"
 
 namespace versavis::daemon {
 
@@ -32,14 +36,49 @@ unsigned frame_retention_us(const CameraConfiguration& configuration) {
     return std::max(shortest_retention_us, static_cast<unsigned>(std::lround(longest)));
 }
 
+/// Silence within a frame after which its last packets are asked for, and asked for again. At half,
+/// moments when the sender or the host is busy look like the loss of all that follows, for which
+/// Aravis gives up asking; at twice, frames that lost their last packets are 2 ms later.
+constexpr Duration packet_timeout = milliseconds(2);
+
+/// The same by a packet socket, whose blocks are silent until they are handed over. At half, each
+/// block would seem to miss the rest of its frame; at twice, such frames are 10 ms later.
+constexpr Duration packet_timeout_by_blocks = packet_socket_lateness + milliseconds(2);
+
+/// Complete frames in a row that paused for longer than that. At half, a busy host or switch looks
+/// like a camera that pauses; at twice, it is found out after twice as many frames.
+constexpr unsigned frames_with_pauses = 3;
+
 /// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
 /// longer for one that is mute.
 constexpr Duration goodbye = milliseconds(250);
 
-Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configuration) {
+/// The socket of the stream with this port, which Aravis does not hand out.
+std::optional<int> find_socket(std::uint16_t port) {
+    std::error_code ignored;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
+        const int descriptor =
+            static_cast<int>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
+        sockaddr_in self{};
+        socklen_t size = sizeof self;
+        if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&self), &size) != 0) continue;
+        if (self.sin_family == AF_INET && ntohs(self.sin_port) == port) return descriptor;
+    }
+    return std::nullopt;
+}
+
+/// Nothing arrives any more; requests for packets still leave.
+void receive_nothing(int socket) {
+    sock_filter drop_all[] = {BPF_STMT(BPF_RET | BPF_K, 0)};
+    const sock_fprog program{1, drop_all};
+    ::setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program);
+}
+
+Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configuration,
+                           ReceiveMode receive) {
     GlibError error;
     arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-    arv_camera_gv_set_stream_options(camera, configuration.receive == ReceiveMode::socket
+    arv_camera_gv_set_stream_options(camera, receive == ReceiveMode::socket
                                                  ? ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED
                                                  : ARV_GV_STREAM_OPTION_NONE);
     if (configuration.packet_size != 0)
@@ -60,18 +99,27 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(
     std::unique_ptr<AravisStream> self(
         new AravisStream(configuration, setup, pipeline, meter, patient));
     self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
-    if (self->calls_back_)
-        if (auto done = set_packet_size(camera, configuration); !done)
+    if (self->calls_back_) {
+        const auto mode = choose_receive_mode(configuration, packet_socket_allowed());
+        if (!mode) return Unexpected(mode.error());
+        self->receive_ = *mode;
+        if (auto done = set_packet_size(camera, configuration, *mode); !done)
             return Unexpected(done.error());
+    }
     self->chunk_parser_ = std::move(chunks);
     GlibError error;
     self->stream_.reset(arv_camera_create_stream(
         camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
     if (!self->stream_) return failure("stream", error.text());
     if (ARV_IS_GV_STREAM(self->stream_.get())) {
+        const Duration timeout =
+            self->receive_ == ReceiveMode::packet ? packet_timeout_by_blocks : packet_timeout;
+        self->packet_timeout_us_ = static_cast<unsigned>(timeout.ns / 1000);
+        // No wait before a gap is asked for: a link keeps its packets in order.
         g_object_set(self->stream_.get(), "frame-retention", frame_retention_us(configuration),
+                     "initial-packet-timeout", 0U, "packet-timeout", self->packet_timeout_us_,
                      nullptr);
-        self->enlarge_receive_buffer();
+        self->prepare_socket();
     }
     self->refill();
     return self;
@@ -92,33 +140,31 @@ AravisStream::~AravisStream() {
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }
 
+/// By a packet socket nobody reads the UDP socket: it would fill and stay full.
+void AravisStream::prepare_socket() const {
+    const auto socket = find_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
+    if (!socket) return;
+    if (receive_ == ReceiveMode::packet)
+        receive_nothing(*socket);
+    else
+        enlarge_receive_buffer(*socket);
+}
+
 /// The default of 208 KiB does not hold one frame. Aravis sets its own property only when the first
-/// frame opens, and loses that frame: so the socket is found by its port and enlarged here.
-void AravisStream::enlarge_receive_buffer() const {
-    const std::uint16_t port = arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get()));
-    std::error_code ignored;
-    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
-        const int descriptor =
-            static_cast<int>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
-        sockaddr_in self{};
-        socklen_t size = sizeof self;
-        if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&self), &size) != 0) continue;
-        if (self.sin_family != AF_INET || ntohs(self.sin_port) != port) continue;
-        if (::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer,
-                         sizeof receive_buffer) == 0)
-            continue;
-        ::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
-        int got = 0;
-        size = sizeof got;
-        ::getsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &got, &size);
-        if (static_cast<std::uint64_t>(got) < setup_.payload)
-            log(LogLevel::warning, configuration_.name,
-                "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max "
-                "or give the "
-                "service "
-                "CAP_NET_ADMIN",
-                got >> 10);
-    }
+/// frame opens, and loses that frame: so it is enlarged here.
+void AravisStream::enlarge_receive_buffer(int socket) const {
+    if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) ==
+        0)
+        return;
+    ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+    int got = 0;
+    socklen_t size = sizeof got;
+    ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &size);
+    if (static_cast<std::uint64_t>(got) < setup_.payload)
+        log(LogLevel::warning, configuration_.name,
+            "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max or "
+            "give the service CAP_NET_ADMIN",
+            got >> 10);
 }
 
 void AravisStream::on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* /*buffer*/) {
@@ -235,6 +281,23 @@ void AravisStream::note_starvation() {
     underruns_ = underruns;
 }
 
+/// Some cameras pause within a frame, as after a leader that is sent when the exposure begins:
+/// Aravis then misses all packets that follow, and asks for none of this frame any more. Complete
+/// frames show that nothing was lost, and that the pause must be waited for.
+void AravisStream::note_pauses(EventReason refused) {
+    if (receive_ == ReceiveMode::automatic) return;
+    const std::uint64_t given_up =
+        arv_stream_get_info_uint64_by_name(stream_.get(), "n_resend_ratio_reached");
+    const bool paused = given_up != given_up_ && refused == EventReason::none;
+    given_up_ = given_up;
+    pauses_ = paused ? pauses_ + 1 : 0;
+    if (pauses_ < frames_with_pauses || packet_timeout_us_ >= frame_retention_us(configuration_))
+        return;
+    pauses_ = 0;
+    packet_timeout_us_ *= 2;
+    g_object_set(stream_.get(), "packet-timeout", packet_timeout_us_, nullptr);
+}
+
 void AravisStream::take(ArvBuffer* buffer) {
     pairing::Arrival arrival;
     arrival.arrived = host_now();
@@ -243,6 +306,7 @@ void AravisStream::take(ArvBuffer* buffer) {
     arrival.block_id = block_id(buffer);
     const EventReason refused = refusal(buffer);
     note_size(buffer, refused);
+    note_pauses(refused);
     ++taken_;
     if (refused == EventReason::none) {
         if (setup_.has_clock)

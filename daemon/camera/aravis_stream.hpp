@@ -39,6 +39,9 @@ class AravisStream {
     /// Its stamps are the same for frame after frame.
     bool clock_stands() const { return equal_stamps_ >= stamps_of_a_standing_clock; }
 
+    /// `socket` or `packet`; `automatic` where the transport is not GigE Vision.
+    ReceiveMode receive_mode() const { return receive_; }
+
     /// Frames of any kind that were taken, and packets that arrived, so far.
     std::uint64_t taken() const { return taken_; }
     std::uint64_t packets() const;
@@ -66,7 +69,9 @@ class AravisStream {
     void note_starvation();
     void note_size(ArvBuffer* buffer, EventReason refused);
     void note_clock(const pairing::Arrival& arrival);
-    void enlarge_receive_buffer() const;
+    void note_pauses(EventReason refused);
+    void prepare_socket() const;
+    void enlarge_receive_buffer(int socket) const;
 
     const CameraConfiguration& configuration_;
     CameraSetup setup_;
@@ -74,6 +79,7 @@ class AravisStream {
     FrameMeter* meter_;
     PatientWork& patient_;
     bool calls_back_ = true;
+    ReceiveMode receive_ = ReceiveMode::automatic;
     std::shared_ptr<std::promise<void>> ended_ = std::make_shared<std::promise<void>>();
     std::atomic<std::uint64_t> changed_{0};  ///< width, height and the bytes that do not fit
     std::atomic<unsigned> equal_stamps_{0};
@@ -85,6 +91,9 @@ class AravisStream {
     Object<ArvChunkParser> chunk_parser_;
     std::vector<std::uint32_t> queued_;  ///< slots that Aravis holds
     std::uint64_t underruns_ = 0;        ///< packets, as Aravis counts them
+    std::uint64_t given_up_ = 0;         ///< frames of which Aravis missed too many packets to ask
+    unsigned pauses_ = 0;                ///< complete ones among them, in a row
+    unsigned packet_timeout_us_ = 0;     ///< silence within a frame after which packets are missed
     pairing::BlockIdUnwrapper block_ids_;
     std::uint32_t width_ = 0;  ///< of the first frame: the others must be of the same size
     std::uint32_t height_ = 0;

@@ -289,6 +289,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     {
         const std::lock_guard lock(mutex_);
         ++report_.connections;
+        report_.receive = (*stream)->receive_mode();
     }
     set_state(CameraState::streaming, "");
     streaming_ = true;

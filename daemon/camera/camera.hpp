@@ -46,6 +46,7 @@ struct CameraReport {
     std::vector<StepResult> steps;  ///< of the preset
     std::uint64_t connections = 0;
     std::uint32_t packet_size = 0;
+    ReceiveMode receive = ReceiveMode::automatic;  ///< in use; automatic: not GigE Vision
     BandwidthShare bandwidth;
     double temperature_c = 0;  ///< 0: unknown
 };

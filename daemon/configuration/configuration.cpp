@@ -187,7 +187,9 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
     reader.read("history_s", camera.history_s, 0, longest_history_s);
     reader.read("packet_size", camera.packet_size, 576, 16000);
     reader.choose<ReceiveMode>("receive", camera.receive,
-                               {{"socket", ReceiveMode::socket}, {"packet", ReceiveMode::packet}});
+                               {{"auto", ReceiveMode::automatic},
+                                {"socket", ReceiveMode::socket},
+                                {"packet", ReceiveMode::packet}});
     reader.read("latest_arrival_ms", camera.latest_arrival_ms, 1, 60000);
     reader.choose<OnUnproved>("on_unproved", camera.on_unproved,
                               {{"withhold", OnUnproved::withhold}, {"flag", OnUnproved::flag}});

@@ -49,7 +49,7 @@ struct ClockConfiguration {
 
 enum class TriggerSource { board, free_run };
 enum class Strobe { active_high, active_low, none };
-enum class ReceiveMode { socket, packet };
+enum class ReceiveMode { automatic, socket, packet };
 enum class OnUnproved { withhold, flag };
 
 struct AutoExposureConfiguration {
@@ -101,7 +101,7 @@ struct CameraConfiguration {
     double history_s = 0;  ///< frames so old can still be read: part of `slots`
     unsigned buffers = 6;
     unsigned packet_size = 0;  ///< 0: the largest that passes
-    ReceiveMode receive = ReceiveMode::socket;
+    ReceiveMode receive = ReceiveMode::automatic;
     double latest_arrival_ms = 500;
     OnUnproved on_unproved = OnUnproved::withhold;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by preset, or found out

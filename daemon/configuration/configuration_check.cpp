@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "camera/camera_preset.hpp"
+#include "camera/receive_mode.hpp"
 #include "engine/pairing/pairing.hpp"
 
 namespace versavis::daemon {
@@ -192,6 +193,18 @@ void check_devices(const Configuration& configuration, Findings& findings) {
                                      at_line(first.entry)),
                          "one camera has one table: give another device, or remove the table");
         });
+}
+
+/// The lateness of a packet socket varies.
+void check_receive(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.receive == ReceiveMode::packet && !packet_socket_suits(camera))
+            findings.add(camera.entry, "receive",
+                         fmt::format("\"packet\" delivers frames up to {} ms late, too much for a "
+                                     "period of {:g} ms",
+                                     packet_socket_lateness.ns / 1'000'000,
+                                     static_cast<double>(period_of(camera).ns) * 1e-6),
+                         "use \"auto\" or \"socket\"");
 }
 
 void check_outputs(const Configuration& configuration, Findings& findings) {
@@ -532,7 +545,7 @@ constexpr void (*rules[])(const Configuration&, Findings&){
     check_names,          check_devices,       check_outputs,       check_masters,
     check_camera_times,   check_glitch,        check_auto_exposure, check_presets,
     check_imus,           check_illumination,  check_inputs,        check_uart_and_imu_output,
-    check_test_rate,      check_pulse_outputs, check_history};
+    check_test_rate,      check_pulse_outputs, check_history,       check_receive};
 
 }  // namespace
 

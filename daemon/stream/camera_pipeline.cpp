@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "camera/receive_mode.hpp"
 #include "stream/arrival_check.hpp"
 
 namespace versavis::daemon {
@@ -24,7 +25,8 @@ constexpr int records_to_confirm = 3;
 
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
-    limits.latest_arrival = from_us(configuration.latest_arrival_ms * 1e3);
+    limits.latest_arrival =
+        from_us(configuration.latest_arrival_ms * 1e3) + receive_lateness(configuration);
     limits.period = period_of(configuration);
     limits.pattern_duration = limits.period * (wire::start_pattern_length + pattern_margin);
     limits.frames_held = configuration.slots - configuration.buffers - slots_for_readers;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "camera/receive_mode.hpp"
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_version.hpp"
 
@@ -157,6 +158,7 @@ json camera_json(const CameraStatus& status) {
             {"model", camera.model},
             {"serial", camera.serial},
             {"packet_size", camera.packet_size},
+            {"receive", to_string(camera.receive)},
             {"connections", camera.connections},
             {"frames_received", pipeline.received},
             {"frames_incomplete", pipeline.incomplete},

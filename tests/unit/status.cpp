@@ -73,6 +73,18 @@ TEST_CASE("status: each device has health, state, fault, since when, and what to
     CHECK(document["cameras"][0]["fault"] == "");
 }
 
+TEST_CASE("status: how packets are received, once that is decided") {
+    Status status = healthy();
+    const auto receive = [&] {
+        return nlohmann::json::parse(to_json(status))["cameras"][0]["receive"];
+    };
+    CHECK(receive() == "");
+    status.cameras[0].camera.receive = ReceiveMode::packet;
+    CHECK(receive() == "packet");
+    status.cameras[0].camera.receive = ReceiveMode::socket;
+    CHECK(receive() == "socket");
+}
+
 TEST_CASE("status: what the kernel says of its clock, and whether its TAI is worth the name") {
     Status status = healthy();
     auto clock = nlohmann::json::parse(to_json(status))["clock"];

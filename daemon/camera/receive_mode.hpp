@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a GigE Vision camera's packets are received: by a packet socket or by a UDP socket.
+#pragma once
+
+#include "configuration/configuration.hpp"
+#include "versavis/error.hpp"
+
+namespace versavis::daemon {
+
+/// A packet socket hands packets over in blocks: a frame is complete at most this much later.
+/// Aravis' block time-out, 5 ms, which kernels with a tick of 4 ms round up.
+constexpr Duration packet_socket_lateness = milliseconds(8);
+
+/// Lateness that varies may be this part of a period at most, the pairing's `close_by_arrival`, or
+/// an arrival does not show which exposure its frame is of.
+constexpr int latenesses_in_period = 3;
+
+/// Arrivals by a packet socket still show which exposure a frame of this camera is of.
+bool packet_socket_suits(const CameraConfiguration& camera);
+
+/// What frames may be late by, beside what the network takes, in the modes that `receive` allows.
+Duration receive_lateness(const CameraConfiguration& camera);
+
+/// This process may open a packet socket (CAP_NET_RAW).
+bool packet_socket_allowed();
+
+/// `socket` or `packet`. Error: `packet` is configured and not allowed.
+Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed);
+
+/// Empty for `automatic`: no mode was chosen.
+const char* to_string(ReceiveMode mode);
+
+}  // namespace versavis::daemon
