@@ -273,6 +273,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
     }
+    exposure_feature_ = setup.exposure_feature;
     Object<ArvChunkParser> chunks;
     if (setup.chunks) {
         const auto turn = lock(environment_.aravis, [this] { return !pause({}); });
@@ -354,6 +355,8 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStre
                            {configuration_.name, "the camera is gone", "check cable and power"});
         if (auto good = examine(stream, health); !good) return good;
         if (exposure_) control_exposure(nodes);
+        if (host_now() >= next_reading_ && pipeline_.wants_exposure_readings())
+            read_exposure(nodes);
         if (host_now() < housekeeping) continue;
         housekeeping = host_now() + housekeeping_interval;
         do_housekeeping(camera, nodes);
@@ -477,11 +480,23 @@ void Camera::control_exposure(AravisNodeMap& nodes) {
         log(LogLevel::warning, configuration_.name, "exposure cannot be set: {}",
             done.error().message());
         pipeline_.set_camera_exposure({}, host_now());
+    } else {
+        read_exposure(nodes);  // it may take another one than it was told
     }
     const double period_ns = 1e9 / configuration_.rate_hz;
     exposure_holds_ =
         host_now() +
         Duration{std::llround(period_ns * (configuration_.auto_exposure.delay_frames + 2.0))};
+}
+
+/// A camera that is mute would hold this thread for seconds: it is asked only while frames come.
+void Camera::read_exposure(const AravisNodeMap& nodes) {
+    const HostTime now = host_now();
+    next_reading_ = now + exposure_reading_interval;
+    const bool mute = now - pipeline_.report().last_frame > period_of(configuration_) * 2;
+    if (exposure_feature_.empty() || mute) return;
+    const double us = nodes.read_number(exposure_feature_).value_or(0);
+    pipeline_.read_exposure({std::llround(us * 1e3)}, host_now());
 }
 
 }  // namespace versavis::daemon

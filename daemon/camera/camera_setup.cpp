@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "log.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -69,7 +71,7 @@ std::vector<std::string> wanted_groups(const CameraConfiguration& configuration)
     std::vector<std::string> groups;
     if (!configuration.keep_settings) groups.emplace_back("default_settings");
     groups.emplace_back("known_state");
-    if (configuration.chunks) groups.emplace_back("chunks");
+    if (configuration.chunks.value_or(false)) groups.emplace_back("chunks");
     if (configuration.ptp) groups.emplace_back("ptp");
     if (configuration.auto_exposure.enabled) groups.emplace_back("fixed_exposure");
     if (configuration.trigger == TriggerSource::free_run) {
@@ -145,6 +147,31 @@ bool has_clock(ArvDevice* device) {
            arv_gv_device_get_timestamp_tick_frequency(ARV_GV_DEVICE(device), error.out()) != 0;
 }
 
+/// By itself, or because the service sets it while the camera streams.
+bool exposure_changes(const AravisNodeMap& nodes, const CameraSetup& setup,
+                      const CameraConfiguration& configuration) {
+    return configuration.trigger == TriggerSource::board &&
+           (configuration.auto_exposure.enabled ||
+            fixed_exposure(nodes, setup.exposure_feature).ns == 0);
+}
+
+/// Nobody asked for them: a camera without them is witnessed by its register instead.
+bool enable_chunks(AravisNodeMap& nodes, const CameraPreset& preset,
+                   const CameraConfiguration& configuration, CameraSetup& setup) {
+    PresetRun run(preset, nodes, variables_of(preset, configuration));
+    run.carry_out("chunks");
+    run.read_back();
+    const auto done = run.verdict();
+    if (done && !run.results().empty()) {
+        setup.steps.insert(setup.steps.end(), run.results().begin(), run.results().end());
+        return true;
+    }
+    log(LogLevel::info, configuration.name, "its frames do not carry their exposure time{}{}",
+        done ? "" : ": ", done ? "" : done.error().message());
+    static_cast<void>(nodes.set("ChunkModeActive", "false"));
+    return false;
+}
+
 }  // namespace
 
 Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
@@ -188,7 +215,11 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
     setup.watched = watched(nodes, setup.steps, setup.exposure_feature);
     if (auto good = run.verdict(); !good) return good;
 
-    setup.chunks = configuration.chunks;
+    const std::string mode = nodes.read("ExposureMode");
+    if (!mode.empty() && mode != "Timed") setup.exposure_feature.clear();  // pulses are as long
+    setup.chunks = configuration.chunks ? *configuration.chunks
+                                        : exposure_changes(nodes, setup, configuration) &&
+                                              enable_chunks(nodes, *preset, configuration, setup);
     const auto payload = payload_of(camera, configuration);
     if (!payload) return Unexpected(payload.error());
     setup.payload = *payload;
@@ -198,9 +229,7 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
 
 Duration fixed_exposure(const AravisNodeMap& nodes, const std::string& feature) {
     const std::string automatic = nodes.read("ExposureAuto");
-    const std::string mode = nodes.read("ExposureMode");
-    const bool fixed =
-        (automatic.empty() || automatic == "Off") && (mode.empty() || mode == "Timed");
+    const bool fixed = automatic.empty() || automatic == "Off";
     if (!fixed || feature.empty()) return {};
     return {std::llround(nodes.read_number(feature).value_or(0) * 1e3)};
 }

@@ -21,7 +21,7 @@ struct CameraSetup {
     std::vector<StepResult> steps;  ///< of the preset
     std::vector<std::pair<std::string, std::string>>
         watched;                   ///< features with the values that must stay as they are
-    std::string exposure_feature;  ///< in microseconds; empty: it has none
+    std::string exposure_feature;  ///< in microseconds; empty: it has none that counts
     std::string chunk_exposure;    ///< the same of each frame, in units of ...
     double chunk_exposure_unit_us = 1;
     bool chunk_is_integer = false;

@@ -199,7 +199,7 @@ CameraConfiguration read_camera(TomlFile& file, TableReader& reader) {
                                      {"middle", pairing::Instant::middle},
                                      {"end", pairing::Instant::end}});
     reader.read("camera_clock", camera.camera_clock);
-    reader.read("chunks", camera.chunks);
+    if (reader.has("chunks")) reader.read("chunks", camera.chunks.emplace());
     reader.read("keep_settings", camera.keep_settings);
     reader.read("ptp", camera.ptp);
     reader.read("max_temperature_c", camera.max_temperature_c, 0, 200);

@@ -91,7 +91,7 @@ struct CameraConfiguration {
     double grid_slew_ppm = 0;  ///< at most; 0: the grid runs freely
     bool exposure_by_pulse =
         false;  ///< the trigger's length is the exposure's: slaves with their master's exposure
-    bool chunks = false;
+    std::optional<bool> chunks;  ///< none: where the camera changes its exposure by itself
     bool keep_settings = false;  ///< the camera's own, rather than its defaults
     bool ptp = false;
     AutoExposureConfiguration auto_exposure;

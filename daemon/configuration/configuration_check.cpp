@@ -355,7 +355,7 @@ void check_preset(const CameraConfiguration& camera, const std::vector<CameraPre
                             fmt::format("there is no preset '{}'", clipped(camera.preset)),
                             fmt::format("use one of: {}", fmt::join(names, ", ")));
     const std::tuple<const char*, const char*, bool> asked[]{
-        {"chunks", "chunks", camera.chunks},
+        {"chunks", "chunks", camera.chunks.value_or(false)},
         {"ptp", "ptp", camera.ptp},
         {"exposure", "pulse_width", camera.exposure_by_pulse}};
     for (const auto& [key, group, wanted] : asked)

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/camera_pipeline.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "camera/receive_mode.hpp"
+#include "engine/rounding.hpp"
 #include "stream/arrival_check.hpp"
 
 namespace versavis::daemon {
@@ -34,6 +36,21 @@ pairing::Limits limits_of(const CameraConfiguration& configuration) {
     return limits;
 }
 
+/// What the line's own difference of edges adds is taken off.
+pairing::Exposure corrected(pairing::Exposure exposure, const EdgeCorrection& correction) {
+    exposure.start = exposure.start - correction.start;
+    exposure.end = exposure.end - correction.end;
+    exposure.delay = exposure.delay + correction.middle();
+    exposure.delay_sigma = rounded(std::hypot(exposure.delay_sigma.ns, correction.sigma.ns));
+    return exposure;
+}
+
+clock::Stamp corrected(clock::Stamp stamp, const EdgeCorrection& correction) {
+    stamp.host = stamp.host - correction.middle();
+    stamp.output = stamp.output - correction.middle();
+    return stamp;
+}
+
 }  // namespace
 
 CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
@@ -47,6 +64,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       witness_(ExposureHistory(configuration), records_to_confirm),
       completion_(configuration),
       check_(configuration),
+      chunk_exposures_(configuration.slots),
       triggers_(configuration),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
@@ -138,7 +156,12 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     triggers_.answered();
     answers_.arrived(arrival);
     if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
-    if (triggered()) return tell(arrival);
+    if (triggered()) {
+        pairing::Arrival told = arrival;
+        chunk_exposures_[arrival.slot] = arrival.exposure;
+        told.exposure = check_.for_pairing(arrival.exposure);
+        return tell(told);
+    }
     ++report_.published;
     frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), false);
 }
@@ -220,15 +243,17 @@ void CameraPipeline::triggers_skipped(std::uint64_t count) {
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
     const auto middle = middles_.find(exposure.trigger);
-    const bool contradicted = check_.contradicts(arrival, exposure);
-    edges_.paired(exposure, check_.told());
+    const ExposureVerdict verdict =
+        check_.judge(arrival, chunk_exposures_[arrival.slot], exposure, report_.start_delay);
+    note_chunk_lag();
     if (middle == middles_.end()) {
         frame_unpaired(arrival, EventReason::mismatch, nullptr);
         announce_unpaired(exposure, EventReason::mismatch);
-    } else if (contradicted) {
+    } else if (verdict.contradicted) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
         announce_unpaired(exposure, EventReason::wrong_exposure);
-    } else if (!frames_.publish_proved(arrival, exposure, middle->second)) {
+    } else if (!frames_.publish_proved(arrival, corrected(exposure, verdict.correction),
+                                       corrected(middle->second, verdict.correction))) {
         if (frames_.stuck()) translator_.begin_epoch();
         frame_unpaired(arrival, EventReason::went_back, nullptr);
         announce_unpaired(exposure, EventReason::went_back);
@@ -238,6 +263,14 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
     }
     // The newest used record may still be the guess for a suspect frame.
     middles_.erase(std::exchange(last_used_, exposure.trigger));
+}
+
+void CameraPipeline::note_chunk_lag() {
+    const ExposureSource before = std::exchange(report_.exposure_source, check_.source());
+    if (before != ExposureSource::chunk || check_.source() != ExposureSource::chunk_before) return;
+    unsaid_.push_back({LogLevel::warning,
+                       "the exposure time in a frame's data is that of the frame before: it is "
+                       "used as such, and sigma is larger while the exposure changes"});
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -346,10 +379,20 @@ void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     report_.told_exposure = exposure;
 }
 
+void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
+    const std::lock_guard lock(mutex_);
+    check_.read_exposure(exposure, at, report_.start_delay);
+}
+
+bool CameraPipeline::wants_exposure_readings() {
+    const std::lock_guard lock(mutex_);
+    return triggered() && check_.wants_readings();
+}
+
 void CameraPipeline::set_line_delays(const LineDelays& lines) {
     const std::lock_guard lock(mutex_);
     completion_.set_line_delays(lines);
-    edges_.set_line_delays(lines);
+    check_.set_line_delays(lines);
 }
 
 std::uint64_t CameraPipeline::newest_trigger() {
@@ -370,7 +413,7 @@ PipelineReport CameraPipeline::report() {
     report_.camera_exposure = check_.told();
     report_.exposure_contradicted = check_.contradicted();
     report_.lines = completion_.line_delays();
-    report_.edges = edges_.report();
+    report_.edges = check_.edges();
     report_.answers = answers_.report();
     return report_;
 }

@@ -14,7 +14,6 @@
 #include "engine/pairing/recording.hpp"
 #include "log.hpp"
 #include "stream/answer_watch.hpp"
-#include "stream/edge_difference.hpp"
 #include "stream/event_journal.hpp"
 #include "stream/evidence_recorder.hpp"
 #include "stream/exposure_check.hpp"
@@ -51,10 +50,11 @@ struct PipelineReport {
     Duration told_exposure;  ///< as the camera was told, or tells; 0: it varies
     HostTime last_sign;      ///< a frame arrived, whole or not
     HostTime last_frame;
-    HostTime last_proof;                 ///< a frame was proved, or the camera was begun anew
-    Duration exposure;                   ///< measured, of the newest frame; 0: unknown
-    Duration camera_exposure;            ///< by the camera's account; 0: unknown
-    bool exposure_contradicted = false;  ///< the two differ
+    HostTime last_proof;       ///< a frame was proved, or the camera was begun anew
+    Duration exposure;         ///< measured, of the newest frame; 0: unknown
+    Duration camera_exposure;  ///< by the camera's account; 0: unknown
+    ExposureSource exposure_source = ExposureSource::none;  ///< of that account
+    bool exposure_contradicted = false;                     ///< the two differ
     LineDelays lines;
     EdgeReport edges;
     AnswerReport answers;
@@ -81,6 +81,10 @@ class CameraPipeline final : private pairing::Outcome {
 
     /// What the camera says that it exposes from now on, about; 0: it changes by itself.
     void set_camera_exposure(Duration exposure, HostTime since);
+
+    /// What the camera's register says that it exposes; to be read while wanted.
+    void read_exposure(Duration exposure, HostTime at);
+    bool wants_exposure_readings();
 
     /// Before frames of these lines come.
     void set_line_delays(const LineDelays& lines);
@@ -139,6 +143,7 @@ class CameraPipeline final : private pairing::Outcome {
     void adopt_step(const wire::Exposure& record, const Doubt& doubt);
     void follow_clock(std::uint32_t life);
     std::optional<pairing::Start> advance_locked(HostTime now);
+    void note_chunk_lag();
     void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
@@ -157,8 +162,8 @@ class CameraPipeline final : private pairing::Outcome {
     std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
     ExposureCompletion completion_;
     ExposureCheck check_;
-    EdgeDifference edges_;
     AnswerWatch answers_;
+    std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
     TriggerWatch triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;

@@ -23,6 +23,10 @@ constexpr unsigned frames_to_tell = 8;
 /// a cause; at twice, slow pull-ups are found only when they take a millisecond.
 constexpr double significant_sigmas = 3;
 
+/// Slowest edge of a line: makers and pull-ups stay below. At half, the slowest lines are refused;
+/// at twice, signals other than the exposure pass for slow lines.
+constexpr Duration slowest_edge = milliseconds(1);
+
 /// Standard deviation of normal noise by the median of its absolute deviations, and that of the
 /// median of n samples by theirs: factors of statistics, not of taste.
 constexpr double sigma_per_deviation = 1.4826;
@@ -39,17 +43,58 @@ double us(Duration duration) { return static_cast<double>(duration.ns) * 1e-3; }
 }  // namespace
 
 void EdgeDifference::set_line_delays(const LineDelays& lines) {
+    report_ = {};
     report_.line = lines.line;
-    report_.frames = 0;
     report_.expected = lines.end.delay - lines.start.delay;
     report_.expected_sigma = {std::llround(std::hypot(lines.start.sigma.ns, lines.end.sigma.ns))};
     next_ = 0;
+    agreed_ = rivals_ = 0;
+    corrected_ = false;
+    surplus_ = SteadyValue({}, insignificant());
 }
 
-void EdgeDifference::paired(const pairing::Exposure& exposure, Duration told) {
-    if (told.ns == 0 || exposure.kind != StampKind::measured_middle) return;
-    surplus_ns_[next_++ % surplus_ns_.size()] = (exposure.end - exposure.start - told).ns;
+/// What may as well be the sigma of the delays, and the rounding of the camera's account. No honest
+/// frame is further off than that, for else each that is believed would make room for a worse one.
+Duration EdgeDifference::insignificant() const {
+    return rounded(significant_sigmas *
+                   std::hypot(report_.expected_sigma.ns, exposure_rounding.ns));
+}
+
+void EdgeDifference::learn(Duration surplus, Duration start_delay) {
+    surplus_ns_[next_++ % surplus_ns_.size()] = surplus.ns;
     report_.frames = std::min(next_, surplus_ns_.size());
+    if (!explains(surplus)) return dispute(surplus, start_delay);
+    surplus_.learn(surplus);
+    agreed_ = std::min(agreed_ + 1, frames_to_learn);
+    rivals_ = 0;
+}
+
+/// A line is slow, never early: an exposure that shows too long ends late, one that shows too short
+/// begins late, but not before its trigger. What is neither is another signal than the exposure.
+void EdgeDifference::dispute(Duration surplus, Duration start_delay) {
+    if (rivals_ == 0 || absolute(surplus - rival_.value()) > insignificant()) {
+        rival_ = SteadyValue(insignificant());
+        rivals_ = 0;
+    }
+    rival_.learn(surplus);
+    const Duration learned = rival_.value();
+    const bool possible =
+        learned <= slowest_edge && -learned <= std::min(start_delay, slowest_edge);
+    if (++rivals_ < frames_to_learn || !possible) return;
+    surplus_ = rival_;
+    agreed_ = frames_to_learn;
+    rivals_ = 0;
+    corrected_ = absolute(learned) > insignificant();
+}
+
+EdgeCorrection EdgeDifference::correction() const {
+    EdgeCorrection correction;
+    const Duration surplus = surplus_.value();
+    if (corrected_) (surplus.ns > 0 ? correction.end : correction.start) = absolute(surplus);
+    // The camera's account is rounded; what is not taken off lies somewhere in the exposure.
+    const Duration doubt = corrected_ ? exposure_rounding / 2 : surplus / 4;
+    correction.sigma = rounded(std::hypot(doubt.ns, surplus_.deviation().ns));
+    return correction;
 }
 
 EdgeReport EdgeDifference::report() const {
@@ -65,6 +110,7 @@ EdgeReport EdgeDifference::report() const {
     report.sigma = {std::llround(
         std::hypot(sigma_of_median * spread / std::sqrt(static_cast<double>(report.frames)),
                    static_cast<double>(exposure_rounding.ns)))};
+    report.correction = correction().middle();
     return report;
 }
 
@@ -76,10 +122,10 @@ std::string line_hint(const EdgeReport& edges) {
         return "";
     return fmt::format(
         "{}: the exposure line shows {:.0f} us {} than the camera exposes, its delays explain "
-        "{:.0f}: check its LineSource, its pull-up and load, and its polarity ('strobe'), or "
+        "{:.0f}{}: check its LineSource, its pull-up and load, and its polarity ('strobe'), or "
         "measure it and set 'strobe_rising_us' and 'strobe_falling_us'",
         edges.line, std::abs(us(edges.difference)), edges.difference.ns < 0 ? "less" : "more",
-        us(edges.expected));
+        us(edges.expected), edges.correction.ns == 0 ? "" : ", the rest is taken off the stamps");
 }
 
 }  // namespace versavis::daemon

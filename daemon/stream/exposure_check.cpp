@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stream/exposure_check.hpp"
 
-#include "engine/pairing/alignment.hpp"
+#include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace versavis::daemon {
 
@@ -15,24 +17,144 @@ constexpr Duration exposure_settling = milliseconds(500);
 /// deep queues are said to be miswired after each change; at twice, the check starts later.
 constexpr int settling_frames = 5;
 
+/// Sigma of the middle of an exposure of whose length nothing but its line is known: six sigma are
+/// more than half of the slowest edge. At half they are not; at twice, such a camera's stamps look
+/// worse than any known line makes them.
+constexpr Duration unwitnessed_end = microseconds(100);
+
+/// A length that may be anything in a range leaves the middle uncertain by half of it either way,
+/// which is taken for two sigma.
+constexpr std::int64_t range_per_sigma = 4;
+
+Duration root_of_squares(Duration a, Duration b) { return rounded(std::hypot(a.ns, b.ns)); }
+
 }  // namespace
+
+const char* to_string(ExposureSource source) {
+    switch (source) {
+        case ExposureSource::none: return "none";
+        case ExposureSource::setting: return "setting";
+        case ExposureSource::reading: return "reading";
+        case ExposureSource::chunk: return "chunk";
+        case ExposureSource::chunk_before: return "chunk_before";
+    }
+    return "none";
+}
 
 ExposureCheck::ExposureCheck(const CameraConfiguration& configuration)
     : enabled_(configuration.check_exposure),
-      settling_(exposure_settling + period_of(configuration) * settling_frames) {}
+      settings_(exposure_settling + period_of(configuration) * settling_frames),
+      readings_(exposure_reading_interval + period_of(configuration) * settling_frames) {}
 
-void ExposureCheck::set_camera_exposure(Duration exposure, HostTime since) {
-    camera_exposure_ = exposure;
-    since_ = since;
+void ExposureCheck::set_line_delays(const LineDelays& lines) {
+    edges_.set_line_delays(lines);
+    settings_.clear();
+    readings_.clear();
+    newest_ = {};
+    lags_ = false;
+    votes_ = 0;
 }
 
-bool ExposureCheck::contradicts(const pairing::Arrival& arrival,
-                                const pairing::Exposure& exposure) {
-    told_ = arrival.exposure.ns != 0 ? arrival.exposure : told_at(exposure.earliest_on_host);
-    if (exposure.kind != StampKind::measured_middle) return false;
-    measured_ = exposure.end - exposure.start;
-    contradicted_ = enabled_ && told_.ns != 0 && pairing::lengths_differ(told_, measured_);
-    return contradicted_;
+void ExposureCheck::set_camera_exposure(Duration exposure, HostTime since) {
+    settings_.add(exposure, since);
+    varies_ = exposure.ns == 0;
+}
+
+/// A reading shows what frames were exposed before it as little as a setting; but where the one
+/// before and this one agree, the frame in between had this exposure.
+void ExposureCheck::read_exposure(Duration exposure, HostTime at, Duration start_delay) {
+    if (exposure.ns == 0) return;
+    ReportedExposure& reports = varies_ ? readings_ : settings_;
+    reports.add(exposure, at);
+    const auto range = reports.at(newest_.end);
+    const bool fresh = std::exchange(newest_.unread, false);
+    if (fresh && range && range->width().ns == 0)
+        edges_.learn(newest_.length - exposure, start_delay);
+}
+
+bool ExposureCheck::wants_readings() const {
+    const bool by_chunk =
+        source_ == ExposureSource::chunk || source_ == ExposureSource::chunk_before;
+    return !by_chunk && (varies_ || contradicted_);
+}
+
+Duration ExposureCheck::told_at(HostTime at) const {
+    const auto range = settings_.at(at);
+    return range && range->width().ns == 0 ? range->longest : Duration{};
+}
+
+/// Before the line's own difference is known, the true exposure may seem to be another one.
+Duration ExposureCheck::for_pairing(Duration chunk) const {
+    const bool usable = chunk.ns != 0 && enabled_ && !lags_ && edges_.settled();
+    return usable ? chunk + edges_.surplus() : Duration{};
+}
+
+/// Some cameras send with each frame the exposure of the one before. That shows when it changes.
+void ExposureCheck::follow_lag(const Measured& before, Duration chunk) {
+    const bool own = edges_.explains(newest_.length - chunk);
+    const bool neighbour = edges_.explains(before.length - chunk);
+    if (own == neighbour) return;
+    if (neighbour == lags_) {
+        votes_ = 0;
+    } else if (++votes_ >= votes_to_shift) {
+        lags_ = neighbour;
+        votes_ = 0;
+    }
+}
+
+ExposureCheck::Account ExposureCheck::account_of(const Measured& before, Duration chunk,
+                                                 Duration start_delay) {
+    if (chunk.ns != 0) {
+        const bool follows = before.length.ns != 0 && newest_.block_id == before.block_id + 1;
+        if (follows) follow_lag(before, chunk);
+        if (!lags_) return {ExposureSource::chunk, {chunk, chunk}};
+        if (follows) edges_.learn(before.length - chunk, start_delay);
+        readings_.add(chunk, before.end);
+        const auto range = readings_.at(newest_.end);
+        return range ? Account{ExposureSource::chunk_before, *range} : Account{};
+    }
+    const auto range = (varies_ ? readings_ : settings_).at(newest_.end);
+    if (!range) return {};
+    return {varies_ ? ExposureSource::reading : ExposureSource::setting, *range};
+}
+
+/// By how much the measured length lies outside of that range.
+Duration ExposureCheck::excess(LengthRange range) const {
+    const Duration length = newest_.length - edges_.surplus();
+    return std::max({Duration{}, length - range.longest, range.shortest - length});
+}
+
+/// A length that changed may as well be wrong by the change.
+ExposureVerdict ExposureCheck::unwitnessed(const Measured& before) const {
+    const Duration change =
+        before.length.ns != 0 ? absolute(newest_.length - before.length) : Duration{};
+    return {false, {{}, {}, root_of_squares(unwitnessed_end, change / 2)}};
+}
+
+ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, Duration chunk,
+                                     const pairing::Exposure& exposure, Duration start_delay) {
+    contradicted_ = false;
+    told_ = {};
+    source_ = ExposureSource::none;
+    const Measured before = std::exchange(newest_, {});
+    if (exposure.kind != StampKind::measured_middle) return {};
+    newest_ = {arrival.block_id, exposure.end - exposure.start, exposure.earliest_on_host, true};
+    const Account account = account_of(before, chunk, start_delay);
+    if (account.source == ExposureSource::none) return unwitnessed(before);
+    source_ = account.source;
+    told_ = account.range.longest;
+    const Duration excess = this->excess(account.range);
+    const bool certain = source_ == ExposureSource::chunk || source_ == ExposureSource::setting;
+    const bool off = certain && excess > edges_.tolerance();
+    if (source_ == ExposureSource::chunk || (certain && !off && account.range.width().ns == 0))
+        edges_.learn(newest_.length - account.range.longest, start_delay);
+    if (!enabled_) return unwitnessed(before);
+    contradicted_ = off;
+    ExposureVerdict verdict{contradicted_, edges_.correction()};
+    Duration& sigma = verdict.correction.sigma;
+    sigma = root_of_squares(sigma, account.range.width() / range_per_sigma);
+    if (!certain) sigma = root_of_squares(sigma, excess / 2);
+    return verdict;
 }
 
 }  // namespace versavis::daemon

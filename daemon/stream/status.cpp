@@ -172,6 +172,7 @@ json camera_json(const CameraStatus& status) {
             {"frames_without_buffer", pipeline.no_buffer},
             {"exposure_ns", pipeline.exposure.ns},
             {"camera_exposure_ns", pipeline.camera_exposure.ns},
+            {"exposure_source", to_string(pipeline.exposure_source)},
             {"line", pipeline.lines.line},
             {"line_delay_start_ns", pipeline.lines.start.delay.ns},
             {"line_delay_end_ns", pipeline.lines.end.delay.ns},
@@ -180,6 +181,7 @@ json camera_json(const CameraStatus& status) {
             {"trigger_delay_ns", pipeline.lines.trigger.delay.ns},
             {"edge_difference_ns", known(pipeline.edges.frames != 0, pipeline.edges.difference)},
             {"edge_difference_sigma_ns", known(pipeline.edges.frames != 0, pipeline.edges.sigma)},
+            {"edge_correction_ns", pipeline.edges.correction.ns},
             {"locks", pipeline.locks},
             {"slips", pipeline.slips},
             {"last_frame_ns", pipeline.last_frame.ns}};

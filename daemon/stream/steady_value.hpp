@@ -28,6 +28,9 @@ class SteadyValue {
     /// How far off an honest value can be.
     Duration tolerance() const { return floor + rounded(deviations * deviation_ns_); }
 
+    /// Mean deviation of the values, as far as it is known.
+    Duration deviation() const { return rounded(deviation_ns_); }
+
     bool fits(Duration value, Duration allowance = {}) const {
         return !known() || absolute(value - this->value()) <= tolerance() + allowance;
     }

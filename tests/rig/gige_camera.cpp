@@ -359,6 +359,7 @@ std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
 Duration GigeCamera::exposure_at(HostTime at) const {
     double exposure_us = static_cast<double>(registers_.real(reg_exposure_time));
     if (registers_.value(reg_exposure_auto) != 0) {
+        exposure_us = settings_.exposure_us;
         const double seconds = static_cast<double>((at - zero_).ns) * 1e-9;
         const double phase = 2 * 3.14159265358979 * seconds / settings_.exposure_swing_s;
         exposure_us *= 1 + settings_.exposure_swing * std::sin(phase);
@@ -435,7 +436,11 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         if (active_fault(FaultKind::change_size) != nullptr)
             registers_.resize(settings_.width, settings_.height / 2);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
-        truth.end = truth.start + exposure_at(trigger);
+        const Duration exposure = exposure_at(trigger);
+        truth.end = truth.start + exposure;
+        if (registers_.value(reg_exposure_auto) != 0)
+            registers_.write(reg_exposure_time,
+                             std::bit_cast<std::uint32_t>(static_cast<float>(exposure.ns) * 1e-3F));
         busy_until_ = std::max(
             truth.end, trigger + Duration{std::llround(settings_.shortest_period_us * 1e3)});
         frame.block_id = block_id_;

@@ -31,6 +31,7 @@ class Bench : public test::Pipelines {
         : pipeline(configuration, 0, translator, events),
           period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {
         synchronise(begin);
+        pipeline.set_camera_exposure(milliseconds(4), {});
     }
 
     /// The board's record of the trigger at grid point `tick`, measured unless flags say otherwise.
@@ -63,6 +64,7 @@ class Bench : public test::Pipelines {
         arrival.block_id = ++frames;
         arrival.camera_time = {at.ns + 777};
         arrival.arrived = at + milliseconds(15);
+        arrival.exposure = chunk;
         arrival.width = 64;
         arrival.height = 48;
         arrival.stride = 64;
@@ -86,6 +88,7 @@ class Bench : public test::Pipelines {
 
     const HostTime begin{100'000'000'000};
     std::function<void(wire::Exposure&)> lie = [](wire::Exposure&) {};
+    Duration chunk;  ///< of the frames to come; 0: they have none
     CameraPipeline pipeline;
     Duration period;
     std::uint64_t triggers = 0;
@@ -240,7 +243,8 @@ TEST_CASE("camera_pipeline: an exposure is translated once, when its record come
         const auto item = test::look(reader.next());
         REQUIRE(item.found == test::Found::item);
         CHECK(item.time == stamp.output);
-        CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns == stamp.sigma_ns);
+        CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns >= stamp.sigma_ns);
+        CHECK(unpack<FrameMetadata>(item.metadata).sigma_ns < stamp.sigma_ns + 8'000);
     }
 }
 
@@ -458,4 +462,36 @@ TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is
     CHECK(report.edges.difference == microseconds(-18));
     CHECK(report.edges.frames == std::size(pattern));
     CHECK(report.exposure == microseconds(4018));
+}
+
+TEST_CASE("camera_pipeline: a slow end of the exposure line is learned, and taken off the stamps") {
+    Bench bench(camera(20));
+    bench.pipeline.set_camera_exposure({}, bench.begin);  // it changes by itself
+    bench.chunk = milliseconds(4);
+    bench.lie = [](wire::Exposure& record) { record.end_ns += 400'000; };
+    bench.start();
+    bench.run(12, 40);
+    CHECK(bench.published.size() == 7 + 28 - 8);
+    for (const FrameMetadata& frame : bench.published) {
+        const HostTime middle = bench.begin + bench.period * frame.tick() + microseconds(2020);
+        CHECK(absolute(frame.host_time - middle) <= microseconds(1));
+        CHECK(absolute(frame.exposure - milliseconds(4)) <= microseconds(1));
+        CHECK(std::abs(frame.delay_ns - 200'000) <= 1000);
+    }
+    CHECK(bench.pipeline.report().edges.correction == microseconds(200));
+    CHECK(bench.pipeline.report().slips == 0);
+}
+
+TEST_CASE("camera_pipeline: ends that are wrong now and then are withheld while it changes") {
+    Bench bench(camera(20));
+    bench.pipeline.set_camera_exposure({}, bench.begin);
+    bench.chunk = milliseconds(4);
+    bench.lie = [](wire::Exposure& record) {
+        if (record.tick % 3 == 0) record.end_ns += 300'000;
+    };
+    bench.start();
+    bench.run(12, 60);
+    CHECK(bench.pipeline.report().exposure_source == ExposureSource::chunk);
+    for (const FrameMetadata& frame : bench.published) CHECK(frame.tick() % 3 != 0);
+    CHECK(bench.published.size() == 4 + 32);
 }

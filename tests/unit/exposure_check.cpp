@@ -9,6 +9,7 @@ using namespace versavis::daemon;
 namespace {
 
 constexpr HostTime begin{100'000'000'000};
+constexpr Duration period = milliseconds(50);
 
 CameraConfiguration camera(bool check = true) {
     CameraConfiguration configuration;
@@ -17,52 +18,225 @@ CameraConfiguration camera(bool check = true) {
     return configuration;
 }
 
-pairing::Exposure exposure(Duration length, HostTime at = begin + seconds(10)) {
-    pairing::Exposure made;
-    made.end = made.start + length;
-    made.end_on_host = at;
-    made.earliest_on_host = at;
-    return made;
-}
+struct Bench {
+    explicit Bench(bool checks = true) : check(camera(checks)) { check.set_line_delays({}); }
+
+    /// The next frame, of an exposure that measures `length`; `chunk`: by its own data.
+    ExposureVerdict frame(Duration length, Duration chunk = {}) {
+        pairing::Exposure exposure;
+        exposure.end = exposure.start + length;
+        exposure.earliest_on_host = now = now + period;
+        pairing::Arrival arrival;
+        arrival.block_id = ++block_id;
+        return check.judge(arrival, chunk, exposure, microseconds(20));
+    }
+
+    bool contradicts(Duration length, Duration chunk = {}) {
+        return frame(length, chunk).contradicted;
+    }
+
+    Duration sigma(Duration length, Duration chunk = {}) {
+        return frame(length, chunk).correction.sigma;
+    }
+
+    ExposureCheck check;
+    HostTime now = begin;
+    std::uint64_t block_id = 0;
+};
 
 }  // namespace
 
-TEST_CASE("exposure_check: a twentieth, or 200 us, of difference is none") {
-    ExposureCheck check(camera());
-    check.set_camera_exposure(milliseconds(2), begin);
-    CHECK_FALSE(check.contradicts({}, exposure(microseconds(2190))));
-    CHECK(check.contradicts({}, exposure(microseconds(2210))));
-    check.set_camera_exposure(milliseconds(19), begin);
-    CHECK_FALSE(check.contradicts({}, exposure(microseconds(19990))));
-    CHECK(check.contradicts({}, exposure(microseconds(20100))));
-    CHECK(check.contradicted());
-    CHECK(check.measured() == microseconds(20100));
-    CHECK(check.told() == milliseconds(19));
+TEST_CASE("exposure_check: a length is held to what is known of the line, whatever it lasts") {
+    Bench bench;
+    bench.check.set_camera_exposure(milliseconds(19), {});
+    CHECK_FALSE(bench.contradicts(microseconds(19060)));
+    CHECK(bench.contradicts(microseconds(19200)));
+    CHECK(bench.check.contradicted());
+    CHECK(bench.check.measured() == microseconds(19200));
+    CHECK(bench.check.told() == milliseconds(19));
+    CHECK(bench.check.source() == ExposureSource::setting);
+    for (int i = 0; i < 100; ++i) CHECK_FALSE(bench.contradicts(microseconds(19003)));
+    CHECK(bench.contradicts(microseconds(19025)));
+    CHECK(bench.contradicts(microseconds(18980)));
 }
 
-TEST_CASE("exposure_check: a new exposure is given time to hold, one in the frame's data is not") {
-    ExposureCheck check(camera());
-    check.set_camera_exposure(milliseconds(2), begin);
+TEST_CASE("exposure_check: while a setting settles, both lengths pass, and sigma says so") {
+    Bench bench;
+    bench.check.set_camera_exposure(milliseconds(2), {});
+    for (int i = 0; i < 40; ++i) bench.frame(milliseconds(2));
+    CHECK(bench.check.told_at(bench.now) == milliseconds(2));
+    bench.check.set_camera_exposure(milliseconds(3), bench.now);
+    const ExposureVerdict old = bench.frame(milliseconds(2));
+    CHECK_FALSE(old.contradicted);
+    CHECK(old.correction.sigma >= microseconds(250));
+    CHECK_FALSE(bench.contradicts(milliseconds(3)));
+    CHECK(bench.contradicts(microseconds(3100)));
+    CHECK(bench.check.told_at(bench.now).ns == 0);
     // Half a second and five periods of 50 ms.
-    CHECK_FALSE(check.contradicts({}, exposure(milliseconds(9), begin + milliseconds(750))));
-    CHECK(check.contradicts({}, exposure(milliseconds(9), begin + milliseconds(751))));
-    check.set_camera_exposure(milliseconds(2), {});  // before the first frame
-    CHECK(check.contradicts({}, exposure(milliseconds(9), begin)));
-    check.set_camera_exposure(milliseconds(2), begin);
-    pairing::Arrival with_chunk;
-    with_chunk.exposure = milliseconds(2);
-    CHECK(check.contradicts(with_chunk, exposure(milliseconds(9), begin)));
+    bench.now = bench.now + milliseconds(750);
+    CHECK(bench.check.told_at(bench.now) == milliseconds(3));
+    CHECK(bench.contradicts(milliseconds(2)));
+    CHECK(bench.sigma(milliseconds(3)) < microseconds(10));
 }
 
-TEST_CASE("exposure_check: nothing to hold it against, or not wanted, is no contradiction") {
-    ExposureCheck ignorant(camera());
-    CHECK_FALSE(ignorant.contradicts({}, exposure(milliseconds(9))));
-    ExposureCheck unwanted(camera(false));
-    unwanted.set_camera_exposure(milliseconds(2), begin);
-    CHECK_FALSE(unwanted.contradicts({}, exposure(milliseconds(9))));
-    ExposureCheck check(camera());
-    check.set_camera_exposure(milliseconds(2), begin);
-    auto predicted = exposure(milliseconds(9));
+TEST_CASE("exposure_check: a frame's own data are tight at once, after any change") {
+    Bench bench;
+    for (int i = 0; i < 200; ++i) {
+        const Duration length = microseconds(2000 + i * 377 % 5000);
+        CHECK_FALSE(bench.contradicts(length + microseconds(i % 3), length));
+    }
+    CHECK(bench.check.source() == ExposureSource::chunk);
+    CHECK_FALSE(bench.check.wants_readings());
+    CHECK(bench.contradicts(microseconds(20030), milliseconds(20)));
+    CHECK(bench.sigma(milliseconds(3), milliseconds(3)) < microseconds(5));
+}
+
+TEST_CASE("exposure_check: every second or third end that is late is withheld, and no other") {
+    Bench bench;
+    const int every = GENERATE(2, 3);
+    int withheld = 0;
+    for (int i = 0; i < 300; ++i) {
+        const Duration exposure = microseconds(3000 + i * 7);
+        const bool lie = i % every == 0;
+        const bool contradicted =
+            bench.contradicts(exposure + microseconds(lie ? 300 + i * 131 % 700 : 0), exposure);
+        CHECK(contradicted == lie);
+        withheld += contradicted ? 1 : 0;
+    }
+    CHECK(withheld == 300 / every);
+    CHECK(bench.check.source() == ExposureSource::chunk);
+}
+
+TEST_CASE("exposure_check: a slow falling edge costs eight frames, and is then taken off") {
+    Bench bench;
+    for (int i = 0; i < 40; ++i) {
+        const Duration exposure = microseconds(3000 + i * 100);
+        const ExposureVerdict verdict = bench.frame(exposure + microseconds(400), exposure);
+        CHECK(verdict.contradicted == (i < 8));
+        if (i < 8) continue;
+        CHECK(absolute(verdict.correction.middle() - microseconds(200)) <= microseconds(1));
+        CHECK(verdict.correction.sigma < microseconds(20));
+    }
+    // Pairing gets what fits the line.
+    CHECK(absolute(bench.check.for_pairing(milliseconds(3)) - microseconds(3400)) <=
+          microseconds(1));
+}
+
+TEST_CASE("exposure_check: before the line is known, no account is good enough for pairing") {
+    Bench bench;
+    CHECK(bench.check.for_pairing(milliseconds(3)).ns == 0);
+    for (int i = 0; i < 8; ++i) bench.frame(milliseconds(3), milliseconds(3));
+    CHECK(bench.check.for_pairing(milliseconds(3)) == milliseconds(3));
+    CHECK(bench.check.for_pairing({}).ns == 0);
+}
+
+TEST_CASE("exposure_check: chunks of the frame before are found out, and used as such") {
+    Bench bench;
+    Duration before = milliseconds(3);
+    int withheld = 0;
+    for (int i = 0; i < 60; ++i) {
+        const Duration length = microseconds(3000 + i * 377 % 2000);
+        const ExposureVerdict verdict = bench.frame(length, before);
+        withheld += verdict.contradicted ? 1 : 0;
+        // Of the newest length there is no witness yet: half of what it may be wrong by is sigma.
+        INFO(i << ": " << length.ns << " after " << before.ns);
+        if (i > 10) CHECK((verdict.correction.sigma * 6).ns > (absolute(length - before) / 2).ns);
+        before = length;
+    }
+    CHECK(bench.check.source() == ExposureSource::chunk_before);
+    CHECK(withheld <= 6);
+    CHECK(bench.check.for_pairing(milliseconds(3)).ns == 0);
+    for (int i = 0; i < 30; ++i) bench.frame(milliseconds(3), milliseconds(3));
+    CHECK(bench.sigma(milliseconds(3), milliseconds(3)) < microseconds(10));
+}
+
+TEST_CASE("exposure_check: what readings cannot confirm is in sigma") {
+    Bench bench;
+    bench.check.set_camera_exposure({}, {});
+    CHECK(bench.check.wants_readings());
+    CHECK(bench.sigma(milliseconds(3)) >= microseconds(90));
+    CHECK(bench.check.source() == ExposureSource::none);
+    const auto read = [&](Duration exposure) {
+        bench.check.read_exposure(exposure, bench.now, microseconds(20));
+    };
+    for (int i = 0; i < 20; ++i) {
+        bench.frame(milliseconds(3));
+        read(milliseconds(3));
+    }
+    CHECK(bench.sigma(milliseconds(3)) < microseconds(10));
+    CHECK(bench.check.source() == ExposureSource::reading);
+    // It may have changed since the reading, or its end may be wrong: nobody can know.
+    const ExposureVerdict longer = bench.frame(microseconds(3800));
+    CHECK_FALSE(longer.contradicted);
+    CHECK(longer.correction.sigma >= microseconds(390));
+    read(microseconds(3800));
+    CHECK(bench.sigma(microseconds(3800)) >= microseconds(190));
+    for (int i = 0; i < 20; ++i) {
+        bench.frame(microseconds(3800));
+        read(microseconds(3800));
+    }
+    CHECK(bench.sigma(microseconds(3800)) < microseconds(10));
+}
+
+TEST_CASE("exposure_check: readings show a slow edge, but only of an exposure that keeps still") {
+    Bench bench;
+    bench.check.set_camera_exposure({}, {});
+    for (int i = 0; i < 40; ++i) {
+        const Duration exposure = microseconds(3000 + i * 50);
+        bench.check.read_exposure(exposure, bench.now, microseconds(20));
+        bench.frame(exposure + microseconds(400));
+    }
+    CHECK(bench.check.edges().correction.ns == 0);
+    for (int i = 0; i < 40; ++i) {
+        bench.check.read_exposure(milliseconds(5), bench.now, microseconds(20));
+        bench.frame(microseconds(5400));
+    }
+    CHECK(absolute(bench.check.edges().correction - microseconds(200)) <= microseconds(1));
+    CHECK(bench.sigma(microseconds(5400)) < microseconds(20));
+}
+
+TEST_CASE("exposure_check: an exposure that somebody changes is read, and no slow edge") {
+    Bench bench;
+    bench.check.set_camera_exposure(milliseconds(2), {});
+    for (int i = 0; i < 20; ++i) bench.frame(milliseconds(2));
+    CHECK_FALSE(bench.check.wants_readings());
+    int withheld = 0;
+    for (int i = 0; i < 40; ++i) {
+        if (bench.contradicts(microseconds(2500))) ++withheld;
+        if (bench.check.wants_readings())
+            bench.check.read_exposure(microseconds(2500), bench.now, microseconds(20));
+    }
+    CHECK(withheld == 1);
+    CHECK(bench.check.edges().correction.ns == 0);
+    CHECK(bench.check.told_at(bench.now) == microseconds(2500));
+}
+
+TEST_CASE(
+    "exposure_check: a slow edge of a fixed exposure is learned by readings that confirm it") {
+    Bench bench;
+    bench.check.set_camera_exposure(milliseconds(2), {});
+    for (int i = 0; i < 20; ++i) CHECK(bench.contradicts(microseconds(2400)));
+    for (int i = 0; i < 8; ++i) {
+        CHECK(bench.contradicts(microseconds(2400)));
+        bench.check.read_exposure(milliseconds(2), bench.now, microseconds(20));
+    }
+    CHECK_FALSE(bench.contradicts(microseconds(2400)));
+    CHECK(bench.check.edges().correction == microseconds(200));
+}
+
+TEST_CASE("exposure_check: where nothing is checked, sigma has room for the slowest edge") {
+    Bench ignorant;
+    CHECK(ignorant.sigma(milliseconds(9)) == microseconds(100));
+    CHECK(ignorant.sigma(milliseconds(9)) == microseconds(100));
+    CHECK(ignorant.sigma(milliseconds(19)) > milliseconds(5));
+    Bench unwanted(false);
+    unwanted.check.set_camera_exposure(milliseconds(2), {});
+    CHECK_FALSE(unwanted.contradicts(milliseconds(9)));
+    CHECK(unwanted.sigma(milliseconds(9)) == microseconds(100));
+    Bench bench;
+    bench.check.set_camera_exposure(milliseconds(2), {});
+    pairing::Exposure predicted;
+    predicted.end = predicted.start + milliseconds(9);
     predicted.kind = StampKind::predicted_middle;
-    CHECK_FALSE(check.contradicts({}, predicted));
+    CHECK_FALSE(bench.check.judge({}, {}, predicted, {}).contradicted);
 }
