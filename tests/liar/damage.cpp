@@ -14,6 +14,10 @@ namespace {
 /// themselves. At half it ends about when the service believes it, at twice it says no more.
 constexpr unsigned lasting_messages = 20;
 
+/// Slow edges and wrong ends of an exposure move its middle by less than the usual floor: these
+/// kinds have one of their own, twice the scatter of the rig's clock on a loaded machine.
+constexpr Duration tight = microseconds(60);
+
 const std::vector<Field> exposure_instants = instants(Type::exposure);
 const std::vector<Field> answer_instants = instants(Type::clock_answer);
 
@@ -100,6 +104,34 @@ const std::vector<Kind>& kinds() {
         {"late-imu", Way::late, {{Type::imu_sample, {imu_sample::time}}}},
         {"late-exchange", Way::late, {any_answer}},
         {"clock-step", Way::step, all},
+        {"end-second",
+         Way::regular,
+         {{Type::exposure, {exposure::end}}},
+         2,
+         microseconds(300),
+         milliseconds(1),
+         tight},
+        {"end-third",
+         Way::regular,
+         {{Type::exposure, {exposure::end}}},
+         3,
+         microseconds(300),
+         milliseconds(1),
+         tight},
+        {"end-all",
+         Way::regular,
+         {{Type::exposure, {exposure::end}}},
+         1,
+         microseconds(300),
+         milliseconds(1),
+         tight},
+        {"slow-end",
+         Way::regular,
+         {{Type::exposure, {exposure::end}}},
+         1,
+         microseconds(400),
+         microseconds(400),
+         tight},
     };
     return list;
 }
@@ -372,8 +404,19 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
             note(kind, packet, now, "the clock steps by " + in_ms(by));
             return true;
         }
+        case Way::regular: return shift_regularly(kind, victim, packet, now);
         default: return false;
     }
+}
+
+/// False: it is not the turn of this one.
+bool Liar::shift_regularly(const Kind& kind, const Victim& victim, Packet& packet, HostTime now) {
+    if (camera_of(packet) != 0 || ++regular_ % kind.every != 0) return false;
+    const auto spread = static_cast<std::uint64_t>((kind.most - kind.least).ns);
+    const std::int64_t by = kind.least.ns + static_cast<std::int64_t>(below(spread + 1));
+    if (!shift(victim.fields, by, packet)) return false;
+    note(kind, packet, now, names(victim.fields) + " " + in_ms(by));
+    return true;
 }
 
 /// False: none of them was observed.

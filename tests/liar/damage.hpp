@@ -26,9 +26,10 @@ enum class Way {
     swap_fields,    ///< one of the fields, with the next of its type
     repeat,
     drop,
-    freeze,  ///< one of the fields keeps its value for several messages
-    late,    ///< all fields are off by the same time for several messages
-    step,    ///< every instant from here on is off by the same whole number of periods
+    freeze,   ///< one of the fields keeps its value for several messages
+    late,     ///< all fields are off by the same time for several messages
+    step,     ///< every instant from here on is off by the same whole number of periods
+    regular,  ///< all fields of every n-th message of camera 0 are late, as long as it is ordered
 };
 
 struct Victim {
@@ -40,6 +41,10 @@ struct Kind {
     std::string_view name;
     Way way;
     std::vector<Victim> victims;
+    unsigned every = 1;               ///< for Way::regular: n
+    Duration least{};                 ///< for Way::regular: how late, drawn anew for each
+    Duration most{};                  ///< the same
+    std::optional<Duration> floor{};  ///< errors below it are not held against a stamp; none: usual
 };
 
 const std::vector<Kind>& kinds();
@@ -100,6 +105,7 @@ class Liar {
     std::vector<Packet> lie(const Kind& kind, const Victim& victim, Packet packet, HostTime now);
     bool alter(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
     bool shift(const std::vector<Field>& fields, std::int64_t by_ns, Packet& packet);
+    bool shift_regularly(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
     void note(const Kind& kind, const Packet& packet, HostTime now, std::string what);
     void damage_counted(HostTime now);
     const Kind* choose(const Packet& packet);
@@ -127,6 +133,7 @@ class Liar {
     std::uint32_t nonce_ = 0;
     std::optional<std::uint32_t> sequence_;  ///< of the next packet
     std::map<Type, std::uint64_t> seen_;
+    std::uint64_t regular_ = 0;  ///< messages that a regular lie could have damaged
     struct Truth {
         std::uint64_t camera = 0;
         std::uint64_t number = 0;

@@ -50,6 +50,7 @@ Tally& Tally::operator+=(const Tally& more) {
 
 LiveJudge::LiveJudge(JudgedSystem system, const Liar& liar)
     : system_(std::move(system)),
+      floor_(system_.floor),
       liar_(liar),
       utc_(*clock::OutputClock::create(clock::OutputClockKind::realtime)),
       truth_file_(system_.truth_path),
@@ -100,7 +101,7 @@ void LiveJudge::read_truth() {
 }
 
 bool LiveJudge::honest(Duration error, std::uint32_t sigma_ns) const {
-    return error <= std::max(Duration{honest_sigmas * sigma_ns}, system_.floor);
+    return error <= std::max(Duration{honest_sigmas * sigma_ns}, floor_);
 }
 
 /// True: stamp and order are right.

@@ -50,6 +50,9 @@ class LiveJudge {
     /// Reads what is new; returns what is wrong with it.
     std::vector<Wrong> poll();
 
+    /// From now on; none: that of the system.
+    void set_floor(std::optional<Duration> floor) { floor_ = floor.value_or(system_.floor); }
+
     Tally tally(HostTime begin, HostTime end) const;
 
     /// How long after `begin` every stream was whole again, judged up to `end`; nothing: one is
@@ -85,6 +88,7 @@ class LiveJudge {
     std::vector<const Judged*> all() const;
 
     JudgedSystem system_;
+    Duration floor_;
     const Liar& liar_;
     clock::OutputClock utc_;
     std::ifstream truth_file_;

@@ -89,10 +89,14 @@ class Run {
         for (const Kind* kind : chosen) {
             Row row{std::string(kind->name)};
             const bool last = kind == chosen.back();
+            judge_->set_floor(kind->floor);
             phase(
                 row, [&] { tell(*kind, row); }, !settings_.brief || last);
+            judge_->set_floor({});
         }
-        std::erase_if(chosen, [](const Kind* kind) { return kind->way == Way::step; });
+        std::erase_if(chosen, [](const Kind* kind) {
+            return kind->way == Way::step || kind->way == Way::regular;
+        });
         if (!chosen.empty() && liar_.damaged() < settings_.messages) {
             for (unsigned i = 0; i < settings_.starts; ++i) tell_from_the_start(chosen);
             tell_at_random(chosen);
@@ -116,6 +120,7 @@ class Run {
         stack.height = 48;
         stack.camera_scenario = "exposure_us = 2000\nreadout_us = 500\n";
         stack.camera_extra = "exposure_us = 2000\n";
+        stack.scenarios = {"exposure_swing = 0.3\nexposure_swing_s = 3"};  // auto exposure
         stack.extras = {"", "on_unproved = \"flag\""};
         stack.faults = "[board]\ngnss = true\n";
         stack.link = "unix:" + proxy_path(directory);
@@ -206,6 +211,10 @@ class Run {
 
     /// One at a time, then at rates that leave the service less and less of the truth.
     void tell(const Kind& kind, const Row&) {
+        if (kind.way == Way::regular) {
+            liar_.obey({{&kind}});
+            return watch(settings_.brief ? milliseconds(1000) : seconds(4));
+        }
         const bool steps = kind.way == Way::step;
         const std::uint32_t epoch = judge_->epoch();
         const int singles = steps ? 1 : settings_.brief ? 2 : 5;  // two steps may cancel out
