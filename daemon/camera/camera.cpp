@@ -9,6 +9,7 @@
 
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
+#include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
 
 namespace versavis::daemon {
@@ -284,6 +285,9 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
                                        std::move(chunks), environment_.patient);
     if (!stream) return failed(stream.error());
     plan_bandwidth(camera, nodes, setup.payload);
+    const auto events = device_ ? receive_events(nodes, device_->interface, device_->address,
+                                                 [this](const auto& it) { pipeline_.add(it); })
+                                : nullptr;
     GlibError error;
     arv_camera_start_acquisition(camera, error.out());
     if (error.set()) return failed({configuration_.name, "does not start: " + error.text(), ""});

@@ -101,7 +101,7 @@ struct CameraConfiguration {
     double history_s = 0;  ///< frames so old can still be read: part of `slots`
     unsigned buffers = 6;
     unsigned packet_size = 0;  ///< 0: the largest that passes
-    ReceiveMode receive = ReceiveMode::automatic;
+    ReceiveMode receive = ReceiveMode::socket;
     double latest_arrival_ms = 500;
     OnUnproved on_unproved = OnUnproved::withhold;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by preset, or found out

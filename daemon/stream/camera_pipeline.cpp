@@ -244,7 +244,7 @@ void CameraPipeline::triggers_skipped(std::uint64_t count) {
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
     const auto middle = middles_.find(exposure.trigger);
     const ExposureVerdict verdict =
-        check_.judge(arrival, chunk_exposures_[arrival.slot], exposure, report_.start_delay);
+        check_.judge(arrival, account_of(arrival), exposure, report_.start_delay);
     note_chunk_lag();
     if (middle == middles_.end()) {
         frame_unpaired(arrival, EventReason::mismatch, nullptr);
@@ -263,6 +263,27 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
     }
     // The newest used record may still be the guess for a suspect frame.
     middles_.erase(std::exchange(last_used_, exposure.trigger));
+}
+
+FrameAccount CameraPipeline::account_of(const pairing::Arrival& arrival) const {
+    const Duration chunk = chunk_exposures_[arrival.slot];
+    if (chunk.ns != 0) return {chunk, ExposureSource::chunk};
+    return {event_lengths_.length(arrival.block_id), ExposureSource::event};
+}
+
+void CameraPipeline::add(const CameraEvent& event) {
+    const std::lock_guard lock(mutex_);
+    switch (event.kind) {
+        case CameraEventKind::exposure_start:
+            return event_lengths_.started(event.block_id, event.at);
+        case CameraEventKind::exposure_end: return event_lengths_.ended(event.block_id, event.at);
+        case CameraEventKind::trigger_missed: break;
+    }
+    ++report_.triggers_missed;
+    if (std::exchange(missed_said_, true)) return;
+    unsaid_.push_back({LogLevel::warning,
+                       "the camera reports that it missed a trigger: exposure and readout may be "
+                       "longer than the period"});
 }
 
 void CameraPipeline::note_chunk_lag() {
@@ -391,6 +412,8 @@ bool CameraPipeline::wants_exposure_readings() {
 
 void CameraPipeline::set_line_delays(const LineDelays& lines) {
     const std::lock_guard lock(mutex_);
+    event_lengths_ = {};
+    missed_said_ = false;
     completion_.set_line_delays(lines);
     check_.set_line_delays(lines);
 }

@@ -9,12 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "camera/message_channel.hpp"
 #include "configuration/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
 #include "log.hpp"
 #include "stream/answer_watch.hpp"
 #include "stream/event_journal.hpp"
+#include "stream/event_lengths.hpp"
 #include "stream/evidence_recorder.hpp"
 #include "stream/exposure_check.hpp"
 #include "stream/exposure_completion.hpp"
@@ -37,6 +39,7 @@ struct PipelineReport {
     std::uint64_t triggers = 0;
     std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
     std::uint64_t triggers_without_frame = 0;
+    std::uint64_t triggers_missed = 0;  ///< by the camera's own events
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -96,6 +99,9 @@ class CameraPipeline final : private pairing::Outcome {
     /// is doubted.
     std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
 
+    /// By the camera's message channel.
+    void add(const CameraEvent& event);
+
     /// The board sent no trigger for one grid point, and said so.
     void triggers_skipped(std::uint64_t count);
 
@@ -144,6 +150,7 @@ class CameraPipeline final : private pairing::Outcome {
     void follow_clock(std::uint32_t life);
     std::optional<pairing::Start> advance_locked(HostTime now);
     void note_chunk_lag();
+    FrameAccount account_of(const pairing::Arrival& arrival) const;
     void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
     void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
@@ -163,6 +170,8 @@ class CameraPipeline final : private pairing::Outcome {
     ExposureCompletion completion_;
     ExposureCheck check_;
     AnswerWatch answers_;
+    EventLengths event_lengths_;
+    bool missed_said_ = false;               ///< in the log, of this stream
     std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
     TriggerWatch triggers_;
     pairing::Limits limits_;

@@ -35,6 +35,7 @@ const char* to_string(ExposureSource source) {
         case ExposureSource::none: return "none";
         case ExposureSource::setting: return "setting";
         case ExposureSource::reading: return "reading";
+        case ExposureSource::event: return "event";
         case ExposureSource::chunk: return "chunk";
         case ExposureSource::chunk_before: return "chunk_before";
     }
@@ -73,9 +74,9 @@ void ExposureCheck::read_exposure(Duration exposure, HostTime at, Duration start
 }
 
 bool ExposureCheck::wants_readings() const {
-    const bool by_chunk =
-        source_ == ExposureSource::chunk || source_ == ExposureSource::chunk_before;
-    return !by_chunk && (varies_ || contradicted_);
+    const bool by_frame = source_ == ExposureSource::event || source_ == ExposureSource::chunk ||
+                          source_ == ExposureSource::chunk_before;
+    return !by_frame && (varies_ || contradicted_);
 }
 
 Duration ExposureCheck::told_at(HostTime at) const {
@@ -102,20 +103,29 @@ void ExposureCheck::follow_lag(const Measured& before, Duration chunk) {
     }
 }
 
-ExposureCheck::Account ExposureCheck::account_of(const Measured& before, Duration chunk,
+ExposureCheck::Account ExposureCheck::account_of(const Measured& before, const FrameAccount& frame,
                                                  Duration start_delay) {
-    if (chunk.ns != 0) {
+    const LengthRange own{frame.exposure, frame.exposure};
+    if (frame.exposure.ns != 0 && frame.source == ExposureSource::event)
+        return {ExposureSource::event, own};
+    if (frame.exposure.ns != 0) {
         const bool follows = before.length.ns != 0 && newest_.block_id == before.block_id + 1;
-        if (follows) follow_lag(before, chunk);
-        if (!lags_) return {ExposureSource::chunk, {chunk, chunk}};
-        if (follows) edges_.learn(before.length - chunk, start_delay);
-        readings_.add(chunk, before.end);
+        if (follows) follow_lag(before, frame.exposure);
+        if (!lags_) return {ExposureSource::chunk, own};
+        if (follows) edges_.learn(before.length - frame.exposure, start_delay);
+        readings_.add(frame.exposure, before.end);
         const auto range = readings_.at(newest_.end);
         return range ? Account{ExposureSource::chunk_before, *range} : Account{};
     }
     const auto range = (varies_ ? readings_ : settings_).at(newest_.end);
     if (!range) return {};
     return {varies_ ? ExposureSource::reading : ExposureSource::setting, *range};
+}
+
+/// The account is of this exposure, and of no older one.
+bool ExposureCheck::certain() const {
+    return source_ == ExposureSource::event || source_ == ExposureSource::chunk ||
+           source_ == ExposureSource::setting;
 }
 
 /// By how much the measured length lies outside of that range.
@@ -131,7 +141,7 @@ ExposureVerdict ExposureCheck::unwitnessed(const Measured& before) const {
     return {false, {{}, {}, root_of_squares(unwitnessed_end, change / 2)}};
 }
 
-ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, Duration chunk,
+ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const FrameAccount& frame,
                                      const pairing::Exposure& exposure, Duration start_delay) {
     contradicted_ = false;
     told_ = {};
@@ -139,21 +149,22 @@ ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, Duration c
     const Measured before = std::exchange(newest_, {});
     if (exposure.kind != StampKind::measured_middle) return {};
     newest_ = {arrival.block_id, exposure.end - exposure.start, exposure.earliest_on_host, true};
-    const Account account = account_of(before, chunk, start_delay);
+    const Account account = account_of(before, frame, start_delay);
     if (account.source == ExposureSource::none) return unwitnessed(before);
     source_ = account.source;
     told_ = account.range.longest;
     const Duration excess = this->excess(account.range);
-    const bool certain = source_ == ExposureSource::chunk || source_ == ExposureSource::setting;
-    const bool off = certain && excess > edges_.tolerance();
-    if (source_ == ExposureSource::chunk || (certain && !off && account.range.width().ns == 0))
+    const bool off = certain() && excess > edges_.tolerance();
+    // A setting that is off may be an old one: readings decide.
+    const bool old = source_ == ExposureSource::setting && off;
+    if (certain() && !old && account.range.width().ns == 0)
         edges_.learn(newest_.length - account.range.longest, start_delay);
     if (!enabled_) return unwitnessed(before);
     contradicted_ = off;
     ExposureVerdict verdict{contradicted_, edges_.correction()};
     Duration& sigma = verdict.correction.sigma;
     sigma = root_of_squares(sigma, account.range.width() / range_per_sigma);
-    if (!certain) sigma = root_of_squares(sigma, excess / 2);
+    if (!certain()) sigma = root_of_squares(sigma, excess / 2);
     return verdict;
 }
 

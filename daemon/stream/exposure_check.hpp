@@ -18,6 +18,7 @@ enum class ExposureSource {
     none,          ///< it gives none, or may just have been changed
     setting,       ///< what it was set to
     reading,       ///< its register, now and then, of an exposure that it changes by itself
+    event,         ///< its own events of start and end
     chunk,         ///< data of the frame
     chunk_before,  ///< the same, but what it says is of the frame before
 };
@@ -26,6 +27,12 @@ const char* to_string(ExposureSource source);
 struct ExposureVerdict {
     bool contradicted = false;  ///< the camera exposed for another time
     EdgeCorrection correction;  ///< its sigma contains what no witness has confirmed
+};
+
+/// What the camera says of one frame.
+struct FrameAccount {
+    Duration exposure;  ///< 0: nothing
+    ExposureSource source = ExposureSource::chunk;
 };
 
 /// Not thread-safe.
@@ -49,8 +56,8 @@ class ExposureCheck {
     /// The account of a frame's own data, as far as pairing can use it; 0: not.
     Duration for_pairing(Duration chunk) const;
 
-    /// Of a frame and its exposure, in the order of frames. `chunk`: by the frame's data; 0: none.
-    ExposureVerdict judge(const pairing::Arrival& arrival, Duration chunk,
+    /// Of a frame and its exposure, in the order of frames.
+    ExposureVerdict judge(const pairing::Arrival& arrival, const FrameAccount& frame,
                           const pairing::Exposure& exposure, Duration start_delay);
 
     /// What the camera keeps to at that time; 0: it varies, is unknown, or may just have changed.
@@ -79,7 +86,8 @@ class ExposureCheck {
     static constexpr int votes_to_shift = 5;
 
     void follow_lag(const Measured& before, Duration chunk);
-    Account account_of(const Measured& before, Duration chunk, Duration start_delay);
+    Account account_of(const Measured& before, const FrameAccount& frame, Duration start_delay);
+    bool certain() const;
     Duration excess(LengthRange range) const;
     ExposureVerdict unwitnessed(const Measured& before) const;
 

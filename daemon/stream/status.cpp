@@ -166,6 +166,7 @@ json camera_json(const CameraStatus& status) {
             {"frames_without_trigger", pipeline.frames_without_trigger},
             {"triggers", pipeline.triggers},
             {"triggers_without_frame", pipeline.triggers_without_frame},
+            {"triggers_missed", pipeline.triggers_missed},
             {"exposures_unmeasured", pipeline.unmeasured},
             {"records_doubted", pipeline.records_doubted},
             {"frames_suspect", pipeline.suspect},

@@ -127,7 +127,8 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
-      broadcast_socket_(broadcast_socket) {
+      broadcast_socket_(broadcast_socket),
+      events_(socket) {
     configure_stream();
     server_ = std::thread([this] { serve(); });
 }
@@ -272,6 +273,8 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
         case reg_stream_packet_size:
         case reg_stream_packet_delay:
         case reg_stream_address: configure_stream(); break;
+        case reg_message_port:
+        case reg_message_address: configure_messages(); break;
         case reg_acquisition_start: start_acquisition(); break;
         case reg_acquisition_stop: stop_acquisition(); break;
         case reg_trigger_software:
@@ -295,6 +298,24 @@ void GigeCamera::configure_stream() {
     registers_.write(reg_stream_source_port, std::uint32_t{transmitter_.source_port()});
 }
 
+void GigeCamera::configure_messages() {
+    sockaddr_in destination{};
+    destination.sin_family = AF_INET;
+    destination.sin_port = htons(static_cast<std::uint16_t>(registers_.value(reg_message_port)));
+    destination.sin_addr.s_addr = htonl(registers_.value(reg_message_address));
+    events_.direct_to(destination);
+}
+
+/// If the controller wants to know of such events.
+void GigeCamera::send_event(CameraEventId id, HostTime at, std::uint64_t block_id) {
+    const auto index =
+        static_cast<std::uint32_t>(id) - static_cast<std::uint32_t>(CameraEventId::exposure_start);
+    const auto notification = static_cast<Register>(reg_event_notification + 4 * index);
+    if (registers_.value(notification) == 0 || muted()) return;
+    const auto ticks = static_cast<std::uint64_t>(clock_.device_ns(at) + clock_step_ns_);
+    events_.send(at, {id, block_id, ticks, settings_.extended_ids});
+}
+
 void GigeCamera::start_acquisition() {
     const std::lock_guard lock(mutex_);
     acquiring_ = true;
@@ -312,7 +333,9 @@ void GigeCamera::stop_acquisition() {
 
 void GigeCamera::lose_controller() {
     registers_.write(reg_control_privilege, std::uint32_t{0});
+    registers_.write(reg_message_port, std::uint32_t{0});
     controller_ = {};
+    configure_messages();
     stop_acquisition();
 }
 
@@ -321,6 +344,7 @@ void GigeCamera::power_cycle() {
     registers_.reset();
     controller_ = {};
     configure_stream();
+    configure_messages();
 }
 
 void GigeCamera::free_run(HostTime now) {
@@ -420,11 +444,14 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
     TrueExposure truth;
     {
         const std::lock_guard lock(mutex_);
+        if (acquiring_ && trigger < busy_until_)
+            send_event(CameraEventId::trigger_missed, trigger, 0);
         if (!acquiring_ || trigger < busy_until_) return std::nullopt;
         ++exposures_;
         for (const Fault& fault : board_faults_)
             if (fault.at_exposure == exposures_) afflict_board_(fault);
         if (active_fault(FaultKind::ignore_trigger) != nullptr) {
+            send_event(CameraEventId::trigger_missed, trigger, 0);
             if (settings_.ids_count_ignored) next_block_id();
             return std::nullopt;
         }
@@ -443,6 +470,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
                              std::bit_cast<std::uint32_t>(static_cast<float>(exposure.ns) * 1e-3F));
         busy_until_ = std::max(
             truth.end, trigger + Duration{std::llround(settings_.shortest_period_us * 1e3)});
+        send_event(CameraEventId::exposure_start, truth.start, block_id_);
+        send_event(CameraEventId::exposure_end, truth.end, block_id_);
         frame.block_id = block_id_;
         frame.serial = exposures_;
         if (active_fault(FaultKind::drop_frame) != nullptr) frame.serial = 0;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "camera_view.hpp"
+#include "event_sender.hpp"
 #include "gige_registers.hpp"
 #include "ground_truth.hpp"
 #include "gvsp_transmitter.hpp"
@@ -57,6 +58,8 @@ class GigeCamera final : public TriggeredCamera {
     void start_acquisition();
     void stop_acquisition();
     void configure_stream();
+    void configure_messages();
+    void send_event(CameraEventId id, HostTime at, std::uint64_t block_id);
     void power_cycle();
     void free_run(HostTime now);
     bool pending(std::uint16_t command, std::span<const std::uint8_t> body) const;
@@ -97,6 +100,7 @@ class GigeCamera final : public TriggeredCamera {
     std::atomic<bool> stop_{false};
     int socket_;
     int broadcast_socket_;  ///< receives discovery; -1 on loopback, which does not broadcast
+    EventSender events_;
     std::thread server_;
 };
 

@@ -30,12 +30,15 @@ enum Register : std::uint32_t {
     reg_user_name = 0x00E8,
     reg_xml_url = 0x0200,
     reg_interface_count = 0x0600,
+    reg_message_count = 0x0900,
     reg_stream_count = 0x0904,
     reg_capabilities = 0x0934,
     reg_heartbeat_ms = 0x0938,
     reg_tick_high = 0x093C,
     reg_tick_low = 0x0940,
     reg_control_privilege = 0x0A00,
+    reg_message_port = 0x0B00,
+    reg_message_address = 0x0B10,
     reg_stream_port = 0x0D00,
     reg_stream_packet_size = 0x0D04,
     reg_stream_packet_delay = 0x0D08,
@@ -71,6 +74,8 @@ enum Register : std::uint32_t {
     reg_chunk_enable = 0x10068,
     reg_temperature = 0x1006C,
     reg_exposure_limit = 0x10070,
+    reg_event_selector = 0x10074,
+    reg_event_notification = 0x10078,  ///< one register for each event
 
     reg_xml = 0x20000,
 };

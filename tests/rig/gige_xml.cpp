@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "event_sender.hpp"
 #include "gige_registers.hpp"
 
 namespace versavis::rig {
@@ -69,6 +70,27 @@ class XmlWriter {
         nodes_ +=
             fmt::format("<Boolean Name=\"{0}\"><pValue>{0}Register</pValue></Boolean>\n", name);
         int_register(name, address, true);
+    }
+
+    /// One register for each value of the selector.
+    void selected(const std::string& name, Register address, const std::string& selector,
+                  const Entries& entries) {
+        list(name);
+        nodes_ += fmt::format("<Enumeration Name=\"{}\">\n", name);
+        for (const auto& [entry, value] : entries)
+            nodes_ +=
+                fmt::format("<EnumEntry Name=\"{}\"><Value>{}</Value></EnumEntry>\n", entry, value);
+        nodes_ += fmt::format(
+            "<pValue>{0}Register</pValue></Enumeration>\n<IntReg Name=\"{0}Register\"><Address>"
+            "{1:#x}</Address><pIndex Offset=\"4\">{2}Register</pIndex><Length>4</Length>"
+            "<AccessMode>RW</AccessMode><pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>"
+            "BigEndian</Endianess></IntReg>\n",
+            name, std::uint32_t{address}, selector);
+    }
+
+    void event(const std::string& name, CameraEventId id) {
+        nodes_ += fmt::format("<Port Name=\"Event{}Port\"><EventID>{:x}</EventID></Port>\n", name,
+                              static_cast<std::uint16_t>(id));
     }
 
     void chunk_real(const std::string& name, std::uint32_t id) {
@@ -162,6 +184,13 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.enumeration("ChunkSelector", reg_chunk_selector, {{"ExposureTime", 0}});
     xml.boolean("ChunkEnable", reg_chunk_enable);
     xml.chunk_real("ChunkExposureTime", chunk_id_exposure);
+    xml.enumeration("EventSelector", reg_event_selector,
+                    {{"ExposureStart", 0}, {"ExposureEnd", 1}, {"FrameTriggerMissed", 2}});
+    xml.selected("EventNotification", reg_event_notification, "EventSelector",
+                 {{"Off", 0}, {"On", 1}});
+    xml.event("ExposureStart", CameraEventId::exposure_start);
+    xml.event("ExposureEnd", CameraEventId::exposure_end);
+    xml.event("FrameTriggerMissed", CameraEventId::trigger_missed);
     xml.real("DeviceTemperature", reg_temperature, "C", -100, 200);
     xml.integer("TLParamsLocked", reg_tl_params_locked, "<Min>0</Min><Max>1</Max>");
     xml.integer("GevSCPSPacketSize", reg_stream_packet_size, "<Min>256</Min><Max>16000</Max>");

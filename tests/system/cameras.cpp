@@ -171,6 +171,48 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
     CHECK(judge(stack, 2).ok);
 }
 
+TEST_CASE("cameras: events of the camera witness the length, and name a trigger that it missed") {
+    StackSettings settings{
+        "events",
+        57,
+        2,
+        20,
+        "exposure_us = 4000\nexposure_swing = 0.5",
+        fault("cam0", "ignore_trigger", 80, "count = 3") + fault("cam1", "ignore_trigger", 90),
+        "chunks = false"};
+    settings.scenarios = {"", "extended_ids = true"};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return healthy(s) && s["cameras"][0]["triggers_missed"] == 3 &&
+               s["cameras"][1]["triggers_missed"] == 1;
+    });
+    for (const auto& camera : status["cameras"]) CHECK(camera["exposure_source"] == "event");
+    judge(stack, 2);
+}
+
+TEST_CASE("cameras: a slow falling edge of the exposure line is taken off, by event or register") {
+    StackSettings settings{"slow-edge", 63, 3, 20, "exposure_us = 2000\nline_falling_us = 400",
+                           "",          ""};
+    settings.scenarios = {"exposure_swing = 0.5", "exposure_swing = 0.5", ""};
+    settings.extras = {"", "chunks = false", ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        for (const auto& camera : s["cameras"])
+            if (std::abs(camera["edge_correction_ns"].template get<int>() - 200'000) > 5'000 ||
+                camera["frames_published"].template get<int>() < 20)
+                return false;
+        return true;
+    });
+    CHECK(status["cameras"][0]["exposure_source"] == "chunk");
+    CHECK(status["cameras"][1]["exposure_source"] == "event");
+    CHECK(status["cameras"][2]["exposure_source"] == "setting");
+    judge(stack, 2);
+}
+
 TEST_CASE("cameras: which instant of a changing exposure a camera stamps is found out, and shown") {
     const std::string changing =
         "exposure_us = 8000\nexposure_swing = 0.7\n"

@@ -28,7 +28,7 @@ struct Bench {
         exposure.earliest_on_host = now = now + period;
         pairing::Arrival arrival;
         arrival.block_id = ++block_id;
-        return check.judge(arrival, chunk, exposure, microseconds(20));
+        return check.judge(arrival, {chunk, source}, exposure, microseconds(20));
     }
 
     bool contradicts(Duration length, Duration chunk = {}) {
@@ -40,6 +40,7 @@ struct Bench {
     }
 
     ExposureCheck check;
+    ExposureSource source = ExposureSource::chunk;  ///< of what `chunk` says
     HostTime now = begin;
     std::uint64_t block_id = 0;
 };
@@ -89,6 +90,16 @@ TEST_CASE("exposure_check: a frame's own data are tight at once, after any chang
     CHECK_FALSE(bench.check.wants_readings());
     CHECK(bench.contradicts(microseconds(20030), milliseconds(20)));
     CHECK(bench.sigma(milliseconds(3), milliseconds(3)) < microseconds(5));
+}
+
+TEST_CASE("exposure_check: the camera's events are as good as data of the frame") {
+    Bench bench;
+    bench.source = ExposureSource::event;
+    for (int i = 0; i < 100; ++i)
+        CHECK_FALSE(bench.contradicts(microseconds(2000 + i * 10), microseconds(2000 + i * 10)));
+    CHECK(bench.check.source() == ExposureSource::event);
+    CHECK_FALSE(bench.check.wants_readings());
+    CHECK(bench.contradicts(microseconds(3020), microseconds(3000)));
 }
 
 TEST_CASE("exposure_check: every second or third end that is late is withheld, and no other") {
