@@ -49,7 +49,7 @@ TEST_CASE("scenario: what is wrong is told with its place") {
                Contains(":2:") && Contains("3 numbers"));
     CHECK_THAT(refusal("[motion]\nlowest_hz = 3\nhighest_hz = 2\n"),
                Contains(":3:") && Contains("below 'lowest_hz'"));
-    CHECK_THAT(refusal("[leds]\noutput = \"light\"\n"), Contains(":2:") && Contains("\"test\""));
+    CHECK_THAT(refusal("[leds]\noutput = \"light\"\n"), Contains(":2:") && Contains("one of test"));
     CHECK_THAT(refusal(camera + "leds = [0, 0, 9, 9]\n"), Contains(":4:") && Contains("[leds]"));
     CHECK_THAT(refusal("[leds]\n" + camera + "blur_steps = 17\n"), Contains(":5:"));
 }
