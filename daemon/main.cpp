@@ -190,6 +190,8 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
+    if (as_json && !check_only && probe_options.device.empty())
+        return app.exit(CLI::RequiresError("--json", "--check-config or --probe-camera")), EX_USAGE;
     if (!probe_options.device.empty()) {
         probe_options.json = as_json;
         if (app.count("--config") > 0) probe_options.configuration = path;

@@ -417,13 +417,21 @@ bool Camera::restarted(Health& health) const {
     return privilege && (*privilege & gvcp_controlled) == 0;
 }
 
-/// What reads otherwise than it was set up, as a hint; empty: nothing does.
+bool Camera::mute() const {
+    return host_now() - pipeline_.report().last_frame > period_of(configuration_) * 2;
+}
+
+/// What reads otherwise than it was set up, as a hint; empty: nothing does. A camera that is mute
+/// would hold this thread for seconds with each reading: it is asked only while frames come, and
+/// not again after one that fails.
 std::string Camera::changed_settings(const AravisNodeMap& nodes) {
     std::string hint;
+    if (mute()) return hint;
     for (const auto& [feature, value] : watched_) {
         const bool own = feature == exposure_feature_ && exposure_ != nullptr;
         const std::string now = own ? value : nodes.read(feature);
-        if (now.empty() || same_value(now, value)) continue;
+        if (now.empty()) return hint;
+        if (same_value(now, value)) continue;
         hint = fmt::format(
             "{} changed from {} to {}, not by this service: close the program that "
             "set it, or power the camera off and on",
@@ -495,10 +503,8 @@ void Camera::control_exposure(AravisNodeMap& nodes) {
 
 /// A camera that is mute would hold this thread for seconds: it is asked only while frames come.
 void Camera::read_exposure(const AravisNodeMap& nodes) {
-    const HostTime now = host_now();
-    next_reading_ = now + exposure_reading_interval;
-    const bool mute = now - pipeline_.report().last_frame > period_of(configuration_) * 2;
-    if (exposure_feature_.empty() || mute) return;
+    next_reading_ = host_now() + exposure_reading_interval;
+    if (exposure_feature_.empty() || mute()) return;
     const double us = nodes.read_number(exposure_feature_).value_or(0);
     pipeline_.read_exposure({std::llround(us * 1e3)}, host_now());
 }

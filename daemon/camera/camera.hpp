@@ -115,6 +115,7 @@ class Camera {
     void control_exposure(AravisNodeMap& nodes);
     void read_exposure(const AravisNodeMap& nodes);
     bool silent(HostTime began) const;
+    bool mute() const;  ///< no frame comes
     void describe(const CameraSetup& setup);
     void lose();
     void set_state(CameraState state, const std::string& hint);
@@ -141,7 +142,7 @@ class Camera {
     std::vector<std::pair<std::string, std::string>>
         watched_;                        ///< features, and the values that they were set up with
     std::vector<std::string> refusals_;  ///< that were logged
-    HostTime next_reading_;    ///< of the exposure
+    HostTime next_reading_;              ///< of the exposure
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
     Retry retry_;

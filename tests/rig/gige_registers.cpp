@@ -30,6 +30,7 @@ GigeRegisters::GigeRegisters(const Identity& identity)
 void GigeRegisters::reset() {
     const std::lock_guard lock(mutex_);
     std::fill(memory_.begin(), memory_.end(), std::uint8_t{0});
+    line_modes_ = {};
     const std::uint32_t ip = ntohl(inet_addr(identity_.address.c_str()));
     set(reg_version, 0x00010002);
     set(reg_device_mode, 0x80000001);  // big-endian, UTF-8
@@ -68,6 +69,12 @@ void GigeRegisters::set(Register address, std::uint32_t value) {
     std::memcpy(memory_.data() + address, &wire, sizeof wire);
 }
 
+std::uint32_t GigeRegisters::peek(Register address) const {
+    std::uint32_t wire = 0;
+    std::memcpy(&wire, memory_.data() + address, sizeof wire);
+    return ntohl(wire);
+}
+
 void GigeRegisters::set_text(Register address, const std::string& text, std::size_t capacity) {
     std::memcpy(memory_.data() + address, text.data(), std::min(text.size(), capacity - 1));
 }
@@ -83,6 +90,10 @@ bool GigeRegisters::read(std::uint32_t address, std::uint32_t& value) const {
 bool GigeRegisters::write(std::uint32_t address, std::uint32_t value) {
     const std::lock_guard lock(mutex_);
     if (address < reg_user_name || address >= reg_xml) return false;  // constant, or not there
+    if (address == reg_line_selector) {
+        line_modes_[peek(reg_line_selector) % line_modes_.size()] = peek(reg_line_mode);
+        set(reg_line_mode, line_modes_[value % line_modes_.size()]);
+    }
     set(static_cast<Register>(address), value);
     if (address == reg_chunk_mode)
         set(reg_payload_size, identity_.width * identity_.height + (value != 0 ? chunk_bytes : 0));

@@ -3,6 +3,7 @@
 // names them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <mutex>
 #include <span>
@@ -119,12 +120,14 @@ class GigeRegisters {
 
  private:
     void set(Register address, std::uint32_t value);
+    std::uint32_t peek(Register address) const;  ///< under the lock
     void set_text(Register address, const std::string& text, std::size_t capacity);
 
     Identity identity_;
     GigeDescription description_;
     mutable std::mutex mutex_;
     std::vector<std::uint8_t> memory_;
+    std::array<std::uint32_t, 2> line_modes_{};  ///< of the lines that are not selected
 };
 
 /// The GenICam description of these registers.
