@@ -235,10 +235,10 @@ CameraResult<> Camera::set_up_and_stream(ArvCamera* camera, const std::atomic<bo
 
 void Camera::describe(const CameraSetup& setup) {
     std::vector<std::string> refusals;
-    for (const StepResult& step : setup.steps)
-        if (!step.needed &&
-            (step.outcome == StepOutcome::refused || step.outcome == StepOutcome::differs))
-            refusals.push_back(step.node() + ": " + step.reason);
+    for (const StepResult& result : setup.steps)
+        if (!result.needed &&
+            (result.outcome == StepOutcome::refused || result.outcome == StepOutcome::differs))
+            refusals.push_back(result.node() + ": " + result.reason);
     const std::lock_guard lock(mutex_);
     report_.vendor = setup.vendor;
     report_.model = setup.model;

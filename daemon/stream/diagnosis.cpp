@@ -602,21 +602,22 @@ Diagnosis diagnose_board(const Status& status) {
     const BoardReport& board = status.board;
     const bool in_time = young(status.started, status.now);
     const bool known = board.connections > 0;
+    const bool quiet = known && status.clock.since_contact > board_silence;
+    const std::string silence =
+        fmt::format("nothing came from it for {:.1f} s: check its cable and power",
+                    static_cast<double>(status.clock.since_contact.ns) * 1e-9);
     if (!status.board_needed) return {};
     switch (board.state) {
         case BoardState::absent: return conclude(Fault::board_gone, board.hint, known, in_time);
         case BoardState::handshake:
             return conclude(known ? Fault::board_silent : Fault::starting,
-                            "it is there, and is being asked who it is", known, in_time);
+                            quiet ? silence : "it is there, and is being asked who it is", known,
+                            in_time);
         case BoardState::incompatible:
         case BoardState::refused: return conclude(Fault::board_refuses, board.hint, true, in_time);
         case BoardState::running: break;
     }
-    if (status.clock.since_contact > board_silence)
-        return conclude(Fault::board_silent,
-                        fmt::format("nothing came from it for {:.1f} s: check its cable and power",
-                                    static_cast<double>(status.clock.since_contact.ns) * 1e-9),
-                        known, in_time);
+    if (quiet) return conclude(Fault::board_silent, silence, known, in_time);
     return conclude(Fault::none, board_remark(status), known, in_time);
 }
 

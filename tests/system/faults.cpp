@@ -92,7 +92,7 @@ const std::vector<Case> cases{
     {"the exposure line is cut", "cam0", "strobe_missing", "exposure line", true,
      "kind = 'cut_strobe'\ncount = 80"},
     {"the trigger cable is cut", "cam0", "no_exposure", "output 0", true,
-     "kind = 'ignore_trigger'\ncount = 80"},
+     "kind = 'ignore_trigger'\ncount = 200"},
     {"trigger cables are swapped", "cam1", "unproved", "swapped", false, "", "", "", "", nullptr,
      Scene::swapped},
     {"unproved frames are published as suspect", "cam0", "unproved", "do not follow", false, "", "",

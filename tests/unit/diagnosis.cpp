@@ -169,7 +169,7 @@ TEST_CASE("diagnosis: a board that does not answer, or refuses, is the cause as 
     check(bench.board(), Fault::board_silent, "1.2 s");
     check(bench.camera(), Fault::board_silent, "does not answer");
     bench.status.board.state = BoardState::handshake;
-    check(bench.board(), Fault::board_silent, "asked");
+    check(bench.board(), Fault::board_silent, "nothing came from it");
     bench.status.board.state = BoardState::refused;
     bench.status.board.hint = "output 3 is used twice";
     check(bench.board(), Fault::board_refuses, "used twice");
