@@ -172,8 +172,7 @@ bool enable_chunks(AravisNodeMap& nodes, const CameraPreset& preset,
     return false;
 }
 
-}  // namespace
-
+/// Names the camera in `setup`, and chooses its preset.
 Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
                                 const std::vector<CameraPreset>& presets, CameraSetup& setup) {
     setup.vendor = name_of(camera, arv_camera_get_vendor_name);
@@ -183,6 +182,8 @@ Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
     if (chosen) setup.preset = chosen->name;
     return chosen;
 }
+
+}  // namespace
 
 Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
                          const CameraConfiguration& configuration,

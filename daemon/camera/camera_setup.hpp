@@ -31,10 +31,6 @@ struct CameraSetup {
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by configuration or preset
 };
 
-/// Names the camera in `setup`, and chooses its preset.
-Expected<CameraPreset> identify(ArvCamera* camera, const std::string& preset,
-                                const std::vector<CameraPreset>& presets, CameraSetup& setup);
-
 /// `setup` holds what was found and done, also after an error. Errors name the feature and what the
 /// camera allows, or all that the preset needs and the camera lacks or does not keep.
 Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
