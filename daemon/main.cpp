@@ -111,16 +111,13 @@ struct ProbeOptions {
     bool json = false;
 };
 
-/// The camera as the file has it, or as a configuration with only this device would.
-CameraConfiguration camera_to_probe(const std::string& device, const std::string& path) {
+/// The camera as the configuration has it, or as one with only this device would.
+CameraConfiguration camera_to_probe(const std::string& device, const Configuration& configuration) {
+    for (const CameraConfiguration& known : configuration.cameras)
+        if (known.device == device || known.name == device) return known;
     CameraConfiguration camera;
     camera.name = camera.device = device;
     camera.max_exposure_us = 1e6 / camera.rate_hz;
-    const auto configuration = path.empty() ? Expected<Configuration, TomlProblems>(Configuration{})
-                                            : load_configuration(path);
-    if (!configuration) return camera;
-    for (const CameraConfiguration& known : configuration->cameras)
-        if (known.device == device || known.name == device) return known;
     return camera;
 }
 
@@ -135,11 +132,17 @@ int write_bundle(const std::string& path, const std::string& text) {
 
 /// Sets up one camera or all, and reports. The exit code says whether all of them are ready.
 int probe(const ProbeOptions& options) {
-    if (!options.configuration.empty())
-        if (const auto read = load_configuration(options.configuration); !read) {
+    Configuration configuration;
+    if (!options.configuration.empty()) {
+        auto read = load_configuration(options.configuration);
+        if (!read) {
             log_problems(read.error());
             return EX_CONFIG;
         }
+        configuration = std::move(*read);
+    }
+    const std::filesystem::path own = configuration.preset_directory;
+    const auto presets = own.empty() ? default_preset_directory() : own;
     const auto devices =
         options.device == "all" ? list_cameras() : std::vector<std::string>{options.device};
     if (devices.empty()) {
@@ -150,8 +153,8 @@ int probe(const ProbeOptions& options) {
     std::string all;
     for (const std::string& device : devices) {
         const bool whole = !options.bundle.empty();
-        const ProbeReport report = probe_camera(camera_to_probe(device, options.configuration),
-                                                default_preset_directory(), whole);
+        const ProbeReport report =
+            probe_camera(camera_to_probe(device, configuration), presets, whole);
         if (!report.problem.empty()) code = EX_UNAVAILABLE;
         fmt::print("{}", options.json ? to_json(report) + "\n" : to_text(report));
         std::fflush(stdout);
