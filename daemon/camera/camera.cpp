@@ -116,10 +116,13 @@ bool Camera::ended_by(HostTime deadline) {
 CameraReport Camera::report() const {
     const std::lock_guard lock(mutex_);
     CameraReport report = report_;
-    if (setting_up_since_.ns != 0 && host_now() - setting_up_since_ > set_up_patience) {
+    const Duration setting_up = host_now() - setting_up_since_;
+    if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
         report.state = CameraState::failed;
-        report.hint =
-            configuration_.device + ": the camera does not finish its answers; power it off and on";
+        report.hint = fmt::format(
+            "{}: it has been set up for {} s: its control channel is slow, or it does not finish "
+            "its answers; if that lasts, power it off and on",
+            configuration_.device, setting_up.ns / seconds(1).ns);
     }
     return report;
 }

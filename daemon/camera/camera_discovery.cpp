@@ -10,9 +10,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Until a camera that answers to its address is taken for absent. At half, a busy one may be
-/// missed; at twice, its state is known later.
-constexpr Duration address_patience = milliseconds(300);
+/// Until a camera that is asked by its address is taken for absent: some answer after a third of a
+/// second. At half, one with a slow control channel may be missed; at twice, the state of one that
+/// is absent is known a second later.
+constexpr Duration address_patience = seconds(1);
 
 /// The same for one that is asked by broadcast, before USB is looked at, and after: cameras may
 /// wait a second with their answer. At half, slow ones are never found; at twice, the state is

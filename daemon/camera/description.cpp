@@ -21,7 +21,7 @@ constexpr std::uint64_t largest_size = 8 << 20;
 
 /// For one block of memory. At half, a camera that is busy is given up; at twice, a mute one holds
 /// its thread up for longer.
-constexpr Duration block_patience = seconds(1);
+constexpr Duration block_patience = seconds(3);
 
 const char* const no_description = "it cannot be used: ask its maker for another firmware";
 

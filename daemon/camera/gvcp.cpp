@@ -28,12 +28,13 @@ constexpr std::size_t header_size = 8;
 constexpr std::size_t discovery_size = 0xF8;
 constexpr std::size_t block = 512;  ///< the most that a device must deliver at once
 
-/// Between two questions to all. At half, twice the packets; at twice, a camera that has booted is
-/// seen 50 ms later.
+/// Between the first two questions to one address, and then twice as long each time, because a slow
+/// camera answers all of them before anything else. At half, twice the packets; at twice, a camera
+/// that has booted is seen 50 ms later.
 constexpr Duration ask_interval = milliseconds(50);
 
-/// Until a question is asked again. At half, a slow camera gets each one twice; at twice, a lost
-/// packet costs twice the time.
+/// Until a question is asked again, of a camera that has not shown that it takes longer. At half, a
+/// slow camera gets each one twice; at twice, a lost packet costs twice the time.
 constexpr Duration answer_time = milliseconds(200);
 
 /// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits 20 ms longer.
@@ -195,10 +196,11 @@ std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancell
     for (const Socket& socket : sockets_) polled.push_back({socket.descriptor, POLLIN, 0});
     const HostTime deadline = host_now() + patience;
     // All that a broadcast reaches answers at once: it is not repeated as often.
-    const Duration interval = address_ ? ask_interval : ask_interval * 10;
+    Duration interval = address_ ? ask_interval : ask_interval * 10;
     for (HostTime asked; host_now() < deadline && !cancelled();) {
         if (host_now() - asked >= interval) {
             ask();
+            if (asked.ns != 0 && address_) interval = interval * 2;
             asked = host_now();
         }
         if (!readable(polled, std::min(deadline, asked + interval), cancelled)) continue;
@@ -209,7 +211,7 @@ std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancell
 }
 
 GvcpClient::GvcpClient(in_addr interface, in_addr address)
-    : name_(to_text(address)), socket_(open_socket(interface)) {
+    : name_(to_text(address)), socket_(open_socket(interface)), repeat_after_(answer_time) {
     const sockaddr_in to = endpoint(address, port);
     ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to);
 }
@@ -230,10 +232,11 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
     put(packet, id_, 2);
     packet.insert(packet.end(), body.begin(), body.end());
     std::vector<pollfd> polled{{socket_, POLLIN, 0}};
-    const HostTime deadline = host_now() + patience;
+    const HostTime asked = host_now();
+    const HostTime deadline = asked + patience;
     while (host_now() < deadline && !cancelled()) {
         ::send(socket_, packet.data(), packet.size(), 0);
-        const HostTime again = std::min(deadline, host_now() + answer_time);
+        const HostTime again = std::min(deadline, host_now() + repeat_after_);
         while (readable(polled, again, cancelled)) {
             std::uint8_t answer[header_size + block + 4];
             const ssize_t size = ::recv(socket_, answer, sizeof answer, 0);
@@ -241,6 +244,7 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
             const bool ours = size >= static_cast<ssize_t>(header_size) &&
                               half_at(answer + 2) == command + 1 && half_at(answer + 6) == id_;
             if (!ours) continue;  // late, or "pending"
+            repeat_after_ = std::max(answer_time, (host_now() - asked) * 2);
             if (half_at(answer) != 0 || size < static_cast<ssize_t>(header_size + answer_size))
                 return std::nullopt;
             return std::vector<std::uint8_t>(answer + header_size,

@@ -83,6 +83,7 @@ class GvcpClient {
     std::string name_;
     int socket_;
     std::uint16_t id_ = 0;
+    Duration repeat_after_;  ///< twice the time that the newest answer took, or what is usual
 };
 
 /// GigE Vision bootstrap registers.

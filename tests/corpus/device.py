@@ -9,6 +9,7 @@ import select
 import socket
 import struct
 import threading
+import time
 
 from node_map import INTEGERS, REGISTERS, NodeMap, number
 
@@ -40,7 +41,7 @@ class Device:
     """Serves `description` at `address`. `absent` names features and entries (as
     "LineSelector.Out1") that this model does not have."""
 
-    def __init__(self, address, vendor, model, description, archive=None, absent=()):
+    def __init__(self, address, vendor, model, description, archive=None, absent=(), delay_s=0):
         self.nodes = NodeMap(description)
         self.url_data = archive or description
         self.xml_at = 0x7F000000
@@ -62,6 +63,7 @@ class Device:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((address, PORT))
         self.stopping = False
+        self.delay_s = delay_s  # of the answer to who is there
         self.thread = threading.Thread(target=self.serve, daemon=True)
         self.thread.start()
 
@@ -393,6 +395,8 @@ class Device:
             command, size, identity = struct.unpack(">HHH", packet[2:8])
             with self.lock:
                 status, body = self.answer(command, packet[8:8 + size])
+            if command == DISCOVERY:
+                time.sleep(self.delay_s)
             if packet[1] & 1:
                 self.socket.sendto(struct.pack(">HHHH", status, command + 1, len(body), identity) +
                                    body, sender)

@@ -123,7 +123,7 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       clock_(zero, settings.clock),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
                   settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c,
-                  settings.hostility}),
+                  settings.events, settings.hostility}),
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
@@ -463,6 +463,9 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         if (active_fault(FaultKind::change_size) != nullptr)
             registers_.resize(settings_.width, settings_.height / 2);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
+        if (active_fault(FaultKind::double_exposure) != nullptr)
+            registers_.write(reg_exposure_time,
+                             std::bit_cast<std::uint32_t>(2 * registers_.real(reg_exposure_time)));
         const Duration exposure = exposure_at(trigger);
         truth.end = truth.start + exposure;
         if (registers_.value(reg_exposure_auto) != 0)

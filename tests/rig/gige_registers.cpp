@@ -46,7 +46,7 @@ void GigeRegisters::reset() {
     set_text(reg_xml_url, description_.url, 512);
     std::memcpy(memory_.data() + reg_xml, description_.bytes.data(), description_.bytes.size());
     set(reg_interface_count, 1);
-    set(reg_message_count, 1);
+    set(reg_message_count, identity_.events ? 1 : 0);
     set(reg_stream_count, 1);
     set(reg_capabilities, capability_write_memory | capability_resend);
     set(reg_heartbeat_ms, gige_default_heartbeat_ms);

@@ -100,6 +100,7 @@ class GigeRegisters {
         double exposure_us;
         bool exposure_auto;
         double temperature_c = 45;
+        bool events = true;
         Hostility hostility = Hostility::none;
     };
     explicit GigeRegisters(const Identity& identity);

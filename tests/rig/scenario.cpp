@@ -69,6 +69,7 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("packet_loss", camera.packet_loss, 0, 1);
     reader.read("extended_ids", camera.extended_ids);
     reader.read("ids_count_ignored", camera.ids_count_ignored);
+    reader.read("events", camera.events);
     reader.read("early_leader", camera.early_leader);
     reader.read("shortest_period_us", camera.shortest_period_us, 0, 1e7);
     reader.read("light", camera.light, 0, 1000);
@@ -115,6 +116,7 @@ Fault read_fault(TableReader& reader) {
                               {"jump_clock", FaultKind::jump_clock},
                               {"change_size", FaultKind::change_size},
                               {"stop_clock", FaultKind::stop_clock},
+                              {"double_exposure", FaultKind::double_exposure},
                               {"ignore_trigger", FaultKind::ignore_trigger},
                               {"camera_mute", FaultKind::camera_mute},
                               {"camera_reboot", FaultKind::camera_reboot},

@@ -62,6 +62,7 @@ struct CameraScenario {
     double packet_loss = 0;          ///< fraction
     bool extended_ids = false;       ///< block ids of 64 bits
     bool ids_count_ignored = false;  ///< an ignored trigger also takes a block id
+    bool events = true;              ///< it has a message channel, for those of its exposures
     bool early_leader = false;       ///< a frame's leader is sent when its exposure begins
     double shortest_period_us = 0;   ///< triggers that come sooner are ignored
     double light =
@@ -78,23 +79,24 @@ struct CameraScenario {
 };
 
 enum class FaultKind {
-    drop_frame,      ///< the exposure happens, no packet leaves
-    drop_leader,     ///< the frame's first packet never leaves, not even when it is asked for again
-                     ///< ...
-    drop_last,       ///< ... nor its last ones
-    half_frame,      ///< the frame ends in the middle, as if it were whole
-    swap_frames,     ///< the frame leaves after the next one
-    repeat_id,       ///< the frame has the number of the one before
-    restart_ids,     ///< numbers start again
-    jump_clock,      ///< the camera's clock steps by `seconds`, from this frame on
-    change_size,     ///< from this frame on they have half the height
-    stop_clock,      ///< the camera's clock stands still, since the frame before
-    ignore_trigger,  ///< the camera does not expose
-    camera_mute,     ///< no answer and no packet for `seconds`
-    camera_reboot,   ///< mute for `seconds`, then all registers as after power-up
-    lose_packets,    ///< a `share` of the packets never leaves, not even when asked for again
-    block_large,     ///< no packet above 1500 bytes gets through
-    cut_strobe,      ///< the exposure line shows nothing
+    drop_frame,   ///< the exposure happens, no packet leaves
+    drop_leader,  ///< the frame's first packet never leaves, not even when it is asked for again
+                  ///< ...
+    drop_last,    ///< ... nor its last ones
+    half_frame,   ///< the frame ends in the middle, as if it were whole
+    swap_frames,  ///< the frame leaves after the next one
+    repeat_id,    ///< the frame has the number of the one before
+    restart_ids,  ///< numbers start again
+    jump_clock,   ///< the camera's clock steps by `seconds`, from this frame on
+    change_size,  ///< from this frame on they have half the height
+    stop_clock,   ///< the camera's clock stands still, since the frame before
+    double_exposure,  ///< the camera doubles its ExposureTime by itself
+    ignore_trigger,   ///< the camera does not expose
+    camera_mute,      ///< no answer and no packet for `seconds`
+    camera_reboot,    ///< mute for `seconds`, then all registers as after power-up
+    lose_packets,     ///< a `share` of the packets never leaves, not even when asked for again
+    block_large,      ///< no packet above 1500 bytes gets through
+    cut_strobe,       ///< the exposure line shows nothing
     // Of the board, for `seconds`; `camera` names whose exposures count.
     board_reset,   ///< the board restarts with another nonce
     board_gone,    ///< it is unplugged

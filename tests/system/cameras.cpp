@@ -298,6 +298,31 @@ TEST_CASE("cameras: a share of the link is planned for each, and too many are sa
     CHECK(judge(stack, 2).ok);
 }
 
+TEST_CASE("cameras: an exposure that changes without the service is named, and frames go on") {
+    StackSettings settings{"changed",
+                           64,
+                           1,
+                           20,
+                           "exposure_us = 3000\nevents = false",
+                           fault("cam0", "double_exposure", 60),
+                           ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        const auto& camera = s["cameras"][0];
+        return camera["hint"].template get<std::string>().find(
+                   "ExposureTime changed from 3000 "
+                   "to 6000") != std::string::npos &&
+               camera["exposure_ns"].template get<std::int64_t>() > 5'900'000;
+    });
+    const auto published = status["cameras"][0]["frames_published"].get<int>();
+    stack.wait_for_status([&](const auto& s) {
+        return s["cameras"][0]["frames_published"].template get<int>() > published + 20;
+    });
+    judge(stack, 1);
+}
+
 TEST_CASE("cameras: what a camera lacks, and who else has it, is its state") {
     StackSettings settings{"states", 57, 3, 20, "temperature_c = 90", "", ""};
     settings.extras = {"[camera.features]\nPixelFormat = \"Mono12\"\n", "trigger_line = \"Line7\"",
