@@ -272,7 +272,6 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     exposure_feature_ = setup.exposure_feature;
     const Duration exposure = fixed_exposure(nodes, exposure_feature_);
     pipeline_.set_camera_exposure(exposure, {});  // it takes no frame yet
-    camera_exposure_ = exposure;
     if (configuration_.auto_exposure.enabled) {
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
@@ -440,13 +439,6 @@ std::string Camera::changed_settings(const AravisNodeMap& nodes) {
             "set it, or power the camera off and on",
             feature, value, now);
     }
-    // The exposure as it is now is what frames must show.
-    if (exposure_ == nullptr && !exposure_feature_.empty())
-        if (const Duration exposure = fixed_exposure(nodes, exposure_feature_);
-            exposure != camera_exposure_) {
-            camera_exposure_ = exposure;
-            pipeline_.set_camera_exposure(exposure, host_now());
-        }
     return hint;
 }
 

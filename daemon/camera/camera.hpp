@@ -138,7 +138,6 @@ class Camera {
     std::unique_ptr<FrameMeter> meter_;
     std::unique_ptr<AutoExposure> exposure_;
     std::string exposure_feature_;
-    Duration camera_exposure_;  ///< as it is set; 0: it varies
     std::vector<std::pair<std::string, std::string>>
         watched_;                        ///< features, and the values that they were set up with
     std::vector<std::string> refusals_;  ///< that were logged

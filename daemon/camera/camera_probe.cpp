@@ -93,7 +93,7 @@ ProbeReport probe_camera(const CameraConfiguration& configuration,
         report.problem = presets.error().message();
         return report;
     }
-    DescriptionVetting descriptions(own_program, std::filesystem::temp_directory_path() / "none");
+    DescriptionVetting descriptions(own_program, "/dev/null");  // nothing is kept
     DeviceClaims claims;
     std::timed_mutex aravis;
     auto opened = open_camera(configuration.name, configuration.device,
