@@ -435,8 +435,8 @@ std::string Camera::changed_settings(const AravisNodeMap& nodes) {
         if (now.empty()) return hint;
         if (same_value(now, value)) continue;
         hint = fmt::format(
-            "{} changed from {} to {}, not by this service: close the program that "
-            "set it, or power the camera off and on",
+            "{} changed from {} to {}, not by this service: close the program that set it, or "
+            "power the camera off and on",
             feature, value, now);
     }
     return hint;

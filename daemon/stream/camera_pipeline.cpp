@@ -87,10 +87,10 @@ void CameraPipeline::pair_without_clock() {
     begin_anew();
     pairing_.set_limits(limits_);
     tell(limits_);
-    unsaid_.push_back({LogLevel::warning,
-                       fmt::format("its clock runs {:.4g} times as fast as it says: frames are "
-                                   "paired without it",
-                                   answers_.report().clock_rate)});
+    log_later(LogLevel::warning,
+              fmt::format("its clock runs {:.4g} times as fast as it says: frames are "
+                          "paired without it",
+                          answers_.report().clock_rate));
 }
 
 void CameraPipeline::count_refusal(EventReason reason) {
@@ -281,17 +281,21 @@ void CameraPipeline::add(const CameraEvent& event) {
     }
     ++report_.triggers_missed;
     if (std::exchange(missed_said_, true)) return;
-    unsaid_.push_back({LogLevel::warning,
-                       "the camera reports that it missed a trigger: exposure and readout may be "
-                       "longer than the period"});
+    log_later(LogLevel::warning,
+              "the camera reports that it missed a trigger: exposure and readout may be "
+              "longer than the period");
+}
+
+void CameraPipeline::log_later(LogLevel level, std::string text) {
+    unsaid_.push_back({level, std::move(text)});
 }
 
 void CameraPipeline::note_chunk_lag() {
     const ExposureSource before = std::exchange(report_.exposure_source, check_.source());
     if (before != ExposureSource::chunk || check_.source() != ExposureSource::chunk_before) return;
-    unsaid_.push_back({LogLevel::warning,
-                       "the exposure time in a frame's data is that of the frame before: it is "
-                       "used as such, and sigma is larger while the exposure changes"});
+    log_later(LogLevel::warning,
+              "the exposure time in a frame's data is that of the frame before: it is "
+              "used as such, and sigma is larger while the exposure changes");
 }
 
 void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
@@ -327,18 +331,18 @@ void CameraPipeline::announce_unpaired(const pairing::Exposure& exposure, EventR
 
 void CameraPipeline::locked(const pairing::Exposure& first) {
     ++report_.locks;
-    unsaid_.push_back({LogLevel::info, fmt::format("paired: frames are verified from trigger {} on",
-                                                   first.trigger)});
+    log_later(LogLevel::info,
+              fmt::format("paired: frames are verified from trigger {} on", first.trigger));
     journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger),
             first.start);
 }
 
 void CameraPipeline::slipped(const pairing::Arrival& at) {
     ++report_.slips;
-    unsaid_.push_back(
-        {LogLevel::warning,
-         fmt::format("pairing slipped at block {}: frames are withheld until it is proved again",
-                     at.block_id)});
+    log_later(
+        LogLevel::warning,
+        fmt::format("pairing slipped at block {}: frames are withheld until it is proved again",
+                    at.block_id));
     journal(EventKind::pairing_slipped, EventReason::mismatch,
             static_cast<std::int64_t>(at.block_id));
 }

@@ -134,6 +134,8 @@ class CameraPipeline final : private pairing::Outcome {
         std::string text;
     };
 
+    /// advance() logs it: nothing is written under the lock.
+    void log_later(LogLevel level, std::string text);
     void paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) override;
     void frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
                         const pairing::Exposure* guess) override;
@@ -181,7 +183,7 @@ class CameraPipeline final : private pairing::Outcome {
     std::map<std::uint64_t, clock::Stamp> middles_;
     std::uint64_t last_used_ = 0;  ///< trigger
     PipelineReport report_;
-    std::vector<Line> unsaid_;  ///< advance() logs it: nothing is written under the lock
+    std::vector<Line> unsaid_;  ///< see log_later()
 };
 
 }  // namespace versavis::daemon

@@ -149,13 +149,12 @@ std::string not_exposing_hint(const CameraView& camera) {
     const Duration quiet = camera.all.now - camera.it.pipeline.last_sign;
     if (camera.it.delivery.ever && quiet < restart_time)
         return fmt::format(
-            "it has not answered a trigger for {:.1f} s, and may be restarting: if it does not "
-            "come "
-            "back, check its power",
+            "it has not answered a trigger for {:.1f} s, and may be restarting: if it stays away, "
+            "check its power",
             static_cast<double>(quiet.ns) * 1e-9);
     return fmt::format(
-        "triggers are sent but it does not expose: check that its trigger "
-        "cable is on output {}, and TriggerSource",
+        "triggers are sent but it does not expose: check that its trigger cable is on output {}, "
+        "and TriggerSource",
         camera.it.configuration.output);
 }
 
@@ -186,8 +185,7 @@ std::string every_nth_hint(const CameraView& camera) {
     const double rate_hz = camera.it.configuration.rate_hz / static_cast<double>(answers.every);
     return fmt::format(
         "takes every {} trigger: exposure ({}) and readout need more than {}, and at most {}: "
-        "lower "
-        "'rate_hz' to {:.4g}, shorten ExposureTime, or set TriggerOverlap to ReadOut",
+        "lower 'rate_hz' to {:.4g}, shorten ExposureTime, or set TriggerOverlap to ReadOut",
         ordinal(answers.every), in_ms(camera.exposure()),
         in_ms(camera.period() * static_cast<std::int64_t>(answers.every - 1)),
         in_ms(answers.shortest), rate_hz);
@@ -233,8 +231,7 @@ std::string clock_hint(const CameraView& camera) {
     if (rate == 1) return "";
     return fmt::format(
         "its clock runs {:.4g} times as fast as it says, so frames are paired by their arrival: "
-        "set "
-        "camera_clock = false, or update its firmware",
+        "set camera_clock = false, or update its firmware",
         rate);
 }
 

@@ -62,3 +62,18 @@ TEST_CASE("description_vetting: what ends its reader, or keeps it busy, is refus
     REQUIRE_FALSE(stopped);
     CHECK_THAT(stopped.error().message(), Catch::Contains("stopped"));
 }
+
+TEST_CASE("description_vetting: one that is slow is looked at again, some times") {
+    const test::TemporaryDirectory directory;
+    const std::string runs = directory.path() / "runs";
+    const std::string slow =
+        directory.write("slow", "#!/bin/sh\necho run >> " + runs + "\nkill -XCPU $$\n");
+    std::filesystem::permissions(slow, std::filesystem::perms::owner_all);
+    DescriptionVetting vetting(slow, directory.path());
+    for (int i = 0; i < 5; ++i) {
+        const auto refused = vetting.vet("cam0", honest(), never);
+        REQUIRE_FALSE(refused);
+        CHECK_THAT(refused.error().message(), Catch::Contains("too much CPU time"));
+    }
+    CHECK(std::filesystem::file_size(runs) == 3 * std::string("run\n").size());
+}
