@@ -12,6 +12,7 @@
 
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
+#include "check/camera_check.hpp"
 #include "configuration/configuration.hpp"
 #include "configuration/problem_report.hpp"
 #include "library_log.hpp"
@@ -130,6 +131,31 @@ int write_bundle(const std::string& path, const std::string& text) {
     return EX_CANTCREAT;
 }
 
+std::filesystem::path presets_of(const Configuration& configuration) {
+    const std::filesystem::path own = configuration.preset_directory;
+    return own.empty() ? default_preset_directory() : own;
+}
+
+/// The exit code says whether all wiring is right.
+int check_wiring(const std::string& path, bool as_json) {
+    const auto configuration = load_configuration(path);
+    if (!configuration) {
+        log_problems(configuration.error());
+        return EX_CONFIG;
+    }
+    set_log_level(LogLevel::error);
+    route_library_log();
+    const auto report =
+        check_cameras(*configuration, presets_of(*configuration),
+                      [](const std::string& step) { fmt::print(stderr, "{} ...\n", step); });
+    if (!report) {
+        fmt::print(stderr, "{}\n", report.error().message());
+        return EX_UNAVAILABLE;
+    }
+    fmt::print("{}", as_json ? to_json(*report) + "\n" : to_text(*report));
+    return report->right() ? EX_OK : EX_UNAVAILABLE;
+}
+
 /// Sets up one camera or all, and reports. The exit code says whether all of them are ready.
 int probe(const ProbeOptions& options) {
     Configuration configuration;
@@ -141,8 +167,7 @@ int probe(const ProbeOptions& options) {
         }
         configuration = std::move(*read);
     }
-    const std::filesystem::path own = configuration.preset_directory;
-    const auto presets = own.empty() ? default_preset_directory() : own;
+    const auto presets = presets_of(configuration);
     const auto devices =
         options.device == "all" ? list_cameras() : std::vector<std::string>{options.device};
     if (devices.empty()) {
@@ -178,10 +203,15 @@ int main(int argc, char** argv) {
     CLI::Option* check_config =
         app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
     app.add_flag("--json", as_json, "As JSON");
+    bool check_cables = false;
+    CLI::Option* check_wires = app.add_flag("--check-cameras", check_cables,
+                                            "Prove the wiring of all cameras by pulses, and exit")
+                                   ->excludes(check_config);
     ProbeOptions probe_options;
     app.add_option("--probe-camera", probe_options.device,
                    "Set up one camera (address, serial number or name), or 'all', and report")
-        ->excludes(check_config);
+        ->excludes(check_config)
+        ->excludes(check_wires);
     app.add_option("--bundle", probe_options.bundle,
                    "Also write description, values and a draft of a preset to this file");
     std::string description;  // for the service itself
@@ -193,8 +223,11 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
-    if (as_json && !check_only && probe_options.device.empty())
-        return app.exit(CLI::RequiresError("--json", "--check-config or --probe-camera")), EX_USAGE;
+    if (as_json && !check_only && !check_cables && probe_options.device.empty())
+        return app.exit(CLI::RequiresError("--json",
+                                           "--check-config, --check-cameras or --probe-camera")),
+               EX_USAGE;
+    if (check_cables) return check_wiring(path, as_json);
     if (!probe_options.device.empty()) {
         probe_options.json = as_json;
         if (app.count("--config") > 0) probe_options.configuration = path;

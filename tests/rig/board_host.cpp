@@ -195,14 +195,29 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
         const bool level = (pins >> output & 1U) != 0;
         if (level) ++pulses_[output];
         const auto interval = camera->trigger_line(level, {life_, pulses_[output], instant});
-        if (!interval) continue;
-        const auto input = static_cast<std::uint8_t>(output);
-        const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
-        const HostTime rise = interval->first + late(camera->settings().line_rising_us);
-        const HostTime fall = interval->second + late(camera->settings().line_falling_us);
-        board_->schedule_edge({clock_->device_ns(rise), input, true});
-        board_->schedule_edge({clock_->device_ns(fall), input, false});
+        if (camera->settings().line == LineShows::trigger)
+            line_changes(camera->settings(), instant, level);
+        else if (interval)
+            show_exposure(camera->settings(), *interval);
     }
+}
+
+void BoardHost::show_exposure(const CameraScenario& camera,
+                              const TriggeredCamera::Interval& interval) {
+    const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
+    HostTime end = interval.second;
+    if (camera.line == LineShows::fixed) end = interval.first + milliseconds(1);
+    if (camera.line == LineShows::readout) end = end + late(camera.readout_us);
+    line_changes(camera, interval.first + late(camera.line_rising_us), true);
+    line_changes(camera, end + late(camera.line_falling_us), false);
+}
+
+void BoardHost::line_changes(const CameraScenario& camera, HostTime at, bool active) {
+    const int input = camera.input < 0 ? static_cast<int>(camera.output) : camera.input;
+    for (const int wired : {input, camera.second_input})
+        if (wired >= 0)
+            board_->schedule_edge({clock_->device_ns(at), static_cast<std::uint8_t>(wired),
+                                   active != camera.line_inverted});
 }
 
 void BoardHost::run() {

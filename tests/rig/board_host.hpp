@@ -59,6 +59,8 @@ class BoardHost {
     void plug(bool in);
     void write_late(HostTime now);
     void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
+    void show_exposure(const CameraScenario& camera, const TriggeredCamera::Interval& interval);
+    void line_changes(const CameraScenario& camera, HostTime at, bool active);
     void imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
                       std::span<std::uint8_t> received);
     firmware::Nanoseconds board_now() const { return clock_->device_ns(host_now()); }

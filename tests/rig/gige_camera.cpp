@@ -351,7 +351,8 @@ void GigeCamera::free_run(HostTime now) {
     HostTime next;
     {
         const std::lock_guard lock(mutex_);
-        if (!acquiring_ || registers_.value(reg_trigger_mode) != 0 || now < free_run_next_) return;
+        const bool triggered = registers_.value(reg_trigger_mode) != 0 && !settings_.free_runs;
+        if (!acquiring_ || triggered || now < free_run_next_) return;
         next = free_run_next_;
         const double rate = std::max(0.1F, registers_.real(reg_frame_rate));
         free_run_next_ = std::max(now, free_run_next_ + Duration{std::llround(1e9 / rate)});
@@ -369,10 +370,10 @@ void GigeCamera::afflict_board(std::vector<Fault> faults,
 std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
                                                              const TriggerPulse& pulse) {
     const bool falling = registers_.value(reg_trigger_activation) == 1;
-    if (level == falling) return std::nullopt;
+    if (level == (falling != settings_.trigger_inverted)) return std::nullopt;
     std::optional<Interval> interval;
-    const bool listens =
-        registers_.value(reg_trigger_mode) == 1 && registers_.value(reg_trigger_source) == 1;
+    const bool listens = registers_.value(reg_trigger_mode) == 1 &&
+                         registers_.value(reg_trigger_source) == 1 && !settings_.free_runs;
     if (listens && !muted()) interval = expose(pulse.at, &pulse);
     truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
                            interval.has_value()});

@@ -49,6 +49,16 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("name", camera.name);
     reader.read("address", camera.address);
     reader.read("output", camera.output, 0, 3);
+    reader.read("input", camera.input, -1, 3);
+    reader.read("second_input", camera.second_input, -1, 3);
+    reader.choose<LineShows>("line", camera.line,
+                             {{"exposure", LineShows::exposure},
+                              {"trigger", LineShows::trigger},
+                              {"fixed", LineShows::fixed},
+                              {"readout", LineShows::readout}});
+    reader.read("line_inverted", camera.line_inverted);
+    reader.read("trigger_inverted", camera.trigger_inverted);
+    reader.read("free_runs", camera.free_runs);
     camera.serial = "RIGCAM-" + camera.name;
     reader.read("serial", camera.serial);
     reader.read("width", camera.width, 16, 10000);

@@ -41,11 +41,19 @@ struct LedScenario {
 /// What a camera stamps: an instant of the exposure, or when its frame begins to leave.
 enum class Stamped { start, middle, end, readout };
 
+/// What its exposure line shows.
+enum class LineShows { exposure, trigger, fixed, readout };
+
 struct CameraScenario {
     std::string name;
-    std::string address;  ///< loopback address that the camera answers on
-    unsigned output =
-        0;  ///< board output that triggers it, and input that its exposure line is wired to
+    std::string address;    ///< loopback address that the camera answers on
+    unsigned output = 0;    ///< of the board, that triggers it
+    int input = -1;         ///< of the board, that its exposure line is wired to; -1: as the output
+    int second_input = -1;  ///< that it is wired to as well; -1: none
+    LineShows line = LineShows::exposure;
+    bool line_inverted = false;     ///< low while it exposes
+    bool trigger_inverted = false;  ///< its trigger wire
+    bool free_runs = false;         ///< whatever its TriggerMode says
     std::string serial;
     std::uint32_t width = 1920;
     std::uint32_t height = 1200;

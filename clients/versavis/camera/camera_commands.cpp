@@ -27,13 +27,22 @@ CameraCommands::CameraCommands(CLI::App& app) {
                        "Also write description, values of all features, and a draft of a preset to "
                        "this file, for a report");
     probe_->add_flag("--json", json_, "Print one JSON object per camera");
+    check_ = camera->add_subcommand(
+        "check",
+        "Prove the wiring of all cameras by pulses at one output after the other: trigger lines, "
+        "exposure lines, polarity, delays, lost triggers, swapped cables. Takes a minute, and "
+        "exits 0 if all is right. The service must not run meanwhile");
+    check_->add_option("--config", configuration_,
+                       "Configuration of the service; default: the installed one");
+    check_->add_flag("--json", json_, "Print one JSON object");
 }
 
 int CameraCommands::run() {
     std::error_code error;
     const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
     const std::string program = self.parent_path() / "versavisd";
-    std::vector<std::string> arguments{program, "--probe-camera", device_};
+    std::vector<std::string> arguments{program, "--check-cameras"};
+    if (probe_->parsed()) arguments = {program, "--probe-camera", device_};
     if (!configuration_.empty()) arguments.insert(arguments.end(), {"--config", configuration_});
     if (!bundle_.empty()) arguments.insert(arguments.end(), {"--bundle", bundle_});
     if (json_) arguments.emplace_back("--json");

@@ -12,13 +12,14 @@ class CameraCommands {
  public:
     explicit CameraCommands(CLI::App& app);
 
-    bool chosen() const { return probe_->parsed(); }
+    bool chosen() const { return probe_->parsed() || check_->parsed(); }
 
     /// Becomes the other program. Returns an exit code only if that fails.
     int run();
 
  private:
     CLI::App* probe_;
+    CLI::App* check_;
     std::string device_;
     std::string configuration_;
     std::string bundle_;
