@@ -279,7 +279,10 @@ class Judge {
                                     "too weak for its input, or frames are lost on the link",
                                     frames, pulses, us(at->exposures[index_])));
         const PulseRun* working = working_run();
-        if (working == nullptr || missing(*working) + working->skipped <= 1) return;
+        if (working == nullptr) return;
+        // The board takes the pauses on an inverted line for exposures, and waits for their end.
+        const bool inverted = camera_.strobe && answer_of(*at, camera_.output).inverted();
+        if (missing(*working) + (inverted ? 0 : working->skipped) <= 1) return;
         find("overlap",
              fmt::format("at the configured rate it takes {} of {} triggers, with an exposure of "
                          "{}: exposure and readout need longer than the period; lower 'rate_hz', "

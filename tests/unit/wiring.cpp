@@ -220,6 +220,29 @@ TEST_CASE("wiring: so are those that the board waits for") {
     CHECK_THAT(wirings[0].findings[0].text, Catch::Contains("10 of 20 triggers"));
 }
 
+TEST_CASE("wiring: but not where the board takes an inverted line for one exposure") {
+    PulseRun run;
+    run.output = 0;
+    run.width = microseconds(100);
+    run.exposures = {milliseconds(1)};
+    run.frames = {10};
+    for (int k = 0; k < 10; ++k) {
+        const HostTime at{milliseconds(50).ns * k};
+        run.pulses.push_back(at);
+        run.inputs[0].push_back({at, false});
+        run.inputs[0].push_back({at + milliseconds(1), true});
+    }
+    PulseRun second = run;
+    second.exposures = {milliseconds(4)};
+    for (std::size_t k = 1; k < 20; k += 2)
+        second.inputs[0][k].at = second.inputs[0][k - 1].at + milliseconds(4);
+    PulseRun working = run;
+    working.working = true;
+    working.skipped = 10;
+    CHECK(codes(judge_wiring({{"a", 0, true, {}}}, {run, second, working})[0]) ==
+          Codes{"exposure_inverted"});
+}
+
 TEST_CASE("wiring: without an exposure line only the trigger is judged") {
     const std::vector<WiredCamera> believed{{"a", 0, false, {}}};
     CHECK(codes(World({wired({0}, {})}).check(believed)[0]) == Codes{"right"});
