@@ -131,12 +131,7 @@ int write_bundle(const std::string& path, const std::string& text) {
     return EX_CANTCREAT;
 }
 
-std::filesystem::path presets_of(const Configuration& configuration) {
-    const std::filesystem::path own = configuration.preset_directory;
-    return own.empty() ? default_preset_directory() : own;
-}
-
-/// The exit code says whether all wiring is right.
+/// Exit code 1: something is wrong.
 int check_wiring(const std::string& path, bool as_json) {
     const auto configuration = load_configuration(path);
     if (!configuration) {
@@ -145,15 +140,14 @@ int check_wiring(const std::string& path, bool as_json) {
     }
     set_log_level(LogLevel::error);
     route_library_log();
-    const auto report =
-        check_cameras(*configuration, presets_of(*configuration),
-                      [](const std::string& step) { fmt::print(stderr, "{} ...\n", step); });
+    const auto report = check_cameras(
+        *configuration, [](const std::string& step) { fmt::print(stderr, "{} ...\n", step); });
     if (!report) {
         fmt::print(stderr, "{}\n", report.error().message());
         return EX_UNAVAILABLE;
     }
     fmt::print("{}", as_json ? to_json(*report) + "\n" : to_text(*report));
-    return report->right() ? EX_OK : EX_UNAVAILABLE;
+    return report->right() ? EX_OK : EXIT_FAILURE;
 }
 
 /// Sets up one camera or all, and reports. The exit code says whether all of them are ready.
@@ -167,7 +161,7 @@ int probe(const ProbeOptions& options) {
         }
         configuration = std::move(*read);
     }
-    const auto presets = presets_of(configuration);
+    const auto presets = preset_directory(configuration);
     const auto devices =
         options.device == "all" ? list_cameras() : std::vector<std::string>{options.device};
     if (devices.empty()) {

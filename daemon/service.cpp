@@ -100,8 +100,7 @@ Expected<> Service::make_rings() {
 }
 
 Expected<> Service::make_cameras() {
-    const std::filesystem::path own_presets = configuration_.preset_directory;
-    auto presets = load_presets(own_presets.empty() ? default_preset_directory() : own_presets);
+    auto presets = load_presets(preset_directory(configuration_));
     if (!presets) return Unexpected(presets.error());
     BoardListener& self = *this;
     Configuration told = configuration_;

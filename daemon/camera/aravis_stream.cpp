@@ -74,8 +74,10 @@ void receive_nothing(int socket) {
     ::setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program);
 }
 
-Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configuration,
-                           ReceiveMode receive) {
+}  // namespace
+
+Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configuration,
+                          ReceiveMode receive) {
     GlibError error;
     arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
     arv_camera_gv_set_stream_options(camera, receive == ReceiveMode::socket
@@ -90,8 +92,6 @@ Expected<> set_packet_size(ArvCamera* camera, const CameraConfiguration& configu
     return failure("packet size", error.text(), "set 'packet_size' to what the network passes");
 }
 
-}  // namespace
-
 Expected<std::unique_ptr<AravisStream>> AravisStream::create(
     ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
     CameraPipeline& pipeline, FrameMeter* meter, Object<ArvChunkParser> chunks,
@@ -103,7 +103,7 @@ Expected<std::unique_ptr<AravisStream>> AravisStream::create(
         const auto mode = choose_receive_mode(configuration, packet_socket_allowed());
         if (!mode) return Unexpected(mode.error());
         self->receive_ = *mode;
-        if (auto done = set_packet_size(camera, configuration, *mode); !done)
+        if (auto done = set_up_packets(camera, configuration, *mode); !done)
             return Unexpected(done.error());
     }
     self->chunk_parser_ = std::move(chunks);

@@ -16,6 +16,11 @@
 
 namespace versavis::daemon {
 
+/// By which packets arrive and how large they are, before the stream is made. Error: no packet
+/// passes.
+Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configuration,
+                          ReceiveMode receive);
+
 class AravisStream {
  public:
     /// `camera` must outlive the stream. The pipeline's ring must be prepared. `meter` and

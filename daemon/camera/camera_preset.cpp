@@ -150,6 +150,11 @@ void complete(CameraPreset& preset, const CameraPreset& base) {
 
 }  // namespace
 
+std::filesystem::path preset_directory(const Configuration& configuration) {
+    const std::filesystem::path own = configuration.preset_directory;
+    return own.empty() ? default_preset_directory() : own;
+}
+
 std::filesystem::path default_preset_directory() {
     std::error_code error;
     const auto program = std::filesystem::read_symlink("/proc/self/exe", error);

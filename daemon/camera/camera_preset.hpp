@@ -71,6 +71,9 @@ extern const std::vector<std::string> preset_groups;
 /// Where the presets are that belong to this program.
 std::filesystem::path default_preset_directory();
 
+/// That of the configuration, or else of the installation.
+std::filesystem::path preset_directory(const Configuration& configuration);
+
 /// All of a directory, most specific first. Errors name file, line and column; none there.
 Expected<std::vector<CameraPreset>> load_presets(const std::filesystem::path& directory);
 

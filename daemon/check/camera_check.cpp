@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "board/board_link.hpp"
+#include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_setup.hpp"
 #include "engine/ring/directory.hpp"
@@ -41,6 +42,10 @@ constexpr double check_rate_hz = 10;
 constexpr double longest_exposure_us = 4000;
 constexpr double exposure_of_period = 0.2;
 
+/// By which pulses are longer the second time. At half, sensors that start with a line may hide it;
+/// at twice, it comes near the lengths of exposures.
+constexpr double least_widening_us = 200;
+
 /// Exchanges that the ring of clocks holds; nobody reads them.
 constexpr std::uint32_t clock_items = 1024;
 
@@ -56,7 +61,7 @@ class Recorder final : public BoardListener {
         std::size_t skipped = 0;  ///< triggers
     };
 
-    void board_restarted() override {}
+    void board_restarted() override { set_connected(false); }
     void board_synchronised() override {}
     void board_connected() override { set_connected(true); }
     void board_lost() override { set_connected(false); }
@@ -82,13 +87,20 @@ class Recorder final : public BoardListener {
                                  [&] { return connected_; });
     }
 
-    /// Waits until so many pulses of the output are reported.
+    /// It did not go or restart since it was connected first.
+    bool stayed() {
+        const std::lock_guard lock(mutex_);
+        return connected_ && !lost_;
+    }
+
+    /// Waits until so many pulses of the output are reported, or the board is gone.
     void wait_pulses(unsigned output, std::size_t count, Duration timeout) {
         std::unique_lock lock(mutex_);
         changed_.wait_for(lock, std::chrono::nanoseconds(timeout.ns), [&] {
             const auto of = [&](const wire::Exposure& record) { return record.camera == output; };
-            return static_cast<std::size_t>(std::count_if(records_.exposures.begin(),
-                                                          records_.exposures.end(), of)) >= count;
+            const auto sent =
+                std::count_if(records_.exposures.begin(), records_.exposures.end(), of);
+            return lost_ || static_cast<std::size_t>(sent) >= count;
         });
     }
 
@@ -106,6 +118,7 @@ class Recorder final : public BoardListener {
  private:
     void set_connected(bool connected) {
         const std::lock_guard lock(mutex_);
+        lost_ = lost_ || (connected_ && !connected);
         connected_ = connected;
         changed_.notify_all();
     }
@@ -113,10 +126,11 @@ class Recorder final : public BoardListener {
     std::mutex mutex_;
     std::condition_variable changed_;
     bool connected_ = false;
+    bool lost_ = false;
     Records records_;
 };
 
-/// A camera that is set up and streams; what it sends is counted.
+/// A camera that is set up and streams; what it sends is counted. It gets its exposure back.
 class CountedCamera {
  public:
     CountedCamera(const CameraConfiguration& configuration, OpenCamera opened)
@@ -127,31 +141,30 @@ class CountedCamera {
         stop_ = true;
         if (thread_.joinable()) thread_.join();
         arv_camera_stop_acquisition(opened_.camera.get(), nullptr);
+        if (working_.ns != 0) set_exposure(working_);
+        if (!auto_.empty()) static_cast<void>(nodes_.set("ExposureAuto", auto_));
     }
     CountedCamera(const CountedCamera&) = delete;
     CountedCamera& operator=(const CountedCamera&) = delete;
 
     const CameraConfiguration& configuration() const { return configuration_; }
-    std::size_t frames() const { return frames_; }
+    FrameCount frames() const { return {arrived_, incomplete_}; }
     Duration latency() const { return setup_.lines.trigger.delay; }
 
     Expected<> start(const std::vector<CameraPreset>& presets) {
         ArvCamera* camera = opened_.camera.get();
         if (auto done = set_up_camera(camera, nodes_, configuration_, presets, setup_); !done)
             return done;
-        if (nodes_.available("ExposureAuto")) static_cast<void>(nodes_.set("ExposureAuto", "Off"));
-        working_ = read_exposure();
-        GlibError error;
-        if (arv_camera_is_gv_device(camera)) {
-            arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
-            if (configuration_.packet_size == 0)
-                arv_camera_gv_auto_packet_size(camera, error.out());
-            else
-                arv_camera_gv_set_packet_size(camera, static_cast<gint>(configuration_.packet_size),
-                                              error.out());
+        if (nodes_.available("ExposureAuto")) {
+            auto_ = nodes_.read("ExposureAuto");
+            static_cast<void>(nodes_.set("ExposureAuto", "Off"));
         }
-        if (!error.set())
-            stream_.reset(arv_camera_create_stream(camera, nullptr, nullptr, error.out()));
+        working_ = read_exposure();
+        if (arv_camera_is_gv_device(camera))
+            if (auto done = set_up_packets(camera, configuration_, ReceiveMode::socket); !done)
+                return done;
+        GlibError error;
+        stream_.reset(arv_camera_create_stream(camera, nullptr, nullptr, error.out()));
         for (unsigned i = 0; stream_ && i < buffers; ++i)
             arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(setup_.payload));
         if (!error.set()) arv_camera_start_acquisition(camera, error.out());
@@ -169,16 +182,23 @@ class CountedCamera {
     }
     Duration working_exposure() const { return working_; }
 
+    bool answers() const {
+        GlibError error;
+        arv_camera_get_payload(opened_.camera.get(), error.out());
+        return !error.set();
+    }
+
  private:
     Duration read_exposure() const { return fixed_exposure(nodes_, setup_.exposure_feature); }
 
-    /// An incomplete frame was triggered, too.
     void receive() {
         while (!stop_) {
             constexpr guint64 poll_us = 50'000;
             ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_.get(), poll_us);
             if (buffer == nullptr) continue;
-            if (arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS) ++frames_;
+            // One without all of its packets was triggered, too.
+            ++arrived_;
+            if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) ++incomplete_;
             arv_stream_push_buffer(stream_.get(), buffer);
         }
     }
@@ -187,9 +207,11 @@ class CountedCamera {
     OpenCamera opened_;
     AravisNodeMap nodes_;
     CameraSetup setup_;
-    Duration working_;
+    std::string auto_;  ///< its ExposureAuto, and
+    Duration working_;  ///< its exposure, before the check
     Object<ArvStream> stream_;
-    std::atomic<std::size_t> frames_{0};
+    std::atomic<std::size_t> arrived_{0};
+    std::atomic<std::size_t> incomplete_{0};
     std::atomic<bool> stop_{false};
     std::thread thread_;
 };
@@ -244,10 +266,9 @@ Configuration for_check(const Configuration& configuration, std::uint32_t presen
 /// One connection to the board, with a configuration of its own.
 class Session {
  public:
-    explicit Session(const Configuration& configuration, ClockRecorder& clock_recorder,
-                     clock::Translator& translator)
-        : translator_(translator),
-          link_([board = configuration.board] { return open_byte_stream(board); }, configuration,
+    Session(const Configuration& configuration, ClockRecorder& clock_recorder,
+            clock::Translator& translator)
+        : link_([board = configuration.board] { return open_byte_stream(board); }, configuration,
                 configuration.clock.exchange_rate_hz, translator, clock_recorder, recorder_) {
         link_.start();
     }
@@ -271,7 +292,8 @@ class Session {
         fill(run, 0);
     }
 
-    void pulse(unsigned output, double rate_hz, PulseRun& run) {
+    /// Error: the board went, or sends none.
+    Expected<> pulse(unsigned output, double rate_hz, PulseRun& run) {
         recorder_.take();
         std::size_t patterned = 0;
         for (unsigned tick = 0; tick < wire::start_pattern_length; ++tick)
@@ -284,35 +306,37 @@ class Session {
         link_.stop_cameras(mask);
         recorder_.wait(settling);
         fill(run, output);
+        if (!recorder_.stayed())
+            return failure("board", "it restarted or went during the check",
+                           "check its USB cable and power, and check again");
+        if (run.pulses.size() + run.skipped >= patterned) return {};
+        return failure("board",
+                       fmt::format("it reports {} pulses of output {} in {:.0f} s, not {}",
+                                   run.pulses.size(), output, longest_s, patterned),
+                       "see what 'versavis board info' says of it");
     }
 
  private:
-    HostTime host(std::int64_t board_ns) const {
-        const auto at = translator_.to_host(BoardTime{board_ns});
-        return at ? at->time : HostTime{board_ns};
-    }
-
     void fill(PulseRun& run, unsigned output) {
         const Recorder::Records records = recorder_.take();
         run.skipped = records.skipped;
         for (const wire::Exposure& record : records.exposures) {
             if (run.output && record.camera == output)
-                run.pulses.push_back(host(record.trigger_ns));
+                run.pulses.push_back(BoardTime{record.trigger_ns});
             if (record.start_ns != wire::no_time)
-                run.inputs[record.camera].push_back({host(record.start_ns), true});
+                run.inputs[record.camera].push_back({BoardTime{record.start_ns}, true});
             if (record.end_ns != wire::no_time)
-                run.inputs[record.camera].push_back({host(record.end_ns), false});
+                run.inputs[record.camera].push_back({BoardTime{record.end_ns}, false});
         }
         for (const wire::Event& stray : records.strays)
             if (stray.source < wire::camera_count)
-                run.inputs[stray.source].push_back({host(stray.time_ns), stray.value != 0});
+                run.inputs[stray.source].push_back({BoardTime{stray.time_ns}, stray.value != 0});
         std::sort(run.pulses.begin(), run.pulses.end());
         for (auto& edges : run.inputs)
             std::sort(edges.begin(), edges.end(),
                       [](const LineEdge& a, const LineEdge& b) { return a.at < b.at; });
     }
 
-    clock::Translator& translator_;
     Recorder recorder_;
     BoardLink link_;
 };
@@ -325,15 +349,14 @@ class CameraCheck {
         : configuration_(configuration), translator_(translator), recorder_(recorder), say_(say) {}
 
     /// Cameras that cannot be set up have a finding instead.
-    Expected<> prepare(const std::filesystem::path& preset_directory) {
-        const auto presets = load_presets(preset_directory);
+    Expected<> prepare() {
+        const auto presets = load_presets(preset_directory(configuration_));
         if (!presets) return Unexpected(presets.error());
         for (const CameraConfiguration& camera : configuration_.cameras) {
             if (camera.trigger != TriggerSource::board) continue;
             say_(fmt::format("setting up {}", camera.name));
             if (const auto done = prepare(camera, *presets); !done)
-                report_.cameras.push_back(
-                    {camera.name, false, {{"not_ready", done.error().message()}}});
+                report_.cameras.push_back(not_ready(camera.name, done.error().message()));
         }
         if (!cameras_.empty()) return {};
         return failure("cameras", report_.cameras.empty()
@@ -345,12 +368,22 @@ class CameraCheck {
         if (auto done = work(); !done) return Unexpected(done.error());
         for (const unsigned scale : {1U, 4U})
             if (auto done = pulse_all(probes(scale)); !done) return Unexpected(done.error());
-        for (CameraWiring& wiring : judge_wiring(wired_cameras(), runs_))
-            report_.cameras.push_back(std::move(wiring));
+        const std::vector<CameraWiring> judged = judge_wiring(wired_cameras(), runs_);
+        for (std::size_t i = 0; i < judged.size(); ++i)
+            report_.cameras.push_back(
+                cameras_[i]->answers()
+                    ? judged[i]
+                    : not_ready(
+                          judged[i].name,
+                          "it stopped answering during the check: check its power and cable"));
         return report_;
     }
 
  private:
+    static CameraWiring not_ready(const std::string& camera, const std::string& why) {
+        return {camera, false, {{"not_ready", why}}};
+    }
+
     Expected<> prepare(const CameraConfiguration& camera,
                        const std::vector<CameraPreset>& presets) {
         auto opened = open_camera(camera.name, camera.device, {descriptions_, claims_, aravis_},
@@ -362,7 +395,7 @@ class CameraCheck {
         return {};
     }
 
-    /// `scale` 1 or 4: widths and lengths that no signal of fixed length matches twice.
+    /// `scale` 1 or 4: exposures and widths that no signal of fixed length matches twice.
     Probe probes(unsigned scale) const {
         double longest_us = longest_exposure_us;
         double pulse_us = longest_us;
@@ -370,7 +403,8 @@ class CameraCheck {
             longest_us = std::min(longest_us, exposure_of_period * 1e6 / camera.rate_hz);
             pulse_us = std::min(pulse_us, camera.pulse_us);
         }
-        return {longest_us * scale / 4, pulse_us * (scale == 1 ? 1 : 2)};
+        const double wider_us = std::max(2 * pulse_us, pulse_us + least_widening_us);
+        return {longest_us * scale / 4, scale == 1 ? pulse_us : wider_us};
     }
 
     /// Without triggers, and with those of the configuration.
@@ -380,11 +414,14 @@ class CameraCheck {
         if (auto connected = session.connect(); !connected) return connected;
         present_ = session.present();
         say_("looking for what happens without a trigger");
-        observe({}, false, [&](PulseRun& run) { session.idle(run); });
+        static_cast<void>(observe({}, false, [&](PulseRun& run) {
+            session.idle(run);
+            return Expected<>{};
+        }));
         std::vector<Duration> exposures;
         for (const auto& camera : cameras_) exposures.push_back(camera->working_exposure());
         for (const CameraConfiguration& camera : configured.cameras)
-            pulse(session, camera, exposures, true);
+            if (auto done = pulse(session, camera, exposures, true); !done) return done;
         return {};
     }
 
@@ -396,31 +433,37 @@ class CameraCheck {
         Session session(all, recorder_, translator_);
         if (auto connected = session.connect(); !connected) return connected;
         for (const CameraConfiguration& output : all.cameras)
-            pulse(session, output, exposures, false);
+            if (auto done = pulse(session, output, exposures, false); !done) return done;
         return {};
     }
 
-    void pulse(Session& session, const CameraConfiguration& camera,
-               const std::vector<Duration>& exposures, bool working) {
+    Expected<> pulse(Session& session, const CameraConfiguration& camera,
+                     const std::vector<Duration>& exposures, bool working) {
         say_(fmt::format("pulses at output {}{}", camera.output, working ? ", as configured" : ""));
-        observe(camera.output, working, [&](PulseRun& run) {
+        return observe(camera.output, working, [&](PulseRun& run) {
             run.width = from_us(camera.pulse_us);
             run.exposures = exposures;
-            session.pulse(camera.output, camera.rate_hz, run);
+            for (std::size_t i = 0; i < cameras_.size(); ++i)
+                if (cameras_[i]->configuration().exposure_by_pulse) run.exposures[i] = run.width;
+            return session.pulse(camera.output, camera.rate_hz, run);
         });
     }
 
     template <class Happen>
-    void observe(std::optional<unsigned> output, bool working, Happen&& happen) {
+    Expected<> observe(std::optional<unsigned> output, bool working, Happen&& happen) {
         PulseRun run;
         run.output = output;
         run.working = working;
-        std::vector<std::size_t> before;
+        std::vector<FrameCount> before;
         for (const auto& camera : cameras_) before.push_back(camera->frames());
-        happen(run);
-        for (std::size_t i = 0; i < cameras_.size(); ++i)
-            run.frames.push_back(cameras_[i]->frames() - before[i]);
+        auto happened = happen(run);
+        for (std::size_t i = 0; i < cameras_.size(); ++i) {
+            const FrameCount after = cameras_[i]->frames();
+            run.frames.push_back(
+                {after.arrived - before[i].arrived, after.incomplete - before[i].incomplete});
+        }
         runs_.push_back(std::move(run));
+        return happened;
     }
 
     std::vector<WiredCamera> wired_cameras() const {
@@ -452,7 +495,6 @@ bool CameraCheckReport::right() const {
 }
 
 Expected<CameraCheckReport> check_cameras(const Configuration& configuration,
-                                          const std::filesystem::path& preset_directory,
                                           const std::function<void(const std::string&)>& say) {
     // Its directory is claimed, so that no service of this configuration runs meanwhile.
     auto directory = ring::OwnedDirectory::claim(instance_directory(configuration.instance));
@@ -465,7 +507,7 @@ Expected<CameraCheckReport> check_cameras(const Configuration& configuration,
     if (!ring) return Unexpected(ring.error());
     ClockRecorder recorder(std::move(*ring), translator);
     CameraCheck check(configuration, translator, recorder, say);
-    if (auto ready = check.prepare(preset_directory); !ready) return Unexpected(ready.error());
+    if (auto ready = check.prepare(); !ready) return Unexpected(ready.error());
     return check.run();
 }
 

@@ -3,7 +3,6 @@
 // and frames that follow.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,10 +18,9 @@ struct CameraCheckReport {
     bool right() const;
 };
 
-/// Takes half a minute, and board and cameras for itself. `say` is given a line for each step.
-/// Error: the board does not answer, or no camera can be set up.
+/// Takes a minute, and board and cameras for itself; their settings are put back. `say` is given a
+/// line for each step. Error: the board does not answer or goes, or no camera can be set up.
 Expected<CameraCheckReport> check_cameras(const Configuration& configuration,
-                                          const std::filesystem::path& preset_directory,
                                           const std::function<void(const std::string&)>& say);
 
 /// For a terminal.

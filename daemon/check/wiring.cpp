@@ -144,7 +144,7 @@ class Judge {
     /// The camera sends frames when pulses leave at this output.
     bool delivers(unsigned output, std::size_t camera) const {
         for (unsigned nth = 0; const PulseRun* at = run(output, nth); ++nth)
-            if (is_answer(at->frames[camera], at->pulses.size())) return true;
+            if (is_answer(at->frames[camera].arrived, at->pulses.size())) return true;
         return false;
     }
     bool delivers(unsigned output) const { return delivers(output, index_); }
@@ -177,7 +177,7 @@ class Judge {
         return "";
     }
 
-    void find(const char* code, std::string text) {
+    void report(const char* code, std::string text) {
         result_.findings.push_back({code, std::move(text)});
     }
 
@@ -190,11 +190,12 @@ class Judge {
 
     bool runs_freely() {
         const PulseRun* idle = run(std::nullopt);
-        if (idle == nullptr || idle->frames[index_] < frames_of_a_free_run) return false;
-        find("free_run",
-             fmt::format("it sends frames without a trigger ({} while no pulse left): TriggerMode "
-                         "is off, or something else triggers it",
-                         idle->frames[index_]));
+        if (idle == nullptr || idle->frames[index_].arrived < frames_of_a_free_run) return false;
+        report(
+            "free_run",
+            fmt::format("it sends frames without a trigger ({} while no pulse left): TriggerMode "
+                        "is off, or something else triggers it",
+                        idle->frames[index_].arrived));
         return true;
     }
 
@@ -204,33 +205,38 @@ class Judge {
             return name_wrong_output(output);
         }
         if (const auto input = exposes_at()) {
-            return find("no_frames",
-                        fmt::format("it exposes with the pulses of output {} (input {} shows it), "
-                                    "but no frame arrives: check its network or USB cable, the "
-                                    "packet size, and the firewall",
-                                    camera_.output, *input));
+            return report(
+                "no_frames",
+                fmt::format("it exposes with the pulses of output {} (input {} shows it), "
+                            "but no frame arrives: check its network or USB cable, the "
+                            "packet size, and the firewall",
+                            camera_.output, *input));
         }
-        find("no_trigger",
-             fmt::format("no output triggers it: check that its trigger cable is on output {} and "
-                         "has a common ground, that its level suits the input, and TriggerSource",
-                         camera_.output));
+        report("no_trigger",
+               fmt::format("no output triggers it: check that its trigger cable is on output {} "
+                           "and has a common ground, that its level suits the input, and "
+                           "TriggerSource{}",
+                           camera_.output,
+                           camera_.strobe ? ""
+                                          : "; it has no exposure line, so it may also expose, and "
+                                            "no frame arrive: check its network or USB cable"));
     }
 
     void name_wrong_output(unsigned output) {
         const std::string other = owner(output);
         if (explained(output, output)) {
-            find("shared_trigger",
-                 fmt::format("its trigger cable is on output {}, as that of {}: move it to {}",
-                             output, other, camera_.output));
+            report("shared_trigger",
+                   fmt::format("its trigger cable is on output {}, as that of {}: move it to {}",
+                               output, other, camera_.output));
         } else if (camera_.strobe && follows(output, output)) {
-            return find(
+            return report(
                 "wrong_port",
                 fmt::format(
                     "its trigger and exposure cables are at {}, not {}: {}", output, camera_.output,
                     other.empty() ? fmt::format("move them, or set output = {}", output)
                                   : fmt::format("swap 'device' or the cables with {}", other)));
         } else {
-            find(
+            report(
                 "wrong_output",
                 fmt::format("its trigger cable is on output {}, not {}: {}", output, camera_.output,
                             other.empty() ? "move it" : "swap it with that of " + other));
@@ -256,43 +262,51 @@ class Judge {
     void name_other_triggers() {
         for (unsigned output = 0; output < wire::camera_count; ++output) {
             if (output == camera_.output || !delivers(output)) continue;
-            find("two_outputs",
-                 fmt::format("output {} triggers it, too: its trigger input is connected to both "
-                             "outputs, or to the exposure line of a camera at output {}",
-                             output, output));
+            report("two_outputs",
+                   fmt::format("output {} triggers it, too: its trigger input is connected to both "
+                               "outputs, or to the exposure line of a camera at output {}",
+                               output, output));
         }
     }
 
     void judge_frames() {
         const PulseRun* at = run(camera_.output);
-        const std::size_t frames = at->frames[index_];
+        const std::size_t frames = at->frames[index_].arrived;
         const std::size_t pulses = at->pulses.size();
         if (frames * 2 > pulses * 3)
-            return find("frames_for_each",
-                        fmt::format("{} frames arrive for {} pulses: AcquisitionBurstFrameCount is "
-                                    "not 1, or its trigger line bounces",
-                                    frames, pulses));
+            return report(
+                "frames_for_each",
+                fmt::format("{} frames arrive for {} pulses: AcquisitionBurstFrameCount is "
+                            "not 1, or its trigger line bounces",
+                            frames, pulses));
+        if (at->frames[index_].incomplete > 1)
+            return report(
+                "incomplete",
+                fmt::format("packets are missing in {} of {} frames: check its cable, and "
+                            "set 'packet_size' to what the network passes",
+                            at->frames[index_].incomplete, frames));
         if (missing(*at) > 1)
-            return find("lost",
-                        fmt::format("{} of {} frames arrive even at an exposure of {}: its readout "
-                                    "needs longer than the pulses' period, they are too short or "
-                                    "too weak for its input, or frames are lost on the link",
+            return report(
+                "lost", fmt::format("{} of {} frames arrive even at an exposure of {}: its readout "
+                                    "is longer than the period, the pulses are too short or too "
+                                    "weak for its input, or frames are lost on the link",
                                     frames, pulses, us(at->exposures[index_])));
         const PulseRun* working = working_run();
         if (working == nullptr) return;
         // The board takes the pauses on an inverted line for exposures, and waits for their end.
         const bool inverted = camera_.strobe && answer_of(*at, camera_.output).inverted();
         if (missing(*working) + (inverted ? 0 : working->skipped) <= 1) return;
-        find("overlap",
-             fmt::format("at the configured rate it takes {} of {} triggers, with an exposure of "
-                         "{}: exposure and readout need longer than the period; lower 'rate_hz', "
-                         "shorten ExposureTime, or set TriggerOverlap to ReadOut",
-                         working->frames[index_], working->pulses.size() + working->skipped,
-                         us(working->exposures[index_])));
+        report(
+            "overlap",
+            fmt::format("at the configured rate it takes {} of {} triggers, with an exposure of "
+                        "{}: exposure and readout need longer than the period; lower 'rate_hz', "
+                        "shorten ExposureTime, or set TriggerOverlap to ReadOut",
+                        working->frames[index_].arrived, working->pulses.size() + working->skipped,
+                        us(working->exposures[index_])));
     }
 
     std::size_t missing(const PulseRun& at) const {
-        return at.pulses.size() - std::min(at.pulses.size(), at.frames[index_]);
+        return at.pulses.size() - std::min(at.pulses.size(), at.frames[index_].arrived);
     }
 
     void judge_line() {
@@ -303,24 +317,25 @@ class Judge {
         const LineAnswer b = answer_of(*second, camera_.output);
         if (!camera_.strobe) {
             if (a.follows())
-                find("strobe_unused",
-                     fmt::format("the configuration has strobe = \"none\", but input {} shows its "
-                                 "exposures: remove that key",
-                                 camera_.output));
+                report(
+                    "strobe_unused",
+                    fmt::format("the configuration has strobe = \"none\", but input {} shows its "
+                                "exposures: remove that key",
+                                camera_.output));
             return;
         }
         if (!a.follows() || !b.follows()) return name_missing_line(camera_.output);
         name_other_inputs();
         if (a.bounced * 10 > a.answered)
-            find("bounces",
-                 fmt::format("input {} changes more than twice in {} of {} exposures: check the "
-                             "ground and the pull-up, or raise 'glitch_us'",
-                             camera_.output, a.bounced, a.answered));
+            report("bounces",
+                   fmt::format("input {} changes more than twice in {} of {} exposures: check the "
+                               "ground and the pull-up, or raise 'glitch_us'",
+                               camera_.output, a.bounced, a.answered));
         if (a.inverted())
-            find("exposure_inverted",
-                 fmt::format("input {} has the other level while it exposes: change 'strobe' to "
-                             "the other of \"active_high\" and \"active_low\", or LineInverter",
-                             camera_.output));
+            report("exposure_inverted",
+                   fmt::format("input {} has the other level while it exposes: change 'strobe' to "
+                               "the other of \"active_high\" and \"active_low\", or LineInverter",
+                               camera_.output));
         if (judge_lengths(*first, *second, a, b)) judge_delays(*first, *second, a, b);
     }
 
@@ -329,15 +344,16 @@ class Judge {
             if (input == camera_.output || !shows(output, input) || explained(output, input))
                 continue;
             const std::string other = owner(input);
-            return find(
+            return report(
                 "wrong_input",
                 fmt::format("its exposure line is at input {}, not {}: {}", input, camera_.output,
                             other.empty() ? "move it" : "swap it with that of " + other));
         }
-        find("no_exposure_line",
-             fmt::format("frames arrive, but input {} shows no exposure: check the cable and its "
-                         "ground, whether the output needs a pull-up, and LineMode and LineSource",
-                         camera_.output));
+        report(
+            "no_exposure_line",
+            fmt::format("frames arrive, but input {} shows no exposure: check the cable and its "
+                        "ground, whether the output needs a pull-up, and LineMode and LineSource",
+                        camera_.output));
     }
 
     void name_other_inputs() {
@@ -345,9 +361,9 @@ class Judge {
             if (input == camera_.output || !shows(camera_.output, input) ||
                 explained(camera_.output, input))
                 continue;
-            find("lines_joined",
-                 fmt::format("its exposures also show at input {}: the two inputs are connected",
-                             input));
+            report("lines_joined",
+                   fmt::format("its exposures also show at input {}: the two inputs are connected",
+                               input));
         }
     }
 
@@ -356,8 +372,9 @@ class Judge {
                        const LineAnswer& b) {
         const Duration longer = b.length - a.length;
         const Duration exposure = first.exposures[index_];
-        if (alike(a.length, first.width) && alike(b.length, second.width)) {
-            find(
+        const bool by_pulse = alike(exposure, first.width);
+        if (!by_pulse && alike(a.length, first.width) && alike(b.length, second.width)) {
+            report(
                 "shows_trigger",
                 fmt::format("input {} shows the trigger pulses, not the exposures: it is connected "
                             "to the trigger output, or LineSource is the trigger line",
@@ -366,7 +383,7 @@ class Judge {
         }
         if (alike(second.exposures[index_], exposure)) return true;  // it cannot be set
         if (alike(longer, {})) {
-            find(
+            report(
                 "fixed_length",
                 fmt::format("input {} is active for {} whatever the exposure is: set LineSource to "
                             "ExposureActive, and StrobeDuration to 0",
@@ -374,29 +391,30 @@ class Judge {
             return false;
         }
         if (!alike(longer, second.exposures[index_] - exposure)) {
-            find("other_signal",
-                 fmt::format("input {} is active for {} at an exposure of {}, and for {} at {}: it "
-                             "does not show the exposure; set LineSource to ExposureActive",
-                             camera_.output, us(a.length), us(exposure), us(b.length),
-                             us(second.exposures[index_])));
+            report(
+                "other_signal",
+                fmt::format("input {} is active for {} at an exposure of {}, and for {} at {}: it "
+                            "does not show the exposure; set LineSource to ExposureActive",
+                            camera_.output, us(a.length), us(exposure), us(b.length),
+                            us(second.exposures[index_])));
             return false;
         }
         const Duration beyond = a.length - exposure;
         if (absolute(beyond) < noticeable_edge) return true;
         if (absolute(beyond) <= slowest_edge) {
-            find("slow_edge",
-                 fmt::format("input {} is active for {} {} than the exposure: an edge is slow; use "
-                             "a stronger pull-up, or state the delays as 'strobe_rising_us' and "
-                             "'strobe_falling_us'",
-                             camera_.output, us(absolute(beyond)),
-                             beyond.ns > 0 ? "longer" : "shorter"));
+            report("slow_edge",
+                   fmt::format(
+                       "input {} is active for {} {} than the exposure: an edge is slow; use "
+                       "a stronger pull-up, or state the delays as 'strobe_rising_us' and "
+                       "'strobe_falling_us'",
+                       camera_.output, us(absolute(beyond)), beyond.ns > 0 ? "longer" : "shorter"));
             return true;
         }
-        find("readout",
-             fmt::format("input {} is active for {} {} than the exposure: it shows frame or "
-                         "readout; set LineSource to ExposureActive",
-                         camera_.output, us(absolute(beyond)),
-                         beyond.ns > 0 ? "longer" : "shorter"));
+        report("readout",
+               fmt::format("input {} is active for {} {} than the exposure: it shows frame or "
+                           "readout; set LineSource to ExposureActive",
+                           camera_.output, us(absolute(beyond)),
+                           beyond.ns > 0 ? "longer" : "shorter"));
         return true;
     }
 
@@ -404,31 +422,33 @@ class Judge {
                       const LineAnswer& b) {
         const Duration wider = second.width - first.width;
         if (absolute(wider) > line_time * 2 && alike(b.delay - a.delay, wider))
-            return find("trigger_edge",
-                        fmt::format("it exposes when the pulse at output {} ends: change "
-                                    "TriggerActivation, or 'trigger_inverted' if its input inverts",
-                                    camera_.output));
+            return report(
+                "trigger_edge",
+                fmt::format("it exposes when the pulse at output {} ends: change "
+                            "TriggerActivation, or 'trigger_inverted' if its input inverts",
+                            camera_.output));
         if (a.delay - camera_.latency > late_start)
-            return find("late_start",
-                        fmt::format("it exposes {} after its trigger, and 'latency_us' is {:.0f}: "
-                                    "set TriggerDelay to 0, or state the latency",
-                                    us(a.delay), static_cast<double>(camera_.latency.ns) * 1e-3));
+            return report(
+                "late_start",
+                fmt::format("it exposes {} after its trigger, and 'latency_us' is {:.0f}: "
+                            "set TriggerDelay to 0, or state the latency",
+                            us(a.delay), static_cast<double>(camera_.latency.ns) * 1e-3));
         if (a.delay_spread > late_start)
-            find("jitter", fmt::format("it exposes {} to {} after its trigger: something in "
-                                       "between is no wire",
-                                       us(a.delay), us(a.delay + a.delay_spread)));
+            report("jitter", fmt::format("it exposes {} to {} after its trigger: something in "
+                                         "between is no wire",
+                                         us(a.delay), us(a.delay + a.delay_spread)));
     }
 
     void describe() {
         const PulseRun* at = run(camera_.output);
         const LineAnswer line = answer_of(*at, camera_.output);
         std::string text = fmt::format("triggered by output {}, {} of {} frames", camera_.output,
-                                       at->frames[index_], at->pulses.size());
+                                       at->frames[index_].arrived, at->pulses.size());
         if (camera_.strobe)
             text += fmt::format(", exposure at input {} {} after the trigger, {} long at {}",
                                 camera_.output, us(line.delay), us(line.length),
                                 us(at->exposures[index_]));
-        find("right", std::move(text));
+        report("right", std::move(text));
     }
 
     const std::vector<WiredCamera>& cameras_;

@@ -23,8 +23,14 @@ struct WiredCamera {
 
 /// An edge of an exposure input.
 struct LineEdge {
-    HostTime at;
+    BoardTime at;
     bool exposing = false;  ///< the level that the configuration takes for an exposure begins
+};
+
+/// Frames of one camera.
+struct FrameCount {
+    std::size_t arrived = 0;
+    std::size_t incomplete = 0;  ///< of those: packets are missing
 };
 
 /// Pulses at one output, and all that happened meanwhile. The gaps between them are irregular, and
@@ -32,10 +38,10 @@ struct LineEdge {
 struct PulseRun {
     std::optional<unsigned> output;   ///< none: nothing was triggered
     Duration width;                   ///< of the pulses
-    std::vector<HostTime> pulses;     ///< when each began
+    std::vector<BoardTime> pulses;    ///< when each began
     std::size_t skipped = 0;          ///< that were due while the camera still exposed
     std::vector<Duration> exposures;  ///< by camera, as it was set
-    std::vector<std::size_t> frames;  ///< by camera, how many arrived
+    std::vector<FrameCount> frames;   ///< by camera
     std::array<std::vector<LineEdge>, wire::camera_count> inputs;  ///< edges in order of time
     bool working = false;  ///< at the exposure that the configuration asks for
 };

@@ -367,8 +367,7 @@ void check_preset(const CameraConfiguration& camera, const std::vector<CameraPre
 
 void check_presets(const Configuration& configuration, Findings& findings) {
     if (configuration.cameras.empty()) return;
-    const std::filesystem::path own = configuration.preset_directory;
-    const auto presets = load_presets(own.empty() ? default_preset_directory() : own);
+    const auto presets = load_presets(preset_directory(configuration));
     if (!presets) {
         const Error& error = presets.error();
         return findings.add(configuration.entry, "preset_directory",

@@ -25,6 +25,7 @@ struct TrueCamera {
     unsigned bursts = 1;
     std::size_t idle_frames = 0;
     bool bounces = false;
+    bool incomplete = false;  ///< its frames
 };
 
 class World {
@@ -36,7 +37,7 @@ class World {
                                         {"b", 1, true, microseconds(30)}}) {
         std::vector<PulseRun> runs;
         PulseRun idle;
-        for (const TrueCamera& camera : cameras_) idle.frames.push_back(camera.idle_frames);
+        for (const TrueCamera& camera : cameras_) idle.frames.push_back({camera.idle_frames, 0});
         runs.push_back(idle);
         for (const int scale : {1, 2})
             for (unsigned output = 0; output < wire::camera_count; ++output)
@@ -59,8 +60,8 @@ class World {
         run.output = output;
         run.width = width;
         run.exposures.assign(cameras_.size(), exposure);
-        run.frames.assign(cameras_.size(), 0);
-        HostTime at{1'000'000'000};
+        run.frames.assign(cameras_.size(), {});
+        BoardTime at{1'000'000'000};
         for (unsigned k = 0; k < 32; ++k) {
             run.pulses.push_back(at);
             for (std::size_t i = 0; i < cameras_.size(); ++i) answer(run, i, at, k);
@@ -72,16 +73,17 @@ class World {
         return run;
     }
 
-    void answer(PulseRun& run, std::size_t index, HostTime pulse, unsigned k) {
+    void answer(PulseRun& run, std::size_t index, BoardTime pulse, unsigned k) {
         const TrueCamera& camera = cameras_[index];
         if (std::count(camera.outputs.begin(), camera.outputs.end(), *run.output) == 0) return;
         const Duration exposure = run.exposures[index];
         if (chance() < camera.ignores || (exposure > busy_beyond && k % 2 == 1)) return;
-        if (chance() >= camera.loses) run.frames[index] += camera.bursts;
+        if (chance() >= camera.loses) run.frames[index].arrived += camera.bursts;
+        if (camera.incomplete) run.frames[index].incomplete = run.frames[index].arrived;
         const Duration jitter{static_cast<std::int64_t>(chance() * 12'000)};
-        const HostTime start =
+        const BoardTime start =
             pulse + camera.delay + jitter + (camera.at_end ? run.width : Duration{});
-        const HostTime end = start + camera.fixed.value_or(exposure) + camera.longer;
+        const BoardTime end = start + camera.fixed.value_or(exposure) + camera.longer;
         for (const unsigned input : camera.inputs) {
             run.inputs[input].push_back({start, !camera.inverted});
             if (camera.bounces) {
@@ -154,6 +156,7 @@ TEST_CASE("wiring: each fault of one camera is named, and no other") {
     CHECK(first(with([](auto& c) { c.delay = milliseconds(5); })) == Codes{"late_start"});
     CHECK(first(with([](auto& c) { c.ignores = 0.3; })) == Codes{"lost"});
     CHECK(first(with([](auto& c) { c.loses = 1; })) == Codes{"no_frames"});
+    CHECK(first(with([](auto& c) { c.incomplete = true; })) == Codes{"incomplete"});
     CHECK(first(with([](auto& c) { c.bursts = 2; })) == Codes{"frames_for_each"});
     CHECK(first(with([](auto& c) { c.idle_frames = 20; })) == Codes{"free_run"});
     CHECK(first(with([](auto& c) { c.bounces = true; })) == Codes{"bounces"});
@@ -167,9 +170,9 @@ TEST_CASE("wiring: what shows the trigger pulse is not taken for an exposure") {
         run.output = 0;
         run.width = microseconds(100) * scale;
         run.exposures = {milliseconds(1) * scale * scale};
-        run.frames = {20};
+        run.frames = {{20, 0}};
         for (int k = 0; k < 20; ++k) {
-            const HostTime at{milliseconds(50).ns * (k + k / 3)};
+            const BoardTime at{milliseconds(50).ns * (k + k / 3)};
             run.pulses.push_back(at);
             run.inputs[0].push_back({at, true});
             run.inputs[0].push_back({at + run.width, false});
@@ -177,7 +180,7 @@ TEST_CASE("wiring: what shows the trigger pulse is not taken for an exposure") {
         runs.push_back(run);
     }
     CHECK(codes(judge_wiring({{"a", 0, true, {}}}, runs)[0]) == Codes{"shows_trigger"});
-    for (PulseRun& run : runs) run.frames = {0};
+    for (PulseRun& run : runs) run.frames = {{0, 0}};
     CHECK(codes(judge_wiring({{"a", 0, true, {}}}, runs)[0]) == Codes{"no_trigger"});
 }
 
@@ -210,7 +213,7 @@ TEST_CASE("wiring: so are those that the board waits for") {
     PulseRun run;
     run.output = 0;
     run.pulses.resize(10);
-    run.frames = {10};
+    run.frames = {{10, 0}};
     run.exposures = {milliseconds(60)};
     PulseRun working = run;
     working.working = true;
@@ -225,9 +228,9 @@ TEST_CASE("wiring: but not where the board takes an inverted line for one exposu
     run.output = 0;
     run.width = microseconds(100);
     run.exposures = {milliseconds(1)};
-    run.frames = {10};
+    run.frames = {{10, 0}};
     for (int k = 0; k < 10; ++k) {
-        const HostTime at{milliseconds(50).ns * k};
+        const BoardTime at{milliseconds(50).ns * k};
         run.pulses.push_back(at);
         run.inputs[0].push_back({at, false});
         run.inputs[0].push_back({at + milliseconds(1), true});
@@ -243,9 +246,30 @@ TEST_CASE("wiring: but not where the board takes an inverted line for one exposu
           Codes{"exposure_inverted"});
 }
 
+TEST_CASE("wiring: a camera that exposes for as long as the pulse is right") {
+    std::vector<PulseRun> runs;
+    for (const int scale : {1, 3}) {
+        PulseRun run;
+        run.output = 0;
+        run.width = run.exposures.emplace_back(microseconds(100) * scale);
+        run.frames = {{10, 0}};
+        for (int k = 0; k < 10; ++k) {
+            const BoardTime at{milliseconds(100).ns * (k + k / 3)};
+            run.pulses.push_back(at);
+            run.inputs[0].push_back({at + microseconds(20), true});
+            run.inputs[0].push_back({at + microseconds(20) + run.width, false});
+        }
+        runs.push_back(run);
+    }
+    CHECK(codes(judge_wiring({{"a", 0, true, microseconds(20)}}, runs)[0]) == Codes{"right"});
+}
+
 TEST_CASE("wiring: without an exposure line only the trigger is judged") {
     const std::vector<WiredCamera> believed{{"a", 0, false, {}}};
     CHECK(codes(World({wired({0}, {})}).check(believed)[0]) == Codes{"right"});
     CHECK(codes(World({right(0)}).check(believed)[0]) == Codes{"strobe_unused"});
     CHECK(codes(World({wired({1}, {})}).check(believed)[0]) == Codes{"wrong_output"});
+    const CameraWiring unseen = World({wired({}, {})}).check(believed)[0];
+    CHECK(codes(unseen) == Codes{"no_trigger"});
+    CHECK_THAT(unseen.findings[0].text, Catch::Contains("no frame arrive"));
 }
