@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 
 #include "camera/receive_mode.hpp"
@@ -257,18 +258,19 @@ std::uint64_t AravisStream::block_id(ArvBuffer* buffer) {
     return id == 0 ? 0 : block_ids_.unwrap(id);
 }
 
-Duration AravisStream::chunk_exposure(ArvBuffer* buffer) const {
-    if (!chunk_parser_ || setup_.chunk_exposure.empty() || arv_buffer_has_chunks(buffer) == FALSE)
-        return {};
+/// NaN: the frame does not carry it.
+double AravisStream::chunk_value(ArvBuffer* buffer, const ChunkFeature& feature) const {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    if (!chunk_parser_ || feature.name.empty() || arv_buffer_has_chunks(buffer) == FALSE)
+        return none;
     GlibError error;
-    const char* feature = setup_.chunk_exposure.c_str();
-    const double value =
-        setup_.chunk_is_integer
-            ? static_cast<double>(arv_chunk_parser_get_integer_value(chunk_parser_.get(), buffer,
-                                                                     feature, error.out()))
-            : arv_chunk_parser_get_float_value(chunk_parser_.get(), buffer, feature, error.out());
-    const double us = value * setup_.chunk_exposure_unit_us;
-    return error.set() ? Duration{} : Duration{std::llround(us * 1e3)};
+    ArvChunkParser* parser = chunk_parser_.get();
+    const char* name = feature.name.c_str();
+    const double value = feature.is_integer
+                             ? static_cast<double>(arv_chunk_parser_get_integer_value(
+                                   parser, buffer, name, error.out()))
+                             : arv_chunk_parser_get_float_value(parser, buffer, name, error.out());
+    return error.set() ? none : value;
 }
 
 /// Aravis counts packets that find no buffer, and drops their frame without a word.
@@ -312,7 +314,10 @@ void AravisStream::take(ArvBuffer* buffer) {
         if (setup_.has_clock)
             arrival.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
         note_clock(arrival);
-        arrival.exposure = chunk_exposure(buffer);
+        const double exposure_us =
+            chunk_value(buffer, setup_.chunk_exposure) * setup_.chunk_exposure_unit_us;
+        if (!std::isnan(exposure_us)) arrival.exposure = {std::llround(exposure_us * 1e3)};
+        arrival.sensor.gain = static_cast<float>(chunk_value(buffer, setup_.chunk_gain));
         arrival.width = width_ = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
         arrival.height = height_ = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));
         arrival.pixel_format = arv_buffer_get_image_pixel_format(buffer);

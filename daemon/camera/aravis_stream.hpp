@@ -70,7 +70,7 @@ class AravisStream {
     EventReason refusal(ArvBuffer* buffer) const;
     std::uint32_t stride(ArvBuffer* buffer) const;
     std::uint64_t block_id(ArvBuffer* buffer);
-    Duration chunk_exposure(ArvBuffer* buffer) const;
+    double chunk_value(ArvBuffer* buffer, const ChunkFeature& feature) const;
     void note_starvation();
     void note_size(ArvBuffer* buffer, EventReason refused);
     void note_clock(const pairing::Arrival& arrival);

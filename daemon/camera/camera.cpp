@@ -247,6 +247,7 @@ void Camera::describe(const CameraSetup& setup) {
     report_.model = setup.model;
     report_.serial = setup.serial;
     report_.preset = setup.preset;
+    report_.gain_feature = setup.sensor.gain;
     report_.steps = setup.steps;
     if (refusals == refusals_) return;
     for (const std::string& refusal : refusals)
@@ -270,13 +271,13 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
         return failed(done.error());
     watched_ = setup.watched;
     exposure_feature_ = setup.exposure_feature;
+    sensor_features_ = setup.sensor;
     const Duration exposure = fixed_exposure(nodes, exposure_feature_);
     pipeline_.set_camera_exposure(exposure, {});  // it takes no frame yet
     if (configuration_.auto_exposure.enabled) {
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
     }
-    exposure_feature_ = setup.exposure_feature;
     Object<ArvChunkParser> chunks;
     if (setup.chunks) {
         const auto turn = lock(environment_.aravis, [this] { return !pause({}); });
@@ -450,16 +451,16 @@ void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
         arv_camera_gv_set_packet_delay(camera, share.packet_delay.ns, nullptr);
         packet_delay_ = share.packet_delay;
     }
-    const double temperature = nodes.read_number("DeviceTemperature").value_or(0);
+    const SensorState sensor = read_sensor(nodes);
     std::string hint = changed_settings(nodes);
     if (!share.fits())
         hint = fmt::format(
             "the link carries {:.0f} Mbit/s but its cameras need {:.0f}: lower rate, size or "
             "number",
             share.link_mbps, share.link_needed_mbps);
-    else if (temperature > configuration_.max_temperature_c)
+    else if (sensor.temperature_c > configuration_.max_temperature_c)
         hint = fmt::format("the camera is at {:.0f} degrees: cool it, or raise 'max_temperature_c'",
-                           temperature);
+                           sensor.temperature_c);
     else if (without_clock_)
         hint = "its clock stood still: it is paired without it; power the camera off and on";
     else if (meter_ && !meter_->usable())
@@ -469,9 +470,17 @@ void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
     {
         const std::lock_guard lock(mutex_);
         report_.bandwidth = share;
-        report_.temperature_c = temperature;
+        report_.sensor = sensor;
     }
     if (streaming_) set_state(CameraState::streaming, hint);
+}
+
+/// A camera that is mute would hold this thread for seconds with each reading.
+SensorState Camera::read_sensor(const AravisNodeMap& nodes) {
+    const SensorState sensor =
+        streaming_ && mute() ? SensorState{} : sensor_state(nodes, sensor_features_);
+    pipeline_.set_sensor_state(sensor);
+    return sensor;
 }
 
 /// The board learns of an exposure before the camera does: it is on the way when the camera takes

@@ -23,6 +23,7 @@
 #include "camera/patient_work.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/retry.hpp"
+#include "camera/sensor_features.hpp"
 #include "configuration/configuration.hpp"
 #include "stream/camera_pipeline.hpp"
 
@@ -48,7 +49,8 @@ struct CameraReport {
     std::uint32_t packet_size = 0;
     ReceiveMode receive = ReceiveMode::automatic;  ///< in use; automatic: not GigE Vision
     BandwidthShare bandwidth;
-    double temperature_c = 0;  ///< 0: unknown
+    std::string gain_feature;
+    SensorState sensor;  ///< as its registers say
 };
 
 /// What all cameras share.
@@ -114,6 +116,7 @@ class Camera {
     std::string changed_settings(const AravisNodeMap& nodes);
     void control_exposure(AravisNodeMap& nodes);
     void read_exposure(const AravisNodeMap& nodes);
+    SensorState read_sensor(const AravisNodeMap& nodes);
     bool silent(HostTime began) const;
     bool mute() const;  ///< no frame comes
     void describe(const CameraSetup& setup);
@@ -138,6 +141,7 @@ class Camera {
     std::unique_ptr<FrameMeter> meter_;
     std::unique_ptr<AutoExposure> exposure_;
     std::string exposure_feature_;
+    SensorFeatures sensor_features_;
     std::vector<std::pair<std::string, std::string>>
         watched_;                        ///< features, and the values that they were set up with
     std::vector<std::string> refusals_;  ///< that were logged

@@ -107,6 +107,10 @@ Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     reader.read("chunk_selector", preset.chunk_selector);
     reader.read("chunk_exposure", preset.chunk_exposure);
     reader.read("chunk_exposure_unit_us", preset.chunk_exposure_unit_us, 0, longest_unit_us);
+    reader.read("gain", preset.gain);
+    reader.read("temperature", preset.temperature);
+    reader.read("chunk_gain_selector", preset.chunk_gain_selector);
+    reader.read("chunk_gain", preset.chunk_gain);
     reader.choose<pairing::Instant>("stamp_instant", preset.stamp_instant,
                                     {{"start", pairing::Instant::start},
                                      {"middle", pairing::Instant::middle},
@@ -145,6 +149,10 @@ void complete(CameraPreset& preset, const CameraPreset& base) {
     inherit(preset.exposure_time, base.exposure_time);
     inherit(preset.chunk_selector, base.chunk_selector);
     inherit(preset.chunk_exposure, base.chunk_exposure);
+    inherit(preset.gain, base.gain);
+    inherit(preset.temperature, base.temperature);
+    inherit(preset.chunk_gain_selector, base.chunk_gain_selector);
+    inherit(preset.chunk_gain, base.chunk_gain);
     preset.groups.insert(base.groups.begin(), base.groups.end());
 }
 

@@ -16,8 +16,8 @@
 namespace versavis::daemon {
 
 /// Sets the first of the features that the camera has to the first of the values that it takes.
-/// A text may be {trigger}, {trigger_line}, {strobe_line}, {edge}, {line_inverter}, {chunk} or
-/// {max_exposure_us}; the value "min" is the lowest that the camera allows.
+/// A text may be {trigger}, {trigger_line}, {strobe_line}, {edge}, {line_inverter}, {chunk},
+/// {chunk_gain} or {max_exposure_us}; the value "min" is the lowest that the camera allows.
 struct PresetStep {
     std::string selector;  ///< is set first, to `selected`, where the camera has it
     std::string selected;
@@ -52,6 +52,10 @@ struct CameraPreset {
     std::vector<std::string> chunk_selector;  ///< of the chunk with the exposure time ...
     std::vector<std::string> chunk_exposure;  ///< ... and the feature that has its value
     double chunk_exposure_unit_us = 1;
+    std::vector<std::string> gain;                 ///< feature: the first that reads as a number
+    std::vector<std::string> temperature;          ///< the same, in degrees Celsius
+    std::vector<std::string> chunk_gain_selector;  ///< of the chunk with the gain ...
+    std::vector<std::string> chunk_gain;           ///< ... and the feature that has its value
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< what its stamps are of
     std::vector<PresetLine> lines;
     std::map<std::string, std::vector<PresetStep>>

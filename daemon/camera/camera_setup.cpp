@@ -106,6 +106,7 @@ PresetVariables variables_of(const CameraPreset& preset, const CameraConfigurati
             {"trigger_line", own_or(configuration.trigger_line, preset.trigger_lines)},
             {"strobe_line", own_or(configuration.strobe_line, preset.strobe_lines)},
             {"chunk", preset.chunk_selector},
+            {"chunk_gain", preset.chunk_gain_selector},
             {"line_inverter", {preset.line_inverter ? "true" : "false"}},
             {"max_exposure_us", {fmt::format("{:.0f}", std::floor(configuration.max_exposure_us))}},
             {"edge", {configuration.trigger_inverted ? "FallingEdge" : "RisingEdge"}}};
@@ -116,6 +117,34 @@ std::string first_of(const AravisNodeMap& nodes, const std::vector<std::string>&
     const auto found = std::find_if(features.begin(), features.end(),
                                     [&](const std::string& name) { return nodes.has(name); });
     return found == features.end() ? "" : *found;
+}
+
+/// The first of the features that reads as a number; empty: none.
+std::string first_number(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
+    const auto found = std::find_if(features.begin(), features.end(), [&](const std::string& name) {
+        return nodes.read_number(name).has_value();
+    });
+    return found == features.end() ? "" : *found;
+}
+
+/// The first of the features that the camera's description has.
+ChunkFeature first_chunk(const AravisNodeMap& nodes, const std::vector<std::string>& features) {
+    const std::string name = first_of(nodes, features);
+    return {name, nodes.is_integer(name)};
+}
+
+/// Whether a step set something of one of the selector's values.
+bool has_set(const std::vector<StepResult>& steps, const std::vector<std::string>& selected) {
+    return std::any_of(steps.begin(), steps.end(), [&](const StepResult& step) {
+        return step.outcome == StepOutcome::set &&
+               std::find(selected.begin(), selected.end(), step.selected) != selected.end();
+    });
+}
+
+/// By itself: no register says what it is of a frame.
+bool changes_itself(const AravisNodeMap& nodes, const std::string& automatic) {
+    const std::string mode = nodes.read(automatic);
+    return !mode.empty() && mode != "Off";
 }
 
 /// What was set, as it reads now, with the exposure: where it changes, somebody else, or the camera
@@ -134,8 +163,7 @@ std::vector<std::pair<std::string, std::string>> watched(const AravisNodeMap& no
         if ((step.group == "trigger" || step.group == "strobe") && step.outcome == StepOutcome::set)
             add(step.feature);
     add("ExposureAuto");
-    if (nodes.read("ExposureAuto") == "Off" || nodes.read("ExposureAuto").empty())
-        add(exposure_feature);
+    if (!changes_itself(nodes, "ExposureAuto")) add(exposure_feature);
     return features;
 }
 
@@ -194,9 +222,9 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
                               ? preset->stamp_instant
                               : configuration.stamp_instant;
     setup.exposure_feature = first_of(nodes, preset->exposure_time);
-    setup.chunk_exposure = first_of(nodes, preset->chunk_exposure);
+    setup.chunk_exposure = first_chunk(nodes, preset->chunk_exposure);
     setup.chunk_exposure_unit_us = preset->chunk_exposure_unit_us;
-    setup.chunk_is_integer = nodes.is_integer(setup.chunk_exposure);
+    setup.sensor = {first_number(nodes, preset->gain), first_number(nodes, preset->temperature)};
 
     arv_camera_stop_acquisition(camera, nullptr);  // somebody may have left it running
     if (auto has_all = check_groups(*preset, configuration); !has_all) return has_all;
@@ -221,6 +249,8 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
     setup.chunks = configuration.chunks ? *configuration.chunks
                                         : exposure_changes(nodes, setup, configuration) &&
                                               enable_chunks(nodes, *preset, configuration, setup);
+    if (setup.chunks && has_set(setup.steps, preset->chunk_gain_selector))
+        setup.chunk_gain = first_chunk(nodes, preset->chunk_gain);
     const auto payload = payload_of(camera, configuration);
     if (!payload) return Unexpected(payload.error());
     setup.payload = *payload;
@@ -229,10 +259,19 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
 }
 
 Duration fixed_exposure(const AravisNodeMap& nodes, const std::string& feature) {
-    const std::string automatic = nodes.read("ExposureAuto");
-    const bool fixed = automatic.empty() || automatic == "Off";
-    if (!fixed || feature.empty()) return {};
+    if (feature.empty() || changes_itself(nodes, "ExposureAuto")) return {};
     return {std::llround(nodes.read_number(feature).value_or(0) * 1e3)};
+}
+
+SensorState sensor_state(const AravisNodeMap& nodes, const SensorFeatures& features) {
+    SensorState state;
+    const auto read = [&](const std::string& feature, float& value) {
+        const auto number = feature.empty() ? std::nullopt : nodes.read_number(feature);
+        if (number) value = static_cast<float>(*number);
+    };
+    read(features.temperature, state.temperature_c);
+    if (!changes_itself(nodes, "GainAuto")) read(features.gain, state.gain);
+    return state;
 }
 
 }  // namespace versavis::daemon

@@ -6,10 +6,17 @@
 #include "camera/camera_preset.hpp"
 #include "camera/line_delays.hpp"
 #include "camera/preset_run.hpp"
+#include "camera/sensor_features.hpp"
 #include "configuration/configuration.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {
+
+/// A value that frames carry.
+struct ChunkFeature {
+    std::string name;  ///< empty: they do not
+    bool is_integer = false;
+};
 
 /// What the setup found out of the camera.
 struct CameraSetup {
@@ -22,9 +29,10 @@ struct CameraSetup {
     std::vector<std::pair<std::string, std::string>>
         watched;                   ///< features with the values that must stay as they are
     std::string exposure_feature;  ///< in microseconds; empty: it has none that counts
-    std::string chunk_exposure;    ///< the same of each frame, in units of ...
+    ChunkFeature chunk_exposure;   ///< the same of each frame, in units of ...
     double chunk_exposure_unit_us = 1;
-    bool chunk_is_integer = false;
+    ChunkFeature chunk_gain;
+    SensorFeatures sensor;
     std::uint64_t payload = 0;  ///< bytes of a frame, chunks included
     bool chunks = false;        ///< frames carry their exposure time
     bool has_clock = true;      ///< its time stamps are its own, not the host's
@@ -40,5 +48,8 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
 /// Exposure time as `feature` has it, in microseconds; zero when the camera changes it by itself,
 /// or does not say.
 Duration fixed_exposure(const AravisNodeMap& nodes, const std::string& feature);
+
+/// As the registers have it now. No gain while the camera changes it by itself.
+SensorState sensor_state(const AravisNodeMap& nodes, const SensorFeatures& features);
 
 }  // namespace versavis::daemon

@@ -156,14 +156,27 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     triggers_.answered();
     answers_.arrived(arrival);
     if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
+    pairing::Arrival told = completed(arrival);
     if (triggered()) {
-        pairing::Arrival told = arrival;
         chunk_exposures_[arrival.slot] = arrival.exposure;
         told.exposure = check_.for_pairing(arrival.exposure);
         return tell(told);
     }
     ++report_.published;
-    frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), false);
+    frames_.publish_arrived(told, translator_.translate(arrival.arrived, {}), false);
+}
+
+/// With what the camera's registers say where the frame does not.
+pairing::Arrival CameraPipeline::completed(pairing::Arrival arrival) const {
+    if (std::isnan(arrival.sensor.gain)) arrival.sensor.gain = sensor_.gain;
+    if (std::isnan(arrival.sensor.temperature_c))
+        arrival.sensor.temperature_c = sensor_.temperature_c;
+    return arrival;
+}
+
+void CameraPipeline::set_sensor_state(const SensorState& state) {
+    const std::lock_guard lock(mutex_);
+    sensor_ = state;
 }
 
 std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received) {

@@ -89,6 +89,9 @@ class CameraPipeline final : private pairing::Outcome {
     void read_exposure(Duration exposure, HostTime at);
     bool wants_exposure_readings();
 
+    /// Of the frames from now on, but for what they carry themselves.
+    void set_sensor_state(const SensorState& state);
+
     /// Before frames of these lines come.
     void set_line_delays(const LineDelays& lines);
 
@@ -151,6 +154,7 @@ class CameraPipeline final : private pairing::Outcome {
     void adopt_step(const wire::Exposure& record, const Doubt& doubt);
     void follow_clock(std::uint32_t life);
     std::optional<pairing::Start> advance_locked(HostTime now);
+    pairing::Arrival completed(pairing::Arrival arrival) const;
     void note_chunk_lag();
     FrameAccount account_of(const pairing::Arrival& arrival) const;
     void count_refusal(EventReason reason);
@@ -173,6 +177,7 @@ class CameraPipeline final : private pairing::Outcome {
     ExposureCheck check_;
     AnswerWatch answers_;
     EventLengths event_lengths_;
+    SensorState sensor_;
     bool missed_said_ = false;               ///< in the log, of this stream
     std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
     TriggerWatch triggers_;

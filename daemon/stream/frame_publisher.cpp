@@ -87,7 +87,7 @@ bool FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp
     if (!guarded) return false;
     metadata.flags |= guarded->flags;
     metadata.sigma_ns = guarded->sigma_ns;
-    ring_->publish(arrival.slot, arrival.size, guarded->time, pack(metadata));
+    ring_->publish(arrival.slot, arrival.size, guarded->time, pack(metadata), pack(arrival.sensor));
     return true;
 }
 

@@ -309,6 +309,14 @@ int versavis_view(const versavis_item* item, versavis_image* image) {
     return VERSAVIS_OK;
 }
 
+int versavis_sensor(const versavis_item* item, versavis_sensor_state* state) {
+    if (item == nullptr || state == nullptr || item->kind != VERSAVIS_FRAMES || !held(*item))
+        return VERSAVIS_INVALID;
+    const SensorState found = unpack_sensor_state(held(*item)->attributes());
+    *state = {found.gain, found.temperature_c};
+    return held(*item)->valid() ? VERSAVIS_OK : VERSAVIS_OVERTAKEN;
+}
+
 const char* versavis_pixel_format_name(uint32_t pixel_format) {
     return pixel_format_name(pixel_format);
 }

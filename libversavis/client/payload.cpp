@@ -43,6 +43,12 @@ Payload::Payload(std::shared_ptr<const Mapping> mapping, std::uint32_t slot,
       slot_(slot),
       size_(size) {}
 
+std::uint64_t Payload::attributes() const {
+    return mapping_ && mapping_->constants().has_attributes
+               ? mapping_->attributes(slot_).load(std::memory_order_relaxed)
+               : no_attributes;
+}
+
 bool Payload::valid() const {
     if (!mapping_) return true;
     // SYNC 4: acquire fence here, release fence in Writer::acquire(): if anything that was read of

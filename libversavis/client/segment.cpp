@@ -29,6 +29,7 @@ struct OpenFile {
 
 /// Older segments have nothing there.
 constexpr std::uint32_t minor_with_life = 5;
+constexpr std::uint32_t minor_with_attributes = 6;
 
 bool inside(std::uint64_t at, std::uint64_t count, std::uint64_t size, std::uint64_t total) {
     return at <= total && (size == 0 || count <= (total - at) / size);
@@ -125,6 +126,7 @@ void Mapping::read_constants() {
     std::memcpy(constants_.name.data(), from.name, sizeof from.name);
     constants_.life = from.abi_minor >= minor_with_life ? from.life : 0;
     constants_.pid_namespace = from.abi_minor >= minor_with_life ? from.pid_namespace : 0;
+    constants_.has_attributes = from.abi_minor >= minor_with_attributes;
 }
 
 File::~File() {

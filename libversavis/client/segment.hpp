@@ -31,6 +31,7 @@ struct Constants {
     std::array<char, sizeof Header::name> name;
     std::uint64_t life;
     std::uint64_t pid_namespace;
+    bool has_attributes;  ///< its slots have
 };
 
 /// Device and inode: tells a segment from its successor of the same name.
@@ -91,8 +92,10 @@ class Mapping {
             bytes() + constants_.descriptors_at)[number & (constants_.descriptor_count - 1)];
     }
     std::atomic<std::uint64_t>& generation(std::uint32_t slot) const {
-        return *reinterpret_cast<std::atomic<std::uint64_t>*>(bytes() + constants_.generations_at +
-                                                              slot * generation_stride);
+        return words(slot).generation;
+    }
+    std::atomic<std::uint64_t>& attributes(std::uint32_t slot) const {
+        return words(slot).attributes;
     }
     std::byte* slot(std::uint32_t slot) const {
         return bytes() + constants_.slots_at + slot * constants_.slot_size;
@@ -103,6 +106,9 @@ class Mapping {
     void read_constants();
 
  private:
+    SlotWords& words(std::uint32_t slot) const {
+        return reinterpret_cast<SlotWords*>(bytes() + constants_.generations_at)[slot];
+    }
     std::byte* bytes() const { return static_cast<std::byte*>(region_.get_address()); }
 
     boost::interprocess::mapped_region region_;

@@ -180,6 +180,12 @@ typedef struct versavis_image {
     uint32_t bytes_per_channel; /* 1 or 2 */
 } versavis_image;
 
+/* How the sensor was when it took a frame, by the camera's own account; NaN: not known. */
+typedef struct versavis_sensor_state {
+    float gain;        /* dB, or the unit of the camera */
+    float temperature; /* degree Celsius */
+} versavis_sensor_state;
+
 VERSAVIS_EXPORT const char *versavis_version(void);
 
 /* One sentence about a result. */
@@ -224,6 +230,9 @@ VERSAVIS_EXPORT void versavis_release(versavis_item *item);
 
 /* The pixels of a frame. VERSAVIS_INVALID: no frame, or fewer bytes than its numbers claim. */
 VERSAVIS_EXPORT int versavis_view(const versavis_item *item, versavis_image *image);
+
+/* VERSAVIS_INVALID: no frame. VERSAVIS_OVERTAKEN: the writer needed the memory. */
+VERSAVIS_EXPORT int versavis_sensor(const versavis_item *item, versavis_sensor_state *state);
 
 /* As "Mono8"; "unknown" for others. */
 VERSAVIS_EXPORT const char *versavis_pixel_format_name(uint32_t pixel_format);

@@ -122,8 +122,8 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       truth_(truth),
       clock_(zero, settings.clock),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
-                  settings.exposure_us, settings.exposure_swing > 0, settings.temperature_c,
-                  settings.events, settings.hostility}),
+                  settings.exposure_us, settings.exposure_swing > 0, settings.auto_gain,
+                  settings.temperature_c, settings.events, settings.hostility}),
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
@@ -415,14 +415,20 @@ Missing GigeCamera::missing_part() const {
 }
 
 /// Each chunk is followed by its id and length; those of the image come right after it.
-std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure) const {
+std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure, std::uint64_t block_id) const {
     std::vector<std::uint8_t> out;
+    const auto put_float = [&](std::uint32_t id, std::uint32_t value) {
+        put_word(out, value);
+        put_word(out, id);
+        put_word(out, sizeof(float));
+    };
     put_word(out, chunk_id_image);
     put_word(out, settings_.width * settings_.height);
-    put_word(out, std::bit_cast<std::uint32_t>(
-                      static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
-    put_word(out, chunk_id_exposure);
-    put_word(out, sizeof(float));
+    put_float(chunk_id_exposure, std::bit_cast<std::uint32_t>(
+                                     static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
+    put_float(chunk_id_gain, registers_.value(reg_gain_auto) != 0
+                                 ? std::bit_cast<std::uint32_t>(static_cast<float>(block_id % 10))
+                                 : registers_.value(reg_gain));
     return out;
 }
 
@@ -509,7 +515,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         frame.pixels = view_.wall(middle(truth.start, truth.end))
                            .first(std::size_t{frame.width} * frame.height);
     frame.exposed = truth.end;
-    if (registers_.value(reg_chunk_mode) != 0) frame.chunks = chunks(truth.end - truth.start);
+    if (registers_.value(reg_chunk_mode) != 0)
+        frame.chunks = chunks(truth.end - truth.start, frame.block_id);
     frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};
     frame.leader_due = settings_.early_leader ? truth.start : frame.due;
     frame.done = [this, truth](bool sent) mutable {

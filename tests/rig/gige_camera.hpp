@@ -70,7 +70,7 @@ class GigeCamera final : public TriggeredCamera {
     const Fault* active_fault(FaultKind kind) const;
     void next_block_id();
     Missing missing_part() const;
-    std::vector<std::uint8_t> chunks(Duration exposure) const;
+    std::vector<std::uint8_t> chunks(Duration exposure, std::uint64_t block_id) const;
     void apply_outages();
 
     CameraScenario settings_;

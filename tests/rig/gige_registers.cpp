@@ -62,6 +62,7 @@ void GigeRegisters::reset() {
     set(reg_temperature, std::bit_cast<std::uint32_t>(static_cast<float>(identity_.temperature_c)));
     set(reg_exposure_limit, std::bit_cast<std::uint32_t>(1e7F));
     set(reg_exposure_auto, identity_.exposure_auto ? 2 : 0);
+    set(reg_gain_auto, identity_.gain_auto ? 2 : 0);
 }
 
 void GigeRegisters::set(Register address, std::uint32_t value) {

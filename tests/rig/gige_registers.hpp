@@ -77,16 +77,19 @@ enum Register : std::uint32_t {
     reg_exposure_limit = 0x10070,
     reg_event_selector = 0x10074,
     reg_event_notification = 0x10078,  ///< one register for each event
+    reg_gain_auto = 0x10090,
 
     reg_xml = 0x20000,
 };
 
 inline constexpr std::uint32_t gige_default_heartbeat_ms = 3000;
 
-/// Chunk data: the image, then the exposure time as a float, each followed by its id and length.
+/// Chunk data: the image, then exposure time and gain as floats, each followed by its id and
+/// length.
 inline constexpr std::uint32_t chunk_id_image = 1;
 inline constexpr std::uint32_t chunk_id_exposure = 0x1001;
-inline constexpr std::uint32_t chunk_bytes = 8 + 4 + 8;
+inline constexpr std::uint32_t chunk_id_gain = 0x1002;
+inline constexpr std::uint32_t chunk_bytes = 8 + 2 * (4 + 8);
 
 /// Thread-safe.
 class GigeRegisters {
@@ -99,6 +102,7 @@ class GigeRegisters {
         std::uint32_t height;
         double exposure_us;
         bool exposure_auto;
+        bool gain_auto = false;
         double temperature_c = 45;
         bool events = true;
         Hostility hostility = Hostility::none;

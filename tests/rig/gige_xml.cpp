@@ -177,13 +177,15 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.enumeration("ExposureAuto", reg_exposure_auto, {{"Off", 0}, {"Continuous", 2}});
     xml.real("AutoExposureExposureTimeUpperLimit", reg_exposure_limit, "us", 10, 1e7);
     xml.real("Gain", reg_gain, "dB", 0, 48);
+    xml.enumeration("GainAuto", reg_gain_auto, {{"Off", 0}, {"Continuous", 2}});
     xml.enumeration("LineSelector", reg_line_selector, {{"Line0", 0}, {"Line1", 1}});
     xml.enumeration("LineMode", reg_line_mode, {{"Input", 0}, {"Output", 1}});
     xml.enumeration("LineSource", reg_line_source, {{"Off", 0}, {"ExposureActive", 1}});
     xml.boolean("ChunkModeActive", reg_chunk_mode);
-    xml.enumeration("ChunkSelector", reg_chunk_selector, {{"ExposureTime", 0}});
+    xml.enumeration("ChunkSelector", reg_chunk_selector, {{"ExposureTime", 0}, {"Gain", 1}});
     xml.boolean("ChunkEnable", reg_chunk_enable);
     xml.chunk_real("ChunkExposureTime", chunk_id_exposure);
+    xml.chunk_real("ChunkGain", chunk_id_gain);
     xml.enumeration("EventSelector", reg_event_selector,
                     {{"ExposureStart", 0}, {"ExposureEnd", 1}, {"FrameTriggerMissed", 2}});
     xml.selected("EventNotification", reg_event_notification, "EventSelector",

@@ -90,6 +90,7 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("leds", camera.leds, 4, -1e4, 2e4);
     reader.read("led_level", camera.led_level, 0, 1000);
     reader.read("temperature_c", camera.temperature_c, -40, 150);
+    reader.read("auto_gain", camera.auto_gain);
     reader.choose<Hostility>("hostile", camera.hostility,
                              {{"none", Hostility::none},
                               {"value_loop", Hostility::value_loop},

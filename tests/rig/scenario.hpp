@@ -82,6 +82,7 @@ struct CameraScenario {
     std::vector<double> leds{};  ///< centres of the outermost LEDs, x and y each; none: not in view
     double led_level = 160;      ///< brightness of an LED that is lit during the whole exposure
     double temperature_c = 45;
+    bool auto_gain = false;  ///< frame n is taken with n mod 10 dB
     Hostility hostility = Hostility::none;
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };

@@ -110,8 +110,8 @@ std::string envelope(const FileItem& item) {
     std::string data = raw(item.number) + raw(item.life) + raw(item.time.ns) +
                        raw(static_cast<std::uint32_t>(item.payload.size())) +
                        raw(std::uint32_t{0}) + raw(item.metadata);
-    if (item.kind != ring::StreamKind::frames) data += as_text(item.payload);
-    return data;
+    if (item.kind != ring::StreamKind::frames) return data + as_text(item.payload);
+    return item.attributes == ring::no_attributes ? data : data + raw(item.attributes);
 }
 
 std::string map_text(const std::map<std::string, std::string>& map) {
@@ -254,8 +254,15 @@ FileItem sample_frame(const std::string& camera, std::uint64_t number, std::int6
     frame.sigma_ns = 900;
     frame.epoch = 1;
     if (camera == "cam0" && number == 7) frame.flags = flag_suspect;
-    return {camera,      ring::StreamKind::frames,    number, life, {time},
-            pack(frame), sample_pixels(frame, number)};
+    return {camera,
+            ring::StreamKind::frames,
+            number,
+            life,
+            {time},
+            pack(frame),
+            sample_pixels(frame, number),
+            camera == "cam1" ? pack(SensorState{static_cast<float>(number), 41.5F})
+                             : ring::no_attributes};
 }
 
 FileItem sample_sample(std::uint64_t number, std::int64_t time) {

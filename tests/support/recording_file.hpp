@@ -24,6 +24,7 @@ struct FileItem {
     OutputTime time;
     ring::Metadata metadata{};
     std::vector<std::byte> payload;
+    std::uint64_t attributes = ring::no_attributes;  ///< of a frame; these: as before version 1.2
 };
 
 class RecordingFile {
@@ -62,7 +63,8 @@ class RecordingFile {
 
 /// Two cameras at 20 Hz, `cam0` and `cam1` (whose stamps are 40 ns later), an IMU at 200 Hz, events
 /// and status: `seconds` long, some frames of `cam1` are missing, one of `cam0` is suspect, the
-/// last images lie behind the IMU's end, and one sample in ten repeats.
+/// last images lie behind the IMU's end, and one sample in ten repeats. Only frames of `cam1` have
+/// gain and temperature.
 std::string sample_recording(int seconds, bool as_png, bool cut_off, std::uint32_t pixel_format,
                              std::uint32_t width = 61, std::uint32_t height = 9);
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <set>
@@ -369,6 +370,35 @@ TEST_CASE("cameras: an address in no network of this host is unreachable") {
         [](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
     CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
                Catch::Contains("not in any network of this host"));
+}
+
+TEST_CASE("cameras: frames say gain and temperature as far as the camera tells") {
+    StackSettings settings{"sensor", 64, 3, 20, "", "", ""};
+    settings.scenarios = {"auto_gain = true\nexposure_swing = 0.5\ntemperature_c = 51.5",
+                          "auto_gain = true", ""};
+    settings.extras = {"", "", "[camera.features]\nGain = 6.5"};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto newest = [&](const std::string& camera) {
+        auto stream = FrameStream::open(camera, {{}, stack.instance()});
+        REQUIRE(stream);
+        auto frame = stream->latest(seconds(10));
+        REQUIRE(frame);
+        return *frame;
+    };
+    const auto status = stack.wait_for_status(healthy);
+    for (unsigned i = 0; i < 5; ++i) {  // by chunks
+        const Frame frame = newest("cam0");
+        CHECK(frame.sensor().gain == static_cast<float>(frame.data.block_id % 10));
+        CHECK(frame.sensor().temperature_c == 51.5F);
+    }
+    CHECK(std::isnan(newest("cam1").sensor().gain));  // its register is of some frame
+    CHECK(newest("cam1").sensor().temperature_c == 45);
+    CHECK(newest("cam2").sensor().gain == 6.5F);
+    CHECK(status["cameras"][0]["gain"].is_null());
+    CHECK(status["cameras"][2]["gain"] == 6.5);
+    CHECK(status["cameras"][2]["gain_feature"] == "Gain");
 }
 
 TEST_CASE("cameras: a hot one is said") {

@@ -82,7 +82,7 @@ TEST_CASE("end to end: two cameras and an IMU, every stamp belongs to its item")
     CHECK(run({"python3", VERSAVIS_SOURCE_DIR "/tests/system/read_ring.py",
                stream_path("e2e", "cam0").string(), "5"},
               stack.log_path("python.log"), &output) == 0);
-    CHECK_THAT(output, Catch::Contains("320 x 240"));
+    CHECK_THAT(output, Catch::Contains("320 x 240") && Catch::Contains("0.0 dB, 45.0 C"));
 
     CHECK(stack.service().terminate() == 0);
     CHECK_THAT(stack.service().output(), !Catch::Contains("CRITICAL"));

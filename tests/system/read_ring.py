@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads frames of a stream, written from docs/contracts/shm-layout.md alone.
 
-read_ring.py FILE COUNT: prints item number, output time, trigger, size and corrected delay of each
-frame.
+read_ring.py FILE COUNT: prints item number, output time, trigger, size, corrected delay, gain and
+temperature of each frame.
 Exits 0 after COUNT intact frames, 1 if FILE is not a ring or they do not arrive in ten seconds.
 """
 import fcntl
@@ -39,7 +39,7 @@ def opened(path):
 def main(path, count):
     descriptor = opened(path)
     memory = mmap.mmap(descriptor, 0, prot=mmap.PROT_READ)
-    magic, major, _minor, total = unpack(memory, "8sIIQ", 0)
+    magic, major, minor, total = unpack(memory, "8sIIQ", 0)
     if magic != b"VERSAVIS" or major != 1 or total != os.fstat(descriptor).st_size:
         sys.exit(f"{path}: not a ring of version 1")
     descriptors, slots, slot_size = unpack(memory, "IIQ", 64)
@@ -60,10 +60,13 @@ def main(path, count):
         if complete and slot < slots and length <= slot_size:
             begin = slots_at + slot * slot_size
             pixels = memory[begin : begin + length]
+            gain, temperature = unpack(memory, "ff", generations_at + 64 * slot + 8)
             (generation_now,) = unpack(memory, "Q", generations_at + 64 * slot)
             if generation_now == generation and len(pixels) == stride * height:
                 size = f"{width} x {height}"
-                print(f"{number} {output_time} trigger {trigger}: {size}, {delay} ns taken off")
+                sensor = f", {gain} dB, {temperature} C" if minor >= 6 else ""
+                print(f"{number} {output_time} trigger {trigger}: {size}, {delay} ns taken off"
+                      + sensor)
                 count -= 1
         number += 1
     return 0 if count == 0 else 1

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -181,6 +182,29 @@ TEST_CASE_METHOD(CApi, "c_api: what an item held is let go by the next, a pause,
     CHECK(mapped() == before);
     CHECK(is_empty());
     CHECK(versavis_view(&item, &image) == VERSAVIS_INVALID);
+}
+
+TEST_CASE_METHOD(CApi, "c_api: a frame says gain and temperature, or that they are not known") {
+    versavis_stream* stream = open();
+    versavis_item item = VERSAVIS_ITEM_INIT;
+    versavis_sensor_state state{};
+    CHECK(versavis_sensor(&item, &state) == VERSAVIS_INVALID);
+    frame(*camera, 1);
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(versavis_sensor(&item, &state) == VERSAVIS_OK);
+    CHECK(std::isnan(state.gain));
+    CHECK(std::isnan(state.temperature));
+    camera->publish(*camera->acquire(), 48, OutputTime{1002}, {}, pack(SensorState{6.5F, 41}));
+    REQUIRE(versavis_next(stream, &item, 0) == VERSAVIS_OK);
+    CHECK(versavis_sensor(&item, &state) == VERSAVIS_OK);
+    CHECK(state.gain == 6.5F);
+    CHECK(state.temperature == 41);
+    CHECK(versavis_sensor(&item, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_sensor(nullptr, &state) == VERSAVIS_INVALID);
+    for (std::uint64_t tick = 3; tick < 30; ++tick) frame(*camera, tick);
+    CHECK(versavis_sensor(&item, &state) == VERSAVIS_OVERTAKEN);
+    versavis_release(&item);
+    versavis_close(stream);
 }
 
 TEST_CASE_METHOD(CApi, "c_api: an item without payload is whole, and a copy of nothing") {

@@ -34,6 +34,7 @@ struct Bench : test::Pipelines {
         made.width = 64;
         made.height = 48;
         made.size = 3072;
+        made.sensor = {6.5F, 41};
         return made;
     }
 
@@ -75,6 +76,8 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
     CHECK(measured.trigger == 5);
     CHECK(measured.tick() == (std::uint64_t{1} << 32U) + 6);
     CHECK(measured.block_id == 12);
+    CHECK(unpack_sensor_state(first.payload.attributes()).gain == 6.5F);
+    CHECK(unpack_sensor_state(first.payload.attributes()).temperature_c == 41);
     const auto by_edge = unpack<FrameMetadata>(test::look(reader.next()).metadata);
     CHECK(by_edge.stamp_kind() == StampKind::trigger_edge);
     CHECK(by_edge.exposure.ns == 0);

@@ -37,7 +37,7 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
     const auto recording = Recording::open(sample.path);
     REQUIRE(recording);
     std::map<std::uint64_t, std::vector<std::byte>> expected;
-    REQUIRE(recording->for_each({"cam0"}, [&](const RecordedItem& item) {
+    REQUIRE(recording->for_each({"cam1"}, [&](const RecordedItem& item) {
         expected[item.number] = {item.payload.begin(), item.payload.end()};
         return true;
     }));
@@ -47,13 +47,13 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
     std::uint64_t restarts = 0;
     PlaySettings settings;
     settings.instance = instance;
-    settings.streams = {"cam0"};
+    settings.streams = {"cam1"};
     settings.rate = 1000;
     settings.loop = true;
     // The reader looks between any two items: it misses none.
     settings.stop = [&] {
         if (!reader) {
-            auto opened = ring::Reader::open(stream_path(instance, "cam0"),
+            auto opened = ring::Reader::open(stream_path(instance, "cam1"),
                                              {ring::Position::oldest, ring::Position::oldest});
             if (!opened) return false;
             reader.emplace(std::move(*opened));
@@ -66,8 +66,11 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
             ++lives[item->life];
             const auto frame = unpack<FrameMetadata>(item->metadata);
             const auto& pixels = expected.at(frame.block_id - 1);
+            const SensorState sensor = unpack_sensor_state(item->payload.attributes());
             good += std::equal(pixels.begin(), pixels.end(), item->payload.data(),
-                               item->payload.data() + item->payload.size())
+                               item->payload.data() + item->payload.size()) &&
+                            sensor.gain == static_cast<float>(frame.block_id - 1) &&
+                            sensor.temperature_c == 41.5F
                         ? 1
                         : 0;
         }

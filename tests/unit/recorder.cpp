@@ -89,7 +89,8 @@ struct Instance {
         const auto pixels = pixels_of(number);
         const std::uint32_t slot = camera->acquire().value();
         std::memcpy(camera->slot_data(slot), pixels.data(), pixels.size());
-        camera->publish(slot, static_cast<std::uint32_t>(pixels.size()), time, pack(frame));
+        camera->publish(slot, static_cast<std::uint32_t>(pixels.size()), time, pack(frame),
+                        pack(SensorState{static_cast<float>(number), 41.5F}));
         ImuMetadata sample{};
         sample.number = number;
         sample.epoch = epoch;
@@ -147,6 +148,9 @@ Frames frames_in(const std::string& path) {
         frames.numbers.push_back(item.number);
         frames.right = frames.right && std::equal(item.payload.begin(), item.payload.end(),
                                                   expected.begin(), expected.end());
+        const SensorState sensor = unpack_sensor_state(item.attributes);
+        CHECK(sensor.gain == static_cast<float>(item.number));
+        CHECK(sensor.temperature_c == 41.5F);
         return true;
     }));
     return frames;

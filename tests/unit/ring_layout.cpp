@@ -14,6 +14,7 @@
 
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
+#include "versavis/metadata.hpp"
 #include "versavis/ring/layout.hpp"
 #include "versavis/time.hpp"
 
@@ -181,12 +182,14 @@ TEST_CASE_METHOD(Ring, "ring_layout: a payload, its slot and its generation") {
     CHECK(generation(0) == 1);
     CHECK(generation(1) == 1);
     std::memset(writer.slot_data(1), 'x', 8192);
-    writer.publish(1, 8192, OutputTime{7}, {});
+    writer.publish(1, 8192, OutputTime{7}, {}, pack(SensorState{6.5F, 41}));
     CHECK(generation(1) == 2);
     CHECK(generation(0) == 1);
     writer.abandon(0);
     CHECK(generation(0) == 2);
     const std::string file = bytes("frames");
+    CHECK(at<float>(file, 4096 + 8 * 128 + 64 + 8) == 6.5F);
+    CHECK(at<float>(file, 4096 + 8 * 128 + 64 + 12) == 41);
     CHECK(u64(file, 4096) == 2);
     CHECK(u64(file, 4096 + 8) == 2);
     CHECK(u64(file, 4096 + 16) == (8192ULL << 32U | 1));

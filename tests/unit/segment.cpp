@@ -124,14 +124,16 @@ TEST_CASE_METHOD(Copies, "segment: what its header says is read once") {
     CHECK(constants.generation == generation);
 }
 
-TEST_CASE_METHOD(Copies, "segment: one that is older than life and namespace has none of both") {
+TEST_CASE_METHOD(Copies,
+                 "segment: one that is older than life, namespace and attributes has none") {
     const auto path = directory.path() / "changed";
-    for (const std::uint32_t minor : {4U, 5U, 6U}) {
+    for (const std::uint32_t minor : {4U, 5U, 6U, 7U}) {
         changed(offsetof(Header, abi_minor), minor);
         const auto mapping = Mapping::open(path, Mapping::Access::read_only);
         REQUIRE(mapping);
         CHECK((mapping->constants().life != 0) == (minor >= 5));
         CHECK((mapping->constants().pid_namespace != 0) == (minor >= 5));
+        CHECK(mapping->constants().has_attributes == (minor >= 6));
     }
 }
 

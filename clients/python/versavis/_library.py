@@ -77,6 +77,10 @@ class Image(ctypes.Structure):
     ]
 
 
+class SensorState(ctypes.Structure):
+    _fields_ = [("gain", c_float), ("temperature", c_float)]
+
+
 class SetsOptions(ctypes.Structure):
     _fields_ = [("imu", c_char_p), ("patience", c_int64), ("partial", c_int32),
                 ("suspect", c_int32), ("streams", Options)]
@@ -128,6 +132,7 @@ SIGNATURES = {
     "copy": (c_int, [POINTER(Item), c_void_p, c_size_t]),
     "release": (None, [POINTER(Item)]),
     "view": (c_int, [POINTER(Item), POINTER(Image)]),
+    "sensor": (c_int, [POINTER(Item), POINTER(SensorState)]),
     "pixel_format_name": (c_char_p, [c_uint32]),
     "event_name": (c_char_p, [c_uint32]),
     "reason_name": (c_char_p, [c_uint32]),

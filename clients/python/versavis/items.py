@@ -4,6 +4,7 @@ import ctypes
 import enum
 import gc
 import json
+import math
 import weakref
 
 import numpy as np
@@ -153,6 +154,12 @@ class Frame(Item):
         """What the time is: "measured", "predicted", "trigger" or "arrival"."""
         return STAMP_KINDS[self._item.data.frame.flags & 3]
 
+    gain = property(lambda self: self._sensor("gain"),
+                    doc="Of the sensor, by the camera: dB, or its own unit; None: not known.")
+    temperature = property(lambda self: self._sensor("temperature"),
+                           doc="Of the camera, by its own account, in degree Celsius; None: not "
+                               "known.")
+
     def copy(self):
         """The pixels as an array of one's own. Raises Overtaken if the writer needed the memory.
 
@@ -176,6 +183,15 @@ class Frame(Item):
         if library.functions.valid(held.item) != 1:
             raise overtaken(self)
         return result
+
+    def _sensor(self, name):
+        held = self._holding()
+        state = library.SensorState()
+        result = library.functions.sensor(held.item, state)
+        if result == library.OVERTAKEN:
+            raise overtaken(self)
+        value = getattr(state, name)
+        return None if math.isnan(value) else value
 
     def _image(self, held):
         image = library.Image()

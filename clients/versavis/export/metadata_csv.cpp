@@ -16,6 +16,7 @@ std::string known(std::int64_t value) { return value == 0 ? "" : fmt::format("{}
 
 std::string sigma(std::uint32_t ns) { return ns == sigma_unknown ? "" : fmt::format("{}", ns); }
 
+/// Empty: not known.
 std::string measured(float value) { return std::isnan(value) ? "" : fmt::format("{}", value); }
 
 int flag(std::uint32_t flags, std::uint32_t which) { return (flags & which) != 0 ? 1 : 0; }
@@ -33,12 +34,14 @@ std::string common(const RecordedItem& item) {
 
 std::string frame_row(const RecordedItem& item) {
     const auto data = unpack<FrameMetadata>(item.metadata);
+    const SensorState sensor = unpack_sensor_state(item.attributes);
     return row(common(item), data.epoch, sigma(data.sigma_ns), to_string(data.stamp_kind()),
                flag(data.flags, flag_suspect), flag(data.flags, flag_holdover),
                flag(data.flags, flag_clamped), flag(data.flags, flag_sensor_error), data.trigger,
                data.tick(), data.block_id, data.board_time.ns, data.host_time.ns, data.arrival.ns,
                known(data.camera_time.ns), known(data.exposure.ns), data.delay_ns, data.width,
-               data.height, data.stride, pixel_format_name(data.pixel_format));
+               data.height, data.stride, pixel_format_name(data.pixel_format),
+               measured(sensor.gain), measured(sensor.temperature_c));
 }
 
 std::string imu_row(const RecordedItem& item) {
@@ -80,7 +83,7 @@ std::string csv_columns(ring::StreamKind kind) {
             return fmt::format(
                 "{},kind,suspect,holdover,clamped,sensor_error,trigger,tick,block_id,"
                 "board_time_ns,host_time_ns,arrival_ns,camera_time_ns,exposure_ns,delay_ns,width,"
-                "height,stride,pixel_format",
+                "height,stride,pixel_format,gain,temperature_c",
                 common_columns);
         case ring::StreamKind::imu:
             return fmt::format(

@@ -187,7 +187,7 @@ class Player {
         }
         std::memcpy(writer.slot_data(*slot), item.payload.data(), item.payload.size());
         writer.publish(*slot, static_cast<std::uint32_t>(item.payload.size()), item.time,
-                       item.metadata);
+                       item.metadata, item.attributes);
         ++report_.items;
     }
 

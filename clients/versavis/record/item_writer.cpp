@@ -29,6 +29,7 @@ Json sigma(std::uint32_t sigma_ns) { return sigma_ns == sigma_unknown ? Json() :
 
 Json stamp_json(const ring::Item& item) {
     const auto frame = unpack<FrameMetadata>(item.metadata);
+    const SensorState sensor = unpack_sensor_state(item.payload.attributes());
     const auto is = [&](std::uint32_t flag) { return (frame.flags & flag) != 0; };
     return {{"time_ns", item.time.ns},
             {"sigma_ns", sigma(frame.sigma_ns)},
@@ -46,6 +47,8 @@ Json stamp_json(const ring::Item& item) {
             {"camera_time_ns", known(frame.camera_time.ns)},
             {"exposure_ns", known(frame.exposure.ns)},
             {"delay_ns", frame.delay_ns},
+            {"gain", sensor.gain},
+            {"temperature_c", sensor.temperature_c},
             {"epoch", frame.epoch},
             {"life", fmt::format("{:016x}", item.life)}};
 }
@@ -148,7 +151,8 @@ Expected<ItemWriter::Outcome> ItemWriter::write_frame(const std::string& stream,
         file_.take_back();
         return Outcome::overtaken;
     }
-    write_item(channels, stream, ring::StreamKind::frames, item, {});
+    write_item(channels, stream, ring::StreamKind::frames, item,
+               mcap_number(item.payload.attributes()));
     write_frame_notes(channels, stream, item);
     return Outcome::written;
 }
@@ -164,7 +168,8 @@ Expected<> ItemWriter::write_png(const std::string& stream, const ring::Item& it
         {channel, channels.sequence, item.time.ns},
         ros_png_head(item.time, stream, frame, static_cast<std::uint32_t>(png.size())), png);
     if (!written) return written;
-    write_item(channels, stream, ring::StreamKind::frames, item, {});
+    write_item(channels, stream, ring::StreamKind::frames, item,
+               mcap_number(item.payload.attributes()));
     write_frame_notes(channels, stream, item);
     return {};
 }

@@ -89,6 +89,12 @@ std::optional<Envelope> parse_envelope(std::span<const std::byte> data) {
     return envelope;
 }
 
+/// Of a frame; files before version 1.2 have none.
+std::uint64_t attributes_of(std::span<const std::byte> item) {
+    if (item.size() < item_size + sizeof(std::uint64_t)) return ring::no_attributes;
+    return ByteCursor(item.subspan(item_size)).number<std::uint64_t>();
+}
+
 /// The image that was met last, of one camera.
 struct Image {
     std::uint32_t sequence;
@@ -353,9 +359,17 @@ Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uin
         return reader.damaged(record.offset, "the stamp of an item is no time");
     const auto place =
         static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
-    RecordedItem item{
-        part.stream,        part.kind, envelope->number, envelope->life,        envelope->time,
-        envelope->metadata, {},        envelope->length, {index, chunk, place}, {}};
+    RecordedItem item{part.stream,
+                      part.kind,
+                      envelope->number,
+                      envelope->life,
+                      envelope->time,
+                      envelope->metadata,
+                      {},
+                      envelope->length,
+                      ring::no_attributes,
+                      {index, chunk, place},
+                      {}};
     if (part.kind != ring::StreamKind::frames) {
         const std::uint64_t size = record.length - mcap_message_header - item_size;
         if (size != envelope->length)
@@ -370,6 +384,7 @@ Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uin
         }
         return take(item);
     }
+    item.attributes = attributes_of(message->data);
     const auto image = walk.images.find(part.stream);
     if (image != walk.images.end() && image->second.sequence == message->sequence) {
         item.place.image = image->second.place;

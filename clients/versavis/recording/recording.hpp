@@ -38,7 +38,8 @@ struct RecordedItem {
     ring::Metadata metadata;
     /// Of a frame its pixels, unpacked where they are PNG; none when the file does not have them.
     std::span<const std::byte> payload;
-    std::uint32_t length;  ///< of the payload in the ring
+    std::uint32_t length;      ///< of the payload in the ring
+    std::uint64_t attributes;  ///< of a frame: see SensorState
     ItemPlace place;
     std::span<const std::byte> png;  ///< of a frame that was recorded as PNG
 };

@@ -27,12 +27,13 @@ json describe(const ring::Item& item) {
     return line;
 }
 
-/// JSON numbers have no NaN: what a part does not measure is null.
+/// JSON numbers have no NaN: what is not known, or a part does not measure, is null.
 json vector(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
 
 json describe(const Frame& item) {
     json line = describe(static_cast<const ring::Item&>(item));
     const FrameMetadata& d = item.data;
+    const SensorState sensor = item.sensor();
     line.update({{"kind", to_string(d.stamp_kind())},
                  {"sigma_ns", d.sigma_ns == sigma_unknown ? json(nullptr) : json(d.sigma_ns)},
                  {"trigger", d.trigger},
@@ -43,6 +44,8 @@ json describe(const Frame& item) {
                  {"arrival_ns", d.arrival.ns},
                  {"camera_time_ns", d.camera_time.ns},
                  {"delay_ns", d.delay_ns},
+                 {"gain", sensor.gain},
+                 {"temperature_c", sensor.temperature_c},
                  {"tick", d.tick()},
                  {"width", d.width},
                  {"height", d.height},

@@ -48,6 +48,7 @@ struct Arrival {
     std::uint32_t stride = 0;  ///< bytes from row to row
     std::uint32_t pixel_format = 0;
     std::uint32_t size = 0;  ///< bytes
+    SensorState sensor;      ///< handed on
 };
 
 /// Why a frame that the camera sent did not arrive. Explains the trigger that is left without one.

@@ -279,7 +279,8 @@ void Writer::abandon(std::uint32_t slot) {
 }
 
 void Writer::publish(std::uint32_t slot, std::uint32_t length, OutputTime time,
-                     const Metadata& metadata) {
+                     const Metadata& metadata, std::uint64_t attributes) {
+    segment_->mapping.attributes(slot).store(attributes, std::memory_order_relaxed);
     // Readers here learn this generation from the descriptor, so SYNC 2 orders the payload for
     // them. Release serves a reader in another language that acquires the generation by itself.
     const std::uint64_t generation =

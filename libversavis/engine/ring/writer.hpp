@@ -61,7 +61,7 @@ class Writer {
     /// Publishes an acquired slot with `length` bytes of payload. Cost does not depend on the
     /// length.
     void publish(std::uint32_t slot, std::uint32_t length, OutputTime time,
-                 const Metadata& metadata);
+                 const Metadata& metadata, std::uint64_t attributes = no_attributes);
 
     /// Publishes an item without payload.
     void publish(OutputTime time, const Metadata& metadata);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 #include "versavis/export.hpp"
 #include "versavis/ring/layout.hpp"
@@ -62,6 +63,12 @@ struct FrameMetadata {
         tick_low = static_cast<std::uint32_t>(tick);
         tick_high = static_cast<std::uint32_t>(tick >> 32U);
     }
+};
+
+/// How a camera's sensor was when it took a frame, by the camera's own account; NaN: not known.
+struct SensorState {
+    float gain = std::numeric_limits<float>::quiet_NaN();  ///< dB, or the unit of the camera
+    float temperature_c = std::numeric_limits<float>::quiet_NaN();
 };
 
 struct ImuMetadata {
@@ -159,6 +166,20 @@ struct EventMetadata {
 static_assert(sizeof(FrameMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 static_assert(sizeof(ImuMetadata) == ring::metadata_size, "96 bytes of inline metadata");
 static_assert(sizeof(EventMetadata) == ring::metadata_size, "96 bytes of inline metadata");
+
+/// As attributes of a frame's payload.
+inline std::uint64_t pack(const SensorState& state) {
+    static_assert(sizeof(SensorState) == sizeof(std::uint64_t));
+    std::uint64_t attributes = 0;
+    std::memcpy(&attributes, &state, sizeof attributes);
+    return attributes;
+}
+
+inline SensorState unpack_sensor_state(std::uint64_t attributes) {
+    SensorState state;
+    std::memcpy(static_cast<void*>(&state), &attributes, sizeof state);
+    return state;
+}
 
 template <class T>
 ring::Metadata pack(const T& metadata) {

@@ -37,6 +37,9 @@ struct Frame : Typed<FrameMetadata> {
     /// The pixels in place: what was read of them is good if valid() is true afterwards. None: the
     /// payload holds fewer bytes than the metadata claim.
     std::optional<ImageView> image() const { return image_of(data, payload); }
+
+    /// As the pixels, good if valid() is true afterwards.
+    SensorState sensor() const { return unpack_sensor_state(payload.attributes()); }
 };
 
 using ImuSample = Typed<ImuMetadata>;

@@ -29,9 +29,9 @@ namespace versavis::ring {
 
 inline constexpr std::uint64_t magic = 0x5349564153524556U;  ///< "VERSAVIS" as little-endian bytes
 inline constexpr std::uint32_t abi_major = 1;
-inline constexpr std::uint32_t abi_minor = 5;
+inline constexpr std::uint32_t abi_minor = 6;
 inline constexpr std::size_t page_size = 4096;
-inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's generation
+inline constexpr std::size_t generation_stride = 64;  ///< one cache line for each slot's words
 inline constexpr std::size_t metadata_words = 12;
 inline constexpr std::size_t metadata_size = metadata_words * 8;
 inline constexpr std::uint32_t no_slot = 0xFFFFFFFFU;  ///< the item lies in the descriptor alone
@@ -88,6 +88,15 @@ struct alignas(128) Descriptor {
     std::array<std::atomic<std::uint64_t>, metadata_words> metadata;
 };
 
+/// What changes with the payload of a slot.
+struct alignas(generation_stride) SlotWords {
+    std::atomic<std::uint64_t> generation;  ///< odd while the writer may touch the slot (SYNC 4)
+    std::atomic<std::uint64_t> attributes;  ///< of the payload, by kind of stream; since ABI 1.6
+};
+
+/// Of a payload that has none: a pair of NaN.
+inline constexpr std::uint64_t no_attributes = 0x7FC000007FC00000U;
+
 static_assert(offsetof(Header, total_size) == 16 && offsetof(Header, boot_id) == 32);
 static_assert(offsetof(Header, writer_pid) == 48 && offsetof(Header, kind) == 52);
 static_assert(offsetof(Header, writer_start_ticks) == 56 &&
@@ -98,6 +107,7 @@ static_assert(offsetof(Header, life) == 168 && offsetof(Header, pid_namespace) =
 static_assert(offsetof(Header, head) == 256 && offsetof(Header, wake) == 384);
 static_assert(offsetof(Header, state) == 512 && offsetof(Header, heartbeat_ns) == 640);
 static_assert(sizeof(Header) <= page_size && sizeof(Descriptor) == 128);
+static_assert(sizeof(SlotWords) == 64 && offsetof(SlotWords, attributes) == 8);
 static_assert(alignof(Descriptor) == 128 && offsetof(Descriptor, metadata) == 32);
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);

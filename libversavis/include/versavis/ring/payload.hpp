@@ -25,6 +25,10 @@ class VERSAVIS_API Payload {
     const std::byte* data() const { return data_; }  ///< nullptr: there is none
     std::size_t size() const { return size_; }       ///< bytes
 
+    /// What is said of it beside it, by kind of stream; no_attributes: nothing, or an older service
+    /// wrote it.
+    std::uint64_t attributes() const;
+
     /// True while the writer has not touched it: what was read before this call is good.
     bool valid() const;
 
