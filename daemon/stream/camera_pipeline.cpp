@@ -37,17 +37,21 @@ pairing::Limits limits_of(const CameraConfiguration& configuration) {
 }
 
 /// What the line's own difference of edges adds is taken off.
-pairing::Exposure corrected(pairing::Exposure exposure, const EdgeCorrection& correction) {
+/// As the camera's account corrects or completes it.
+pairing::Exposure corrected(pairing::Exposure exposure, const ExposureVerdict& verdict) {
+    const EdgeCorrection& correction = verdict.correction;
     exposure.start = exposure.start - correction.start;
     exposure.end = exposure.end - correction.end;
     exposure.delay = exposure.delay + correction.middle();
     exposure.delay_sigma = rounded(std::hypot(exposure.delay_sigma.ns, correction.sigma.ns));
+    exposure.length_by_camera = verdict.length.ns != 0;
+    if (exposure.length_by_camera) exposure.end = exposure.start + verdict.length;
     return exposure;
 }
 
-clock::Stamp corrected(clock::Stamp stamp, const EdgeCorrection& correction) {
-    stamp.host = stamp.host - correction.middle();
-    stamp.output = stamp.output - correction.middle();
+clock::Stamp moved(clock::Stamp stamp, Duration by) {
+    stamp.host = stamp.host + by;
+    stamp.output = stamp.output + by;
     return stamp;
 }
 
@@ -255,18 +259,19 @@ void CameraPipeline::triggers_skipped(std::uint64_t count) {
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
-    const auto middle = middles_.find(exposure.trigger);
+    const auto stamp = middles_.find(exposure.trigger);
     const ExposureVerdict verdict =
         check_.judge(arrival, account_of(arrival), exposure, report_.start_delay);
     note_chunk_lag();
-    if (middle == middles_.end()) {
+    const pairing::Exposure shown = corrected(exposure, verdict);
+    const Duration shift = middle(shown.start, shown.end) - middle(exposure.start, exposure.end);
+    if (stamp == middles_.end()) {
         frame_unpaired(arrival, EventReason::mismatch, nullptr);
         announce_unpaired(exposure, EventReason::mismatch);
     } else if (verdict.contradicted) {
         frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
         announce_unpaired(exposure, EventReason::wrong_exposure);
-    } else if (!frames_.publish_proved(arrival, corrected(exposure, verdict.correction),
-                                       corrected(middle->second, verdict.correction))) {
+    } else if (!frames_.publish_proved(arrival, shown, moved(stamp->second, shift))) {
         if (frames_.stuck()) translator_.begin_epoch();
         frame_unpaired(arrival, EventReason::went_back, nullptr);
         announce_unpaired(exposure, EventReason::went_back);
@@ -279,9 +284,7 @@ void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Expo
 }
 
 FrameAccount CameraPipeline::account_of(const pairing::Arrival& arrival) const {
-    const Duration chunk = chunk_exposures_[arrival.slot];
-    if (chunk.ns != 0) return {chunk, ExposureSource::chunk};
-    return {event_lengths_.length(arrival.block_id), ExposureSource::event};
+    return {chunk_exposures_[arrival.slot], event_lengths_.length(arrival.block_id)};
 }
 
 void CameraPipeline::add(const CameraEvent& event) {

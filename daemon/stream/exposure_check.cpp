@@ -22,6 +22,12 @@ constexpr int settling_frames = 5;
 /// worse than any known line makes them.
 constexpr Duration unwitnessed_end = microseconds(100);
 
+/// By how much a camera's events and its register may differ about one exposure: a part of it, and
+/// no less than the time. At half, sensors that expose for whole rows seem to contradict
+/// themselves; at twice, half of so much more is unseen in a stamp without exposure line.
+constexpr std::int64_t part_of_length = 50;
+constexpr Duration least_difference = microseconds(20);
+
 /// A length that may be anything in a range leaves the middle uncertain by half of it either way,
 /// which is taken for two sigma.
 constexpr std::int64_t range_per_sigma = 4;
@@ -76,7 +82,8 @@ void ExposureCheck::read_exposure(Duration exposure, HostTime at, Duration start
 bool ExposureCheck::wants_readings() const {
     const bool by_frame = source_ == ExposureSource::event || source_ == ExposureSource::chunk ||
                           source_ == ExposureSource::chunk_before;
-    return !by_frame && (varies_ || contradicted_);
+    const bool shown = newest_.length.ns != 0;
+    return !(by_frame && shown) && (varies_ || contradicted_);
 }
 
 Duration ExposureCheck::told_at(HostTime at) const {
@@ -105,18 +112,16 @@ void ExposureCheck::follow_lag(const Measured& before, Duration chunk) {
 
 ExposureCheck::Account ExposureCheck::account_of(const Measured& before, const FrameAccount& frame,
                                                  Duration start_delay) {
-    const LengthRange own{frame.exposure, frame.exposure};
-    if (frame.exposure.ns != 0 && frame.source == ExposureSource::event)
-        return {ExposureSource::event, own};
-    if (frame.exposure.ns != 0) {
+    if (frame.chunk.ns != 0) {
         const bool follows = before.length.ns != 0 && newest_.block_id == before.block_id + 1;
-        if (follows) follow_lag(before, frame.exposure);
-        if (!lags_) return {ExposureSource::chunk, own};
-        if (follows) edges_.learn(before.length - frame.exposure, start_delay);
-        readings_.add(frame.exposure, before.end);
+        if (follows) follow_lag(before, frame.chunk);
+        if (!lags_) return {ExposureSource::chunk, {frame.chunk, frame.chunk}};
+        if (follows) edges_.learn(before.length - frame.chunk, start_delay);
+        readings_.add(frame.chunk, before.end);
         const auto range = readings_.at(newest_.end);
         return range ? Account{ExposureSource::chunk_before, *range} : Account{};
     }
+    if (frame.event.ns != 0) return {ExposureSource::event, {frame.event, frame.event}};
     const auto range = (varies_ ? readings_ : settings_).at(newest_.end);
     if (!range) return {};
     return {varies_ ? ExposureSource::reading : ExposureSource::setting, *range};
@@ -138,7 +143,23 @@ Duration ExposureCheck::excess(LengthRange range) const {
 ExposureVerdict ExposureCheck::unwitnessed(const Measured& before) const {
     const Duration change =
         before.length.ns != 0 ? absolute(newest_.length - before.length) : Duration{};
-    return {false, {{}, {}, root_of_squares(unwitnessed_end, change / 2)}};
+    return {false, {{}, {}, root_of_squares(unwitnessed_end, change / 2)}, {}};
+}
+
+/// Without an exposure line, two accounts of the camera must agree.
+ExposureVerdict ExposureCheck::by_camera(const FrameAccount& frame,
+                                         const pairing::Exposure& exposure) {
+    const Duration length = frame.event;
+    if (!enabled_ || length.ns == 0) return {};
+    const auto range = frame.chunk.ns != 0
+                           ? LengthRange{frame.chunk, frame.chunk}
+                           : (varies_ ? readings_ : settings_).at(exposure.earliest_on_host);
+    const Duration difference = std::max(length / part_of_length, least_difference);
+    if (!range || length + difference < range->shortest || length - difference > range->longest)
+        return {};
+    source_ = ExposureSource::event;
+    told_ = length;
+    return {false, {}, length};
 }
 
 ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const FrameAccount& frame,
@@ -147,6 +168,7 @@ ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const Fram
     told_ = {};
     source_ = ExposureSource::none;
     const Measured before = std::exchange(newest_, {});
+    if (exposure.kind == StampKind::trigger_edge) return by_camera(frame, exposure);
     if (exposure.kind != StampKind::measured_middle) return {};
     newest_ = {arrival.block_id, exposure.end - exposure.start, exposure.earliest_on_host, true};
     const Account account = account_of(before, frame, start_delay);
@@ -161,7 +183,7 @@ ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const Fram
         edges_.learn(newest_.length - account.range.longest, start_delay);
     if (!enabled_) return unwitnessed(before);
     contradicted_ = off;
-    ExposureVerdict verdict{contradicted_, edges_.correction()};
+    ExposureVerdict verdict{contradicted_, edges_.correction(), {}};
     Duration& sigma = verdict.correction.sigma;
     sigma = root_of_squares(sigma, account.range.width() / range_per_sigma);
     if (!certain()) sigma = root_of_squares(sigma, excess / 2);

@@ -27,12 +27,13 @@ const char* to_string(ExposureSource source);
 struct ExposureVerdict {
     bool contradicted = false;  ///< the camera exposed for another time
     EdgeCorrection correction;  ///< its sigma contains what no witness has confirmed
+    Duration length;            ///< of an exposure that no line shows; 0: unknown
 };
 
-/// What the camera says of one frame.
+/// How long the camera says that it exposed one frame; 0: it does not.
 struct FrameAccount {
-    Duration exposure;  ///< 0: nothing
-    ExposureSource source = ExposureSource::chunk;
+    Duration chunk;
+    Duration event;
 };
 
 /// Not thread-safe.
@@ -90,6 +91,7 @@ class ExposureCheck {
     bool certain() const;
     Duration excess(LengthRange range) const;
     ExposureVerdict unwitnessed(const Measured& before) const;
+    ExposureVerdict by_camera(const FrameAccount& frame, const pairing::Exposure& exposure);
 
     bool enabled_;
     ReportedExposure settings_;

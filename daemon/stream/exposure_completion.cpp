@@ -89,8 +89,9 @@ void ExposureCompletion::place_on_host(pairing::Exposure& exposure, const wire::
 
 Duration kind_sigma(const pairing::Exposure& exposure, Duration middle_to_arrival) {
     if (exposure.kind == StampKind::measured_middle) return exposure.delay_sigma;
-    const Duration half =
-        (exposure.end - exposure.start) / 2 + unmeasured_delay + exposure.delay_sigma;
+    const Duration start = unmeasured_delay + exposure.delay_sigma;
+    if (exposure.length_by_camera) return start;
+    const Duration half = (exposure.end - exposure.start) / 2 + start;
     // An end that was not seen lies before the arrival; no more is known.
     return exposure.kind == StampKind::predicted_middle ? std::max(half, middle_to_arrival) : half;
 }

@@ -20,10 +20,11 @@ FrameMetadata describe(const pairing::Exposure& exposure) {
     metadata.trigger = exposure.trigger;
     metadata.set_tick(exposure.tick);
     metadata.board_time = middle(exposure.start, exposure.end);
-    if (exposure.kind == StampKind::measured_middle)
+    if (exposure.kind == StampKind::measured_middle || exposure.length_by_camera)
         metadata.exposure = exposure.end - exposure.start;
     metadata.delay_ns = static_cast<std::int32_t>(exposure.delay.ns);
-    metadata.flags = static_cast<std::uint32_t>(exposure.kind);
+    metadata.flags = static_cast<std::uint32_t>(exposure.kind) |
+                     (exposure.length_by_camera ? flag_camera_length : 0U);
     return metadata;
 }
 

@@ -65,7 +65,8 @@ enum { /* bits of flags */
     VERSAVIS_CLAMPED = 1 << 4,
     VERSAVIS_SENSOR_ERROR = 1 << 5,
     VERSAVIS_REPEATED = 1 << 6,
-    VERSAVIS_ACCEL_AGE = 1 << 7
+    VERSAVIS_ACCEL_AGE = 1 << 7,
+    VERSAVIS_CAMERA_LENGTH = 1 << 8
 };
 
 #define VERSAVIS_SIGMA_UNKNOWN 0xFFFFFFFFu

@@ -194,6 +194,32 @@ TEST_CASE("cameras: events of the camera witness the length, and name a trigger 
     judge(stack, 2);
 }
 
+TEST_CASE("cameras: without an exposure line, its events tell how long it exposed") {
+    StackSettings settings{"no-line", 65, 3, 20, "exposure_us = 8000", "", "strobe = \"none\""};
+    settings.scenarios = {"", "exposure_swing = 0.5", "events = false"};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status([](const auto& s) {
+        const auto& cameras = s["cameras"];
+        return healthy(s) && cameras[0]["exposure_source"] == "event" &&
+               cameras[1]["exposure_source"] == "event";
+    });
+    for (const auto& [camera, by_events] : {std::pair{"cam0", true}, {"cam2", false}}) {
+        INFO(camera);
+        auto stream = FrameStream::open(camera, {{}, stack.instance()});
+        REQUIRE(stream);
+        const auto frame = stream->next(seconds(10));
+        REQUIRE(frame);
+        CHECK(frame->data.stamp_kind() == StampKind::trigger_edge);
+        CHECK(((frame->data.flags & flag_camera_length) != 0) == by_events);
+        const Duration exposure = by_events ? milliseconds(8) : Duration{};
+        CHECK(absolute(frame->data.exposure - exposure) < microseconds(2));
+        CHECK((frame->data.sigma_ns < 1'000'000) == by_events);
+    }
+    judge(stack, 2);
+}
+
 TEST_CASE("cameras: a slow falling edge of the exposure line is taken off, by event or register") {
     StackSettings settings{"slow-edge", 63, 3, 20, "exposure_us = 2000\nline_falling_us = 400",
                            "",          ""};

@@ -28,7 +28,20 @@ struct Bench {
         exposure.earliest_on_host = now = now + period;
         pairing::Arrival arrival;
         arrival.block_id = ++block_id;
-        return check.judge(arrival, {chunk, source}, exposure, microseconds(20));
+        return check.judge(
+            arrival,
+            source == ExposureSource::event ? FrameAccount{{}, chunk} : FrameAccount{chunk, {}},
+            exposure, microseconds(20));
+    }
+
+    /// The same, of one that no line shows.
+    Duration unseen(Duration chunk, Duration event) {
+        pairing::Exposure exposure;
+        exposure.kind = StampKind::trigger_edge;
+        exposure.earliest_on_host = now = now + period;
+        pairing::Arrival arrival;
+        arrival.block_id = ++block_id;
+        return check.judge(arrival, {chunk, event}, exposure, {}).length;
     }
 
     bool contradicts(Duration length, Duration chunk = {}) {
@@ -100,6 +113,37 @@ TEST_CASE("exposure_check: the camera's events are as good as data of the frame"
     CHECK(bench.check.source() == ExposureSource::event);
     CHECK_FALSE(bench.check.wants_readings());
     CHECK(bench.contradicts(microseconds(3020), microseconds(3000)));
+}
+
+TEST_CASE(
+    "exposure_check: without a line, events tell the length if the camera agrees with itself") {
+    Bench bench;
+    CHECK(bench.unseen({}, milliseconds(3)).ns == 0);  // nothing else is known
+    CHECK(bench.unseen(milliseconds(3), {}).ns == 0);  // it may be of the frame before
+    CHECK(bench.unseen(milliseconds(3), microseconds(3050)) == microseconds(3050));
+    CHECK(bench.check.source() == ExposureSource::event);
+    CHECK(bench.check.told() == microseconds(3050));
+    CHECK(bench.unseen(milliseconds(3), microseconds(3070)).ns == 0);
+    CHECK(bench.check.source() == ExposureSource::none);
+    CHECK(bench.unseen(microseconds(40), microseconds(25)) == microseconds(25));
+
+    bench.check.set_camera_exposure(milliseconds(3), {});
+    CHECK(bench.unseen({}, microseconds(2950)) == microseconds(2950));
+    CHECK(bench.unseen({}, microseconds(3100)).ns == 0);
+    CHECK_FALSE(bench.check.wants_readings());
+
+    bench.check.set_camera_exposure({}, bench.now);  // it varies
+    CHECK(bench.check.wants_readings());
+    bench.check.read_exposure(milliseconds(4), bench.now, {});
+    bench.check.read_exposure(milliseconds(5), bench.now + milliseconds(200), {});
+    CHECK(bench.unseen({}, microseconds(4500)) == microseconds(4500));
+    CHECK(bench.unseen({}, microseconds(5200)).ns == 0);
+    CHECK(bench.check.wants_readings());  // there is nothing better against events
+}
+
+TEST_CASE("exposure_check: without a line, nothing is believed where checks are switched off") {
+    Bench bench(false);
+    CHECK(bench.unseen(milliseconds(3), milliseconds(3)).ns == 0);
 }
 
 TEST_CASE("exposure_check: every second or third end that is late is withheld, and no other") {

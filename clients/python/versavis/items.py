@@ -24,6 +24,7 @@ class Flags(enum.IntFlag):
     SENSOR_ERROR = 1 << 5
     REPEATED = 1 << 6
     ACCEL_AGE = 1 << 7
+    CAMERA_LENGTH = 1 << 8
 
 
 class Held:
@@ -122,7 +123,7 @@ class Frame(Item):
     board_time = number("frame", "board_time", "Middle of the exposure, board's clock, ns.")
     host_time = number("frame", "host_time", "Middle of the exposure, CLOCK_MONOTONIC_RAW, ns.")
     arrival = number("frame", "arrival", "Host time when the frame was complete, ns.")
-    exposure = number("frame", "exposure", "Measured, in ns; 0: unknown.")
+    exposure = number("frame", "exposure", "Measured, in ns, or see Flags.CAMERA_LENGTH; 0: unknown.")
     camera_time = number("frame", "camera_time", "As the camera stamped it, ns; 0: none.")
     sigma = sigma_of("frame")
     width = number("frame", "width", "Pixels of a row.")

@@ -34,6 +34,8 @@ struct Exposure {
     HostTime recorded;     ///< when its record reached the host; 0: unknown
     Duration delay;        ///< of the lines, already taken off the middle; of the stamp alone
     Duration delay_sigma;  ///< one standard deviation of it
+    bool length_by_camera =
+        false;  ///< the end follows from the camera's events; of the stamp alone
 };
 
 /// One complete frame.

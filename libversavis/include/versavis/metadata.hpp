@@ -27,9 +27,10 @@ enum ItemFlag : std::uint32_t {
     flag_holdover =
         1U << 3U,             ///< the clocks lost contact, or messages contradict them: sigma grows
     flag_clamped = 1U << 4U,  ///< the stamp was held so that it did not go backwards
-    flag_sensor_error = 1U << 5U,  ///< the sensor reported a fault, or its checksum was wrong
-    flag_repeated = 1U << 6U,      ///< an IMU sample with the data of the one before
-    flag_accel_age = 1U << 7U,     ///< accel_age_ns is measured
+    flag_sensor_error = 1U << 5U,   ///< the sensor reported a fault, or its checksum was wrong
+    flag_repeated = 1U << 6U,       ///< an IMU sample with the data of the one before
+    flag_accel_age = 1U << 7U,      ///< accel_age_ns is measured
+    flag_camera_length = 1U << 8U,  ///< the exposure's length is by the camera's own events
 };
 
 /// A stamp of sigma `sigma_unknown` has no known accuracy.
@@ -42,7 +43,7 @@ struct FrameMetadata {
     BoardTime board_time;    ///< middle of the exposure
     HostTime host_time;      ///< middle of the exposure
     HostTime arrival;        ///< the frame was complete on the host
-    Duration exposure;       ///< measured; 0: unknown
+    Duration exposure;       ///< measured, or with flag_camera_length; 0: unknown
     CameraTime camera_time;  ///< as the camera stamped it; 0: unknown
     std::uint32_t sigma_ns;  ///< one standard deviation of the output time
     std::uint32_t width;
