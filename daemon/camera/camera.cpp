@@ -463,6 +463,10 @@ void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
                            sensor.temperature_c);
     else if (without_clock_)
         hint = "its clock stood still: it is paired without it; power the camera off and on";
+    else if (pipeline_.report().ptp_lost)
+        hint =
+            "its clock lost PTP, and its frames are paired as before: check the PTP master and the "
+            "network";
     else if (meter_ && !meter_->usable())
         hint =
             "auto exposure cannot meter this pixel format: use Mono or Bayer of 8 to 16 bits, "

@@ -28,6 +28,8 @@ constexpr EventName event_names[] = {
     {CameraEventKind::trigger_missed, "FrameStartOvertrigger"},
     {CameraEventKind::trigger_missed, "FrameStartOverTrigger"},
     {CameraEventKind::trigger_missed, "TriggerSkipped"},
+    {CameraEventKind::ptp_lost, "PtpSyncLost"},
+    {CameraEventKind::ptp_locked, "PtpSyncLocked"},
 };
 
 /// What "send it" is called.
@@ -81,7 +83,9 @@ std::vector<EventNumber> switch_on_events(AravisNodeMap& nodes) {
     const bool both = contains(known, "ExposureStart") && contains(known, "ExposureEnd");
     std::vector<EventNumber> numbers;
     for (const auto& [kind, name] : event_names) {
-        if (!contains(known, name) || (!both && kind != CameraEventKind::trigger_missed)) continue;
+        const bool of_length =
+            kind == CameraEventKind::exposure_start || kind == CameraEventKind::exposure_end;
+        if (!contains(known, name) || (of_length && !both)) continue;
         const auto number = number_of(nodes, name);
         if (number && notify(nodes, name)) numbers.push_back({*number, kind});
     }

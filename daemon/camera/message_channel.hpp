@@ -18,7 +18,7 @@
 
 namespace versavis::daemon {
 
-enum class CameraEventKind { exposure_start, exposure_end, trigger_missed };
+enum class CameraEventKind { exposure_start, exposure_end, trigger_missed, ptp_lost, ptp_locked };
 
 struct CameraEvent {
     CameraEventKind kind = CameraEventKind::trigger_missed;

@@ -293,13 +293,26 @@ void CameraPipeline::add(const CameraEvent& event) {
         case CameraEventKind::exposure_start:
             return event_lengths_.started(event.block_id, event.at);
         case CameraEventKind::exposure_end: return event_lengths_.ended(event.block_id, event.at);
-        case CameraEventKind::trigger_missed: break;
+        case CameraEventKind::trigger_missed: return note_missed_trigger();
+        case CameraEventKind::ptp_lost: return note_ptp(true);
+        case CameraEventKind::ptp_locked: return note_ptp(false);
     }
+}
+
+void CameraPipeline::note_missed_trigger() {
     ++report_.triggers_missed;
     if (std::exchange(missed_said_, true)) return;
     log_later(LogLevel::warning,
               "the camera reports that it missed a trigger: exposure and readout may be "
               "longer than the period");
+}
+
+void CameraPipeline::note_ptp(bool lost) {
+    if (std::exchange(report_.ptp_lost, lost) == lost) return;
+    if (lost)
+        log_later(LogLevel::warning, "the camera reports that its clock lost PTP");
+    else
+        log_later(LogLevel::info, "the camera reports that its clock follows PTP again");
 }
 
 void CameraPipeline::log_later(LogLevel level, std::string text) {
@@ -434,6 +447,7 @@ void CameraPipeline::set_line_delays(const LineDelays& lines) {
     const std::lock_guard lock(mutex_);
     event_lengths_ = {};
     missed_said_ = false;
+    report_.ptp_lost = false;
     completion_.set_line_delays(lines);
     check_.set_line_delays(lines);
 }

@@ -40,6 +40,7 @@ struct PipelineReport {
     std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
     std::uint64_t triggers_without_frame = 0;
     std::uint64_t triggers_missed = 0;  ///< by the camera's own events
+    bool ptp_lost = false;              ///< the same
     /// Triggers whose exposure was not measured although its line is wired.
     std::uint64_t unmeasured = 0;
     bool measured = true;       ///< the newest one was
@@ -156,6 +157,8 @@ class CameraPipeline final : private pairing::Outcome {
     std::optional<pairing::Start> advance_locked(HostTime now);
     pairing::Arrival completed(pairing::Arrival arrival) const;
     void note_chunk_lag();
+    void note_missed_trigger();
+    void note_ptp(bool lost);
     FrameAccount account_of(const pairing::Arrival& arrival) const;
     void count_refusal(EventReason reason);
     void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);

@@ -19,6 +19,8 @@ enum class CameraEventId : std::uint16_t {
     exposure_start = 0x9001,
     exposure_end = 0x9002,
     trigger_missed = 0x9003,
+    ptp_lost = 0x9004,
+    ptp_locked = 0x9005,
 };
 
 struct TimedEvent {

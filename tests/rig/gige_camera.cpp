@@ -444,6 +444,15 @@ void GigeCamera::apply_outages() {
     if (reboot != nullptr) power_cycle_pending_ = true;
 }
 
+void GigeCamera::report_ptp(HostTime at) {
+    for (const Fault& fault : faults_) {
+        if (fault.kind != FaultKind::lose_ptp) continue;
+        if (fault.at_exposure == exposures_) send_event(CameraEventId::ptp_lost, at, 0);
+        if (fault.at_exposure + fault.count == exposures_)
+            send_event(CameraEventId::ptp_locked, at, 0);
+    }
+}
+
 /// An exposure, if the camera can take the trigger now. Counts it, and queues its frame.
 std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
                                                        const TriggerPulse* pulse) {
@@ -463,6 +472,7 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
             return std::nullopt;
         }
         apply_outages();
+        report_ptp(trigger);
         if (active_fault(FaultKind::restart_ids) != nullptr) block_id_ = 0;
         if (active_fault(FaultKind::repeat_id) == nullptr) next_block_id();
         if (const Fault* jump = active_fault(FaultKind::jump_clock))

@@ -72,6 +72,7 @@ class GigeCamera final : public TriggeredCamera {
     Missing missing_part() const;
     std::vector<std::uint8_t> chunks(Duration exposure, std::uint64_t block_id) const;
     void apply_outages();
+    void report_ptp(HostTime at);
 
     CameraScenario settings_;
     std::vector<Fault> faults_;

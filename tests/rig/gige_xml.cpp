@@ -187,12 +187,18 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.chunk_real("ChunkExposureTime", chunk_id_exposure);
     xml.chunk_real("ChunkGain", chunk_id_gain);
     xml.enumeration("EventSelector", reg_event_selector,
-                    {{"ExposureStart", 0}, {"ExposureEnd", 1}, {"FrameTriggerMissed", 2}});
+                    {{"ExposureStart", 0},
+                     {"ExposureEnd", 1},
+                     {"FrameTriggerMissed", 2},
+                     {"PtpSyncLost", 3},
+                     {"PtpSyncLocked", 4}});
     xml.selected("EventNotification", reg_event_notification, "EventSelector",
                  {{"Off", 0}, {"On", 1}});
     xml.event("ExposureStart", CameraEventId::exposure_start);
     xml.event("ExposureEnd", CameraEventId::exposure_end);
     xml.event("FrameTriggerMissed", CameraEventId::trigger_missed);
+    xml.event("PtpSyncLost", CameraEventId::ptp_lost);
+    xml.event("PtpSyncLocked", CameraEventId::ptp_locked);
     xml.real("DeviceTemperature", reg_temperature, "C", -100, 200);
     xml.integer("TLParamsLocked", reg_tl_params_locked, "<Min>0</Min><Max>1</Max>");
     xml.integer("GevSCPSPacketSize", reg_stream_packet_size, "<Min>256</Min><Max>16000</Max>");

@@ -127,6 +127,7 @@ Fault read_fault(TableReader& reader) {
                               {"jump_clock", FaultKind::jump_clock},
                               {"change_size", FaultKind::change_size},
                               {"stop_clock", FaultKind::stop_clock},
+                              {"lose_ptp", FaultKind::lose_ptp},
                               {"double_exposure", FaultKind::double_exposure},
                               {"ignore_trigger", FaultKind::ignore_trigger},
                               {"camera_mute", FaultKind::camera_mute},

@@ -99,6 +99,7 @@ enum class FaultKind {
     jump_clock,   ///< the camera's clock steps by `seconds`, from this frame on
     change_size,  ///< from this frame on they have half the height
     stop_clock,   ///< the camera's clock stands still, since the frame before
+    lose_ptp,     ///< the camera reports that its clock lost PTP, and then that it has it again
     double_exposure,  ///< the camera doubles its ExposureTime by itself
     ignore_trigger,   ///< the camera does not expose
     camera_mute,      ///< no answer and no packet for `seconds`

@@ -194,6 +194,20 @@ TEST_CASE("cameras: events of the camera witness the length, and name a trigger 
     judge(stack, 2);
 }
 
+TEST_CASE("cameras: one whose clock loses PTP says so, until it has it again") {
+    StackSettings settings{"ptp", 66, 1, 20, "", fault("cam0", "lose_ptp", 60, "count = 120"), ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find("lost PTP") !=
+               std::string::npos;
+    });
+    stack.wait_for_status(
+        [](const auto& s) { return healthy(s) && s["cameras"][0]["hint"] == ""; });
+    judge(stack, 1);
+}
+
 TEST_CASE("cameras: without an exposure line, its events tell how long it exposed") {
     StackSettings settings{"no-line", 65, 3, 20, "exposure_us = 8000", "", "strobe = \"none\""};
     settings.scenarios = {"", "exposure_swing = 0.5", "events = false"};
