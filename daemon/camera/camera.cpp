@@ -479,10 +479,11 @@ void Camera::do_housekeeping(ArvCamera* camera, AravisNodeMap& nodes) {
     if (streaming_) set_state(CameraState::streaming, hint);
 }
 
-/// A camera that is mute would hold this thread for seconds with each reading.
+/// A camera that is mute would hold this thread for seconds with each reading: what it said last is
+/// kept.
 SensorState Camera::read_sensor(const AravisNodeMap& nodes) {
-    const SensorState sensor =
-        streaming_ && mute() ? SensorState{} : sensor_state(nodes, sensor_features_);
+    if (streaming_ && mute()) return report().sensor;
+    const SensorState sensor = sensor_state(nodes, sensor_features_);
     pipeline_.set_sensor_state(sensor);
     return sensor;
 }
