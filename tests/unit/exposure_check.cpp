@@ -135,6 +135,8 @@ TEST_CASE(
     bench.check.set_camera_exposure({}, bench.now);  // it varies
     CHECK(bench.check.wants_readings());
     bench.check.read_exposure(milliseconds(4), bench.now, {});
+    bench.now = bench.now + seconds(2);
+    bench.check.read_exposure(milliseconds(4), bench.now, {});
     bench.check.read_exposure(milliseconds(5), bench.now + milliseconds(200), {});
     CHECK(bench.unseen({}, microseconds(4500)) == microseconds(4500));
     CHECK(bench.unseen({}, microseconds(5200)).ns == 0);
