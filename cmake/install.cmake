@@ -11,8 +11,8 @@ install(FILES ${CMAKE_BINARY_DIR}/firmware/versavis.uf2
     DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis OPTIONAL)
 if(TARGET versavis-rig)
     install(TARGETS versavis-rig RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-    install(DIRECTORY tests/rig/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
-        FILES_MATCHING PATTERN *.toml)
+    install(DIRECTORY tests/rig/scenarios tests/rig/models
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis)
 endif()
 
 # The library, for pkg-config and for find_package(versavis).

@@ -194,22 +194,21 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
         if ((changed >> output & 1U) == 0) continue;
         const bool level = (pins >> output & 1U) != 0;
         if (level) ++pulses_[output];
-        const auto interval = camera->trigger_line(level, {life_, pulses_[output], instant});
+        const auto line = camera->trigger_line(level, {life_, pulses_[output], instant});
         if (camera->settings().line == LineShows::trigger)
             line_changes(camera->settings(), instant, level);
-        else if (interval)
-            show_exposure(camera->settings(), *interval);
+        else if (line)
+            show_exposure(camera->settings(), *line);
     }
 }
 
-void BoardHost::show_exposure(const CameraScenario& camera,
-                              const TriggeredCamera::Interval& interval) {
+void BoardHost::show_exposure(const CameraScenario& camera, const LineActive& line) {
     const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
-    HostTime end = interval.second;
-    if (camera.line == LineShows::fixed) end = interval.first + milliseconds(1);
+    HostTime end = line.end;
+    if (camera.line == LineShows::fixed) end = line.begin + milliseconds(1);
     if (camera.line == LineShows::readout) end = end + late(camera.readout_us);
-    line_changes(camera, interval.first + late(camera.line_rising_us), true);
-    line_changes(camera, end + late(camera.line_falling_us), false);
+    line_changes(camera, line.begin + late(camera.line_rising_us), !line.inverted);
+    line_changes(camera, end + late(camera.line_falling_us), line.inverted);
 }
 
 void BoardHost::line_changes(const CameraScenario& camera, HostTime at, bool active) {

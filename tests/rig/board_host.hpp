@@ -59,7 +59,7 @@ class BoardHost {
     void plug(bool in);
     void write_late(HostTime now);
     void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
-    void show_exposure(const CameraScenario& camera, const TriggeredCamera::Interval& interval);
+    void show_exposure(const CameraScenario& camera, const LineActive& line);
     void line_changes(const CameraScenario& camera, HostTime at, bool active);
     void imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
                       std::span<std::uint8_t> received);

@@ -94,6 +94,8 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
                                                          HostTime zero,
                                                          const Surroundings& surroundings,
                                                          GroundTruth& truth) {
+    const auto family = settings.model.empty() ? rig_family() : load_camera_family(settings.model);
+    if (!family) return Unexpected(family.error());
     const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_in self{};
     self.sin_family = AF_INET;
@@ -110,20 +112,23 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
             "is another rig running? use other addresses of 127.0.0.0/8");
     }
     return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, surroundings, truth,
-                                                      socket, open_broadcast_socket(self)));
+                                                      *family, socket,
+                                                      open_broadcast_socket(self)));
 }
 
 GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
-                       const Surroundings& surroundings, GroundTruth& truth, int socket,
-                       int broadcast_socket)
+                       const Surroundings& surroundings, GroundTruth& truth,
+                       const CameraFamily& family, int socket, int broadcast_socket)
     : settings_(settings),
       faults_(faults_of(scenario, settings.name)),
       zero_(zero),
       truth_(truth),
       clock_(zero, settings.clock),
+      family_(family),
       registers_({settings.address, settings.serial, settings.name, settings.width, settings.height,
                   settings.exposure_us, settings.exposure_swing > 0, settings.auto_gain,
-                  settings.temperature_c, settings.events, settings.hostility}),
+                  settings.temperature_c, settings.events, settings.hostility},
+                 family),
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       socket_(socket),
@@ -263,6 +268,7 @@ std::uint16_t GigeCamera::write_register(std::uint32_t address, std::uint32_t va
     } else if (!in_control(from)) {
         return access_denied;
     }
+    if (registers_.locked(address, acquiring())) return access_denied;
     const bool fire_test_packet = address == reg_fire_test_packet ||
                                   (address == reg_stream_packet_size && (value & fire_bit) != 0);
     if (address == reg_stream_packet_size)
@@ -316,6 +322,11 @@ void GigeCamera::send_event(CameraEventId id, HostTime at, std::uint64_t block_i
     events_.send(at, {id, block_id, ticks, settings_.extended_ids});
 }
 
+bool GigeCamera::acquiring() {
+    const std::lock_guard lock(mutex_);
+    return acquiring_;
+}
+
 void GigeCamera::start_acquisition() {
     const std::lock_guard lock(mutex_);
     acquiring_ = true;
@@ -351,7 +362,7 @@ void GigeCamera::free_run(HostTime now) {
     HostTime next;
     {
         const std::lock_guard lock(mutex_);
-        const bool triggered = registers_.value(reg_trigger_mode) != 0 && !settings_.free_runs;
+        const bool triggered = registers_.all(family_.triggered) && !settings_.free_runs;
         if (!acquiring_ || triggered || now < free_run_next_) return;
         next = free_run_next_;
         const double rate = std::max(0.1F, registers_.real(reg_frame_rate));
@@ -367,29 +378,56 @@ void GigeCamera::afflict_board(std::vector<Fault> faults,
     afflict_board_ = std::move(afflict);
 }
 
-std::optional<GigeCamera::Interval> GigeCamera::trigger_line(bool level,
-                                                             const TriggerPulse& pulse) {
-    const bool falling = registers_.value(reg_trigger_activation) == 1;
+/// The first exposure that the trigger makes.
+std::optional<GigeCamera::Interval> GigeCamera::take_trigger(const TriggerPulse& pulse) {
+    const bool listens = registers_.all(family_.triggered) && registers_.all(family_.listens);
+    if (!listens || settings_.free_runs || muted()) return std::nullopt;
+    const auto delay = Duration{std::llround(registers_.number(family_.trigger_delay) * 1e3)};
+    const auto first = expose(pulse.at + delay, &pulse);
+    std::optional<Interval> last = first;
+    for (double taken = 1; last && taken < registers_.number(family_.burst); ++taken)
+        last = expose(last->second, &pulse);
+    return first;
+}
+
+/// What the exposure line makes of it.
+std::optional<LineActive> GigeCamera::shown(const Interval& exposure) const {
+    if (!family_.shows_exposure.empty() && !registers_.all(family_.shows_exposure))
+        return std::nullopt;
+    const auto duration_of = [this](const std::optional<Field>& field) {
+        return Duration{std::llround(registers_.number(field) * 1e3)};
+    };
+    const Duration shift = duration_of(family_.line_delay) - duration_of(family_.line_lead);
+    const Duration length = duration_of(family_.line_duration);
+    const HostTime begin = exposure.first + shift;
+    const HostTime end = length.ns > 0 ? begin + length : exposure.second + shift;
+    return LineActive{begin, end, registers_.all(family_.line_inverted)};
+}
+
+std::optional<LineActive> GigeCamera::trigger_line(bool level, const TriggerPulse& pulse) {
+    const bool falling = registers_.all(family_.falling);
     if (level == (falling != settings_.trigger_inverted)) return std::nullopt;
-    std::optional<Interval> interval;
-    const bool listens = registers_.value(reg_trigger_mode) == 1 &&
-                         registers_.value(reg_trigger_source) == 1 && !settings_.free_runs;
-    if (listens && !muted()) interval = expose(pulse.at, &pulse);
+    const auto interval = take_trigger(pulse);
     truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
                            interval.has_value()});
     const std::lock_guard lock(mutex_);
-    return active_fault(FaultKind::cut_strobe) != nullptr ? std::nullopt : interval;
+    const bool cut = active_fault(FaultKind::cut_strobe) != nullptr;
+    return interval && !cut ? shown(*interval) : std::nullopt;
 }
 
+/// By its own auto exposure.
+bool GigeCamera::exposes_by_itself() const { return registers_.all(family_.exposure_auto); }
+
 Duration GigeCamera::exposure_at(HostTime at) const {
-    double exposure_us = static_cast<double>(registers_.real(reg_exposure_time));
-    if (registers_.value(reg_exposure_auto) != 0) {
+    double exposure_us = registers_.number(family_.exposure);
+    if (exposes_by_itself()) {
         exposure_us = settings_.exposure_us;
         const double seconds = static_cast<double>((at - zero_).ns) * 1e-9;
         const double phase = 2 * 3.14159265358979 * seconds / settings_.exposure_swing_s;
         exposure_us *= 1 + settings_.exposure_swing * std::sin(phase);
-        exposure_us =
-            std::min(exposure_us, static_cast<double>(registers_.real(reg_exposure_limit)));
+        if (family_.exposure_limit)
+            exposure_us = std::min(exposure_us, registers_.number(family_.exposure_limit));
+        if (family_.chunk_is_integer) exposure_us = std::round(exposure_us);
     }
     return Duration{std::llround(exposure_us * 1e3)};
 }
@@ -417,18 +455,23 @@ Missing GigeCamera::missing_part() const {
 /// Each chunk is followed by its id and length; those of the image come right after it.
 std::vector<std::uint8_t> GigeCamera::chunks(Duration exposure, std::uint64_t block_id) const {
     std::vector<std::uint8_t> out;
-    const auto put_float = [&](std::uint32_t id, std::uint32_t value) {
+    const auto put_chunk = [&](std::uint32_t id, std::uint32_t value) {
         put_word(out, value);
         put_word(out, id);
-        put_word(out, sizeof(float));
+        put_word(out, sizeof value);
     };
-    put_word(out, chunk_id_image);
-    put_word(out, settings_.width * settings_.height);
-    put_float(chunk_id_exposure, std::bit_cast<std::uint32_t>(
-                                     static_cast<float>(static_cast<double>(exposure.ns) * 1e-3)));
-    put_float(chunk_id_gain, registers_.value(reg_gain_auto) != 0
-                                 ? std::bit_cast<std::uint32_t>(static_cast<float>(block_id % 10))
-                                 : registers_.value(reg_gain));
+    put_word(out, family_.image_chunk);
+    put_word(out, registers_.value(reg_width) * registers_.value(reg_height));
+    const double us = static_cast<double>(exposure.ns) * 1e-3;
+    put_chunk(family_.exposure_chunk,
+              family_.chunk_is_integer
+                  ? __builtin_bswap32(static_cast<std::uint32_t>(std::llround(us)))
+                  : std::bit_cast<std::uint32_t>(static_cast<float>(us)));
+    if (family_.gain_chunk == 0) return out;
+    put_chunk(family_.gain_chunk,
+              registers_.value(reg_gain_auto) != 0
+                  ? std::bit_cast<std::uint32_t>(static_cast<float>(block_id % 10))
+                  : registers_.value(reg_gain));
     return out;
 }
 
@@ -462,7 +505,8 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         const std::lock_guard lock(mutex_);
         if (acquiring_ && trigger < busy_until_)
             send_event(CameraEventId::trigger_missed, trigger, 0);
-        if (!acquiring_ || trigger < busy_until_) return std::nullopt;
+        if (!acquiring_ || trigger < busy_until_ || registers_.any(family_.stalled))
+            return std::nullopt;
         ++exposures_;
         for (const Fault& fault : board_faults_)
             if (fault.at_exposure == exposures_) afflict_board_(fault);
@@ -481,13 +525,11 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
             registers_.resize(settings_.width, settings_.height / 2);
         truth.start = trigger + Duration{std::llround(settings_.trigger_latency_us * 1e3)};
         if (active_fault(FaultKind::double_exposure) != nullptr)
-            registers_.write(reg_exposure_time,
-                             std::bit_cast<std::uint32_t>(2 * registers_.real(reg_exposure_time)));
+            registers_.set_number(family_.exposure, 2 * registers_.number(family_.exposure));
         const Duration exposure = exposure_at(trigger);
         truth.end = truth.start + exposure;
-        if (registers_.value(reg_exposure_auto) != 0)
-            registers_.write(reg_exposure_time,
-                             std::bit_cast<std::uint32_t>(static_cast<float>(exposure.ns) * 1e-3F));
+        if (exposes_by_itself())
+            registers_.set_number(family_.exposure, static_cast<double>(exposure.ns) * 1e-3);
         busy_until_ = std::max(
             truth.end, trigger + Duration{std::llround(settings_.shortest_period_us * 1e3)});
         send_event(CameraEventId::exposure_start, truth.start, block_id_);
@@ -525,7 +567,7 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         frame.pixels = view_.wall(middle(truth.start, truth.end))
                            .first(std::size_t{frame.width} * frame.height);
     frame.exposed = truth.end;
-    if (registers_.value(reg_chunk_mode) != 0)
+    if (registers_.all(family_.chunks))
         frame.chunks = chunks(truth.end - truth.start, frame.block_id);
     frame.due = truth.end + Duration{std::llround(settings_.readout_us * 1e3)};
     frame.leader_due = settings_.early_leader ? truth.start : frame.due;

@@ -34,7 +34,7 @@ class GigeCamera final : public TriggeredCamera {
     GigeCamera(const GigeCamera&) = delete;
     GigeCamera& operator=(const GigeCamera&) = delete;
 
-    std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) override;
+    std::optional<LineActive> trigger_line(bool level, const TriggerPulse& pulse) override;
 
     /// Calls `afflict` at the exposure of each of these faults, counted since the rig's start.
     void afflict_board(std::vector<Fault> faults, std::function<void(const Fault&)> afflict);
@@ -43,8 +43,8 @@ class GigeCamera final : public TriggeredCamera {
 
  private:
     GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
-               const Surroundings& surroundings, GroundTruth& truth, int socket,
-               int broadcast_socket);
+               const Surroundings& surroundings, GroundTruth& truth, const CameraFamily& family,
+               int socket, int broadcast_socket);
 
     void serve();
     void receive(int socket);
@@ -55,6 +55,7 @@ class GigeCamera final : public TriggeredCamera {
                                  const sockaddr_in& from);
     bool in_control(const sockaddr_in& from) const;
     void lose_controller();
+    bool acquiring();
     void start_acquisition();
     void stop_acquisition();
     void configure_stream();
@@ -65,7 +66,11 @@ class GigeCamera final : public TriggeredCamera {
     bool pending(std::uint16_t command, std::span<const std::uint8_t> body) const;
     bool muted() const { return host_now().ns < muted_until_ns_.load(); }
 
+    using Interval = std::pair<HostTime, HostTime>;
     std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
+    std::optional<Interval> take_trigger(const TriggerPulse& pulse);
+    std::optional<LineActive> shown(const Interval& exposure) const;
+    bool exposes_by_itself() const;
     Duration exposure_at(HostTime at) const;
     const Fault* active_fault(FaultKind kind) const;
     void next_block_id();
@@ -79,6 +84,7 @@ class GigeCamera final : public TriggeredCamera {
     HostTime zero_;
     GroundTruth& truth_;
     SkewedClock clock_;
+    CameraFamily family_;
     GigeRegisters registers_;
     CameraView view_;
     GvspTransmitter transmitter_;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "camera_family.hpp"
 #include "gige_hostile.hpp"
 
 namespace versavis::rig {
@@ -24,7 +25,7 @@ enum Register : std::uint32_t {
     reg_current_ip = 0x0024,
     reg_current_mask = 0x0034,
     reg_vendor = 0x0048,
-    reg_model = 0x0068,
+    reg_model_name = 0x0068,
     reg_device_version = 0x0088,
     reg_vendor_info = 0x00A8,
     reg_serial = 0x00D8,
@@ -79,17 +80,11 @@ enum Register : std::uint32_t {
     reg_event_notification = 0x10078,  ///< one register for each event
     reg_gain_auto = 0x10090,
 
+    reg_model = 0x11000,  ///< from here on, what a model has of its own
     reg_xml = 0x20000,
 };
 
 inline constexpr std::uint32_t gige_default_heartbeat_ms = 3000;
-
-/// Chunk data: the image, then exposure time and gain as floats, each followed by its id and
-/// length.
-inline constexpr std::uint32_t chunk_id_image = 1;
-inline constexpr std::uint32_t chunk_id_exposure = 0x1001;
-inline constexpr std::uint32_t chunk_id_gain = 0x1002;
-inline constexpr std::uint32_t chunk_bytes = 8 + 2 * (4 + 8);
 
 /// Thread-safe.
 class GigeRegisters {
@@ -107,7 +102,7 @@ class GigeRegisters {
         bool events = true;
         Hostility hostility = Hostility::none;
     };
-    explicit GigeRegisters(const Identity& identity);
+    GigeRegisters(const Identity& identity, const CameraFamily& family);
 
     /// Puts all registers into their state after power-up.
     void reset();
@@ -123,19 +118,39 @@ class GigeRegisters {
     std::uint32_t value(Register address) const;
     float real(Register address) const;
 
+    /// Registers that the model gives a meaning. None: 0.
+    double number(const std::optional<Field>& field) const;
+    void set_number(const Field& field, double value);
+    bool all(const FieldValues& values) const;  ///< none: false
+    bool any(const FieldValues& values) const;  ///< none: false
+
+    /// The model does not let it be written now.
+    bool locked(std::uint32_t address, bool acquiring) const;
+
  private:
-    void set(Register address, std::uint32_t value);
-    std::uint32_t peek(Register address) const;  ///< under the lock
+    // Under the lock.
+    void set(std::uint32_t address, std::uint32_t value);
+    std::uint32_t peek(std::uint32_t address) const;
+    double get(const Field& field) const;
+    void put(const Field& field, double value);
+    bool holds(const FieldValues& values) const;
     void set_text(Register address, const std::string& text, std::size_t capacity);
+    void load_user_set(bool factory);
+    void settle();
 
     Identity identity_;
+    CameraFamily family_;
     GigeDescription description_;
     mutable std::mutex mutex_;
     std::vector<std::uint8_t> memory_;
     std::array<std::uint32_t, 2> line_modes_{};  ///< of the lines that are not selected
 };
 
+/// What the registers of the rig's own camera mean.
+CameraFamily rig_family();
+
 /// The GenICam description of these registers.
-std::string gige_xml(std::uint32_t width, std::uint32_t height);
+std::string gige_xml(std::uint32_t width, std::uint32_t height,
+                     const CameraFamily& family = rig_family());
 
 }  // namespace versavis::rig

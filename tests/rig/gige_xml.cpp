@@ -103,10 +103,16 @@ class XmlWriter {
             name, id);
     }
 
-    std::string document() const {
+    /// Nodes that are written already, with a category of all that they offer.
+    void group(const std::string& category, const std::string& nodes) {
+        list(category);
+        nodes_ += nodes;
+    }
+
+    std::string document(const CameraFamily& family) const {
         return fmt::format(
             "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
-            "<RegisterDescription ModelName=\"RigCamera\" VendorName=\"VersaVIS\" "
+            "<RegisterDescription ModelName=\"{}\" VendorName=\"{}\" "
             "ToolTip=\"Emulated "
             "camera\" "
             "StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" "
@@ -120,7 +126,7 @@ class XmlWriter {
             "GenApiSchema_Version_1_0.xsd\">\n"
             "<Category Name=\"Root\" NameSpace=\"Standard\">\n{}</Category>\n{}"
             "<Port Name=\"Device\" NameSpace=\"Standard\"/>\n</RegisterDescription>\n",
-            root_, nodes_);
+            family.model, family.vendor, root_, nodes_);
     }
 
  private:
@@ -143,12 +149,10 @@ std::string fixed(std::uint32_t value) {
     return fmt::format("<Min>{0}</Min><Max>{0}</Max>", value);
 }
 
-}  // namespace
-
-std::string gige_xml(std::uint32_t width, std::uint32_t height) {
-    XmlWriter xml;
+/// What all models have: names, frames and the stream.
+void add_frames_and_stream(XmlWriter& xml, std::uint32_t width, std::uint32_t height) {
     xml.text("DeviceVendorName", reg_vendor, 32);
-    xml.text("DeviceModelName", reg_model, 32);
+    xml.text("DeviceModelName", reg_model_name, 32);
     xml.text("DeviceVersion", reg_device_version, 32);
     xml.text("DeviceSerialNumber", reg_serial, 16);
     xml.text("DeviceUserID", reg_user_name, 16);
@@ -164,6 +168,15 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
                     {{"SingleFrame", 1}, {"Continuous", 2}});
     xml.command("AcquisitionStart", reg_acquisition_start);
     xml.command("AcquisitionStop", reg_acquisition_stop);
+    xml.real("DeviceTemperature", reg_temperature, "C", -100, 200);
+    xml.integer("GevSCPSPacketSize", reg_stream_packet_size, "<Min>256</Min><Max>16000</Max>");
+    xml.command("GevSCPSFireTestPacket", reg_fire_test_packet);
+    xml.integer("GevSCPD", reg_stream_packet_delay, "<Min>0</Min><Max>4294967295</Max>");
+    xml.integer("GevTimestampTickFrequency", reg_tick_low, "", false);
+}
+
+/// What the rig's own camera has beside it.
+void add_rig_camera(XmlWriter& xml, const CameraFamily& family) {
     xml.real("AcquisitionFrameRate", reg_frame_rate, "Hz", 0.1, 1000);
     xml.enumeration("TriggerSelector", reg_trigger_selector, {{"FrameStart", 0}});
     xml.enumeration("TriggerMode", reg_trigger_mode, {{"Off", 0}, {"On", 1}});
@@ -184,8 +197,8 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.boolean("ChunkModeActive", reg_chunk_mode);
     xml.enumeration("ChunkSelector", reg_chunk_selector, {{"ExposureTime", 0}, {"Gain", 1}});
     xml.boolean("ChunkEnable", reg_chunk_enable);
-    xml.chunk_real("ChunkExposureTime", chunk_id_exposure);
-    xml.chunk_real("ChunkGain", chunk_id_gain);
+    xml.chunk_real("ChunkExposureTime", family.exposure_chunk);
+    xml.chunk_real("ChunkGain", family.gain_chunk);
     xml.enumeration("EventSelector", reg_event_selector,
                     {{"ExposureStart", 0},
                      {"ExposureEnd", 1},
@@ -199,13 +212,19 @@ std::string gige_xml(std::uint32_t width, std::uint32_t height) {
     xml.event("FrameTriggerMissed", CameraEventId::trigger_missed);
     xml.event("PtpSyncLost", CameraEventId::ptp_lost);
     xml.event("PtpSyncLocked", CameraEventId::ptp_locked);
-    xml.real("DeviceTemperature", reg_temperature, "C", -100, 200);
     xml.integer("TLParamsLocked", reg_tl_params_locked, "<Min>0</Min><Max>1</Max>");
-    xml.integer("GevSCPSPacketSize", reg_stream_packet_size, "<Min>256</Min><Max>16000</Max>");
-    xml.command("GevSCPSFireTestPacket", reg_fire_test_packet);
-    xml.integer("GevSCPD", reg_stream_packet_delay, "<Min>0</Min><Max>4294967295</Max>");
-    xml.integer("GevTimestampTickFrequency", reg_tick_low, "", false);
-    return xml.document();
+}
+
+}  // namespace
+
+std::string gige_xml(std::uint32_t width, std::uint32_t height, const CameraFamily& family) {
+    XmlWriter xml;
+    add_frames_and_stream(xml, width, height);
+    if (family.nodes.empty())
+        add_rig_camera(xml, family);
+    else
+        xml.group("Model", family.nodes);
+    return xml.document(family);
 }
 
 }  // namespace versavis::rig

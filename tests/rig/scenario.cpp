@@ -107,8 +107,11 @@ CameraScenario read_camera(TableReader& reader) {
                               {"no_numbers", Hostility::no_numbers},
                               {"pending", Hostility::pending},
                               {"pending_at_all", Hostility::pending_at_all}});
+    reader.read("model", camera.model);
     read_clock(reader, camera.clock);
     if (camera.name.empty()) reader.fail("name", "a camera needs a 'name'");
+    if (!camera.model.empty() && camera.hostility != Hostility::none)
+        reader.fail("hostile", "only the rig's own camera is hostile", "leave out 'model'");
     if (camera.address.empty())
         reader.fail("address", "a camera needs an 'address', such as 127.0.0.2");
     return camera;

@@ -84,6 +84,7 @@ struct CameraScenario {
     double temperature_c = 45;
     bool auto_gain = false;  ///< frame n is taken with n mod 10 dB
     Hostility hostility = Hostility::none;
+    std::string model{};  ///< whose description it offers; empty: the rig's own
     ClockErrors clock{1'000'000'000, -40.0, 0};
 };
 

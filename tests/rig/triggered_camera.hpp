@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <utility>
 
 #include "scenario.hpp"
 #include "versavis/time.hpp"
@@ -29,14 +28,19 @@ inline HostTime stamped(const CameraScenario& camera, HostTime start, HostTime e
     }
 }
 
+/// When the exposure line is active.
+struct LineActive {
+    HostTime begin;
+    HostTime end;
+    bool inverted = false;  ///< by the camera: low meanwhile
+};
+
 class TriggeredCamera {
  public:
-    using Interval = std::pair<HostTime, HostTime>;
-
     virtual ~TriggeredCamera() = default;
     /// The trigger line changed; `level` as on the wire. Returns when the exposure line is active,
-    /// if it exposes.
-    virtual std::optional<Interval> trigger_line(bool level, const TriggerPulse& pulse) = 0;
+    /// if it exposes, and shows it.
+    virtual std::optional<LineActive> trigger_line(bool level, const TriggerPulse& pulse) = 0;
     virtual const CameraScenario& settings() const = 0;
 };
 

@@ -3,17 +3,17 @@
 
 namespace versavis::test {
 
-std::optional<RigU3vCamera::Interval> RigU3vCamera::trigger_line(bool level,
-                                                                 const rig::TriggerPulse& pulse) {
+std::optional<rig::LineActive> RigU3vCamera::trigger_line(bool level,
+                                                          const rig::TriggerPulse& pulse) {
     if (!level) return std::nullopt;
-    std::optional<Interval> interval;
-    if (camera_->listens(level)) interval = expose(pulse);
+    std::optional<rig::LineActive> line;
+    if (camera_->listens(level)) line = expose(pulse);
     truth_.add(rig::TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
-                                interval.has_value()});
-    return interval;
+                                line.has_value()});
+    return line;
 }
 
-std::optional<RigU3vCamera::Interval> RigU3vCamera::expose(const rig::TriggerPulse& pulse) {
+std::optional<rig::LineActive> RigU3vCamera::expose(const rig::TriggerPulse& pulse) {
     if (pulse.at < busy_until_) return std::nullopt;
     rig::TrueExposure exposure;
     exposure.camera = settings_.name;
@@ -40,7 +40,7 @@ std::optional<RigU3vCamera::Interval> RigU3vCamera::expose(const rig::TriggerPul
     if (!block_id) return std::nullopt;
     ++exposures_;
     busy_until_ = exposure.end;
-    return Interval{exposure.start, exposure.end};
+    return rig::LineActive{exposure.start, exposure.end};
 }
 
 }  // namespace versavis::test

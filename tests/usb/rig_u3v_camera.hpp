@@ -31,13 +31,14 @@ class RigU3vCamera final : public rig::TriggeredCamera {
               "VersaVIS", "RigCamera", settings.serial, settings.width, settings.height})),
           device_(testbed, port, camera_) {}
 
-    std::optional<Interval> trigger_line(bool level, const rig::TriggerPulse& pulse) override;
+    std::optional<rig::LineActive> trigger_line(bool level,
+                                                const rig::TriggerPulse& pulse) override;
     const rig::CameraScenario& settings() const override { return settings_; }
     U3vCamera& camera() { return *camera_; }
     SimulatedDevice& device() { return device_; }
 
  private:
-    std::optional<Interval> expose(const rig::TriggerPulse& pulse);
+    std::optional<rig::LineActive> expose(const rig::TriggerPulse& pulse);
 
     rig::CameraScenario settings_;
     const rig::Motion& motion_;

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Cameras that are built as those of four makers: the service's own presets set them up, whatever
+// another program left behind, and each stamp belongs to its frame.
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "../support/judged.hpp"
+#include "../support/stack.hpp"
+#include "pairing/pair_replay.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+struct Model {
+    const char* name;
+    const char* preset;
+    const char* chunks;  ///< key of the service
+};
+
+const Model models[] = {{"ace", "basler", "chunks = true"},
+                        {"blackfly-s", "flir", ""},
+                        {"hikrobot", "hikrobot", "chunks = true"},
+                        {"alvium", "alvium", ""}};
+
+StackSettings four_models(const std::string& name, unsigned subnet) {
+    StackSettings settings{name, subnet, 4, 20, "exposure_us = 4000", "", ""};
+    for (const Model& model : models) {
+        settings.scenarios.push_back("model = \"" + std::string(model.name) + "\"\n");
+        settings.extras.emplace_back(model.chunks);
+    }
+    settings.scenarios[1] += "exposure_swing = 0.3\n";  // its auto exposure is on by default
+    return settings;
+}
+
+/// Frames that the pairing needed to see before it proved the first.
+unsigned frames_to_lock(const Stack& stack, const std::string& camera) {
+    std::string recording;
+    REQUIRE(stack.tool({"tail", camera + "-evidence", "--oldest", "-n", "100", "--json"},
+                       &recording) == 0);
+    std::istringstream lines(recording);
+    std::string seen;
+    for (std::string line; std::getline(lines, line);) {
+        seen += line + "\n";
+        std::istringstream so_far(seen);
+        const auto replayed = client::replay_pairing(so_far, nullptr);
+        if (replayed && replayed->locks > 0) return static_cast<unsigned>(replayed->frames);
+    }
+    FAIL("the pairing of " << camera << " never locks:\n" << recording);
+    return 0;
+}
+
+/// All that the presets want is so, and the lengths of exposures are witnessed.
+void check_setup(const nlohmann::json& status, const std::vector<std::string>& witnesses) {
+    for (std::size_t i = 0; i < std::size(models); ++i) {
+        const auto& camera = status["cameras"][i];
+        INFO(camera.dump(1));
+        CHECK(camera["preset"] == models[i].preset);
+        CHECK(camera["exposure_source"] == witnesses[i]);
+        CHECK(camera["setup"].size() >= 15);
+        for (const auto& step : camera["setup"]) {
+            INFO(step.dump());
+            CHECK(step["outcome"] == "set");
+        }
+    }
+}
+
+void judge_all(Stack& stack) {
+    const rig::Verdict verdict = judged(stack, 5);
+    INFO(rig::to_table(verdict));
+    CHECK(verdict.ok);
+    for (unsigned i = 0; i < std::size(models); ++i) {
+        const auto& stream = verdict.streams.at("cam" + std::to_string(i));
+        CHECK(stream.wrong_pairs == 0);
+        CHECK(stream.rate_hz == Approx(20).margin(0.5));
+    }
+}
+
+}  // namespace
+
+TEST_CASE("models: cameras of four makers deliver proved frames as soon as the rig's own") {
+    Stack own({"ownmodel", 84, 1, 20, "exposure_us = 4000", "", ""});
+    own.start_rig();
+    own.start_service();
+    own.wait_for_status(healthy);
+    const unsigned usual = frames_to_lock(own, "cam0");
+    own.service().terminate();
+    own.stop_rig();
+
+    Stack stack(four_models("models", 85));
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status(healthy);
+    check_setup(status, {"chunk", "chunk", "chunk", "setting"});  // the last has no chunks
+    for (unsigned i = 0; i < std::size(models); ++i) {
+        INFO(models[i].name);
+        CHECK(frames_to_lock(stack, "cam" + std::to_string(i)) <= usual);
+    }
+    judge_all(stack);
+}
+
+// Without the factory settings each step has to undo by itself what was left behind. Of a camera
+// whose frames carry chunks already, nobody need ask for them.
+TEST_CASE("models: what another program left behind is undone without loading factory settings") {
+    StackSettings settings = four_models("leftover", 86);
+    settings.camera_extra = "keep_settings = true";
+    settings.scenarios[1] = "model = \"blackfly-s\"\n";
+    settings.extras = {};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    check_setup(stack.wait_for_status(healthy), {"setting", "chunk", "setting", "setting"});
+    judge_all(stack);
+}
+
+TEST_CASE("models: the probe of each names its preset, and is ready") {
+    Stack stack(four_models("probed", 87));
+    stack.start_rig();
+    for (unsigned i = 0; i < std::size(models); ++i) {
+        std::string output;
+        CHECK(stack.tool({"camera", "probe", "127.0.87." + std::to_string(i + 2)}, &output) == 0);
+        CHECK_THAT(output, Catch::Contains("preset " + std::string(models[i].preset) + "\n") &&
+                               Catch::Contains("ready") && !Catch::Contains("not set"));
+    }
+}
