@@ -107,10 +107,14 @@ TEST_CASE("models: what another program left behind is undone without loading fa
     settings.camera_extra = "keep_settings = true";
     settings.scenarios[1] = "model = \"blackfly-s\"\n";
     settings.extras = {};
+    settings.faults = "[[fault]]\nkind = \"camera_reboot\"\ncamera = \"cam2\"\nat_exposure = 60\n";
     Stack stack(settings);
     stack.start_rig();
     stack.start_service();
-    check_setup(stack.wait_for_status(healthy), {"setting", "chunk", "setting", "setting"});
+    // One powers up again, with the same start-up settings.
+    const auto status = stack.wait_for_status(
+        [](const auto& s) { return s["cameras"][2]["connections"] == 2 && healthy(s); });
+    check_setup(status, {"setting", "chunk", "setting", "setting"});
     judge_all(stack);
 }
 
