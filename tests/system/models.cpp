@@ -16,13 +16,14 @@ namespace {
 struct Model {
     const char* name;
     const char* preset;
-    const char* chunks;  ///< key of the service
+    const char* chunks;    ///< key of the service
+    const char* exposure;  ///< feature that sets it
 };
 
-const Model models[] = {{"ace", "basler", "chunks = true"},
-                        {"blackfly-s", "flir", ""},
-                        {"hikrobot", "hikrobot", "chunks = true"},
-                        {"alvium", "alvium", ""}};
+const Model models[] = {{"ace", "basler", "chunks = true", "ExposureTimeAbs"},
+                        {"blackfly-s", "flir", "", ""},
+                        {"hikrobot", "hikrobot", "chunks = true", "ExposureTime"},
+                        {"alvium", "alvium", "", "ExposureTime"}};
 
 StackSettings four_models(const std::string& name, unsigned subnet) {
     StackSettings settings{name, subnet, 4, 20, "exposure_us = 4000", "", ""};
@@ -88,13 +89,19 @@ TEST_CASE("models: cameras of four makers deliver proved frames as soon as the r
     own.service().terminate();
     own.stop_rig();
 
-    Stack stack(four_models("models", 85));
+    StackSettings settings = four_models("models", 85);
+    for (unsigned i = 0; i < std::size(models); ++i)
+        if (const std::string feature = models[i].exposure; !feature.empty())
+            settings.extras[i] += "\n[camera.features]\n" + feature + " = 6000\n";
+    Stack stack(settings);
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status(healthy);
     check_setup(status, {"chunk", "chunk", "chunk", "setting"});  // the last has no chunks
     for (unsigned i = 0; i < std::size(models); ++i) {
         INFO(models[i].name);
+        if (models[i].exposure[0] != '\0')
+            CHECK(status["cameras"][i]["exposure_ns"].get<double>() == Approx(6e6).margin(1e4));
         CHECK(frames_to_lock(stack, "cam" + std::to_string(i)) <= usual);
     }
     judge_all(stack);
