@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/aravis_stream.hpp"
 
-#include <fmt/format.h>
-#include <linux/filter.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -12,39 +10,20 @@
 #include <limits>
 #include <optional>
 
-#include "camera/receive_mode.hpp"
-
 namespace versavis::daemon {
 
 namespace {
+
+unsigned in_us(Duration duration) { return static_cast<unsigned>(duration.ns / 1000); }
 
 /// Bytes that the kernel keeps while the receive thread is late: 0.27 s of gigabit Ethernet. At
 /// half, a loaded host loses packets; at twice, each camera takes 32 MiB more at worst.
 constexpr int receive_buffer = 32 << 20;
 
-/// Least time that packets which were lost may take to come again. At half, two resends do not fit;
-/// at twice, complete frames wait longer behind a broken one.
-constexpr unsigned shortest_retention_us = 100'000;
-
-/// From the end of the exposure to the trailer, for a large sensor. At half, frames of slow sensors
-/// are given up; at twice, complete frames wait longer behind a broken one.
-constexpr double readout_us = 50'000;
-
-/// A frame is kept open until its trailer may have come, even where the leader leaves when the
-/// exposure begins. No longer: complete frames wait behind one that lost packets.
-unsigned frame_retention_us(const CameraConfiguration& configuration) {
-    const double longest = configuration.max_exposure_us + readout_us;
-    return std::max(shortest_retention_us, static_cast<unsigned>(std::lround(longest)));
-}
-
 /// Silence within a frame after which its last packets are asked for, and asked for again. At half,
 /// moments when the sender or the host is busy look like the loss of all that follows, for which
 /// Aravis gives up asking; at twice, frames that lost their last packets are 2 ms later.
 constexpr Duration packet_timeout = milliseconds(2);
-
-/// The same by a packet socket, whose blocks are silent until they are handed over. At half, each
-/// block would seem to miss the rest of its frame; at twice, such frames are 10 ms later.
-constexpr Duration packet_timeout_by_blocks = packet_socket_lateness + milliseconds(2);
 
 /// Complete frames in a row that paused for longer than that. At half, a busy host or switch looks
 /// like a camera that pauses; at twice, it is found out after twice as many frames.
@@ -68,22 +47,12 @@ std::optional<int> find_socket(std::uint16_t port) {
     return std::nullopt;
 }
 
-/// Nothing arrives any more; requests for packets still leave.
-void receive_nothing(int socket) {
-    sock_filter drop_all[] = {BPF_STMT(BPF_RET | BPF_K, 0)};
-    const sock_fprog program{1, drop_all};
-    ::setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program);
-}
-
 }  // namespace
 
-Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configuration,
-                          ReceiveMode receive) {
+Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configuration) {
     GlibError error;
     arv_camera_gv_set_packet_size_adjustment(camera, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-    arv_camera_gv_set_stream_options(camera, receive == ReceiveMode::socket
-                                                 ? ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED
-                                                 : ARV_GV_STREAM_OPTION_NONE);
+    arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
     if (configuration.packet_size != 0)
         arv_camera_gv_set_packet_size(camera, static_cast<gint>(configuration.packet_size),
                                       error.out());
@@ -93,37 +62,28 @@ Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configur
     return failure("packet size", error.text(), "set 'packet_size' to what the network passes");
 }
 
-Expected<std::unique_ptr<AravisStream>> AravisStream::create(
+Expected<std::unique_ptr<FrameSource>> AravisStream::create(
     ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
     CameraPipeline& pipeline, FrameMeter* meter, Object<ArvChunkParser> chunks,
     PatientWork& patient) {
     std::unique_ptr<AravisStream> self(
         new AravisStream(configuration, setup, pipeline, meter, patient));
     self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
-    if (self->calls_back_) {
-        const auto mode = choose_receive_mode(configuration, packet_socket_allowed());
-        if (!mode) return Unexpected(mode.error());
-        self->receive_ = *mode;
-        if (auto done = set_up_packets(camera, configuration, *mode); !done)
-            return Unexpected(done.error());
-    }
     self->chunk_parser_ = std::move(chunks);
     GlibError error;
     self->stream_.reset(arv_camera_create_stream(
         camera, self->calls_back_ ? &AravisStream::on_stream : nullptr, self.get(), error.out()));
     if (!self->stream_) return failure("stream", error.text());
     if (ARV_IS_GV_STREAM(self->stream_.get())) {
-        const Duration timeout =
-            self->receive_ == ReceiveMode::packet ? packet_timeout_by_blocks : packet_timeout;
-        self->packet_timeout_us_ = static_cast<unsigned>(timeout.ns / 1000);
+        self->packet_timeout_us_ = in_us(packet_timeout);
         // No wait before a gap is asked for: a link keeps its packets in order.
-        g_object_set(self->stream_.get(), "frame-retention", frame_retention_us(configuration),
+        g_object_set(self->stream_.get(), "frame-retention", in_us(frame_retention(configuration)),
                      "initial-packet-timeout", 0U, "packet-timeout", self->packet_timeout_us_,
                      nullptr);
-        self->prepare_socket();
+        self->enlarge_receive_buffer();
     }
     self->refill();
-    return self;
+    return std::unique_ptr<FrameSource>(std::move(self));
 }
 
 AravisStream::~AravisStream() {
@@ -141,26 +101,18 @@ AravisStream::~AravisStream() {
     for (const std::uint32_t slot : queued_) pipeline_.abandon(slot, EventReason::none, 0);
 }
 
-/// By a packet socket nobody reads the UDP socket: it would fill and stay full.
-void AravisStream::prepare_socket() const {
-    const auto socket = find_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
-    if (!socket) return;
-    if (receive_ == ReceiveMode::packet)
-        receive_nothing(*socket);
-    else
-        enlarge_receive_buffer(*socket);
-}
-
 /// The default of 208 KiB does not hold one frame. Aravis sets its own property only when the first
 /// frame opens, and loses that frame: so it is enlarged here.
-void AravisStream::enlarge_receive_buffer(int socket) const {
-    if (::setsockopt(socket, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) ==
+void AravisStream::enlarge_receive_buffer() const {
+    const auto socket = find_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
+    if (!socket) return;
+    if (::setsockopt(*socket, SOL_SOCKET, SO_RCVBUFFORCE, &receive_buffer, sizeof receive_buffer) ==
         0)
         return;
-    ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+    ::setsockopt(*socket, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
     int got = 0;
     socklen_t size = sizeof got;
-    ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &got, &size);
+    ::getsockopt(*socket, SOL_SOCKET, SO_RCVBUF, &got, &size);
     if (static_cast<std::uint64_t>(got) < setup_.payload)
         log(LogLevel::warning, configuration_.name,
             "the receive buffer is only {} KiB, frames will be lost; raise net.core.rmem_max or "
@@ -184,64 +136,6 @@ void AravisStream::poll(Duration timeout) {
     if (ArvBuffer* done =
             arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(timeout.ns / 1000)))
         take(done);
-}
-
-/// Bytes from row to row, by the pixel format; by the size for formats that do not tell.
-std::uint32_t AravisStream::stride(ArvBuffer* buffer) const {
-    const auto width = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
-    const auto height = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));
-    const unsigned bits =
-        static_cast<unsigned>(arv_buffer_get_image_pixel_format(buffer)) >> 16U & 0xFFU;
-    if (bits == 0) return height == 0 ? 0 : static_cast<std::uint32_t>(setup_.payload / height);
-    gint padding_x = 0;
-    gint padding_y = 0;
-    arv_buffer_get_image_padding(buffer, &padding_x, &padding_y);
-    return (width * bits + 7) / 8 + static_cast<std::uint32_t>(padding_x);
-}
-
-/// Success is no proof of size: a frame may be cut, or fill only half of the buffer.
-EventReason AravisStream::refusal(ArvBuffer* buffer) const {
-    if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS)
-        return EventReason::frame_incomplete;
-    std::size_t size = 0;
-    arv_buffer_get_data(buffer, &size);
-    const auto width = static_cast<std::uint32_t>(std::max(arv_buffer_get_image_width(buffer), 0));
-    const auto height =
-        static_cast<std::uint32_t>(std::max(arv_buffer_get_image_height(buffer), 0));
-    const bool like_the_first = width_ == 0 || (width == width_ && height == height_);
-    const bool whole = size == setup_.payload && width > 0 && height > 0 && like_the_first &&
-                       std::uint64_t{stride(buffer)} * height <= size;
-    return whole ? EventReason::none : EventReason::wrong_size;
-}
-
-/// One frame may be cut; two that are alike have another size than was announced.
-void AravisStream::note_size(ArvBuffer* buffer, EventReason refused) {
-    if (refused == EventReason::frame_incomplete) return;
-    std::size_t size = 0;
-    arv_buffer_get_data(buffer, &size);
-    const std::uint64_t now =
-        refused == EventReason::none
-            ? 0
-            : std::uint64_t{static_cast<std::uint16_t>(arv_buffer_get_image_width(buffer))} << 48U |
-                  std::uint64_t{static_cast<std::uint16_t>(arv_buffer_get_image_height(buffer))}
-                      << 32U |
-                  (size & 0xFFFFFFFFU);
-    if (now == 0 || now == misfit_) changed_ = now;
-    misfit_ = now;
-}
-
-std::string AravisStream::changed() const {
-    const std::uint64_t now = changed_;
-    return now == 0
-               ? ""
-               : fmt::format("frames are {} x {} pixels in {} bytes; announced were {} bytes",
-                             now >> 48U, now >> 32U & 0xFFFFU, now & 0xFFFFFFFFU, setup_.payload);
-}
-
-void AravisStream::note_clock(const pairing::Arrival& arrival) {
-    const bool equal = setup_.has_clock && arrival.camera_time.ns == stamp_.ns;
-    equal_stamps_ = equal ? equal_stamps_ + 1 : 0;
-    stamp_ = arrival.camera_time;
 }
 
 std::uint64_t AravisStream::packets() const {
@@ -286,14 +180,15 @@ void AravisStream::note_starvation() {
 /// Some cameras pause within a frame, as after a leader that is sent when the exposure begins:
 /// Aravis then misses all packets that follow, and asks for none of this frame any more. Complete
 /// frames show that nothing was lost, and that the pause must be waited for.
-void AravisStream::note_pauses(EventReason refused) {
-    if (receive_ == ReceiveMode::automatic) return;
+void AravisStream::note_pauses(bool good) {
+    if (!ARV_IS_GV_STREAM(stream_.get())) return;
     const std::uint64_t given_up =
         arv_stream_get_info_uint64_by_name(stream_.get(), "n_resend_ratio_reached");
-    const bool paused = given_up != given_up_ && refused == EventReason::none;
+    const bool paused = given_up != given_up_ && good;
     given_up_ = given_up;
     pauses_ = paused ? pauses_ + 1 : 0;
-    if (pauses_ < frames_with_pauses || packet_timeout_us_ >= frame_retention_us(configuration_))
+    if (pauses_ < frames_with_pauses ||
+        packet_timeout_us_ >= in_us(frame_retention(configuration_)))
         return;
     pauses_ = 0;
     packet_timeout_us_ *= 2;
@@ -301,40 +196,35 @@ void AravisStream::note_pauses(EventReason refused) {
 }
 
 void AravisStream::take(ArvBuffer* buffer) {
-    pairing::Arrival arrival;
-    arrival.arrived = host_now();
-    arrival.slot = static_cast<std::uint32_t>(GPOINTER_TO_UINT(arv_buffer_get_user_data(buffer)));
-    queued_.erase(std::remove(queued_.begin(), queued_.end(), arrival.slot), queued_.end());
-    arrival.block_id = block_id(buffer);
-    const EventReason refused = refusal(buffer);
-    note_size(buffer, refused);
-    note_pauses(refused);
-    ++taken_;
-    if (refused == EventReason::none) {
-        if (setup_.has_clock)
-            arrival.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
-        note_clock(arrival);
+    Received frame;
+    frame.arrived = host_now();
+    frame.slot = static_cast<std::uint32_t>(GPOINTER_TO_UINT(arv_buffer_get_user_data(buffer)));
+    queued_.erase(std::remove(queued_.begin(), queued_.end(), frame.slot), queued_.end());
+    frame.block_id = block_id(buffer);
+    frame.complete = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS;
+    if (frame.complete) {
+        std::size_t size = 0;
+        frame.pixels = static_cast<const std::byte*>(arv_buffer_get_data(buffer, &size));
+        frame.size = size;
+        const auto positive = [](gint value) {
+            return static_cast<std::uint32_t>(std::max(value, 0));
+        };
+        frame.width = positive(arv_buffer_get_image_width(buffer));
+        frame.height = positive(arv_buffer_get_image_height(buffer));
+        frame.pixel_format = arv_buffer_get_image_pixel_format(buffer);
+        gint padding_x = 0;
+        gint padding_y = 0;
+        arv_buffer_get_image_padding(buffer, &padding_x, &padding_y);
+        frame.padding_x = positive(padding_x);
+        frame.camera_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer))};
         const double exposure_us =
             chunk_value(buffer, setup_.chunk_exposure) * setup_.chunk_exposure_unit_us;
-        if (!std::isnan(exposure_us)) arrival.exposure = {std::llround(exposure_us * 1e3)};
-        arrival.sensor.gain = static_cast<float>(chunk_value(buffer, setup_.chunk_gain));
-        arrival.width = width_ = static_cast<std::uint32_t>(arv_buffer_get_image_width(buffer));
-        arrival.height = height_ = static_cast<std::uint32_t>(arv_buffer_get_image_height(buffer));
-        arrival.pixel_format = arv_buffer_get_image_pixel_format(buffer);
-        arrival.stride = stride(buffer);
-        arrival.size = arrival.stride * arrival.height;  // without what follows the image
-        std::size_t size = 0;
-        const auto* pixels = static_cast<const std::byte*>(arv_buffer_get_data(buffer, &size));
-        if (meter_ != nullptr)
-            meter_->take({{pixels, size}, arrival.width, arrival.height, arrival.pixel_format},
-                         arrival.arrived);
+        if (!std::isnan(exposure_us)) frame.exposure = {std::llround(exposure_us * 1e3)};
+        frame.gain = static_cast<float>(chunk_value(buffer, setup_.chunk_gain));
     }
-    g_object_unref(buffer);
+    g_object_unref(buffer);  // the pixels are the slot's
     note_starvation();
-    if (refused == EventReason::none)
-        pipeline_.add(arrival);
-    else
-        pipeline_.abandon(arrival.slot, refused, arrival.block_id);
+    note_pauses(hand_over(frame));
     refill();
 }
 

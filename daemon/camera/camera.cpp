@@ -11,6 +11,8 @@
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
+#include "camera/image_receiver.hpp"
+#include "camera/receive_mode.hpp"
 
 namespace versavis::daemon {
 
@@ -278,15 +280,9 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
         meter_ = std::make_unique<FrameMeter>(configuration_.auto_exposure.percentile);
         exposure_ = std::make_unique<AutoExposure>(configuration_.auto_exposure, exposure);
     }
-    Object<ArvChunkParser> chunks;
-    if (setup.chunks) {
-        const auto turn = lock(environment_.aravis, [this] { return !pause({}); });
-        if (!turn.owns_lock()) return {};
-        chunks.reset(arv_camera_create_chunk_parser(camera));
-    }
-    auto stream = AravisStream::create(camera, configuration_, setup, pipeline_, meter_.get(),
-                                       std::move(chunks), environment_.patient);
-    if (!stream) return failed(stream.error());
+    auto frames = receive(camera, nodes, setup);
+    if (!frames) return failed(frames.error());
+    if (*frames == nullptr) return {};
     plan_bandwidth(camera, nodes, setup.payload);
     const auto events = device_ ? receive_events(nodes, device_->interface, device_->address,
                                                  [this](const auto& it) { pipeline_.add(it); })
@@ -297,12 +293,11 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     {
         const std::lock_guard lock(mutex_);
         ++report_.connections;
-        report_.receive = (*stream)->receive_mode();
     }
     set_state(CameraState::streaming, "");
     streaming_ = true;
     hooks_.streaming();
-    auto ended = watch(camera, nodes, **stream, control_lost);
+    auto ended = watch(camera, nodes, **frames, control_lost);
     lose();
     if (!ended) {
         set_state(ended.error().state, ended.error().error.message());
@@ -316,6 +311,41 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
         },
         goodbye);
     return {};
+}
+
+/// Begins to receive: plain images by the packet socket, where that is chosen, all else by Aravis.
+/// Null: it is to stop.
+Expected<std::unique_ptr<FrameSource>> Camera::receive(ArvCamera* camera,
+                                                       const AravisNodeMap& nodes,
+                                                       const CameraSetup& setup) {
+    ReceiveMode mode = ReceiveMode::automatic;
+    if (arv_camera_is_gv_device(camera) != FALSE) {
+        const bool plain =
+            device_ && !setup.chunks && !no_image_ && nodes.read("ChunkModeActive") != "true";
+        const auto chosen = choose_receive_mode(configuration_, packet_socket_allowed(), plain);
+        if (!chosen) return Unexpected(chosen.error());
+        mode = *chosen;
+        if (!plain && configuration_.receive != ReceiveMode::socket)
+            log(LogLevel::info, configuration_.name,
+                "its frames are more than plain images: they are received by a UDP socket");
+        if (auto done = set_up_packets(camera, configuration_); !done)
+            return Unexpected(done.error());
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        report_.receive = mode;
+    }
+    if (mode == ReceiveMode::packet)
+        return ImageReceiver::create(camera, *device_, configuration_, setup, pipeline_,
+                                     meter_.get(), environment_.patient);
+    Object<ArvChunkParser> chunks;
+    if (setup.chunks) {
+        const auto turn = lock(environment_.aravis, [this] { return !pause({}); });
+        if (!turn.owns_lock()) return std::unique_ptr<FrameSource>();
+        chunks.reset(arv_camera_create_chunk_parser(camera));
+    }
+    return AravisStream::create(camera, configuration_, setup, pipeline_, meter_.get(),
+                                std::move(chunks), environment_.patient);
 }
 
 /// Cameras on one link are told how long to pause between packets.
@@ -349,18 +379,18 @@ bool Camera::silent(HostTime began) const {
     return pipeline_.unanswered_triggers() > triggers_of_silence && since > time_of_silence;
 }
 
-CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStream& stream,
+CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& frames,
                              const std::atomic<bool>& control_lost) {
     Health health;
     health.received = pipeline_.report().received;
     if (device_) health.client.emplace(device_->interface, device_->address);
     HostTime housekeeping = health.began;
-    while (pause(stream.needs_polling() ? Duration{} : step)) {
-        if (stream.needs_polling()) stream.poll(step);
+    while (pause(frames.needs_polling() ? Duration{} : step)) {
+        if (frames.needs_polling()) frames.poll(step);
         if (control_lost)
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});
-        if (auto good = examine(stream, health); !good) return good;
+        if (auto good = examine(frames, health); !good) return good;
         if (exposure_) control_exposure(nodes);
         if (host_now() >= next_reading_ && pipeline_.wants_exposure_readings())
             read_exposure(nodes);
@@ -372,8 +402,8 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStre
 }
 
 /// Whether what comes, or does not come, means that the camera must be opened anew.
-CameraResult<> Camera::examine(AravisStream& stream, Health& health) {
-    if (const std::string changed = stream.changed(); !changed.empty()) {
+CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
+    if (const std::string changed = frames.changed(); !changed.empty()) {
         const bool fitted = pipeline_.report().received > health.received;
         return problem(fitted ? CameraState::opening : CameraState::misconfigured,
                        {configuration_.name, changed,
@@ -381,10 +411,15 @@ CameraResult<> Camera::examine(AravisStream& stream, Health& health) {
                                : "set Width, Height and PixelFormat in [camera.features], or power "
                                  "it off and on"});
     }
-    clock_stands_ = configuration_.camera_clock && stream.clock_stands();
+    clock_stands_ = configuration_.camera_clock && frames.clock_stands();
     if (clock_stands_)
         return problem(CameraState::opening, {configuration_.name, "its clock stands still",
                                               "the camera is being reopened without it"});
+    if (frames.unsuited()) {
+        no_image_ = true;
+        return problem(CameraState::opening, {configuration_.name, "its frames are no plain images",
+                                              "the camera is being reopened"});
+    }
     if (restarted(health))
         return problem(CameraState::silent, {configuration_.name, "the camera has restarted", ""});
     if (silent(health.began))
@@ -394,15 +429,15 @@ CameraResult<> Camera::examine(AravisStream& stream, Health& health) {
              pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
              "check the trigger cable, TriggerSource and the network; the camera is being "
              "reopened"});
-    if (stream.taken() != health.taken) {
-        health.taken = stream.taken();
+    if (frames.taken() != health.taken) {
+        health.taken = frames.taken();
         health.taken_at = host_now();
-        health.packets = stream.packets();
+        health.packets = frames.packets();
     }
     const bool expected =
         !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
     if (health.taken > 0 && expected && host_now() - health.taken_at > time_of_deafness &&
-        stream.packets() > health.packets)
+        frames.packets() > health.packets)
         return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
                                               "the camera is being reopened"});
     return {};

@@ -34,7 +34,7 @@ namespace versavis::daemon {
 
 struct CameraSetup;
 class AravisNodeMap;
-class AravisStream;
+class FrameSource;
 
 struct CameraReport {
     CameraState state = CameraState::absent;
@@ -104,9 +104,11 @@ class Camera {
     CameraResult<> set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost);
     CameraResult<> stream(ArvCamera* camera, AravisNodeMap& nodes, const CameraSetup& setup,
                           const std::atomic<bool>& control_lost);
-    CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, AravisStream& stream,
+    Expected<std::unique_ptr<FrameSource>> receive(ArvCamera* camera, const AravisNodeMap& nodes,
+                                                   const CameraSetup& setup);
+    CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& stream,
                          const std::atomic<bool>& control_lost);
-    CameraResult<> examine(AravisStream& stream, Health& health);
+    CameraResult<> examine(FrameSource& stream, Health& health);
     void explain(CameraProblem& ended);
     bool wait_to_retry(CameraState why);
     bool answers(Duration patience) const;
@@ -153,6 +155,7 @@ class Camera {
     HostTime held_since_;                  ///< somebody else has control since; 0: nobody
     bool clock_stands_ = false;            ///< found out while it streamed last
     bool without_clock_ = false;           ///< for that reason
+    bool no_image_ = false;                ///< its frames are of another kind, as it showed
 
     std::thread thread_;
 };

@@ -17,7 +17,6 @@ namespace versavis::daemon {
 
 namespace {
 
-constexpr std::uint16_t port = 3956;
 constexpr std::uint8_t key = 0x42;
 constexpr std::uint8_t acknowledge = 0x01;
 constexpr std::uint8_t acknowledge_by_broadcast = 0x11;
@@ -143,6 +142,16 @@ std::string to_text(in_addr address) {
     return inet_ntop(AF_INET, &address, text, sizeof text);
 }
 
+CameraTime camera_time(std::uint64_t ticks, std::uint64_t ticks_per_second) {
+    // In two parts, so that no product overflows.
+    constexpr std::uint64_t second_ns = 1'000'000'000;
+    const std::uint64_t ns =
+        ticks / ticks_per_second * second_ns +
+        static_cast<std::uint64_t>(static_cast<double>(ticks % ticks_per_second) * 1e9 /
+                                   static_cast<double>(ticks_per_second));
+    return {static_cast<std::int64_t>(ns)};
+}
+
 bool in_own_network(in_addr address) {
     const auto interfaces = own_interfaces();
     return std::any_of(interfaces.begin(), interfaces.end(),
@@ -169,7 +178,7 @@ void DeviceSearch::ask() const {
     put(packet, discovery, 2);
     put(packet, 0, 2);
     put(packet, 0xFFFF, 2);
-    const sockaddr_in to = endpoint(address_.value_or(in_addr{INADDR_BROADCAST}), port);
+    const sockaddr_in to = endpoint(address_.value_or(in_addr{INADDR_BROADCAST}), gvcp_port);
     for (const Socket& socket : sockets_)
         ::sendto(socket.descriptor, packet.data(), packet.size(), 0,
                  reinterpret_cast<const sockaddr*>(&to), sizeof to);
@@ -212,7 +221,7 @@ std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancell
 
 GvcpClient::GvcpClient(in_addr interface, in_addr address)
     : name_(to_text(address)), socket_(open_socket(interface)), repeat_after_(answer_time) {
-    const sockaddr_in to = endpoint(address, port);
+    const sockaddr_in to = endpoint(address, gvcp_port);
     ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to);
 }
 

@@ -34,6 +34,9 @@ struct NetworkDevice {
 std::optional<in_addr> parse_address(const std::string& text);
 std::string to_text(in_addr address);
 
+/// What a device's clock shows, by its ticks per second, which must not be zero.
+CameraTime camera_time(std::uint64_t ticks, std::uint64_t ticks_per_second);
+
 /// Does this host have an interface in the network of the address?
 bool in_own_network(in_addr address);
 
@@ -85,6 +88,9 @@ class GvcpClient {
     std::uint16_t id_ = 0;
     Duration repeat_after_;  ///< twice the time that the newest answer took, or what is usual
 };
+
+/// Port of every device.
+inline constexpr std::uint16_t gvcp_port = 3956;
 
 /// GigE Vision bootstrap registers.
 inline constexpr std::uint32_t gvcp_description_url = 0x200;

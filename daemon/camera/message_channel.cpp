@@ -9,6 +9,8 @@
 
 #include <algorithm>
 
+#include "camera/gvcp.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -145,13 +147,7 @@ void MessageChannel::take(const EventItem& item) {
     const auto known = std::find_if(numbers_.begin(), numbers_.end(),
                                     [&](const EventNumber& event) { return event.id == item.id; });
     if (known == numbers_.end() || ticks_per_second_ == 0) return;
-    // In two parts, so that no product overflows.
-    constexpr std::uint64_t second_ns = 1'000'000'000;
-    const std::uint64_t ns =
-        item.ticks / ticks_per_second_ * second_ns +
-        static_cast<std::uint64_t>(static_cast<double>(item.ticks % ticks_per_second_) * 1e9 /
-                                   static_cast<double>(ticks_per_second_));
-    sink_({known->kind, item.block_id, {static_cast<std::int64_t>(ns)}});
+    sink_({known->kind, item.block_id, camera_time(item.ticks, ticks_per_second_)});
 }
 
 }  // namespace versavis::daemon

@@ -24,13 +24,15 @@ bool packet_socket_allowed() {
     return true;
 }
 
-Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed) {
+Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed,
+                                          bool plain_images) {
     if (camera.receive == ReceiveMode::packet && !allowed)
         return failure("receive", "\"packet\" needs CAP_NET_RAW, which the service lacks",
                        "grant it, as the systemd unit does, or set receive = \"auto\"");
     const bool packet =
-        camera.receive == ReceiveMode::packet ||
-        (camera.receive == ReceiveMode::automatic && allowed && packet_socket_suits(camera));
+        plain_images &&
+        (camera.receive == ReceiveMode::packet ||
+         (camera.receive == ReceiveMode::automatic && allowed && packet_socket_suits(camera)));
     return packet ? ReceiveMode::packet : ReceiveMode::socket;
 }
 

@@ -7,9 +7,9 @@
 
 namespace versavis::daemon {
 
-/// A packet socket hands packets over in blocks: a frame is complete at most this much later.
-/// Aravis' block time-out, 5 ms, which kernels with a tick of 4 ms round up.
-constexpr Duration packet_socket_lateness = milliseconds(8);
+/// By a packet socket, a frame is complete at most this much later: what was asked for comes within
+/// it, and the receiver sleeps less between looks.
+constexpr Duration packet_socket_lateness = milliseconds(2);
 
 /// Lateness that varies may be this part of a period at most, the pairing's `close_by_arrival`, or
 /// an arrival does not show which exposure its frame is of.
@@ -24,8 +24,10 @@ Duration receive_lateness(const CameraConfiguration& camera);
 /// This process may open a packet socket (CAP_NET_RAW).
 bool packet_socket_allowed();
 
-/// `socket` or `packet`. Error: `packet` is configured and not allowed.
-Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed);
+/// `socket` or `packet`, which is for plain images alone. Error: `packet` is configured and not
+/// allowed.
+Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed,
+                                          bool plain_images);
 
 /// Empty for `automatic`: no mode was chosen.
 const char* to_string(ReceiveMode mode);

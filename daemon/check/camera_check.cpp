@@ -161,8 +161,7 @@ class CountedCamera {
         }
         working_ = read_exposure();
         if (arv_camera_is_gv_device(camera))
-            if (auto done = set_up_packets(camera, configuration_, ReceiveMode::socket); !done)
-                return done;
+            if (auto done = set_up_packets(camera, configuration_); !done) return done;
         GlibError error;
         stream_.reset(arv_camera_create_stream(camera, nullptr, nullptr, error.out()));
         for (unsigned i = 0; stream_ && i < buffers; ++i)

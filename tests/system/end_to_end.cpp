@@ -405,11 +405,14 @@ TEST_CASE("end to end: a GNSS receiver at the board names its pulses, which lie 
 }
 
 TEST_CASE("end to end: packets that get lost are asked for again") {
-    Stack stack({"loss", 18, 1, 20, "packet_loss = 0.02", "", ""});
+    const std::string receive = GENERATE("socket", "auto");
+    Stack stack({"loss", 18, 1, 20, "packet_loss = 0.02", "", "receive = '" + receive + "'"});
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status(healthy);
     CHECK(judge(stack, 4).ok);
+    const auto camera = stack.wait_for_status(healthy)["cameras"][0];
+    CHECK(camera["frames_incomplete"] == 0);
 }
 
 TEST_CASE("end to end: without a board the service says so and waits, it also stops then") {

@@ -146,10 +146,10 @@ TEST_CASE("configuration_check: a device is given, and an address is one") {
 }
 
 TEST_CASE("configuration_check: a packet socket is for cameras that are slower than its lateness") {
-    refused(camera("a", 0, "receive = \"packet\"\nrate_hz = 100\n"),
-            "\"packet\" delivers frames up to 8 ms late, too much for a period of 10 ms; use");
-    CHECK(errors_of(camera("a", 0, "receive = \"packet\"\nrate_hz = 41\n")) == "no error");
-    CHECK(errors_of(camera("a", 0, "receive = \"auto\"\nrate_hz = 100\n")) == "no error");
+    refused(camera("a", 0, "receive = \"packet\"\nrate_hz = 200\n"),
+            "\"packet\" delivers frames up to 2 ms late, too much for a period of 5 ms; use");
+    CHECK(errors_of(camera("a", 0, "receive = \"packet\"\nrate_hz = 166\n")) == "no error");
+    CHECK(errors_of(camera("a", 0, "receive = \"auto\"\nrate_hz = 200\n")) == "no error");
 }
 
 TEST_CASE("configuration_check: a preset is a file, and can do what is asked of it") {
