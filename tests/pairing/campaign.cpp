@@ -48,6 +48,7 @@ void answer_unevenly(WorldSettings& settings, std::mt19937_64& random) {
     if (random() % 3 == 0)
         settings.shortest_period =
             period * static_cast<std::int64_t>(1 + random() % 4) + period / 5 - milliseconds(1);
+    if (random() % 2 == 0) settings.record_delay = milliseconds(random() % 200);
 }
 
 std::uint64_t end_after(std::uint64_t last_fault, double rate_hz) {

@@ -43,7 +43,8 @@ std::vector<Row> run_matrix(unsigned seeds);
 /// How the cameras of random worlds answer triggers.
 enum class Answers {
     each,     ///< one frame for each, but for faults
-    unevenly  ///< they also ignore every n-th or random ones, or send frames twice
+    unevenly  ///< they also ignore every n-th or random ones, or send frames twice, and all
+              ///< records may be late
 };
 
 /// Faults of all kinds at random, close together at times. `progress` is called after each world.

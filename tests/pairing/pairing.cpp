@@ -113,6 +113,22 @@ TEST_CASE("pairing: a link that often holds records up does not keep a camera fr
     CHECK(static_cast<double>(verdict.first_published.ns) * 1e-9 * settings.rate_hz < 150);
 }
 
+TEST_CASE("pairing: records that are all late delay the first frames by no more than that") {
+    for (const double rate_hz : {10.0, 20.0, 50.0})
+        for (const std::int64_t late_ms : {15, 30, 60, 100, 150, 200})
+            for (std::uint64_t seed = 0; seed < 8; ++seed) {
+                INFO(rate_hz << " Hz, " << late_ms << " ms, seed " << seed);
+                WorldSettings settings = world(seed);
+                settings.rate_hz = rate_hz;
+                settings.record_delay = milliseconds(late_ms);
+                settings.strobe = seed % 2 != 0;
+                if (seed % 4 > 1) settings.readout = milliseconds(20);
+                const Verdict verdict = run(settings);
+                CHECK(verdict.published > 0.9 * static_cast<double>(verdict.frames));
+                CHECK(verdict.first_published < seconds(2));
+            }
+}
+
 TEST_CASE("pairing: waiting for exposure records is bounded, and goes on when they come again") {
     Verdict verdict = run(with(FaultKind::usb_stall));
     CHECK(verdict.frame_reasons[EventReason::exposure_missing] > 20);

@@ -89,7 +89,7 @@ class World final : private pairing::Outcome {
             settings_.clock != CameraClock::absent || !settings_.clock_known_absent;
         limits.stamped = settings_.told_stamped;
         limits.pattern_duration = period_ * (wire::start_pattern_length + 2);
-        limits.frames_held = 8 + static_cast<std::uint32_t>(settings_.rate_hz * 0.12);
+        limits.frames_held = 6 + static_cast<std::uint32_t>(std::ceil(settings_.rate_hz * 0.12));
         return limits;
     }
 
@@ -205,7 +205,8 @@ class World final : private pairing::Outcome {
 
     void send_record(Exposure exposure, HostTime sent) {
         if (fault_ == FaultKind::usb_stall) link_free_ = now_ + seconds(2);
-        Duration delay = fault_ == FaultKind::record_late ? milliseconds(100) : microseconds(500);
+        Duration delay = settings_.record_delay;
+        if (fault_ == FaultKind::record_late) delay = delay + milliseconds(100);
         if (settings_.held_records > 0 && chance(settings_.held_records))
             delay = delay + between({}, period_ * 2);
         link_free_ = std::max(link_free_, sent + delay);

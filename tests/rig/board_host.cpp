@@ -107,6 +107,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
+      link_delay_{std::llround(scenario.board.link_ms * 1e6)},
       imu_name_(scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
@@ -241,7 +242,8 @@ void BoardHost::live() {
         if (!suffers(FaultKind::board_mute)) exchange_bytes();
         const HostTime wake =
             clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
-        wait(std::min({wake, next_sample, host_now() + longest_wait}));
+        const HostTime due = late_.empty() ? wake : late_.front().first;
+        wait(std::min({wake, due, next_sample, host_now() + longest_wait}));
     }
 }
 
@@ -321,8 +323,8 @@ void BoardHost::plug(bool in) {
 void BoardHost::write_late(HostTime now) {
     const auto out = board_->transmitted();
     if (!out.empty()) {
-        const HostTime due = suffers(FaultKind::late_records) ? now + lateness : now;
-        late_.emplace_back(due, std::vector(out.begin(), out.end()));
+        const Duration delay = suffers(FaultKind::late_records) ? lateness : link_delay_;
+        late_.emplace_back(now + delay, std::vector(out.begin(), out.end()));
         board_->consume(out.size(), board_now());
     }
     for (; !late_.empty() && late_.front().first <= now; late_.pop_front())
@@ -344,7 +346,8 @@ void BoardHost::exchange_bytes() {
         board_->run_until(at);
     }
     if (size == 0 || errno != EAGAIN) return drop_host();
-    if (suffers(FaultKind::late_records) || !late_.empty()) return write_late(host_now());
+    if (suffers(FaultKind::late_records) || link_delay_.ns > 0 || !late_.empty())
+        return write_late(host_now());
     const auto out = board_->transmitted();
     // Stamped before writing: the host may receive the bytes before this process continues.
     const firmware::Nanoseconds leaving = board_now();

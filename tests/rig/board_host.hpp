@@ -69,6 +69,7 @@ class BoardHost {
     std::uint64_t seed_;
     ClockErrors clock_errors_;
     std::optional<clock::OutputClock> utc_;  ///< what the GNSS receiver sends, if there is one
+    Duration link_delay_;
     std::string imu_name_;
     std::string socket_path_;
     devices::AdisDevice imu_;

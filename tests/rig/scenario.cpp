@@ -167,6 +167,7 @@ Expected<Scenario> load_scenario(const std::string& path) {
         TableReader reader(file, *table);
         reader.read("serial", scenario.board.serial);
         reader.read("gnss", scenario.board.gnss);
+        reader.read("link_ms", scenario.board.link_ms, 0, 1000);
         read_clock(reader, scenario.board.clock);
         reader.finish();
     }

@@ -17,7 +17,8 @@ struct BoardScenario {
     std::string serial = "RIG0001";
     std::string image;  ///< of the firmware, to run on the emulated chip; empty: as a host process
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
-    bool gnss = false;  ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
+    double link_ms = 0;  ///< what it writes arrives so late
+    bool gnss = false;   ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
 };
 
 /// How the rig moves: sums of sines that the seed draws. Without it, it nods.

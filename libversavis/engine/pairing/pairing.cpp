@@ -230,9 +230,14 @@ void Pairing::add(const Arrival& arrival) {
     if (state_ == State::searching) {
         const bool by_clock = limits_.camera_clock && arrival.camera_time.ns != 0;
         while (by_clock != by_clock_ && !arrivals_.empty()) drop_front(EventReason::unproved);
+        if (by_clock != by_clock_) given_up_.clear();
         by_clock_ = by_clock;
     }
-    if (arrivals_.size() >= limits_.frames_held) expire_front();
+    if (arrivals_.size() >= limits_.frames_held) {
+        if (state_ == State::searching) given_up_.push_back(arrivals_.front());
+        if (given_up_.size() > frames_in_search) given_up_.pop_front();
+        expire_front();
+    }
     arrivals_.push_back(arrival);
     process();
 }
@@ -260,17 +265,24 @@ bool Pairing::records_complete(const Arrival& arrival) const {
 }
 
 /// The oldest frames may be of another life of camera or board: they need no place in the
-/// alignment.
+/// alignment. The newest wait for their records, which may always be some frames behind.
 void Pairing::search() {
     const std::size_t enough = frames_for_proof(by_clock_ && start_ != Start::slow);
-    if (arrivals_.size() < enough || !records_complete(arrivals_.back())) return;
-    const std::size_t oldest = arrivals_.size() - std::min(arrivals_.size(), frames_in_search);
-    for (std::size_t first = oldest; first + enough <= arrivals_.size(); ++first) {
-        const std::vector<Arrival> frames(arrivals_.begin() + static_cast<std::ptrdiff_t>(first),
-                                          arrivals_.end());
-        const auto triggers = find_alignment(frames);
+    const auto complete =
+        std::find_if_not(arrivals_.begin(), arrivals_.end(),
+                         [this](const Arrival& arrival) { return records_complete(arrival); });
+    std::vector<Arrival> all(given_up_.begin(), given_up_.end());
+    all.insert(all.end(), arrivals_.begin(), complete);
+    const std::size_t oldest = all.size() - std::min(all.size(), frames_in_search);
+    for (std::size_t first = oldest; first + enough <= all.size(); ++first) {
+        const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first);
+        const auto triggers = find_alignment({begin, all.end()});
         if (triggers.empty()) continue;
-        for (std::size_t i = 0; i < first; ++i) drop_front(EventReason::unproved);
+        for (std::size_t i = 0; i < first; ++i)
+            if (given_up_.empty())
+                drop_front(EventReason::unproved);
+            else
+                given_up_.pop_front();
         return lock(triggers);
     }
 }
@@ -295,10 +307,16 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
     end_start_soon();
     outcome_.locked(exposures_.front().exposure);
     for (const std::uint64_t trigger : triggers)
-        if (trigger != 0)
+        if (!given_up_.empty()) {
+            if (trigger != 0)
+                outcome_.exposure_unpaired(learn(given_up_.front(), trigger).exposure,
+                                           EventReason::unproved);
+            given_up_.pop_front();
+        } else if (trigger != 0) {
             pair_front(trigger);
-        else
+        } else {
             drop_front(EventReason::unproved);
+        }
 }
 
 /// The pauses between starts are over, but not a start that the board may still carry out.
@@ -587,6 +605,10 @@ Arrival Pairing::take_front() {
 
 void Pairing::pair_front(std::uint64_t trigger) {
     const Arrival arrival = take_front();
+    outcome_.paired(arrival, learn(arrival, trigger).exposure);
+}
+
+const Record& Pairing::learn(const Arrival& arrival, std::uint64_t trigger) {
     forget_exposures_before(trigger);
     Record& record = *exposures_.find(trigger);
     record.used = true;
@@ -595,7 +617,7 @@ void Pairing::pair_front(std::uint64_t trigger) {
     if (!latency_.known() || punctual(arrival, record))
         latency_.track(arrival.arrived.ns, record.end_on_host.ns);
     proved_ = Pair{arrival, record};
-    outcome_.paired(arrival, record.exposure);
+    return record;
 }
 
 /// It has waited too long.
@@ -676,6 +698,7 @@ void Pairing::set_limits(const Limits& limits) {
 
 void Pairing::reset() {
     while (!arrivals_.empty()) drop_front(EventReason::reset);
+    given_up_.clear();
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     refuse_odd(EventReason::reset);
     state_ = State::searching;

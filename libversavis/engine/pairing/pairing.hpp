@@ -161,6 +161,7 @@ class Pairing {
 
     Arrival take_front();
     void pair_front(std::uint64_t trigger);
+    const Record& learn(const Arrival& arrival, std::uint64_t trigger);
     void expire_front();
     void drop_front(EventReason reason);
     void forget_exposures_before(std::uint64_t trigger);
@@ -178,6 +179,7 @@ class Pairing {
     RecordGate gate_;
     std::vector<Exposure> odd_;     ///< records that contradict the newest good one
     std::deque<Arrival> arrivals_;  ///< not decided yet
+    std::deque<Arrival> given_up_;  ///< by the search, for want of room: their times still count
     std::deque<Shortfall> shortfalls_;
     CameraClock clock_;
     std::int64_t shortest_delay_ns_ = 0;     ///< from end of exposure to arrival, since the lock
