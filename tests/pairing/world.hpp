@@ -61,7 +61,7 @@ struct WorldSettings {
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames =
-        0.005;                ///< share of frames that the host is slow to take, by 40 ms at most
+        0.005;  ///< share of frames that the host is slow to take, by 40 ms at most
     Duration record_delay = microseconds(500);  ///< of each record, on its way to the host
     double held_records = 0;  ///< share of records that the link holds up, by two periods at most
     double link_load = 0;     ///< time that a frame takes on the link, in periods; above 1 frames

@@ -242,8 +242,9 @@ void BoardHost::live() {
         if (!suffers(FaultKind::board_mute)) exchange_bytes();
         const HostTime wake =
             clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
-        const HostTime due = late_.empty() ? wake : late_.front().first;
-        wait(std::min({wake, due, next_sample, host_now() + longest_wait}));
+        const HostTime leaves = late_.empty() ? wake : late_.front().first;
+        const HostTime comes = coming_.empty() ? wake : coming_.front().first;
+        wait(std::min({wake, leaves, comes, next_sample, host_now() + longest_wait}));
     }
 }
 
@@ -298,6 +299,7 @@ void BoardHost::drop_host() {
     if (host_ >= 0) ::close(host_);
     host_ = -1;
     late_.clear();
+    coming_.clear();
 }
 
 void BoardHost::suffer(const Fault& fault) {
@@ -340,9 +342,12 @@ void BoardHost::exchange_bytes() {
     std::uint8_t buffer[4096];
     ssize_t size = 0;
     while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0) {
+        coming_.emplace_back(host_now() + link_delay_, std::vector(buffer, buffer + size));
+    }
+    for (; !coming_.empty() && coming_.front().first <= host_now(); coming_.pop_front()) {
         const firmware::Nanoseconds at = board_now();
         board_->run_until(at);  // nothing answers before it is asked
-        board_->receive({buffer, static_cast<std::size_t>(size)}, at);
+        board_->receive(coming_.front().second, at);
         board_->run_until(at);
     }
     if (size == 0 || errno != EAGAIN) return drop_host();

@@ -88,7 +88,9 @@ class BoardHost {
     std::uint64_t imu_samples_ = 0;
     HostTime signalled_{};         ///< until here edges of the data-ready line are scheduled
     std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
-    std::deque<std::pair<HostTime, std::vector<std::uint8_t>>> late_;  ///< on its way to the host
+    using Parcels = std::deque<std::pair<HostTime, std::vector<std::uint8_t>>>;
+    Parcels late_;    ///< on its way to the host
+    Parcels coming_;  ///< on its way from there
     bool plugged_ = true;
     std::array<std::atomic<std::int64_t>, fault_kinds> suffers_until_ns_{};
     std::atomic<bool> reset_pending_{false};

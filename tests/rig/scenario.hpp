@@ -17,7 +17,7 @@ struct BoardScenario {
     std::string serial = "RIG0001";
     std::string image;  ///< of the firmware, to run on the emulated chip; empty: as a host process
     ClockErrors clock{5'000'000'000, 25.0, 0.002};
-    double link_ms = 0;  ///< what it writes arrives so late
+    double link_ms = 0;  ///< every byte takes so long, either way
     bool gnss = false;   ///< a receiver delivers time pulses and sentences, from CLOCK_REALTIME
 };
 

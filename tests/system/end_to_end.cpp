@@ -172,6 +172,17 @@ TEST_CASE(
           Approx(parts / 819.2 * 1e9).margin(1));
 }
 
+TEST_CASE("end to end: records that a slow link delays cost no start") {
+    Stack stack({"slowlink", 34, 1, 50, "", "[board]\nlink_ms = 30\n", ""});
+    stack.start_rig();
+    stack.start_service();
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["cameras"][0]["pairing"] == "locked"; });
+    // One pattern proves it: a slow start would have come after two of them.
+    CHECK(status["cameras"][0]["frames_received"] < 60);
+    CHECK(judged(stack, 3).streams.at("cam0").wrong_pairs == 0);
+}
+
 TEST_CASE("end to end: an exposure line of the wrong polarity is named as such") {
     Stack stack({"polarity", 74, 1, 20, "", "", "strobe = \"active_low\""});
     stack.start_rig();
