@@ -50,6 +50,11 @@ constexpr Duration doubt_patience = milliseconds(30);
 /// frames are missed longer.
 constexpr Duration time_of_deafness = milliseconds(300);
 
+/// Streams in a row that fell deaf after a frame or few: the camera does not count at all. At one,
+/// a camera that restarts its ids early would do; at twice, it is said two seconds later.
+constexpr unsigned deaf_streams_of_stuck_ids = 3;
+constexpr std::uint64_t few_frames = 3;
+
 /// Between looks at a streaming camera. At half, an idle service wakes twice as often; at twice,
 /// loss of control shows 20 ms later.
 constexpr Duration step = milliseconds(20);
@@ -118,6 +123,7 @@ bool Camera::ended_by(HostTime deadline) {
 CameraReport Camera::report() const {
     const std::lock_guard lock(mutex_);
     CameraReport report = report_;
+    report.stuck_ids = deaf_streams_ >= deaf_streams_of_stuck_ids;
     const Duration setting_up = host_now() - setting_up_since_;
     if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
         report.state = CameraState::failed;
@@ -422,24 +428,28 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
     }
     if (restarted(health))
         return problem(CameraState::silent, {configuration_.name, "the camera has restarted", ""});
-    if (silent(health.began))
+    if (frames.taken() != health.taken) {
+        health.taken = frames.taken();
+        health.taken_at = host_now();
+        health.packets = frames.packets();
+        if (health.taken > few_frames) deaf_streams_ = 0;
+    }
+    const bool silent = this->silent(health.began);
+    const bool expected =
+        !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
+    const bool missed = expected && host_now() - health.taken_at > time_of_deafness;
+    if (frames.packets() > health.packets && (silent || (health.taken > 0 && missed))) {
+        ++deaf_streams_;
+        return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
+                                              "the camera is being reopened"});
+    }
+    if (silent)
         return problem(
             CameraState::silent,
             {configuration_.name,
              pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
              "check the trigger cable, TriggerSource and the network; the camera is being "
              "reopened"});
-    if (frames.taken() != health.taken) {
-        health.taken = frames.taken();
-        health.taken_at = host_now();
-        health.packets = frames.packets();
-    }
-    const bool expected =
-        !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
-    if (health.taken > 0 && expected && host_now() - health.taken_at > time_of_deafness &&
-        frames.packets() > health.packets)
-        return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
-                                              "the camera is being reopened"});
     return {};
 }
 

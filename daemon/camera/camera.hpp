@@ -49,6 +49,7 @@ struct CameraReport {
     std::uint32_t packet_size = 0;
     ReceiveMode receive = ReceiveMode::automatic;  ///< in use; automatic: not GigE Vision
     BandwidthShare bandwidth;
+    bool stuck_ids = false;  ///< packets come, but all of one frame, as it numbers them
     std::string gain_feature;
     SensorState sensor;  ///< as its registers say
 };
@@ -151,11 +152,12 @@ class Camera {
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
     Retry retry_;
-    std::optional<NetworkDevice> device_;  ///< where it was last seen
-    HostTime held_since_;                  ///< somebody else has control since; 0: nobody
-    bool clock_stands_ = false;            ///< found out while it streamed last
-    bool without_clock_ = false;           ///< for that reason
-    bool no_image_ = false;                ///< its frames are of another kind, as it showed
+    std::optional<NetworkDevice> device_;    ///< where it was last seen
+    HostTime held_since_;                    ///< somebody else has control since; 0: nobody
+    std::atomic<unsigned> deaf_streams_{0};  ///< in a row
+    bool clock_stands_ = false;              ///< found out while it streamed last
+    bool without_clock_ = false;             ///< for that reason
+    bool no_image_ = false;                  ///< its frames are of another kind, as it showed
 
     std::thread thread_;
 };

@@ -346,6 +346,12 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("no triggers: the board refuses, see its own hint");
      }},
+    {Fault::block_ids, [](const CameraView& c) { return c.it.camera.stuck_ids; },
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "its packets arrive, but make no frame: it seems to give all frames one block id; "
+             "update its firmware, or power it off and on");
+     }},
     {Fault::camera_silent, in<CameraState::silent>,
      [](const CameraView& /*c*/) {
          return std::string("the camera does not answer: check its cable and power");

@@ -95,6 +95,26 @@ TEST_CASE(
     CHECK(reasons(stack, "cam2").count(EventReason::trigger_ignored) == 1);
 }
 
+TEST_CASE("cameras: one that gives all frames one block id is named as such") {
+    const std::string receive = GENERATE("socket", "packet");
+    StackSettings settings{"stuckids",
+                           67,
+                           1,
+                           20,
+                           "",
+                           fault("cam0", "repeat_id", 10, "count = 1000"),
+                           "receive = \"" + receive + "\""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find("one block id") !=
+               std::string::npos;
+    });
+    CHECK(status["cameras"][0]["fault"] == "block_ids");
+    CHECK(status["cameras"][0]["health"] != "ok");
+}
+
 TEST_CASE("cameras: one that takes every n-th trigger delivers each frame, and says so") {
     StackSettings settings{"everynth", 61, 3, 20, "", "", ""};
     settings.scenarios = {"shortest_period_us = 61000",
