@@ -341,16 +341,15 @@ void BoardHost::exchange_bytes() {
     }
     std::uint8_t buffer[4096];
     ssize_t size = 0;
-    while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0) {
+    while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0)
         coming_.emplace_back(host_now() + link_delay_, std::vector(buffer, buffer + size));
-    }
+    if (size == 0 || errno != EAGAIN) return drop_host();
     for (; !coming_.empty() && coming_.front().first <= host_now(); coming_.pop_front()) {
         const firmware::Nanoseconds at = board_now();
         board_->run_until(at);  // nothing answers before it is asked
         board_->receive(coming_.front().second, at);
         board_->run_until(at);
     }
-    if (size == 0 || errno != EAGAIN) return drop_host();
     if (suffers(FaultKind::late_records) || link_delay_.ns > 0 || !late_.empty())
         return write_late(host_now());
     const auto out = board_->transmitted();
