@@ -50,8 +50,9 @@ constexpr Duration doubt_patience = milliseconds(30);
 /// frames are missed longer.
 constexpr Duration time_of_deafness = milliseconds(300);
 
-/// Streams in a row that fell deaf after a frame or few: the camera does not count at all. At one,
-/// a camera that restarts its ids early would do; at twice, it is said two seconds later.
+/// Streams in a row in which, after few frames or none, packets came and no frame completed: the
+/// camera's block ids stand still. At one, a camera that restarts its ids early would do; at twice,
+/// it is said some seconds later.
 constexpr unsigned deaf_streams_of_stuck_ids = 3;
 constexpr std::uint64_t few_frames = 3;
 

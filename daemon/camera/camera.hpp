@@ -49,7 +49,7 @@ struct CameraReport {
     std::uint32_t packet_size = 0;
     ReceiveMode receive = ReceiveMode::automatic;  ///< in use; automatic: not GigE Vision
     BandwidthShare bandwidth;
-    bool stuck_ids = false;  ///< packets come, but all of one frame, as it numbers them
+    bool stuck_ids = false;  ///< packets come, but no frame completes, time and again
     std::string gain_feature;
     SensorState sensor;  ///< as its registers say
 };
@@ -107,9 +107,9 @@ class Camera {
                           const std::atomic<bool>& control_lost);
     Expected<std::unique_ptr<FrameSource>> receive(ArvCamera* camera, const AravisNodeMap& nodes,
                                                    const CameraSetup& setup);
-    CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& stream,
+    CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& frames,
                          const std::atomic<bool>& control_lost);
-    CameraResult<> examine(FrameSource& stream, Health& health);
+    CameraResult<> examine(FrameSource& frames, Health& health);
     void explain(CameraProblem& ended);
     bool wait_to_retry(CameraState why);
     bool answers(Duration patience) const;

@@ -90,7 +90,7 @@ class CameraPipeline final : private pairing::Outcome {
     void read_exposure(Duration exposure, HostTime at);
     bool wants_exposure_readings();
 
-    /// Of the frames from now on, but for what they carry themselves.
+    /// Of frames from now on that do not carry it themselves.
     void set_sensor_state(const SensorState& state);
 
     /// Before frames of these lines come.

@@ -349,8 +349,8 @@ constexpr Rule camera_rules[] = {
     {Fault::block_ids, [](const CameraView& c) { return c.it.camera.stuck_ids; },
      [](const CameraView& /*c*/) {
          return std::string(
-             "its packets arrive, but make no frame: it seems to give all frames one block id; "
-             "update its firmware, or power it off and on");
+             "packets arrive, but no frame completes: the camera seems to give all frames one "
+             "block id; update its firmware, or power it off and on");
      }},
     {Fault::camera_silent, in<CameraState::silent>,
      [](const CameraView& /*c*/) {
