@@ -1,28 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A GigE Vision device (control protocol only) that behaves as its GenICam description says.
+"""A device (control only) that behaves as its GenICam description says, of any protocol.
 
 Values are stored as written; what is out of limits, not available on this model, locked or read
 only is refused, as a camera would. It was left in a bad state by another program.
 """
 import itertools
 import select
-import socket
 import struct
 import threading
-import time
 
 from node_map import INTEGERS, REGISTERS, NodeMap, number
 
-PORT, KEY = 3956, 0x42
-DISCOVERY, READ_REGISTER, WRITE_REGISTER, READ_MEMORY, WRITE_MEMORY = 0x02, 0x80, 0x82, 0x84, 0x86
-OK, INVALID_PARAMETER, INVALID_ADDRESS, ACCESS_DENIED = 0, 0x8002, 0x8003, 0x8006
-BOOTSTRAP_END = 0xA000
-CONTROL_PRIVILEGE = 0xA00
+# GigE Vision and GenCP agree on these.
+OK, NOT_IMPLEMENTED, INVALID_PARAMETER, INVALID_ADDRESS, ACCESS_DENIED = (
+    0, 0x8001, 0x8002, 0x8003, 0x8006)
 FEATURES = ("Enumeration", "Integer", "Float", "Boolean", "String")
 LARGE = 0x00FFFFFF  # of a register that is a maximum: a float has 24 bits
 
 FAILURES = (ArithmeticError, ValueError, KeyError, TypeError, struct.error)
 SIDE = 480  # pixels
+LARGEST_PACKET = 2048
 
 # What another program may have left behind, where it fits: each would make wrong stamps.
 LEFT_BEHIND = {"StrobeDelay": 100, "StrobeDuration": 50, "StrobeLineDelay": 100,
@@ -38,12 +35,12 @@ MOST_SELECTIONS = 256  # of one register, by all its selectors
 
 
 class Device:
-    """Serves `description` at `address`. `absent` names features and entries (as
-    "LineSelector.Out1") that this model does not have."""
+    """Behaves as `description`. `absent` names features and entries (as "LineSelector.Out1") that
+    this model does not have. A protocol says what its own registers are and answers packets."""
 
-    def __init__(self, address, vendor, model, description, archive=None, absent=(), delay_s=0):
+    def __init__(self, vendor, model, description, archive=None, absent=()):
         self.nodes = NodeMap(description)
-        self.url_data = archive or description
+        self.xml_data = archive or description
         self.xml_at = 0x7F000000
         self.lock = threading.Lock()
         self.refusals = []
@@ -58,19 +55,42 @@ class Device:
                 for register in self.registers_of(name):
                     self.by_register.setdefault(register, []).append(name)
         self.power_up(vendor, model, absent)
-        self.bootstrap(address, vendor, model, "zip" if archive else "xml")
+        self.bootstrap(vendor, model, "zip" if archive else "xml")
         self.index_registers()
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind((address, PORT))
-        self.stopping = False
-        self.delay_s = delay_s  # of the answer to who is there
-        self.thread = threading.Thread(target=self.serve, daemon=True)
+
+    def serve(self, connection):
+        """Answers at the connection by a thread of its own, until close()."""
+        self.connection, self.stopping = connection, False
+        self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
     def close(self):
         self.stopping = True
         self.thread.join()
-        self.socket.close()
+        self.connection.close()
+
+    def run(self):
+        while not self.stopping:
+            if not select.select([self.connection], [], [], 0.05)[0]:
+                continue
+            packet, sender = self.connection.recvfrom(LARGEST_PACKET)
+            if not packet and not sender:
+                return  # the other end is gone
+            if answer := self.answer_packet(packet):
+                self.connection.sendmsg([answer], (), 0, sender)
+
+    # Of a protocol.
+    def bootstrap(self, vendor, model, kind):
+        """Fills the protocol's own registers; `kind` of file is the description."""
+        raise NotImplementedError
+
+    def own_register(self, address):
+        """Whether the protocol, not the description, says what a write to it does."""
+        raise NotImplementedError
+
+    def answer_packet(self, packet):
+        """The answer to a packet of the host, or nothing."""
+        raise NotImplementedError
 
     # Selectors that are variables of the host: the device sees only the addresses that follow.
     def find_selectors(self):
@@ -101,19 +121,6 @@ class Device:
         self.nodes.variables = {}
 
     # The state after power-up, and after another program.
-    def bootstrap(self, address, vendor, model, kind):
-        ip = struct.unpack(">I", socket.inet_aton(address))[0]
-        self.nodes.store(0, bytes(BOOTSTRAP_END))
-        for at, value in ((0x0, 0x00010002), (0x4, 0x80000001), (0x8, 0x0200), (0xC, ip),
-                          (0x24, ip), (0x34, 0xFF000000), (0x600, 1), (0x904, 1), (0x934, 2),
-                          (0x938, 3000), (0x940, 1_000_000_000), (0xD04, 1500)):
-            self.nodes.store(at, struct.pack(">I", value))
-        for at, size, text in ((0x48, 32, vendor), (0x68, 32, model), (0x88, 32, "1.0"),
-                               (0xD8, 16, "1"), (0xE8, 16, "")):
-            self.nodes.store(at, text.encode()[:size - 1].ljust(size, b"\0"))
-        url = f"Local:camera.{kind};{self.xml_at:X};{len(self.url_data):X}"
-        self.nodes.store(0x200, url.encode().ljust(512, b"\0"))
-
     def conditions(self, keys):
         for node in self.nodes.nodes.values():
             for owner in [node, *node.entries]:
@@ -259,7 +266,7 @@ class Device:
             if (selector, register, after) in self.banks:
                 self.nodes.store(address, self.banks[selector, register, after])
 
-    # Control protocol.
+    # Registers.
     def registers_of(self, name):
         """Where a feature's value is written."""
         behind = self.nodes.closure(name, ("pValue", "pValueIndexed", "pValueDefault"))
@@ -302,7 +309,7 @@ class Device:
                     continue
 
     def write(self, address, data):
-        if address < BOOTSTRAP_END:
+        if self.own_register(address):
             self.nodes.store(address, data)
             return OK
         status = INVALID_ADDRESS
@@ -361,45 +368,10 @@ class Device:
         return OK
 
     def read(self, address, size):
-        if self.xml_at <= address < self.xml_at + len(self.url_data):
+        if self.xml_at <= address < self.xml_at + len(self.xml_data):
             at = address - self.xml_at
-            return self.url_data[at:at + size].ljust(size, b"\0")
+            return self.xml_data[at:at + size].ljust(size, b"\0")
         return self.nodes.bytes(address, size)
-
-    def answer(self, command, body):
-        if command == DISCOVERY:
-            return OK, self.read(0, 0xF8)
-        if command == READ_REGISTER:
-            return OK, b"".join(self.read(at, 4) for at, in struct.iter_unpack(">I", body))
-        if command == READ_MEMORY:
-            address, _, size = struct.unpack(">IHH", body[:8])
-            return OK, body[:4] + self.read(address, size)
-        if command == WRITE_REGISTER:
-            pairs = list(struct.iter_unpack(">II", body))
-            status = OK
-            for at, value in pairs:
-                status = status or self.write(at, struct.pack(">I", value))
-            return status, struct.pack(">HH", 0, len(pairs))
-        if command == WRITE_MEMORY:
-            status = self.write(struct.unpack(">I", body[:4])[0], body[4:])
-            return status, struct.pack(">HH", 0, len(body) - 4)
-        return 0x8001, b""
-
-    def serve(self):
-        while not self.stopping:
-            if not select.select([self.socket], [], [], 0.05)[0]:
-                continue
-            packet, sender = self.socket.recvfrom(2048)
-            if len(packet) < 8 or packet[0] != KEY:
-                continue
-            command, size, identity = struct.unpack(">HHH", packet[2:8])
-            with self.lock:
-                status, body = self.answer(command, packet[8:8 + size])
-            if command == DISCOVERY:
-                time.sleep(self.delay_s)
-            if packet[1] & 1:
-                self.socket.sendto(struct.pack(">HHHH", status, command + 1, len(body), identity) +
-                                   body, sender)
 
     # Judgement.
     def selected_text(self, name, selector, entry):

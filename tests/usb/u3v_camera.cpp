@@ -6,13 +6,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "u3v_description.hpp"
+
 namespace versavis::test {
 
 namespace {
-
-constexpr std::uint8_t control_in = 0x81;
-constexpr std::uint8_t control_out = 0x01;
-constexpr std::uint8_t data_in = 0x82;
 
 constexpr std::uint32_t control_magic = 0x43563355;  // "U3VC"
 constexpr std::uint32_t leader_magic = 0x4C563355;   // "U3VL"
@@ -74,45 +72,12 @@ Bytes acknowledgement(std::uint16_t status, std::uint16_t command, std::uint16_t
     return packet;
 }
 
-UsbDescription describe(const U3vRegisters::Identity& identity) {
-    UsbDescription usb;
-    usb.speed_mbit = 5000;
-    // clang-format off
-    usb.device = {
-        18, 1, 0x00, 0x03,  // USB 3.0
-        0xef, 2, 1,         // class by interface association: required
-        9, 0x09, 0x12, 0x54, 0x56, 0x00, 0x01,
-        1, 2, 3,            // manufacturer, product, serial
-        1};
-    usb.configuration = {
-        9, 2, 0, 0, 2, 1, 0, 0x80, 112,
-        8, 11, 0, 2, 0xef, 5, 0, 0,     // association: interfaces 0 and 1 are one camera
-        9, 4, 0, 0, 2, 0xef, 5, 0, 0,   // interface 0: control
-        20, 0x24, 1, 1, 0, 1, 0, 0, 0, 1, 0,  // GenCP 1.1, USB3 Vision 1.0
-            4, 1, 2, 0, 0, 0, 3, 0, 8,  // strings: GUID, vendor, model, family, version,
-                                        // information, serial, user name; SuperSpeed
-        7, 5, control_in, 2, 0x00, 0x04, 0,
-        6, 0x30, 0, 0, 0, 0,
-        7, 5, control_out, 2, 0x00, 0x04, 0,
-        6, 0x30, 0, 0, 0, 0,
-        9, 4, 1, 0, 1, 0xef, 5, 2, 0,   // interface 1: data
-        7, 5, data_in, 2, 0x00, 0x04, 0,
-        6, 0x30, 15, 0, 0, 0};
-    // clang-format on
-    usb.configuration[2] = static_cast<std::uint8_t>(usb.configuration.size());
-    // A GUID is 4 digits of the vendor and 8 of the device.
-    std::uint32_t hash = 2166136261U;
-    for (char c : identity.serial) hash = (hash ^ static_cast<std::uint8_t>(c)) * 16777619U;
-    char guid[16];
-    std::snprintf(guid, sizeof guid, "5656%08X", hash);
-    usb.strings = {identity.vendor, identity.model, identity.serial, guid};
-    return usb;
-}
-
 }  // namespace
 
 U3vCamera::U3vCamera(const U3vRegisters::Identity& identity)
-    : description_(describe(identity)), registers_(identity), thread_([this] { run(); }) {}
+    : description_(u3v_description(identity.vendor, identity.model, identity.serial)),
+      registers_(identity),
+      thread_([this] { run(); }) {}
 
 U3vCamera::~U3vCamera() {
     {
@@ -135,7 +100,7 @@ void U3vCamera::plugged(bool in) {
 
 void U3vCamera::halt_cleared(std::uint8_t /*endpoint*/) { ++halts_cleared_; }
 
-void U3vCamera::stall_data() { node()->halt(data_in); }
+void U3vCamera::stall_data() { node()->halt(u3v_data_in); }
 
 std::deque<U3vCamera::Exposure> U3vCamera::exposures() const {
     const std::lock_guard lock(mutex_);
@@ -148,7 +113,7 @@ bool U3vCamera::streaming() const {
 }
 
 void U3vCamera::receive(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) {
-    if (endpoint != control_out || muted_) return;
+    if (endpoint != u3v_control_out || muted_) return;
     if (bytes.size() < control_header || get(bytes, 0, 4) != control_magic) return;
     const auto command = static_cast<std::uint16_t>(get(bytes, 6, 2));
     const auto id = static_cast<std::uint16_t>(get(bytes, 10, 2));
@@ -161,13 +126,13 @@ void U3vCamera::receive(std::uint8_t endpoint, std::span<const std::uint8_t> byt
     Bytes packet = acknowledgement(status, static_cast<std::uint16_t>(command + 1), id, body);
     const std::uint64_t pending_ms = pending_ms_.exchange(0);
     if (pending_ms == 0) {
-        node()->send(control_in, std::move(packet));
+        node()->send(u3v_control_in, std::move(packet));
         return;
     }
     Bytes promise;
     put(promise, 0, 2);
     put(promise, pending_ms, 2);
-    node()->send(control_in, acknowledgement(success, pending_acknowledge, id, promise));
+    node()->send(u3v_control_in, acknowledgement(success, pending_acknowledge, id, promise));
     const std::lock_guard lock(mutex_);
     late_answers_.push_back({camera_now_ns() + pending_ms * 500'000, std::move(packet)});
     changed_.notify_all();
@@ -206,7 +171,7 @@ void U3vCamera::written(std::uint32_t address) {
             registers_.set_bootstrap(abrm_timestamp, camera_now_ns(), 8);
             break;
         case sirm_control:
-            if (!stream_enabled()) node()->flush(data_in);
+            if (!stream_enabled()) node()->flush(u3v_data_in);
             break;
         case reg_acquisition_start: {
             const std::lock_guard lock(mutex_);
@@ -275,7 +240,7 @@ void U3vCamera::run() {
         changed_.wait_until(lock, host_time(wake));
         const std::uint64_t now = camera_now_ns();
         if (!late_answers_.empty() && now >= late_answers_.front().due_ns) {
-            if (plugged_) node()->send(control_in, std::move(late_answers_.front().packet));
+            if (plugged_) node()->send(u3v_control_in, std::move(late_answers_.front().packet));
             late_answers_.pop_front();
         }
         if (free_run && now >= free_run_next_ns_) {
@@ -298,11 +263,11 @@ void U3vCamera::run() {
 void U3vCamera::transmit(const Frame& frame) {
     const std::lock_guard sending(sending_);
     const std::uint32_t size = registers_.value(reg_payload_size);
-    const bool room = node()->queued(data_in) < most_frames_queued * size;
+    const bool room = node()->queued(u3v_data_in) < most_frames_queued * size;
     const unsigned to_drop = drop_;
     if (to_drop > 0) drop_ = to_drop - 1;
-    const bool ready =
-        stream_enabled() && registers_.bootstrap(sirm_payload_size) > 0 && !node()->halted(data_in);
+    const bool ready = stream_enabled() && registers_.bootstrap(sirm_payload_size) > 0 &&
+                       !node()->halted(u3v_data_in);
     const bool sent = ready && room && to_drop == 0;
     {
         const std::lock_guard lock(mutex_);
@@ -333,7 +298,7 @@ void U3vCamera::send_leader(const Frame& frame) {
     put(leader, registers_.value(reg_height), 4);
     put(leader, 0, 8);  // offsets
     put(leader, 0, 4);  // padding, reserved
-    node()->send(data_in, std::move(leader));
+    node()->send(u3v_data_in, std::move(leader));
 }
 
 // In transfers of the size that the host has set. A short packet ends one that is not full.
@@ -350,10 +315,10 @@ void U3vCamera::send_payload(const Frame& frame, Defect defect) {
         if (at == 0) std::copy(frame.shot.mark.begin(), frame.shot.mark.end(), part.begin());
         if (defect == Defect::payload_like_leader)
             std::memcpy(part.data(), &leader_magic, sizeof leader_magic);
-        node()->send(data_in, std::move(part));
+        node()->send(u3v_data_in, std::move(part));
         const bool asked_for =
             length == most || size - at == registers_.value(reg_payload_size) % most;
-        if (!asked_for && length % packet_size == 0) node()->send(data_in, {});
+        if (!asked_for && length % packet_size == 0) node()->send(u3v_data_in, {});
     }
 }
 
@@ -367,7 +332,7 @@ void U3vCamera::send_trailer(const Frame& frame) {
     put(trailer, 0, 2);
     put(trailer, registers_.value(reg_payload_size), 8);
     put(trailer, registers_.value(reg_height), 4);
-    node()->send(data_in, std::move(trailer));
+    node()->send(u3v_data_in, std::move(trailer));
 }
 
 }  // namespace versavis::test
