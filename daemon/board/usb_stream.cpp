@@ -2,7 +2,6 @@
 #include "board/usb_stream.hpp"
 
 #include <fmt/format.h>
-#include <libusb.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,8 @@
 #include <condition_variable>
 #include <mutex>
 #include <optional>
+
+#include "usb_handles.hpp"
 
 namespace versavis::daemon {
 
@@ -33,17 +34,9 @@ constexpr std::uint8_t class_interface_out =
 constexpr std::uint8_t set_control_line_state = 0x22;
 constexpr std::uint16_t dtr_rts = 0x03;
 
-struct ContextDeleter {
-    void operator()(libusb_context* context) const { libusb_exit(context); }
-};
-struct HandleDeleter {
-    void operator()(libusb_device_handle* handle) const { libusb_close(handle); }
-};
 struct TransferDeleter {
     void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
 };
-using Context = std::unique_ptr<libusb_context, ContextDeleter>;
-using Handle = std::unique_ptr<libusb_device_handle, HandleDeleter>;
 
 /// Where the CDC function lies.
 struct CdcFunction {
@@ -63,7 +56,7 @@ Unexpected<> usb_failure(const std::string& what, int code) {
 
 class UsbStream final : public ByteStream {
  public:
-    UsbStream(Context context, Handle handle, const CdcFunction& function)
+    UsbStream(UsbContext context, UsbHandle handle, const CdcFunction& function)
         : context_(std::move(context)), handle_(std::move(handle)), function_(function) {}
 
     ~UsbStream() override {
@@ -195,8 +188,8 @@ class UsbStream final : public ByteStream {
         return count;
     }
 
-    Context context_;
-    Handle handle_;
+    UsbContext context_;
+    UsbHandle handle_;
     CdcFunction function_;
     std::array<Slot, transfer_count> slots_;
     boost::container::static_vector<Slot*, transfer_count> completed_;  ///< of the reading thread
@@ -205,15 +198,6 @@ class UsbStream final : public ByteStream {
     std::condition_variable written_;
     std::atomic<bool> gone_{false};
 };
-
-std::string text_descriptor(libusb_device_handle* handle, std::uint8_t index) {
-    std::array<unsigned char, 256> text{};
-    const int size = libusb_get_string_descriptor_ascii(handle, index, text.data(),
-                                                        static_cast<int>(text.size()));
-    return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()),
-                                  static_cast<std::size_t>(size))
-                    : "";
-}
 
 CdcFunction find_function(libusb_device* device) {
     CdcFunction function;
@@ -236,10 +220,10 @@ CdcFunction find_function(libusb_device* device) {
 }
 
 /// The first device of the vendor and product whose serial number fits.
-Expected<Handle> find_board(libusb_context* context, const BoardConfiguration& wanted) {
+Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration& wanted) {
     libusb_device** devices = nullptr;
     const ssize_t count = libusb_get_device_list(context, &devices);
-    Handle found;
+    UsbHandle found;
     std::optional<int> refused;
     for (ssize_t i = 0; i < count && !found; ++i) {
         libusb_device_descriptor descriptor{};
@@ -251,7 +235,7 @@ Expected<Handle> find_board(libusb_context* context, const BoardConfiguration& w
             refused = code;
             continue;
         }
-        Handle candidate(handle);
+        UsbHandle candidate(handle);
         if (wanted.serial.empty() ||
             text_descriptor(handle, descriptor.iSerialNumber) == wanted.serial)
             found = std::move(candidate);
@@ -271,7 +255,7 @@ Expected<std::unique_ptr<ByteStream>> open_usb_stream(const BoardConfiguration& 
     libusb_context* raw_context = nullptr;
     if (const int code = libusb_init(&raw_context); code != 0)
         return usb_failure("libusb cannot start", code);
-    Context context(raw_context);
+    UsbContext context(raw_context);
     auto handle = find_board(context.get(), configuration);
     if (!handle) return Unexpected(handle.error());
     const CdcFunction function = find_function(libusb_get_device(handle->get()));

@@ -6,6 +6,8 @@
 
 #include <chrono>
 
+#include "camera/u3v_client.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -95,17 +97,38 @@ CameraResult<OpenCamera> open_on_network(const std::string& camera, const std::s
     return OpenCamera{std::move(*own), found};
 }
 
-/// The listed device that goes by this id, serial number or GUID; empty: none. Asks each device.
-std::string find_on_usb(const std::string& device) {
+struct UsbDevice {
+    std::string id;  ///< Aravis' word for it
+    UsbName name;
+};
+
+/// The listed device that goes by this id, serial number or GUID. Asks each device.
+std::optional<UsbDevice> find_on_usb(const std::string& device) {
     ArvInterface* usb = arv_uv_interface_get_instance();
     arv_interface_update_device_list(usb);
     for (unsigned i = 0; i < arv_interface_get_n_devices(usb); ++i) {
-        std::string id = text(arv_interface_get_device_id(usb, i));
-        for (const std::string& name : {id, text(arv_interface_get_device_serial_nbr(usb, i)),
-                                        text(arv_interface_get_device_physical_id(usb, i))})
-            if (strcasecmp(name.c_str(), device.c_str()) == 0) return id;
+        UsbDevice found{text(arv_interface_get_device_id(usb, i)),
+                        {text(arv_interface_get_device_vendor(usb, i)),
+                         text(arv_interface_get_device_model(usb, i)),
+                         text(arv_interface_get_device_serial_nbr(usb, i))}};
+        for (const std::string& name :
+             {found.id, found.name.serial, text(arv_interface_get_device_physical_id(usb, i))})
+            if (strcasecmp(name.c_str(), device.c_str()) == 0) return found;
     }
-    return "";
+    return std::nullopt;
+}
+
+CameraResult<Object<ArvDevice>> open_usb_device(const std::string& device, const UsbDevice& found) {
+    GlibError error;
+    Object<ArvDevice> opened(
+        arv_interface_open_device(arv_uv_interface_get_instance(), found.id.c_str(), error.out()));
+    if (opened) return opened;
+    if (error.text().find("usy") != std::string::npos)
+        return problem(CameraState::busy,
+                       {device, "another program holds it", "close that program"});
+    return problem(CameraState::failed,
+                   {device, "it is there but cannot be opened: " + error.text(),
+                    "check the udev rule, or unplug it and plug it in"});
 }
 
 /// None: it is not on USB.
@@ -113,29 +136,22 @@ std::optional<CameraResult<OpenCamera>> open_on_usb(const std::string& camera,
                                                     const std::string& device,
                                                     const CameraOpening& opening,
                                                     const Cancelled& cancelled) {
-    const auto turn = lock(opening.aravis, cancelled);
+    auto turn = lock(opening.aravis, cancelled);
     if (!turn.owns_lock()) return std::nullopt;
-    const std::string id = find_on_usb(device);
-    if (id.empty()) return std::nullopt;
-    if (auto free = check_claim(camera, device, id, opening.claims); !free)
+    const auto found = find_on_usb(device);
+    if (!found) return std::nullopt;
+    turn.unlock();
+    if (auto free = check_claim(camera, device, found->id, opening.claims); !free)
         return Unexpected(free.error());
-    GlibError error;
-    Object<ArvDevice> opened(
-        arv_interface_open_device(arv_uv_interface_get_instance(), id.c_str(), error.out()));
-    if (!opened && error.text().find("usy") != std::string::npos)
-        return problem(CameraState::busy,
-                       {device, "another program holds it", "close that program"});
-    if (!opened)
-        return problem(CameraState::failed,
-                       {device, "it is there but cannot be opened: " + error.text(),
-                        "check the udev rule, or unplug it and plug it in"});
-    Description description;
-    std::size_t size = 0;
-    const char* xml = arv_device_get_genicam_xml(opened.get(), &size);
-    if (xml != nullptr) description.bytes.assign(xml, xml + size);
-    if (auto good = opening.descriptions.vet(device, description, cancelled); !good)
+    const auto description = read_usb_description(device, found->name, cancelled);
+    if (!description) return Unexpected(description.error());
+    if (auto good = opening.descriptions.vet(device, *description, cancelled); !good)
         return problem(CameraState::failed, good.error());
-    auto own = camera_of(device, std::move(opened));
+    turn = lock(opening.aravis, cancelled);
+    if (!turn.owns_lock()) return Unexpected(absent(device));
+    auto opened = open_usb_device(device, *found);
+    if (!opened) return Unexpected(opened.error());
+    auto own = camera_of(device, std::move(*opened));
     if (!own) return Unexpected(own.error());
     return OpenCamera{std::move(*own), std::nullopt};
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/camera_setup.hpp"
 
+#include <endian.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "camera/u3v_client.hpp"
 #include "log.hpp"
 
 namespace versavis::daemon {
@@ -36,13 +38,25 @@ std::string name_of(ArvCamera* camera, const char* (*get)(ArvCamera*, GError**))
     return error.set() || value == nullptr ? "" : std::string(value, strnlen(value, longest_name));
 }
 
+/// By what Aravis plans the transfers of a USB3 camera; zero: it does not say.
+std::uint64_t transferred_payload(ArvDevice* device) {
+    const auto read = [&](std::uint64_t address) {
+        GlibError error;
+        std::uint64_t value = 0;
+        arv_device_read_memory(device, address, sizeof value, &value, error.out());
+        return error.set() ? 0 : le64toh(value);
+    };
+    return read(read(read(abrm_sbrm) + sbrm_sirm) + sirm_payload);
+}
+
 /// Bytes of a frame with all that may follow the pixels. Errors: it does not say, or what it says
 /// cannot be for images of its size.
 Expected<std::uint64_t> payload_of(ArvCamera* camera, const CameraConfiguration& configuration) {
     GlibError error;
+    ArvDevice* device = arv_camera_get_device(camera);
     // As 64 bits: arv_camera_get_payload() cuts off half of them.
-    const gint64 announced = arv_device_get_integer_feature_value(arv_camera_get_device(camera),
-                                                                  "PayloadSize", error.out());
+    const gint64 announced =
+        arv_device_get_integer_feature_value(device, "PayloadSize", error.out());
     if (error.set() || announced <= 0)
         return failure(configuration.name, "the camera does not say how large its frames are",
                        "power it off and on");
@@ -57,11 +71,12 @@ Expected<std::uint64_t> payload_of(ArvCamera* camera, const CameraConfiguration&
         known ? static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) : 0;
     const std::uint64_t most = std::min(
         largest_frame, known ? pixels * most_bytes_per_pixel + largest_extra : largest_frame);
-    if (payload <= most) return payload;
+    const auto transferred = ARV_IS_UV_DEVICE(device) ? transferred_payload(device) : payload;
+    if (payload <= most && transferred > 0 && transferred <= most) return payload;
     return failure(configuration.name,
                    fmt::format("the camera announces frames of {} bytes for {} x {} pixels, more "
-                               "than {}",
-                               payload, width, height, most),
+                               "than {} or none",
+                               payload > most ? payload : transferred, width, height, most),
                    "set Width, Height and PixelFormat in [camera.features], or power it off and "
                    "on");
 }

@@ -15,10 +15,6 @@ namespace {
 
 constexpr std::size_t url_size = 512;
 
-/// The largest description that is read. At half, a verbose one that is not zipped would be
-/// refused; at twice, a camera can keep its thread busy for twice as long.
-constexpr std::uint64_t largest_size = 8 << 20;
-
 /// For one block of memory. At half, a camera that is busy is given up; at twice, a mute one holds
 /// its thread up for longer.
 constexpr Duration block_patience = seconds(3);
@@ -55,8 +51,9 @@ Expected<DescriptionPlace> parse_description_url(const std::string& url) {
     const auto address = parts.size() == 3 ? hexadecimal(parts[1]) : std::nullopt;
     const auto size = parts.size() == 3 ? hexadecimal(parts[2]) : std::nullopt;
     if (!address || !size || *address > UINT32_MAX) return refused("has no valid place");
-    if (*size == 0 || *size > largest_size)
-        return refused(fmt::format("has {} bytes, more than {} or none", *size, largest_size));
+    if (*size == 0 || *size > largest_description)
+        return refused(
+            fmt::format("has {} bytes, more than {} or none", *size, largest_description));
     return DescriptionPlace{static_cast<std::uint32_t>(*address), *size,
                             parts[0].size() > 4 && parts[0].ends_with(".zip")};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The GenICam description of a GigE Vision camera as it lies in the camera: where, and its bytes.
+// The GenICam description of a camera as it lies in the camera: where, and its bytes.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,11 @@
 
 namespace versavis::daemon {
 
+/// The largest description that is read. At half, a verbose one that is not zipped would be
+/// refused; at twice, a camera can keep its thread busy for twice as long.
+inline constexpr std::uint64_t largest_description = 8 << 20;
+
+/// Of GigE Vision.
 struct DescriptionPlace {
     std::uint32_t address = 0;
     std::size_t size = 0;
@@ -24,7 +29,7 @@ struct Description {
 /// From a camera's own words, "Local:name.zip;address;size". Errors: it is elsewhere, or too large.
 Expected<DescriptionPlace> parse_description_url(const std::string& url);
 
-/// Reads it without taking control of the camera.
+/// Reads that of a GigE Vision camera without taking control of the camera.
 Expected<Description> read_description(GvcpClient& camera, const Cancelled& cancelled);
 
 /// SHA-256 as text: what is known by it was looked at before.

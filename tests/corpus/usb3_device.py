@@ -22,6 +22,15 @@ TIMESTAMP_LATCH = 0x1F8
 XML, ZIP = 0, 1
 CAPABILITIES = 0x101  # time stamps; a name that users give
 
+# Place, bytes and value of bootstrap registers that no camera should have, and what is said of it.
+DAMAGES = [
+    ((SBRM + 0x18, 4, 12), "its control packets have 12 bytes"),
+    ((SIRM, 4, 21 << 24), "its transfers are multiples of 2^21 bytes"),
+    ((SIRM + 0x8, 8, 0), "announces frames of 0 bytes"),
+    ((SIRM + 0x10, 4, 0xFFFFFFFF), "leader or trailer of its frames have 4294967295 bytes"),
+    ((MANIFEST + 0x18, 8, 1 << 62), "its description has 4611686018427387904 bytes"),
+    ((MANIFEST + 0xC, 4, 0x01010000 | ZIP << 10), "its description is refused")]
+
 
 class Usb3Device(Device):
     def __init__(self, serial, path, *arguments, **keywords):
@@ -44,7 +53,7 @@ class Usb3Device(Device):
             channels = self.nodes.nodes["NumberOfStreamChannels_Reg"]
             sbrm = self.nodes.address(channels) - STREAM_CHANNELS
         for at, text in ((0x4, vendor), (0x44, model), (0xC4, "1.0"), (0x144, self.serial)):
-            self.put(at, 64, text)
+            self.nodes.store(at, text.encode()[:63].ljust(64, b"\0"))
         payload = self.value("PayloadSize")
         for at, size, value in (
                 (0x0, 4, 0x00010001), (0x1C4, 8, CAPABILITIES), (0x1CC, 4, 1000),
@@ -58,10 +67,10 @@ class Usb3Device(Device):
                 (MANIFEST + 0xC, 4, 0x01010000 | (ZIP if kind == "zip" else XML) << 10),
                 (MANIFEST + 0x10, 8, self.xml_at), (MANIFEST + 0x18, 8, len(self.xml_data)),
                 (MANIFEST + 0x20, 32, 0)):
-            self.nodes.store(at, value.to_bytes(size, "little"))
+            self.put(at, size, value)
 
-    def put(self, address, size, text):
-        self.nodes.store(address, text.encode()[:size - 1].ljust(size, b"\0"))
+    def put(self, address, size, value):
+        self.nodes.store(address, value.to_bytes(size, "little"))
 
     def own_register(self, address):
         return SIRM <= address < SIRM + SIRM_SIZE or address == TIMESTAMP_LATCH

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera/u3v_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+#include "usb_handles.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// For one answer. At half, a camera that is busy is given up; at twice, a mute one holds its
+/// thread up for longer.
+constexpr Duration answer_patience = milliseconds(500);
+
+/// The same for a camera that says that its answer takes longer. At half, one that erases its flash
+/// is given up; at twice, one that never ends holds its thread up for longer.
+constexpr Duration longest_patience = seconds(5);
+
+/// A question is put so often: what is left of an earlier program's may come first.
+constexpr unsigned most_tries = 3;
+
+/// Between looks at whether it is cancelled. At half, an idle wait wakes twice as often; at twice,
+/// a stop comes later.
+constexpr unsigned look_interval_ms = 20;
+
+/// Aravis divides what it reads by the room in a packet: a header, and the longest text of GenCP.
+constexpr std::uint64_t smallest_packet = 12 + 8 + 64;
+constexpr std::uint64_t largest_packet = 65536;  ///< that Aravis makes use of
+
+/// Aravis takes the leader and the trailer of a frame into memory of 1 MiB.
+constexpr std::uint64_t largest_frame_part = 65536;
+
+/// Power of two that the size of a transfer is a multiple of: Aravis' has 1 MiB.
+constexpr std::uint64_t largest_alignment = 20;
+
+constexpr std::size_t header_size = 12;
+constexpr std::uint32_t magic = 0x43563355;  // "U3VC"
+constexpr std::uint16_t acknowledge = 1U << 14U;
+constexpr std::uint16_t read_memory = 0x0800;
+constexpr std::uint16_t pending = 0x0805;
+constexpr std::size_t usb_packet = 1024;  ///< of SuperSpeed: a buffer holds a number of them
+
+/// More bootstrap registers.
+constexpr std::uint64_t abrm_manifest = 0x1D0;
+constexpr std::uint64_t sbrm_largest_command = 0x14;
+constexpr std::uint64_t sbrm_largest_acknowledge = 0x18;
+constexpr std::uint64_t sirm_info = 0x0;
+constexpr std::uint64_t sirm_leader = 0x10;
+constexpr std::uint64_t sirm_trailer = 0x14;
+/// Of the first description that the camera has.
+constexpr std::uint64_t manifest_schema = 8 + 4;
+constexpr std::uint64_t manifest_address = 8 + 8;
+constexpr std::uint64_t manifest_size = 8 + 16;
+
+const char* const replug = "unplug it and plug it in";
+
+using Bytes = std::vector<std::uint8_t>;
+
+void put(Bytes& bytes, std::uint64_t value, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i)
+        bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+}
+
+std::uint64_t number_in(const Bytes& bytes, std::size_t at, std::size_t size) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < size; ++i) value |= std::uint64_t{bytes[at + i]} << (8 * i);
+    return value;
+}
+
+/// Where the control channel lies.
+struct ControlInterface {
+    int number = -1;
+    std::uint8_t in = 0;
+    std::uint8_t out = 0;
+};
+
+ControlInterface find_control(libusb_device* device) {
+    ControlInterface control;
+    libusb_config_descriptor* configuration = nullptr;
+    if (libusb_get_active_config_descriptor(device, &configuration) != 0) return control;
+    for (int i = 0; i < configuration->bNumInterfaces; ++i) {
+        const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
+        if (setting.bInterfaceClass != LIBUSB_CLASS_MISCELLANEOUS ||
+            setting.bInterfaceSubClass != 5 || setting.bInterfaceProtocol != 0)
+            continue;
+        control.number = setting.bInterfaceNumber;
+        for (int e = 0; e < setting.bNumEndpoints; ++e) {
+            const std::uint8_t address = setting.endpoint[e].bEndpointAddress;
+            ((address & LIBUSB_ENDPOINT_IN) != 0 ? control.in : control.out) = address;
+        }
+    }
+    libusb_free_config_descriptor(configuration);
+    return control;
+}
+
+bool is_named(libusb_device_handle* handle, const libusb_device_descriptor& descriptor,
+              const UsbName& name) {
+    return text_descriptor(handle, descriptor.iSerialNumber) == name.serial &&
+           text_descriptor(handle, descriptor.iProduct) == name.model &&
+           text_descriptor(handle, descriptor.iManufacturer) == name.vendor;
+}
+
+/// None: nothing that can be opened has the name.
+UsbHandle open_named(libusb_context* context, const UsbName& name) {
+    libusb_device** devices = nullptr;
+    const ssize_t count = libusb_get_device_list(context, &devices);
+    UsbHandle found;
+    for (ssize_t i = 0; i < count && !found; ++i) {
+        libusb_device_descriptor descriptor{};
+        libusb_device_handle* handle = nullptr;
+        if (libusb_get_device_descriptor(devices[i], &descriptor) != 0 ||
+            find_control(devices[i]).number < 0 || libusb_open(devices[i], &handle) != 0)
+            continue;
+        UsbHandle candidate(handle);
+        if (is_named(handle, descriptor, name)) found = std::move(candidate);
+    }
+    if (count >= 0) libusb_free_device_list(devices, 1);
+    return found;
+}
+
+/// Memory of one camera whose control interface is claimed.
+class ControlChannel {
+ public:
+    ControlChannel(libusb_device_handle* handle, const ControlInterface& control,
+                   const Cancelled& cancelled)
+        : handle_(handle), control_(control), cancelled_(cancelled) {}
+    ~ControlChannel() { libusb_release_interface(handle_, control_.number); }
+    ControlChannel(const ControlChannel&) = delete;
+    ControlChannel& operator=(const ControlChannel&) = delete;
+
+    /// `block`: bytes for one question.
+    std::optional<Bytes> read(std::uint64_t address, std::uint64_t size, std::uint64_t block) {
+        Bytes bytes;
+        while (bytes.size() < size) {
+            const auto part = ask(address + bytes.size(), std::min(block, size - bytes.size()));
+            if (!part) return std::nullopt;
+            bytes.insert(bytes.end(), part->begin(), part->end());
+        }
+        return bytes;
+    }
+
+    std::optional<std::uint64_t> number(std::uint64_t address, std::size_t size) {
+        const auto bytes = ask(address, size);
+        return bytes ? std::optional(number_in(*bytes, 0, size)) : std::nullopt;
+    }
+
+ private:
+    std::optional<Bytes> ask(std::uint64_t address, std::uint64_t size) {
+        for (unsigned i = 0; i < most_tries && !cancelled_(); ++i) {
+            Bytes question;
+            put(question, magic, 4);
+            put(question, acknowledge, 2);
+            put(question, read_memory, 2);
+            put(question, header_size, 2);
+            put(question, ++id_, 2);
+            put(question, address, 8);
+            put(question, 0, 2);
+            put(question, size, 2);
+            int sent = 0;
+            if (libusb_bulk_transfer(handle_, control_.out, question.data(),
+                                     static_cast<int>(question.size()), &sent,
+                                     static_cast<unsigned>(answer_patience.ns / 1'000'000)) != 0)
+                libusb_clear_halt(handle_, control_.out);
+            else if (auto answer = receive(size))
+                return answer;
+        }
+        return std::nullopt;
+    }
+
+    /// What it holds, or none: it does not come, or it is a refusal.
+    std::optional<Bytes> receive(std::uint64_t size) {
+        const HostTime asked = host_now();
+        HostTime until = asked + answer_patience;
+        Bytes buffer((header_size + size + usb_packet - 1) / usb_packet * usb_packet);
+        while (host_now() < until && !cancelled_()) {
+            int got = 0;
+            const int code =
+                libusb_bulk_transfer(handle_, control_.in, buffer.data(),
+                                     static_cast<int>(buffer.size()), &got, look_interval_ms);
+            if (code == LIBUSB_ERROR_TIMEOUT && got == 0) continue;
+            if (code == LIBUSB_ERROR_PIPE) libusb_clear_halt(handle_, control_.in);
+            if (code != 0) return std::nullopt;
+            const auto length = static_cast<std::size_t>(got);
+            if (length < header_size || number_in(buffer, 0, 4) != magic ||
+                number_in(buffer, 10, 2) != id_)
+                continue;  // left over
+            if (number_in(buffer, 6, 2) == pending) {
+                until = asked + longest_patience;
+                continue;
+            }
+            if (number_in(buffer, 4, 2) != 0 || number_in(buffer, 6, 2) != read_memory + 1 ||
+                length != header_size + size)
+                return std::nullopt;
+            return Bytes(buffer.begin() + header_size,
+                         buffer.begin() + static_cast<std::ptrdiff_t>(length));
+        }
+        return std::nullopt;
+    }
+
+    libusb_device_handle* handle_;
+    ControlInterface control_;
+    const Cancelled& cancelled_;
+    std::uint16_t id_ = 0;
+};
+
+/// Reads registers one after the other, and remembers whether one failed.
+class Registers {
+ public:
+    explicit Registers(ControlChannel& channel) : channel_(channel) {}
+    std::uint64_t operator()(std::uint64_t address, std::size_t size) {
+        const auto value = complete_ ? channel_.number(address, size) : std::nullopt;
+        complete_ = value.has_value();
+        return value.value_or(0);
+    }
+    bool complete() const { return complete_; }
+
+ private:
+    ControlChannel& channel_;
+    bool complete_ = true;
+};
+
+CameraResult<Description> read_checked(const std::string& device, ControlChannel& channel) {
+    const auto refused = [&](const std::string& why) {
+        return problem(CameraState::failed,
+                       {device, why, "it cannot be used: ask its maker for another firmware"});
+    };
+    const auto mute =
+        problem(CameraState::failed, {device, "its control channel does not answer", replug});
+    Registers read(channel);
+    const std::uint64_t sbrm = read(abrm_sbrm, 8);
+    const std::uint64_t command = read(sbrm + sbrm_largest_command, 4);
+    const std::uint64_t answer = read(sbrm + sbrm_largest_acknowledge, 4);
+    const std::uint64_t sirm = read(sbrm + sbrm_sirm, 8);
+    const std::uint64_t alignment = read(sirm + sirm_info, 4) >> 24U;
+    const std::uint64_t leader = read(sirm + sirm_leader, 4);
+    const std::uint64_t trailer = read(sirm + sirm_trailer, 4);
+    const std::uint64_t manifest = read(abrm_manifest, 8);
+    const std::uint64_t schema = read(manifest + manifest_schema, 4);
+    const std::uint64_t address = read(manifest + manifest_address, 8);
+    const std::uint64_t size = read(manifest + manifest_size, 8);
+    if (!read.complete()) return mute;
+    if (std::min(command, answer) < smallest_packet)
+        return refused(fmt::format("its control packets have {} bytes, less than {}",
+                                   std::min(command, answer), smallest_packet));
+    if (std::max(leader, trailer) > largest_frame_part)
+        return refused(fmt::format("leader or trailer of its frames have {} bytes, more than {}",
+                                   std::max(leader, trailer), largest_frame_part));
+    if (alignment > largest_alignment)
+        return refused(fmt::format("its transfers are multiples of 2^{} bytes, more than 2^{}",
+                                   alignment, largest_alignment));
+    if (size == 0 || size > largest_description)
+        return refused(fmt::format("its description has {} bytes, more than {} or none", size,
+                                   largest_description));
+    auto bytes = channel.read(address, size, std::min(answer, largest_packet) - header_size);
+    if (!bytes) return mute;
+    return Description{std::move(*bytes), (schema >> 10U & 0x3FU) == 1};
+}
+
+}  // namespace
+
+CameraResult<Description> read_usb_description(const std::string& device, const UsbName& name,
+                                               const Cancelled& cancelled) {
+    libusb_context* started = nullptr;
+    if (const int code = libusb_init(&started); code != 0)
+        return problem(CameraState::failed,
+                       {device, fmt::format("libusb cannot start: {}", libusb_error_name(code)),
+                        "restart the service"});
+    const UsbContext context(started);
+    const UsbHandle handle = open_named(context.get(), name);
+    if (!handle)
+        return problem(CameraState::failed, {device, "it is there but cannot be opened",
+                                             "check the udev rule, or unplug it and plug it in"});
+    const ControlInterface control = find_control(libusb_get_device(handle.get()));
+    const int code = libusb_claim_interface(handle.get(), control.number);
+    if (code == LIBUSB_ERROR_BUSY)
+        return problem(CameraState::busy,
+                       {device, "another program holds it", "close that program"});
+    if (code != 0)
+        return problem(
+            CameraState::failed,
+            {device, fmt::format("it cannot be claimed: {}", libusb_error_name(code)), replug});
+    ControlChannel channel(handle.get(), control, cancelled);
+    return read_checked(device, channel);
+}
+
+}  // namespace versavis::daemon
