@@ -208,8 +208,11 @@ void BoardHost::show_exposure(const CameraScenario& camera, const LineActive& li
     HostTime end = line.end;
     if (camera.line == LineShows::fixed) end = line.begin + milliseconds(1);
     if (camera.line == LineShows::readout) end = end + late(camera.readout_us);
-    line_changes(camera, line.begin + late(camera.line_rising_us), !line.inverted);
-    line_changes(camera, end + late(camera.line_falling_us), line.inverted);
+    for (unsigned i = 0; i < line.times; ++i) {
+        const Duration shift = line.every * static_cast<std::int64_t>(i);
+        line_changes(camera, line.begin + shift + late(camera.line_rising_us), !line.inverted);
+        line_changes(camera, end + shift + late(camera.line_falling_us), line.inverted);
+    }
 }
 
 void BoardHost::line_changes(const CameraScenario& camera, HostTime at, bool active) {

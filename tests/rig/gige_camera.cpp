@@ -131,6 +131,7 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
                  family),
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
+      random_(scenario.seed),
       socket_(socket),
       broadcast_socket_(broadcast_socket),
       events_(socket) {
@@ -318,8 +319,14 @@ void GigeCamera::send_event(CameraEventId id, HostTime at, std::uint64_t block_i
         static_cast<std::uint32_t>(id) - static_cast<std::uint32_t>(CameraEventId::exposure_start);
     const auto notification = static_cast<Register>(reg_event_notification + 4 * index);
     if (registers_.value(notification) == 0 || muted()) return;
-    const auto ticks = static_cast<std::uint64_t>(clock_.device_ns(at) + clock_step_ns_);
-    events_.send(at, {id, block_id, ticks, settings_.extended_ids});
+    events_.send(at, {id, block_id, ticks(at), settings_.extended_ids});
+}
+
+/// What its clock shows.
+std::uint64_t GigeCamera::ticks(HostTime at) const {
+    const std::int64_t ns = clock_.device_ns(at) + clock_step_ns_;
+    if (settings_.clock_rate == 1) return static_cast<std::uint64_t>(ns);
+    return static_cast<std::uint64_t>(std::llround(static_cast<double>(ns) * settings_.clock_rate));
 }
 
 bool GigeCamera::acquiring() {
@@ -378,20 +385,36 @@ void GigeCamera::afflict_board(std::vector<Fault> faults,
     afflict_board_ = std::move(afflict);
 }
 
-/// The first exposure that the trigger makes.
-std::optional<GigeCamera::Interval> GigeCamera::take_trigger(const TriggerPulse& pulse) {
+/// The exposures that the trigger makes, one right after the other.
+std::vector<GigeCamera::Interval> GigeCamera::take_trigger(const TriggerPulse& pulse) {
     const bool listens = registers_.all(family_.triggered) && registers_.all(family_.listens);
-    if (!listens || settings_.free_runs || muted()) return std::nullopt;
+    if (!listens || settings_.free_runs || muted()) return {};
     const auto delay = Duration{std::llround(registers_.number(family_.trigger_delay) * 1e3)};
-    const auto first = expose(pulse.at + delay, &pulse);
-    std::optional<Interval> last = first;
-    for (double taken = 1; last && taken < registers_.number(family_.burst); ++taken)
-        last = expose(last->second, &pulse);
-    return first;
+    std::vector<Interval> made;
+    auto exposure = expose(pulse.at + delay, &pulse);
+    if (!exposure) return {};
+    made.push_back(*exposure);
+    for (const double wanted = exposures_to_make(); static_cast<double>(made.size()) < wanted;) {
+        exposure = expose(made.back().second, &pulse);
+        if (!exposure) break;
+        made.push_back(*exposure);
+    }
+    return made;
+}
+
+/// By the trigger whose first exposure has just been made.
+double GigeCamera::exposures_to_make() {
+    const std::lock_guard lock(mutex_);
+    ++triggers_taken_;
+    const bool doubled =
+        active_fault(FaultKind::double_frame) != nullptr ||
+        (settings_.double_every > 0 && triggers_taken_ % settings_.double_every == 0);
+    return std::max(registers_.number(family_.burst), doubled ? 2.0 : 1.0);
 }
 
 /// What the exposure line makes of it.
-std::optional<LineActive> GigeCamera::shown(const Interval& exposure) const {
+std::optional<LineActive> GigeCamera::shown(const std::vector<Interval>& exposures) const {
+    const Interval& exposure = exposures.front();
     if (!family_.shows_exposure.empty() && !registers_.all(family_.shows_exposure))
         return std::nullopt;
     const auto duration_of = [this](const std::optional<Field>& field) {
@@ -401,18 +424,21 @@ std::optional<LineActive> GigeCamera::shown(const Interval& exposure) const {
     const Duration length = duration_of(family_.line_duration);
     const HostTime begin = exposure.first + shift;
     const HostTime end = length.ns > 0 ? begin + length : exposure.second + shift;
-    return LineActive{begin, end, registers_.all(family_.line_inverted)};
+    LineActive line{begin, end, registers_.all(family_.line_inverted)};
+    line.times = static_cast<unsigned>(exposures.size());
+    if (line.times > 1) line.every = exposures[1].first - exposure.first;
+    return line;
 }
 
 std::optional<LineActive> GigeCamera::trigger_line(bool level, const TriggerPulse& pulse) {
     const bool falling = registers_.all(family_.falling);
     if (level == (falling != settings_.trigger_inverted)) return std::nullopt;
-    const auto interval = take_trigger(pulse);
-    truth_.add(TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at,
-                           interval.has_value()});
+    const std::vector<Interval> exposures = take_trigger(pulse);
+    truth_.add(
+        TrueTrigger{settings_.name, pulse.board_life, pulse.trigger, pulse.at, !exposures.empty()});
     const std::lock_guard lock(mutex_);
     const bool cut = active_fault(FaultKind::cut_strobe) != nullptr;
-    return interval && !cut ? shown(*interval) : std::nullopt;
+    return !exposures.empty() && !cut ? shown(exposures) : std::nullopt;
 }
 
 /// By its own auto exposure.
@@ -438,6 +464,12 @@ const Fault* GigeCamera::active_fault(FaultKind kind) const {
             exposures_ < fault.at_exposure + fault.count)
             return &fault;
     return nullptr;
+}
+
+bool GigeCamera::ignores(const TriggerPulse* pulse) {
+    if (active_fault(FaultKind::ignore_trigger) != nullptr) return true;
+    return pulse != nullptr && settings_.ignored > 0 &&
+           std::uniform_real_distribution(0.0, 1.0)(random_) < settings_.ignored;
 }
 
 void GigeCamera::next_block_id() {
@@ -510,7 +542,7 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
         ++exposures_;
         for (const Fault& fault : board_faults_)
             if (fault.at_exposure == exposures_) afflict_board_(fault);
-        if (active_fault(FaultKind::ignore_trigger) != nullptr) {
+        if (ignores(pulse)) {
             send_event(CameraEventId::trigger_missed, trigger, 0);
             if (settings_.ids_count_ignored) next_block_id();
             return std::nullopt;
@@ -553,8 +585,7 @@ std::optional<GigeCamera::Interval> GigeCamera::expose(HostTime trigger,
     }
     frame.extended_id = settings_.extended_ids;
     if (active_fault(FaultKind::stop_clock) == nullptr)
-        camera_time_ns_ = static_cast<std::uint64_t>(
-            clock_.device_ns(stamped(settings_, truth.start, truth.end)) + clock_step_ns_);
+        camera_time_ns_ = ticks(stamped(settings_, truth.start, truth.end));
     frame.camera_time_ns = camera_time_ns_;
     frame.width = registers_.value(reg_width);
     frame.height = registers_.value(reg_height);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <random>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -68,8 +69,11 @@ class GigeCamera final : public TriggeredCamera {
 
     using Interval = std::pair<HostTime, HostTime>;
     std::optional<Interval> expose(HostTime trigger, const TriggerPulse* pulse);
-    std::optional<Interval> take_trigger(const TriggerPulse& pulse);
-    std::optional<LineActive> shown(const Interval& exposure) const;
+    std::vector<Interval> take_trigger(const TriggerPulse& pulse);
+    double exposures_to_make();
+    std::optional<LineActive> shown(const std::vector<Interval>& exposures) const;
+    bool ignores(const TriggerPulse* pulse);
+    std::uint64_t ticks(HostTime at) const;
     bool exposes_by_itself() const;
     Duration exposure_at(HostTime at) const;
     const Fault* active_fault(FaultKind kind) const;
@@ -95,6 +99,8 @@ class GigeCamera final : public TriggeredCamera {
     std::int64_t clock_step_ns_ = 0;
     std::uint64_t camera_time_ns_ = 0;  ///< of the newest frame
     std::uint64_t exposures_ = 0;
+    std::uint64_t triggers_taken_ = 0;
+    std::mt19937_64 random_;  ///< draws the triggers that it ignores
     HostTime busy_until_;
     HostTime free_run_next_;
     std::vector<Fault> board_faults_;

@@ -82,6 +82,9 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("events", camera.events);
     reader.read("early_leader", camera.early_leader);
     reader.read("shortest_period_us", camera.shortest_period_us, 0, 1e7);
+    reader.read("ignored", camera.ignored, 0, 1);
+    reader.read("double_every", camera.double_every, 0, INT64_MAX);
+    reader.read("clock_rate", camera.clock_rate, 0.01, 100);
     reader.read("light", camera.light, 0, 1000);
     reader.read("focal_px", camera.focal_px, 0, 1e5);
     reader.read("blur_steps", camera.blur_steps, 1, 16);
@@ -131,6 +134,7 @@ Fault read_fault(TableReader& reader) {
                               {"change_size", FaultKind::change_size},
                               {"stop_clock", FaultKind::stop_clock},
                               {"lose_ptp", FaultKind::lose_ptp},
+                              {"double_frame", FaultKind::double_frame},
                               {"double_exposure", FaultKind::double_exposure},
                               {"ignore_trigger", FaultKind::ignore_trigger},
                               {"camera_mute", FaultKind::camera_mute},

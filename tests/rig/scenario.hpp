@@ -74,6 +74,9 @@ struct CameraScenario {
     bool events = true;              ///< it has a message channel, for those of its exposures
     bool early_leader = false;       ///< a frame's leader is sent when its exposure begins
     double shortest_period_us = 0;   ///< triggers that come sooner are ignored
+    double ignored = 0;              ///< share of triggers that it ignores, at random
+    std::uint64_t double_every = 0;  ///< every n-th trigger that it takes makes two frames; 0: none
+    double clock_rate = 1;           ///< ticks of its clock in a nanosecond; it says that it is one
     double light =
         0;  ///< brightness of the image per millisecond of exposure; 0: independent of it
     double focal_px = 0;      ///< of the pinhole that sees the moving world; 0: 0.8 x width
@@ -90,18 +93,19 @@ struct CameraScenario {
 };
 
 enum class FaultKind {
-    drop_frame,   ///< the exposure happens, no packet leaves
-    drop_leader,  ///< the frame's first packet never leaves, not even when it is asked for again
-                  ///< ...
-    drop_last,    ///< ... nor its last ones
-    half_frame,   ///< the frame ends in the middle, as if it were whole
-    swap_frames,  ///< the frame leaves after the next one
-    repeat_id,    ///< the frame has the number of the one before
-    restart_ids,  ///< numbers start again
-    jump_clock,   ///< the camera's clock steps by `seconds`, from this frame on
-    change_size,  ///< from this frame on they have half the height
-    stop_clock,   ///< the camera's clock stands still, since the frame before
-    lose_ptp,     ///< the camera reports that its clock lost PTP, and then that it has it again
+    drop_frame,    ///< the exposure happens, no packet leaves
+    drop_leader,   ///< the frame's first packet never leaves, not even when it is asked for again
+                   ///< ...
+    drop_last,     ///< ... nor its last ones
+    half_frame,    ///< the frame ends in the middle, as if it were whole
+    swap_frames,   ///< the frame leaves after the next one
+    repeat_id,     ///< the frame has the number of the one before
+    restart_ids,   ///< numbers start again
+    jump_clock,    ///< the camera's clock steps by `seconds`, from this frame on
+    change_size,   ///< from this frame on they have half the height
+    stop_clock,    ///< the camera's clock stands still, since the frame before
+    lose_ptp,      ///< the camera reports that its clock lost PTP, and then that it has it again
+    double_frame,  ///< the camera exposes once more, right after, for the same trigger
     double_exposure,  ///< the camera doubles its ExposureTime by itself
     ignore_trigger,   ///< the camera does not expose
     camera_mute,      ///< no answer and no packet for `seconds`

@@ -33,6 +33,8 @@ struct LineActive {
     HostTime begin;
     HostTime end;
     bool inverted = false;  ///< by the camera: low meanwhile
+    unsigned times = 1;     ///< that it is so, for exposures that follow each other ...
+    Duration every{};       ///< ... after so long
 };
 
 class TriggeredCamera {
