@@ -87,6 +87,7 @@ void CameraPipeline::begin_anew() {
 /// Its clock does not count nanoseconds: arrivals alone say what exposures the frames are of.
 void CameraPipeline::pair_without_clock() {
     limits_.camera_clock = false;
+    event_lengths_ = {};  // by the same clock
     if (!triggered()) return;
     begin_anew();
     pairing_.set_limits(limits_);
@@ -289,10 +290,14 @@ FrameAccount CameraPipeline::account_of(const pairing::Arrival& arrival) const {
 
 void CameraPipeline::add(const CameraEvent& event) {
     const std::lock_guard lock(mutex_);
+    const bool times_count = answers_.report().clock_rate == 1;
     switch (event.kind) {
         case CameraEventKind::exposure_start:
+            if (!times_count) return;
             return event_lengths_.started(event.block_id, event.at);
-        case CameraEventKind::exposure_end: return event_lengths_.ended(event.block_id, event.at);
+        case CameraEventKind::exposure_end:
+            if (!times_count) return;
+            return event_lengths_.ended(event.block_id, event.at);
         case CameraEventKind::trigger_missed: return note_missed_trigger();
         case CameraEventKind::ptp_lost: return note_ptp(true);
         case CameraEventKind::ptp_locked: return note_ptp(false);
