@@ -56,6 +56,10 @@ constexpr Duration time_of_deafness = milliseconds(300);
 constexpr unsigned deaf_streams_of_stuck_ids = 3;
 constexpr std::uint64_t few_frames = 3;
 
+/// Ids that began anew twice within so long do it for no reason of the host. At half, a camera that
+/// does it each 20 s is not named; at twice, two power cuts look like it.
+constexpr Duration renumbering_memory = seconds(30);
+
 /// Between looks at a streaming camera. At half, an idle service wakes twice as often; at twice,
 /// loss of control shows 20 ms later.
 constexpr Duration step = milliseconds(20);
@@ -125,6 +129,7 @@ CameraReport Camera::report() const {
     const std::lock_guard lock(mutex_);
     CameraReport report = report_;
     report.stuck_ids = deaf_streams_ >= deaf_streams_of_stuck_ids;
+    report.renumbers = host_now().ns - renumbered_before_ns_ < renumbering_memory.ns;
     const Duration setting_up = host_now() - setting_up_since_;
     if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
         report.state = CameraState::failed;
@@ -441,6 +446,8 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
     const bool missed = expected && host_now() - health.taken_at > time_of_deafness;
     if (frames.packets() > health.packets && (silent || (health.taken > 0 && missed))) {
         ++deaf_streams_;
+        if (health.taken > few_frames)
+            renumbered_before_ns_ = renumbered_ns_.exchange(host_now().ns);
         return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
                                               "the camera is being reopened"});
     }

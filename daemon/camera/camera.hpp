@@ -49,6 +49,7 @@ struct CameraReport {
     std::uint32_t packet_size = 0;
     ReceiveMode receive = ReceiveMode::automatic;  ///< in use; automatic: not GigE Vision
     BandwidthShare bandwidth;
+    bool renumbers = false;  ///< its frames were numbered anew twice lately, and it was reopened
     bool stuck_ids = false;  ///< packets come, but no frame completes, time and again
     std::string gain_feature;
     SensorState sensor;  ///< as its registers say
@@ -152,12 +153,15 @@ class Camera {
     HostTime exposure_holds_;  ///< frames that arrive from then on have the newest exposure
     Duration packet_delay_;
     Retry retry_;
-    std::optional<NetworkDevice> device_;    ///< where it was last seen
-    HostTime held_since_;                    ///< somebody else has control since; 0: nobody
-    std::atomic<unsigned> deaf_streams_{0};  ///< in a row
-    bool clock_stands_ = false;              ///< found out while it streamed last
-    bool without_clock_ = false;             ///< for that reason
-    bool no_image_ = false;                  ///< its frames are of another kind, as it showed
+    std::optional<NetworkDevice> device_;  ///< where it was last seen
+    HostTime held_since_;                  ///< somebody else has control since; 0: nobody
+    static constexpr std::int64_t never_ns = INT64_MIN / 2;
+    std::atomic<unsigned> deaf_streams_{0};                     ///< in a row
+    std::atomic<std::int64_t> renumbered_ns_{never_ns};         ///< its frames were numbered anew
+    std::atomic<std::int64_t> renumbered_before_ns_{never_ns};  ///< the same, the time before
+    bool clock_stands_ = false;   ///< found out while it streamed last
+    bool without_clock_ = false;  ///< for that reason
+    bool no_image_ = false;       ///< its frames are of another kind, as it showed
 
     std::thread thread_;
 };

@@ -29,6 +29,14 @@ constexpr double slowest_rate = 0.2;
 /// twice, a step of the clock looks like one.
 constexpr double same_rate = 0.05;
 
+/// A line that rises so shortly before the next trigger, and within this part of the period, leads.
+/// At half, longer pre-delays are not named; at twice, cameras that start late are.
+constexpr Duration longest_lead = milliseconds(5);
+constexpr std::int64_t lead_part = 8;
+
+/// Records in a row that show it. At half, two late triggers do; at twice, it takes a second more.
+constexpr int leads_to_believe = 5;
+
 /// Ids this far behind the one before began anew; less far, the frames changed places.
 constexpr std::uint64_t ids_back = 16;
 
@@ -41,9 +49,20 @@ void AnswerWatch::recorded(const wire::Exposure& record) {
         ++report_.ignored;
         return;
     }
+    measure_lead(record);
     takes_.push_back({record.trigger, BoardTime{record.trigger_ns}});
     if (takes_.size() > takes_kept) takes_.pop_front();
     measure_takes();
+}
+
+/// The board gives the edge to the trigger before, for no other has left yet. Where the next one is
+/// far, as in a slow start, it gives it to none.
+void AnswerWatch::measure_lead(const wire::Exposure& record) {
+    const Duration delay{record.start_ns - record.trigger_ns};
+    const Duration lead = period_ - delay;
+    const bool leads = lead.ns > 0 && lead < longest_lead && lead * lead_part < period_;
+    leads_ = leads ? leads_ + 1 : 0;
+    report_.lead = leads_ >= leads_to_believe ? lead : Duration{};
 }
 
 void AnswerWatch::measure_takes() {
@@ -90,6 +109,8 @@ void AnswerWatch::measure_clock() {
 void AnswerWatch::begin_anew() {
     takes_.clear();
     times_.clear();
+    leads_ = 0;
+    report_.lead = {};
     report_.every = 1;
     report_.shortest = {};
     report_.clock_rate = 1;

@@ -18,13 +18,17 @@ struct AnswerReport {
     std::uint64_t block_id = 0;  ///< of the newest frame
     std::uint64_t every = 1;     ///< n: it takes every n-th trigger, and did so lately without
                                  ///< exception; else 1
-    Duration shortest;           ///< between two triggers that it took, lately; 0: unknown
-    double clock_rate = 1;       ///< of its clock, when it cannot be a clock in nanoseconds; else 1
+    Duration lead;          ///< by which its exposure line rises before the trigger; 0: it does not
+    Duration shortest;      ///< between two triggers that it took, lately; 0: unknown
+    double clock_rate = 1;  ///< of its clock, when it cannot be a clock in nanoseconds; else 1
 };
 
 /// Not thread-safe.
 class AnswerWatch {
  public:
+    /// `period`: of the triggers.
+    explicit AnswerWatch(Duration period) : period_(period) {}
+
     void recorded(const wire::Exposure& record);
     void arrived(const pairing::Arrival& arrival);
 
@@ -43,10 +47,13 @@ class AnswerWatch {
         HostTime arrived;
     };
 
+    void measure_lead(const wire::Exposure& record);
     void measure_takes();
     void measure_clock();
 
+    Duration period_;
     std::deque<Take> takes_;
+    int leads_ = 0;  ///< records in a row whose line rose with the next trigger
     std::deque<Time> times_;
     AnswerReport report_;
 };

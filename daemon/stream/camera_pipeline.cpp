@@ -68,6 +68,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       witness_(ExposureHistory(configuration), records_to_confirm),
       completion_(configuration),
       check_(configuration),
+      answers_(period_of(configuration)),
       chunk_exposures_(configuration.slots),
       triggers_(configuration),
       limits_(limits_of(configuration)),
@@ -186,6 +187,7 @@ void CameraPipeline::set_sensor_state(const SensorState& state) {
 
 std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received) {
     const std::lock_guard lock(mutex_);
+    report_.last_record = received;
     if (const auto doubted = doubt(record, received)) {
         note(record, *doubted);
         return std::nullopt;

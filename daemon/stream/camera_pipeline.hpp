@@ -52,6 +52,7 @@ struct PipelineReport {
     Duration record_delay;   ///< end of the newest exposure to the arrival of its record
     Duration start_delay;    ///< trigger to the start that its record has; 0: it has none
     Duration told_exposure;  ///< as the camera was told, or tells; 0: it varies
+    HostTime last_record;    ///< the board's record of an exposure arrived, doubted or not
     HostTime last_sign;      ///< a frame arrived, whole or not
     HostTime last_frame;
     HostTime last_proof;       ///< a frame was proved, or the camera was begun anew

@@ -54,6 +54,11 @@ constexpr int quiet_periods = 5;
 /// meanwhile; at twice, a cable that broke is named six seconds later.
 constexpr Duration restart_time = seconds(6);
 
+/// On top of the longest pause between two triggers, and of the link's delay, no record for so long
+/// is no trigger. At half, a start that is asked for again is one; at twice, a board that sends
+/// none is named a second later.
+constexpr Duration record_patience = milliseconds(1500);
+
 bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
 
 struct CameraView {
@@ -74,8 +79,16 @@ struct CameraView {
         const Duration told = it.pipeline.told_exposure;
         return told.ns != 0 ? told : it.pipeline.exposure;
     }
+    /// Triggers of which frames are here, and records still on a slow link.
+    std::uint64_t on_link() const {
+        const std::int64_t delay_ns = std::max(it.pipeline.record_delay.ns, std::int64_t{0});
+        return static_cast<std::uint64_t>((delay_ns + period().ns / 2) / period().ns);
+    }
+    /// Triggers have come without an answer; in a slow start they are far apart.
     bool quiet() const {
-        return all.now - it.pipeline.last_sign > std::max(quiet_time, period() * quiet_periods);
+        const HostTime asked =
+            triggered() ? it.pipeline.last_record - it.pipeline.record_delay : all.now;
+        return asked - it.pipeline.last_sign > std::max(quiet_time, period() * quiet_periods);
     }
     bool starting() const {
         return !full() && !it.delivery.fell_short &&
@@ -107,6 +120,11 @@ bool leased(const CameraView& camera) {
     return camera.in(CameraState::opening) && !own_hint(camera).empty();
 }
 
+bool numbers_anew(const CameraView& camera) {
+    return camera.it.camera.renumbers && !camera.full() &&
+           (camera.in(CameraState::opening) || camera.streaming());
+}
+
 bool lost_packets(const CameraView& camera) {
     return !camera.full() && some(camera.refused(EventReason::frame_incomplete), camera.frames());
 }
@@ -115,6 +133,25 @@ bool lost_packets(const CameraView& camera) {
 bool packets_too_large(const CameraView& camera) {
     return lost_packets(camera) && camera.it.camera.packet_size > common_packet &&
            all_of(camera.refused(EventReason::frame_incomplete), camera.frames());
+}
+
+/// Of the slowest start that any camera or master makes.
+Duration longest_trigger_pause(const CameraView& camera) {
+    const auto rate_uhz = static_cast<std::uint64_t>(camera.it.configuration.rate_hz * 1e6);
+    const std::uint64_t ticks = wire::slow_start_ticks(rate_uhz, wire::camera_count - 1);
+    return camera.period() * static_cast<std::int64_t>(ticks);
+}
+
+bool no_records(const CameraView& camera) {
+    const HostTime since = std::max(camera.it.pipeline.last_record, camera.it.delivery.began);
+    return camera.triggered() && !camera.full() &&
+           camera.all.now - since >
+               longest_trigger_pause(camera) + record_patience + camera.all.clock.round_trip;
+}
+
+bool line_leads(const CameraView& camera) {
+    return camera.triggered() && camera.strobe() && camera.frames() > 0 &&
+           camera.it.pipeline.answers.lead.ns > 0;
 }
 
 bool late_records(const CameraView& camera) {
@@ -201,7 +238,7 @@ std::string ignored_hint(const CameraView& camera) {
 }
 
 bool sends_too_many(const CameraView& camera) {
-    const std::uint64_t triggers = camera.it.recent.triggers;
+    const std::uint64_t triggers = camera.it.recent.triggers + camera.on_link();
     return camera.triggered() && !camera.full() && triggers > 0 && camera.frames() > triggers + 1 &&
            some(camera.frames() - triggers, triggers);
 }
@@ -238,8 +275,9 @@ std::string clock_hint(const CameraView& camera) {
 bool frames_missing(const CameraView& camera) {
     const std::uint64_t unmeasured = camera.strobe() ? camera.it.recent.unmeasured : 0;
     const std::uint64_t exposed = camera.it.recent.triggers - unmeasured;
-    return camera.triggered() && !camera.full() && exposed > camera.frames() &&
-           some(exposed - camera.frames(), exposed);
+    const std::uint64_t arrived = camera.frames() + camera.on_link();
+    return camera.triggered() && !camera.full() && exposed > arrived &&
+           some(exposed - arrived, exposed);
 }
 
 bool all_frames_missing(const CameraView& camera) {
@@ -257,9 +295,10 @@ std::string missing_hint(const CameraView& camera) {
 /// Some triggers are answered, the others come while it is busy.
 bool answers_some(const CameraView& camera) {
     const std::uint64_t asked = camera.it.recent.triggers;
+    const std::uint64_t answered = camera.frames() + camera.on_link();
     const bool free = !camera.triggered() && camera.frames() > 0;
-    return !camera.full() && (free || (asked > camera.frames() && camera.frames() > 0 &&
-                                       some(asked - camera.frames(), asked)));
+    return !camera.full() &&
+           (free || (asked > answered && camera.frames() > 0 && some(asked - answered, asked)));
 }
 
 bool strobe_missing(const CameraView& camera) {
@@ -323,6 +362,12 @@ struct Rule {
 
 /// The first that applies is the cause.
 constexpr Rule camera_rules[] = {
+    {Fault::block_ids, numbers_anew,
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "its block ids begin again and again, and it is reopened each time: update its "
+             "firmware, and check its power");
+     }},
     {Fault::camera_lease, leased, own_hint},
     {Fault::camera_busy, in<CameraState::busy>, own_hint},
     {Fault::camera_unreachable, in<CameraState::unreachable>, own_hint},
@@ -409,8 +454,7 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("a start is in progress: its frames are being proved");
      }},
-    {Fault::no_triggers,
-     [](const CameraView& c) { return c.triggered() && !c.full() && c.it.recent.triggers == 0; },
+    {Fault::no_triggers, no_records,
      [](const CameraView& c) {
          return c.it.configuration.master.empty()
                     ? std::string("the board reports no triggers: see its hint and 'output'")
@@ -439,6 +483,13 @@ constexpr Rule camera_rules[] = {
              c.it.pipeline.edges.line.empty() ? c.it.name : c.it.pipeline.edges.line,
              c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.told_exposure.ns / 1000,
              c.it.configuration.strobe == Strobe::active_high ? "active_low" : "active_high");
+     }},
+    {Fault::line_delays, line_leads,
+     [](const CameraView& c) {
+         return fmt::format(
+             "the exposure line rises {} before the trigger: set its delay and pre-delay "
+             "(StrobeLinePreDelay) to 0, and check its LineSource",
+             in_ms(c.it.pipeline.answers.lead));
      }},
     {Fault::line_delays,
      [](const CameraView& c) { return c.triggered() && !line_hint(c.it.pipeline.edges).empty(); },
@@ -613,8 +664,8 @@ Diagnosis diagnose_board(const Status& status) {
     switch (board.state) {
         case BoardState::absent: return conclude(Fault::board_gone, board.hint, known, in_time);
         case BoardState::handshake:
-            return conclude(known ? Fault::board_silent : Fault::starting,
-                            quiet ? silence : "it is there, and is being asked who it is", known,
+            return conclude(quiet ? Fault::board_silent : Fault::starting,
+                            quiet ? silence : "it is there, and is being asked who it is", quiet,
                             in_time);
         case BoardState::incompatible:
         case BoardState::refused: return conclude(Fault::board_refuses, board.hint, true, in_time);

@@ -12,12 +12,26 @@ namespace {
 constexpr Duration recent_window = seconds(1);
 constexpr int recent_periods = 4;
 
-/// The newest report that is as old as the window, or the oldest.
+/// A slow start has a trigger a second or less: so many are recent, but for those this old. At
+/// half, two frames of each trigger look like swapped cables then; at twice, what has ended is told
+/// for twice as long.
+constexpr std::uint64_t least_triggers = 4;
+constexpr Duration longest_window = seconds(8);
+
+bool tells(const ImuReport& /*before*/, const ImuReport& /*newest*/) { return true; }
+
+bool tells(const PipelineReport& before, const PipelineReport& newest) {
+    return newest.triggers == 0 || newest.triggers - before.triggers >= least_triggers;
+}
+
+/// The newest report that is as old as the window and tells enough, or the oldest.
 template <class Report>
 Report one_window_ago(std::deque<std::pair<HostTime, Report>>& reports, const Report& newest,
                       Duration window, HostTime now) {
     reports.emplace_back(now, newest);
-    while (reports.size() > 2 && reports[1].first <= now - window) reports.pop_front();
+    while (reports.size() > 2 && reports[1].first <= now - window &&
+           (reports[1].first <= now - longest_window || tells(reports[1].second, newest)))
+        reports.pop_front();
     return reports.front().second;
 }
 

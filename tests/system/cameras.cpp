@@ -136,6 +136,96 @@ TEST_CASE("cameras: one that takes every n-th trigger delivers each frame, and s
     CHECK(verdict.streams.at("cam2").rate_hz == Approx(20).margin(0.5));
 }
 
+TEST_CASE("cameras: triggers ignored at random cost no frame, and are said in numbers") {
+    Stack stack({"ignoring", 82, 1, 20, "ignored = 0.2", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    unsigned share = 0;
+    unsigned ignored = 0;
+    unsigned triggers = 0;
+    const auto status = stack.wait_for_status([&](const auto& s) {
+        const auto hint = s["cameras"][0]["hint"].template get<std::string>();
+        return std::sscanf(hint.c_str(), "ignores %u %% of triggers: %u of the last %u;", &share,
+                           &ignored, &triggers) == 3;
+    });
+    CHECK(status["cameras"][0]["fault"] == "triggers_ignored");
+    CHECK(share == Approx(100.0 * ignored / triggers).margin(0.5));
+    const auto& cam0 = judge(stack, 6).streams.at("cam0");
+    CHECK(cam0.rate_hz == Approx(16).margin(2.5));
+    CHECK(cam0.lost == 0);
+}
+
+TEST_CASE("cameras: now and then two frames of one trigger: each proved one is delivered") {
+    StackSettings settings{"doubled", 83, 2, 20, "", fault("cam1", "double_frame", 150), ""};
+    settings.scenarios = {"double_every = 5", ""};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    unsigned frames = 0;
+    unsigned triggers = 0;
+    const auto status = stack.wait_for_status([&](const auto& s) {
+        const auto hint = s["cameras"][0]["hint"].template get<std::string>();
+        return std::sscanf(hint.c_str(), "sends %u frames for %u triggers", &frames, &triggers) ==
+               2;
+    });
+    CHECK(status["cameras"][0]["fault"] == "double_frames");
+    CHECK(frames == Approx(1.2 * triggers).margin(1.5));
+    const rig::Verdict verdict = judge(stack, 6);
+    // A surplus frame costs itself, and the one that shows that it is surplus.
+    CHECK(verdict.streams.at("cam0").rate_hz > 10);
+    CHECK(verdict.streams.at("cam1").rate_hz == Approx(20).margin(0.5));
+    CHECK(verdict.streams.at("cam1").lost <= 4);
+    stack.wait_for_status([](const auto& s) {  // a single one is forgotten
+        return s["cameras"][1]["frames_received"] > 200 && s["cameras"][1]["health"] == "ok";
+    });
+}
+
+TEST_CASE("cameras: two frames of every trigger are never published, and said from then on") {
+    Stack stack({"doubles", 81, 1, 20, "double_every = 1", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    const auto said = [](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find(
+                   " triggers: none of the surplus") != std::string::npos;
+    };
+    stack.wait_for_status(said);
+    // Patterns and slow starts alternate: neither makes it another fault.
+    stack.wait_for_status([&](const auto& s) {
+        INFO(s["cameras"][0].dump(1));
+        CHECK(said(s));
+        // Which of the two is the first, nobody can tell.
+        CHECK(s["cameras"][0]["frames_published"] == 0);
+        return s["cameras"][0]["frames_received"] > 200;
+    });
+}
+
+TEST_CASE("cameras: a clock of another unit than it says is named, and frames come without it") {
+    Stack stack({"tickunit", 89, 1, 20, "clock_rate = 8", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return healthy(s) && s["cameras"][0]["hint"].template get<std::string>().find(
+                                 "its clock runs 8 times as fast as it says") == 0;
+    });
+    CHECK(status["cameras"][0]["frames_published"] > 0);
+    CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(0.5));
+}
+
+TEST_CASE("cameras: block ids that begin again and again are named") {
+    const std::string receive = GENERATE("socket", "packet");
+    std::string faults;
+    for (int at = 100; at < 1000; at += 20) faults += fault("cam0", "restart_ids", at);
+    Stack stack({"restarted", 90, 1, 20, "", faults, "receive = \"" + receive + "\""});
+    stack.start_rig();
+    stack.start_service();
+    const auto status = stack.wait_for_status([](const auto& s) {
+        return s["cameras"][0]["hint"].template get<std::string>().find(
+                   "ids begin again and again") != std::string::npos;
+    });
+    CHECK(status["cameras"][0]["fault"] == "block_ids");
+    judge(stack, 4);
+}
+
 TEST_CASE("cameras: swapped trigger cables are never published, and said") {
     StackSettings settings{"swapped", 51, 2, 20, "", "", ""};
     settings.swapped = true;

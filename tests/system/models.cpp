@@ -135,3 +135,30 @@ TEST_CASE("models: the probe of each names its preset, and is ready") {
                                Catch::Contains("ready") && !Catch::Contains("not set"));
     }
 }
+
+// The presets undo both; whoever sets them by hand learns what is wrong. The last camera's slow
+// starts have a trigger in 1.5 s, which is no board without triggers.
+TEST_CASE("models: a burst or a pre-delay that is set by hand is named, and nothing else blamed") {
+    StackSettings settings{"byhand", 91, 3, 20, "model = \"hikrobot\"", "", ""};
+    settings.extras = {"[camera.features]\nStrobeLinePreDelay = 400", "",
+                       "[camera.features]\nAcquisitionBurstFrameCount = 3"};
+    Stack stack(settings);
+    stack.start_rig();
+    stack.start_service();
+    const auto hint = [](const auto& s, unsigned camera) {
+        return s["cameras"][camera]["hint"].template get<std::string>();
+    };
+    const auto leads = [&](const auto& s) {
+        return hint(s, 0).find("rises 0.38 ms before the trigger") != std::string::npos;
+    };
+    const auto bursts = [&](const auto& s) { return hint(s, 2).find("frames for") < 10; };
+    stack.wait_for_status([&](const auto& s) { return leads(s) && bursts(s); });
+    stack.wait_for_status([&](const auto& s) {
+        INFO(s["cameras"].dump(1));
+        CHECK(leads(s));
+        CHECK(bursts(s));
+        CHECK(s["cameras"][0]["frames_published"] == 0);
+        CHECK(s["cameras"][1]["health"] == "ok");
+        return s["cameras"][2]["frames_received"] > 250;
+    });
+}

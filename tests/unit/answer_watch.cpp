@@ -11,17 +11,20 @@ namespace {
 /// A camera at 20 Hz and its board.
 struct Bench {
     /// A trigger that the camera takes or ignores.
-    void trigger(bool taken, std::uint16_t flags = 0) {
+    void trigger(bool taken, std::uint16_t flags = 0, Duration latency = microseconds(20)) {
         ++number;
         wire::Exposure record{};
         record.trigger = number;
         record.trigger_ns = static_cast<std::int64_t>(number) * 50'000'000;
-        record.start_ns = taken ? record.trigger_ns + 20'000 : wire::no_time;
+        record.start_ns = taken ? record.trigger_ns + latency.ns : wire::no_time;
         record.end_ns = taken ? record.start_ns + 3'000'000 : wire::no_time;
         record.flags = static_cast<std::uint16_t>(
             flags | (taken ? wire::exposure_measured : wire::exposure_no_start));
         watch.recorded(record);
     }
+
+    /// A trigger whose record has the start of the next exposure, as a line that leads makes it.
+    void leading_trigger(Duration lead) { trigger(true, 0, milliseconds(50) - lead); }
 
     void frame(std::uint64_t id, Duration late = {}) {
         elapsed = elapsed + milliseconds(50);
@@ -37,7 +40,7 @@ struct Bench {
     Duration elapsed;
     double rate = 1;
     Duration step;  ///< of the camera's clock
-    AnswerWatch watch;
+    AnswerWatch watch{milliseconds(50)};
 };
 
 }  // namespace
@@ -108,4 +111,23 @@ TEST_CASE("answer_watch: a clock in another unit is known, one that steps or dri
     }
     CHECK(stepped.watch.report().clock_rate == 1);
     CHECK(late.watch.report().clock_rate == 1);
+}
+
+TEST_CASE("answer_watch: an exposure line that rises before its trigger leads") {
+    Bench bench;
+    for (int i = 0; i < 4; ++i) bench.leading_trigger(microseconds(380));
+    bench.trigger(false);  // before a gap of the pattern
+    CHECK(bench.watch.report().lead.ns == 0);
+    bench.leading_trigger(microseconds(380));
+    CHECK(bench.watch.report().lead == microseconds(380));
+    bench.trigger(false);  // in a slow start
+    CHECK(bench.watch.report().lead == microseconds(380));
+    bench.trigger(true);
+    CHECK(bench.watch.report().lead.ns == 0);
+    for (int i = 0; i < 9; ++i) bench.leading_trigger(milliseconds(7));  // it starts late
+    CHECK(bench.watch.report().lead.ns == 0);
+    for (int i = 0; i < 9; ++i) bench.leading_trigger(milliseconds(4));
+    CHECK(bench.watch.report().lead == milliseconds(4));
+    bench.watch.begin_anew();
+    CHECK(bench.watch.report().lead.ns == 0);
 }

@@ -32,7 +32,7 @@ struct Bench {
             camera.camera.state = CameraState::streaming;
             camera.camera.packet_size = 9000;
             camera.pipeline.pairing = pairing::State::locked;
-            camera.pipeline.last_sign = now;
+            camera.pipeline.last_sign = camera.pipeline.last_record = now;
             camera.pipeline.told_exposure = camera.pipeline.exposure = milliseconds(3);
             camera.recent.received = camera.recent.published = camera.recent.triggers = 20;
             camera.delivery = {true, true, false, now - seconds(59), 20};
@@ -246,9 +246,70 @@ TEST_CASE("diagnosis: no triggers, of the board or of the master") {
     Bench bench;
     bench.cam().delivery.full = false;
     bench.cam().recent = {};
+    bench.cam().pipeline.last_record = now - seconds(5);
     check(bench.camera(), Fault::no_triggers, "'output'");
     bench.cam().configuration.master = "cam1";
     check(bench.camera(), Fault::no_triggers, "cam1");
+}
+
+TEST_CASE("diagnosis: a board that triggers slowly, or over a slow link, is not blamed") {
+    Bench bench;
+    bench.cam().delivery.full = false;
+    bench.cam().recent = {};  // nothing within the last second
+    bench.cam().pipeline.pairing = pairing::State::searching;
+    bench.cam().pipeline.last_record = now - milliseconds(3200);  // 1.75 s apart, at the slowest
+    CHECK(bench.camera().fault != Fault::no_triggers);
+    bench.cam().pipeline.last_record = now - milliseconds(3300);
+    check(bench.camera(), Fault::no_triggers, "'output'");
+    bench.status.clock.round_trip = milliseconds(400);
+    CHECK(bench.camera().fault != Fault::no_triggers);
+    bench.cam().pipeline.last_record = {};
+    bench.cam().delivery = {false, true, true, now - seconds(3), 0};  // it was asked just now
+    CHECK(bench.camera().fault != Fault::no_triggers);
+}
+
+TEST_CASE("diagnosis: what a slow link still holds is neither missing nor too much") {
+    Bench bench;
+    bench.cam().delivery.full = false;
+    bench.cam().pipeline.record_delay = milliseconds(190);
+    bench.cam().recent.published = 16;
+    bench.cam().recent.received = 24;  // of which the records of four are on their way
+    CHECK(bench.camera().fault == Fault::too_slow);
+    bench.cam().recent.received = 16;  // the rate fell four periods ago
+    CHECK(bench.camera().fault == Fault::too_slow);
+    bench.cam().recent.received = 30;
+    check(bench.camera(), Fault::double_frames, "sends 30 frames for 20 triggers");
+    bench.cam().recent.received = 10;
+    check(bench.camera(), Fault::no_frames, "10 of the last 20 exposures have no frame");
+}
+
+TEST_CASE("diagnosis: a slow start's pauses are no camera that does not expose") {
+    Bench bench;
+    bench.refuse(EventReason::unproved, 20);
+    bench.cam().recent.received = bench.cam().recent.triggers = bench.cam().recent.unmeasured = 4;
+    bench.cam().pipeline.measured = false;
+    bench.cam().pipeline.last_sign = now - milliseconds(900);
+    bench.cam().pipeline.last_record = now - milliseconds(860);
+    check(bench.camera(), Fault::strobe_missing, "exposure line");
+    bench.cam().pipeline.last_record = now;
+    check(bench.camera(), Fault::no_exposure, "not answered a trigger for 0.9 s");
+}
+
+TEST_CASE("diagnosis: an exposure line that rises before its trigger") {
+    Bench bench;
+    bench.refuse(EventReason::unproved, 20);
+    bench.cam().pipeline.answers.lead = microseconds(380);
+    check(bench.camera(), Fault::line_delays, "rises 0.38 ms before the trigger");
+    bench.cam().configuration.strobe = Strobe::none;
+    check(bench.camera(), Fault::unproved, "do not follow");
+}
+
+TEST_CASE("diagnosis: a board that is being set up is not silent") {
+    Bench bench;
+    bench.status.board.state = BoardState::handshake;
+    CHECK(bench.board().fault == Fault::starting);
+    bench.status.clock.since_contact = milliseconds(1200);
+    check(bench.board(), Fault::board_silent, "nothing came from it for 1.2 s");
 }
 
 TEST_CASE("diagnosis: late records are told with how late they are") {
@@ -305,6 +366,14 @@ TEST_CASE("diagnosis: block ids that do not count") {
     answers.ids_repeated = 0;
     answers.ids_restarted = 2;
     check(bench.camera(), Fault::block_ids, "ids began again 2 times");
+    bench.cam().camera.renumbers = true;
+    bench.cam().camera.state = CameraState::opening;
+    bench.cam().camera.hint = "it is being reopened";
+    check(bench.camera(), Fault::block_ids, "again and again, and it is reopened");
+    bench.cam().camera.state = CameraState::streaming;
+    bench.cam().delivery.full = true;  // the fault has ended
+    bench.cam().camera.hint.clear();
+    CHECK(bench.camera().fault == Fault::none);
 }
 
 TEST_CASE("diagnosis: a clock in another unit is a remark when frames are paired without it") {

@@ -37,6 +37,7 @@ struct Bench {
         pipeline.published += whole;
         pipeline.incomplete += 10 - whole;
         pipeline.refused[1] += 10 - whole;
+        pipeline.last_record = now;
         if (!mute) pipeline.last_sign = now;
         status.imus[0].report.published += 100;
         status.now = now;
@@ -68,6 +69,32 @@ TEST_CASE("health_watch: from the start to full, to a loss within two seconds, a
     CHECK(bench.status.cameras[0].diagnosis.since == since);
     for (int i = 0; i < 8; ++i) bench.step();
     CHECK(health(bench.status) == Health::ok);
+}
+
+TEST_CASE("health_watch: a slow start's few triggers are looked at together") {
+    Bench bench;
+    CameraStatus& camera = bench.status.cameras[0];
+    camera.pipeline.pairing = pairing::State::searching;
+    const auto look = [&](std::uint64_t triggers) {
+        bench.now = bench.now + milliseconds(500);
+        camera.pipeline.triggers += triggers;
+        camera.pipeline.received += 2 * triggers;
+        camera.pipeline.last_sign = camera.pipeline.last_record = bench.now;
+        bench.status.now = bench.now;
+        bench.watch.examine(bench.status);
+    };
+    for (int i = 0; i < 20; ++i) look(10);
+    CHECK(camera.recent.triggers == 20);
+    CHECK(camera.diagnosis.fault == Fault::double_frames);
+    for (int i = 0; i < 20; ++i) {
+        look(i % 3 == 0 ? 1 : 0);
+        CHECK(camera.diagnosis.fault == Fault::double_frames);
+        CHECK(camera.recent.triggers >= 4);
+    }
+    for (int i = 0; i < 13; ++i) look(0);
+    CHECK(camera.recent.triggers == 1);
+    for (int i = 0; i < 3; ++i) look(0);
+    CHECK(camera.recent.triggers == 0);
 }
 
 TEST_CASE("health_watch: frames that are published as suspect are not delivered") {
