@@ -117,7 +117,7 @@ struct Routing {
     };
     /// `force`: even while a master exposes; its pulse is cut, and `clean` says so. The first one
     /// of all makes the outputs drive their pins, triggers at rest and the others low, and may take
-    /// 300 us.
+    /// 400 us.
     virtual Switched route(const Routes& routes, bool force) = 0;
 
  protected:

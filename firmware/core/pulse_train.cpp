@@ -14,7 +14,7 @@ static_assert(furthest > OutputQueue::horizon);
 constexpr Nanoseconds wake_ahead = 700'000;
 /// What is decided later than that may leave late. At half, a port with a horizon of its own
 /// makes it late; at twice, pulses are left out that would be on time.
-constexpr Nanoseconds soonest = 300'000;
+constexpr Nanoseconds soonest = 400'000;
 
 }  // namespace
 

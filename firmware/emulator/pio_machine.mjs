@@ -19,6 +19,9 @@ const one = 256; // the divider's unit
 
 const none = -1;
 
+const mov_isr_x = 0xc1; // and the other way, without the delay
+const mov_x_isr = 0x26;
+
 function rotate_left(word, bits) {
     return bits === 0 ? word : (word << bits) | (word >>> (32 - bits));
 }
@@ -346,11 +349,12 @@ export class StateMachine {
             case 0:
                 return true;
             case 1:
-                this.x_used = true;
+                this.use_x();
                 return this.x === 0;
             case 2: {
                 const was = this.x;
                 this.x = (was - 1) >>> 0;
+                if (this.x_lent) return was !== 0;
                 ++this.x_taken;
                 if (was === 0) this.x_used = true; // the next round goes another way
                 return was !== 0;
@@ -366,7 +370,7 @@ export class StateMachine {
                 return was !== 0;
             }
             case 5:
-                this.x_used = true;
+                this.use_x();
                 this.y_used = true;
                 return this.x !== this.y;
             case 6:
@@ -429,7 +433,7 @@ export class StateMachine {
             case 0:
                 return this.read_in_pins(count);
             case 1:
-                this.x_used = true;
+                this.use_x();
                 return this.x;
             case 2:
                 this.y_used = true;
@@ -439,6 +443,7 @@ export class StateMachine {
             case 5:
                 return this.status();
             case 6:
+                this.lose_count();
                 return this.isr;
             case 7:
                 return this.osr;
@@ -455,6 +460,7 @@ export class StateMachine {
 
     shift_in(opcode) {
         const count = opcode & 31 || 32;
+        this.lose_count();
         if (!this.pushes) {
             const number = (opcode >>> 5) & 7;
             if (number === 5) fault('PIO: IN from a reserved source');
@@ -527,8 +533,7 @@ export class StateMachine {
             case 0:
                 return this.pio.write_pins(this, this.out_mask, rotate_left(value, this.out_base));
             case 1:
-                this.x = value >>> 0;
-                this.x_used = true;
+                this.set_x(value >>> 0);
                 return;
             case 2:
                 this.y = value >>> 0;
@@ -542,6 +547,7 @@ export class StateMachine {
                 this.jumps_by_data = true;
                 return this.jump(value & 31);
             case 6:
+                this.lose_count();
                 this.isr = value >>> 0;
                 this.isc = count;
                 return;
@@ -584,6 +590,8 @@ export class StateMachine {
     }
 
     move(opcode) {
+        if ((opcode & 0xff) === mov_isr_x && this.keep_count()) return;
+        if ((opcode & 0xff) === mov_x_isr && this.fetch_count()) return;
         const operation = (opcode >>> 3) & 3;
         let value = this.source(opcode & 7, 32);
         if (operation === 1) value = ~value >>> 0;
@@ -592,6 +600,7 @@ export class StateMachine {
         if (destination === 3) fault('PIO: MOV to a reserved destination');
         if (destination === 4) this.next_exec = value & 0xffff;
         else if (destination === 6) {
+            this.lose_count();
             this.isr = value;
             this.isc = 0;
         } else if (destination === 7) {
@@ -625,8 +634,7 @@ export class StateMachine {
             case 0:
                 return this.pio.write_pins(this, this.set_mask, rotate_left(value, this.set_base));
             case 1:
-                this.x = value;
-                this.x_used = true;
+                this.set_x(value);
                 return;
             case 2:
                 this.y = value;
@@ -639,12 +647,48 @@ export class StateMachine {
         }
     }
 
-    // Loops.
+    // Loops. X may leave its count in the ISR and be used for something else meanwhile.
+
+    use_x() {
+        if (!this.x_lent) this.x_used = true;
+    }
+
+    set_x(value) {
+        this.x = value;
+        if (this.counts_in_isr) this.x_lent = true;
+        else this.x_used = true;
+    }
+
+    keep_count() {
+        if (this.x_used || this.x_lent) return false;
+        this.isr = this.x;
+        this.isc = 0;
+        this.counts_in_isr = true;
+        this.kept_taken = this.x_taken;
+        return true;
+    }
+
+    fetch_count() {
+        if (!this.counts_in_isr) return false;
+        this.x = this.isr;
+        this.x_lent = false;
+        this.x_taken = this.kept_taken;
+        return true;
+    }
+
+    /// The ISR is used otherwise.
+    lose_count() {
+        if (this.counts_in_isr) this.is_pure = false;
+        this.counts_in_isr = false;
+    }
 
     forget_loop() {
         this.is_pure = true; // nobody but the machine itself sees what it does
         this.x_used = false;
         this.y_used = false;
+        this.x_lent = false;
+        this.counts_in_isr = false;
+        this.kept_taken = 0;
         this.x_taken = 0;
         this.y_taken = 0;
         this.seen_mask = 0;
@@ -671,8 +715,10 @@ export class StateMachine {
     is_unchanged() {
         const counts = (used, taken, before, now) =>
             (before - now) >>> 0 === taken && (taken === 0 || !used);
+        const isr = this.counts_in_isr ? this.x : this.loop_isr;
         return (
-            this.isr === this.loop_isr &&
+            !this.x_lent &&
+            this.isr === isr &&
             this.osr === this.loop_osr &&
             this.isc === this.loop_isc &&
             this.osc === this.loop_osc &&
@@ -708,6 +754,7 @@ export class StateMachine {
         this.parked = false;
         this.x = (this.x - rounds * this.x_taken) >>> 0;
         this.y = (this.y - rounds * this.y_taken) >>> 0;
+        if (this.counts_in_isr) this.isr = this.x;
         this.next = this.cycle_of(this.park_index + rounds * this.park_ticks);
         this.forget_loop();
         this.loop_pc = none;

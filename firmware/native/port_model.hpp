@@ -39,7 +39,7 @@ inline PortModel slow_model(Nanoseconds call_ns, std::uint64_t seed) {
     model.interrupt_ns = 5'000;
     model.wake_ns = 2'000;
     model.seed = seed;
-    model.word_lead_ns = 300'000;
+    model.word_lead_ns = 380'000;
     model.edge_lag_ns = 2'000;
     model.imu_start_ns = 2'000;
     model.store_ns = 400'000'000;

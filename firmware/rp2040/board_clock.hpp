@@ -20,6 +20,28 @@ class BoardClock final : public firmware::Clock64 {
         began_us_ = before + 1;
     }
 
+    /// The state machines have just started.
+    void count_cycles() {
+        constexpr std::uint32_t enable_from_processor = 5;
+        cycle_counter().reload = most_cycles - 1;
+        cycle_counter().current = 0;
+        cycle_counter().control = enable_from_processor;
+    }
+    /// Until a cycle that is not more than 67 ms off, but for a constant.
+    std::int32_t cycles_until(std::uint32_t cycle) const {
+        return static_cast<std::int32_t>((cycle_counter().current + cycle) << 8U) >> 8U;
+    }
+
+    // Where 64 bits take too long: what is left of them when the higher ones are cut off.
+
+    std::uint32_t low_ns() const { return (timer().low - began_us_) * 1000U; }
+    std::uint32_t low_cycles() const { return (timer().low - began_us_) * (1000U / cycle_ns); }
+    static std::uint32_t cycle_of(Nanoseconds at) { return static_cast<std::uint32_t>(at >> 3U); }
+    /// What has these lower bits and is nearest to `now`.
+    static Nanoseconds from_low_ns(std::uint32_t low_ns, Nanoseconds now) {
+        return now + static_cast<std::int32_t>(low_ns - static_cast<std::uint32_t>(now));
+    }
+
     Nanoseconds now() override { return since_begin(count()); }
 
     /// Of a count of the timer that is not yet old, or not far ahead.
@@ -48,6 +70,8 @@ class BoardClock final : public firmware::Clock64 {
             high = again;
         }
     }
+
+    static constexpr std::uint32_t most_cycles = 1U << 24U;
 
     std::uint32_t began_us_ = 0;
 };

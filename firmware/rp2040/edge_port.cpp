@@ -3,24 +3,27 @@
 
 #include "clocks.hpp"
 #include "dma_channels.hpp"
+#include "start.hpp"
 
 namespace versavis::rp2040 {
 
 namespace {
 
-/// Changes that a channel writes until it is started anew. At half, twice as many interrupts; at
+/// Words that a channel writes until the other one goes on. At half, twice as many interrupts; at
 /// twice, a test takes twice as long to get there.
 constexpr std::uint32_t run = 1U << 16U;
 
-/// From an edge at the pin to the count that stamps it, on average: the synchroniser, half of the
-/// watcher's loop, its way to the strobe, half of the stamper's loop.
-constexpr Nanoseconds stamp_delay = 13 * cycle_ns / 2;
+/// An edge through the loop may be stamped so far off. At half, good ones are; at twice, a stamp
+/// that is off by a sample is not noticed.
+constexpr std::int32_t loop_tolerance = 48;
 
-/// A count may be so much newer than the clock that was read before it. At half and at twice the
-/// same.
-constexpr std::uint32_t newer_ticks = 1'000;
+/// An edge through the loop that has not come by then does not come. At half, one may be under way;
+/// at twice, a fault is found out later.
+constexpr std::int32_t loop_patience = 100'000;
 
-constexpr Nanoseconds tick_ns = stamper::tick_cycles * cycle_ns;
+/// So many edges have to come back before stamps are trusted. At half, edges that are off by
+/// another time may be right by chance; at twice, a start takes twice as long.
+constexpr unsigned loops_to_trust = 8;
 
 constexpr std::uint32_t pin_bit(unsigned pin) { return 1U << (pin - first_input); }
 
@@ -41,85 +44,74 @@ constexpr std::array<std::uint8_t, watched_inputs> inputs_by_pin() {
 }
 constexpr std::array<std::uint8_t, watched_inputs> input_of = inputs_by_pin();
 
-[[gnu::section(".rings")]] alignas(EdgePort::capacity * 4) std::uint32_t states[EdgePort::capacity];
-[[gnu::section(".rings")]] alignas(EdgePort::capacity * 4) std::uint32_t counts[EdgePort::capacity];
+std::int32_t since(std::uint32_t at, std::uint32_t now) {
+    return static_cast<std::int32_t>(now - at);
+}
 
-constexpr unsigned ring_channels[2] = {dma_states, dma_counts};
+constexpr std::uint32_t loop_bit = pin_bit(pin_loop);
+
+[[gnu::section(".rings")]] alignas(EdgePort::capacity * 4) std::uint32_t words[EdgePort::capacity];
+
+constexpr unsigned ring_channels[2] = {dma_edges0, dma_edges1};
 
 }  // namespace
 
+/// Words that the ring has got since the start.
+[[gnu::always_inline]] inline std::uint32_t EdgePort::written() const {
+    for (;;) {
+        const std::uint32_t runs = runs_;
+        const std::uint32_t left = dma().channels[ring_channels[runs % 2]].count;
+        if (runs == runs_) return runs * run + run - left;
+    }
+}
+
+/// What the ring had at this index is no longer there.
+[[gnu::always_inline]] inline bool EdgePort::overwritten(std::uint32_t index) const {
+    return written() - index > capacity;
+}
+
 void EdgePort::set_up() {
     for (const SignalPin& input : input_pins) set_function(input.pin, function_none, override_low);
-    set_up_machines();
-    set_up_rings();
+    set_up_machine();
+    set_up_ring();
 }
 
-void EdgePort::set_up_machines() {
+void EdgePort::set_up_machine() {
     Shifting shifting;
     shifting.join_receive = true;
+    shifting.push_at = watched_pins;
     MachinePins pins;
     pins.in = first_input;
-    pins.side = pin_strobe;
-    pins.side_count = 1;
     watcher_.load(watcher::code, watcher::place);
     watcher_.set_up(watcher::place, pins, shifting);
-    watcher_.make_outputs(pin_strobe, 1);
-    watcher_.execute(pio_assembly::set(pio_assembly::To::y, 0));
+    for (const pio_assembly::To counter : {pio_assembly::To::x, pio_assembly::To::y})
+        watcher_.execute(pio_assembly::set(counter, 0));
     watcher_.execute(pio_assembly::jump(watcher::place.wrap_bottom));
-    set_function(pin_strobe, function_pio0);
-    // It comes from the same clock.
-    set_bits(pio(0).bypass_synchroniser, 1U << pin_strobe);
-
-    MachinePins strobe;
-    strobe.jump = pin_strobe;
-    stamper_.load(stamper::code, stamper::place);
-    stamper_.set_up(stamper::place, strobe, shifting);
-    stamper_.execute(pio_assembly::set(pio_assembly::To::x, 0));
-    stamper_.execute(pio_assembly::jump(stamper::place.wrap_bottom));
 }
 
-void EdgePort::set_up_rings() {
-    Register* const fifos[2] = {&pio(0).receive[watcher::machine],
-                                &pio(0).receive[stamper::machine]};
-    std::uint32_t* const rings[2] = {states, counts};
-    const unsigned machines[2] = {watcher::machine, stamper::machine};
-    for (unsigned i = 0; i < 2; ++i) {
+/// Two channels that start each other: there is no moment without one.
+void EdgePort::set_up_ring() {
+    for (unsigned i = 2; i-- > 0;) {  // the one that is started is the first
         DmaChannel& channel = dma().channels[ring_channels[i]];
-        channel.read_address = reinterpret_cast<std::uintptr_t>(fifos[i]);
-        channel.write_address = reinterpret_cast<std::uintptr_t>(rings[i]);
+        channel.read_address = reinterpret_cast<std::uintptr_t>(&pio(0).receive[watcher::machine]);
+        channel.write_address = reinterpret_cast<std::uintptr_t>(words);
         channel.count = run;
-        channel.control_trigger = dma_enable | dma_words | dma_increment_write | dma_ring_on_write |
-                                  dma_ring_bits(ring_bits) | dma_chain_to(ring_channels[i]) |
-                                  dma_paced_by(request_pio0_receive0 + machines[i]);
+        const std::uint32_t control = dma_enable | dma_words | dma_increment_write |
+                                      dma_ring_on_write | dma_ring_bits(ring_bits) |
+                                      dma_chain_to(ring_channels[1 - i]) |
+                                      dma_paced_by(request_pio0_receive0 + watcher::machine);
+        if (i == 0)
+            channel.control_trigger = control;
+        else
+            channel.alias1_control = control;
     }
-    dma().interrupt0_enable = 1U << dma_states | 1U << dma_counts;
+    dma().interrupt0_enable = 1U << dma_edges0 | 1U << dma_edges1;
     set_bits(pio(0).interrupt0_enable, 1U << (8U + watcher::flag));
 }
 
-void EdgePort::continue_rings() {
-    const std::uint32_t ended = dma().interrupt0_status;
-    for (unsigned i = 0; i < 2; ++i) {
-        if ((ended >> ring_channels[i] & 1U) == 0) continue;
-        dma().interrupt0_status = 1U << ring_channels[i];
-        runs_[i] = runs_[i] + 1;
-        dma().channels[ring_channels[i]].alias1_count_trigger = run;
-    }
-}
-
-/// Words that a ring has got since the start.
-std::uint32_t EdgePort::written(unsigned ring) const {
-    for (;;) {
-        const std::uint32_t runs = runs_[ring];
-        const std::uint32_t left = dma().channels[ring_channels[ring]].count;
-        if (runs == runs_[ring]) return runs * run + run - left;
-    }
-}
-
-/// Changes whose state and stamp are in the rings, since the start.
-std::uint32_t EdgePort::arrived() const {
-    const std::uint32_t with_state = written(0);
-    const std::uint32_t with_stamp = written(1) - stamps_ahead_;
-    return static_cast<std::int32_t>(with_stamp - with_state) < 0 ? with_stamp : with_state;
+void EdgePort::count_run() {
+    dma().interrupt0_status = 1U << ring_channels[runs_ % 2];
+    runs_ = runs_ + 1;
 }
 
 void EdgePort::listen(std::uint32_t inputs) {
@@ -136,8 +128,8 @@ void EdgePort::invert(std::uint32_t inputs) {
     apply(changed);
 }
 
-/// Until what the watcher has seen by now is in them.
-void EdgePort::wait_for_rings() const {
+/// Until what the watcher has seen by now is in it.
+void EdgePort::wait_for_ring() const {
     const Nanoseconds begun = clock_.now();
     while (clock_.now() - begun <= 2 * known_after) {
     }
@@ -153,14 +145,14 @@ void EdgePort::apply(std::uint32_t pins) {
                                                            : override_none;
         set_function(first_input + i, function_none, seen);
     }
-    wait_for_rings();
-    const std::uint32_t until = arrived();
+    wait_for_ring();
+    const std::uint32_t until = written();
     quiet_ |= pins;
     for (unsigned i = 0; i < watched_inputs; ++i)
         if ((pins >> i & 1U) != 0) quiet_until_[i] = until;
 }
 
-/// Pins that are quiet in the change of this index, which is the next to be read.
+/// Pins that are quiet in the word of this index, which is the next to be read.
 std::uint32_t EdgePort::quiet(std::uint32_t index) {
     for (unsigned i = 0; i < watched_inputs; ++i)
         if ((quiet_ >> i & 1U) != 0 && static_cast<std::int32_t>(index - quiet_until_[i]) >= 0)
@@ -168,59 +160,79 @@ std::uint32_t EdgePort::quiet(std::uint32_t index) {
     return quiet_;
 }
 
-Nanoseconds EdgePort::time_of(std::uint32_t index) const {
-    const std::uint32_t ticks = 0U - counts[(index + stamps_ahead_) % capacity];
-    // When the change was looked at, which was soon after it.
-    const std::uint64_t now = static_cast<std::uint64_t>(scanned_at_) / tick_ns + newer_ticks;
-    const std::uint32_t ago = static_cast<std::uint32_t>(now) - ticks;
-    return static_cast<Nanoseconds>(now - ago) * tick_ns - stamp_delay;
-}
-
 /// Looks at what is new: does it need attention, and did a data-ready input rise?
 void EdgePort::scan() {
-    // Most of the time there is nothing, which this tells without much work.
-    const std::uint32_t left = dma().channels[dma_states].count + dma().channels[dma_counts].count;
-    if (left == scanned_left_) return;
-    scanned_left_ = left;
-    scanned_at_ = clock_.now();
-    const std::uint32_t end = arrived();
-    if (watcher_.overflowed() || stamper_.overflowed() || end - read_ > capacity) return drop_all();
-    for (; scanned_ != end; ++scanned_) {
-        const std::uint32_t state = states[scanned_ % capacity];
-        const std::uint32_t changed = (state ^ scanned_state_) & listened_;
-        scanned_state_ = state;
-        if ((changed & ~ready_pins) != 0) attention_ = true;
-        std::uint32_t rises = changed & state & ready_pins & ~quiet_;
-        for (unsigned i = 0; rises != 0; rises >>= 1U, ++i)
-            if ((rises & 1U) != 0) rise_[i] = time_of(scanned_);
-    }
+    const std::uint32_t end = written();
+    const std::uint32_t now = clock_.low_ns();
+    const bool too_late = now - scanned_low_ns_ > SampleClock::oldest;
+    scanned_low_ns_ = now;
+    if (loop_.awaited && end == scanned_ && since(loop_.at_low_ns, now) > loop_patience)
+        judge_loop(false);
+    if (end == scanned_) return samples_.pass(now);
+    if (watcher_.overflowed()) restart_at_once();  // the times of all words after are unknown
+    if (too_late || end - read_ > capacity) return drop_all();
+    for (; scanned_ != end; ++scanned_) scan_word(words[scanned_ % capacity], now);
+    if (overwritten(read_)) return drop_all();
     if (end - read_ > capacity / 2) attention_ = true;
 }
 
-/// Which edges are in the rings is no longer known: they begin anew.
+void EdgePort::scan_word(std::uint32_t word, std::uint32_t now_low_ns) {
+    samples_.next(word >> watched_pins, now_low_ns);
+    low_ns_[scanned_ % capacity] = samples_.edge();
+    const std::uint32_t all_changed = word ^ scanned_state_;
+    const std::uint32_t changed = all_changed & listened_;
+    scanned_state_ = word;
+    if ((changed & ~ready_pins) != 0) attention_ = true;
+    if ((all_changed & loop_bit) != 0) loop_came_back();
+    std::uint32_t rises = changed & word & ready_pins & ~quiet_;
+    for (unsigned i = 0; rises != 0; rises >>= 1U, ++i)
+        if ((rises & 1U) != 0) rise_[i] = BoardClock::from_low_ns(samples_.edge(), clock_.now());
+}
+
+void EdgePort::loop_came_back() {
+    if (!loop_.awaited) return;  // dropped, with what was before it
+    const std::int32_t off = since(loop_.at_low_ns, samples_.edge());
+    judge_loop(off >= -loop_tolerance && off <= loop_tolerance);
+}
+
+/// Without the proof that stamps are right, there are none.
+void EdgePort::judge_loop(bool as_expected) {
+    loop_.awaited = false;
+    loops_good_ = as_expected ? loops_good_ + 1 : 0;
+    const bool proved = loops_good_ >= loops_to_trust;
+    if (loop_.proved && !proved) {
+        ++lost_;
+        attention_ = true;
+    }
+    loop_.proved = proved;
+}
+
+/// Which edges there were is no longer known.
 void EdgePort::drop_all() {
-    // From its loop on again, with the strobe low: what it was about to tell, it finds again.
-    watcher_.stop();
-    watcher_.execute(pio_assembly::side(pio_assembly::jump(watcher::place.wrap_bottom), 1, 0));
-    wait_for_rings();
-    lost_ += arrived() - read_ + 1;
-    read_ = scanned_ = written(0);
-    stamps_ahead_ = written(1) - read_;
-    state_ = scanned_state_ = states[(read_ - 1) % capacity];
+    wait_for_ring();
+    const std::uint32_t end = written();
+    lost_ += end - read_;
+    samples_.skip(end - scanned_);
+    read_ = scanned_ = end;
+    state_ = scanned_state_ = words[(end - 1) % capacity];
     changes_ = 0;
     attention_ = true;
-    watcher_.forget_faults();
-    stamper_.forget_faults();
-    watcher_.run();
+    loop_.awaited = false;  // it may be among them
 }
 
 void EdgePort::take_change() {
-    const std::uint32_t state = states[read_ % capacity];
-    std::uint32_t changed = (state ^ state_) & listened_ & (state | ~ready_pins);
+    const std::uint32_t word = words[read_ % capacity];
+    if (overwritten(read_)) return drop_all();
+    std::uint32_t changed = (word ^ state_) & listened_ & (word | ~ready_pins);
     if (quiet_ != 0) changed &= ~quiet(read_);
-    if (changed != 0) changed_at_ = time_of(read_);
-    state_ = state;
+    if (!loop_.proved && changed != 0) {
+        ++lost_;
+        changed = 0;
+    }
+    state_ = word;
     changes_ = changed;
+    // The core is polled once a second at least, so what is settled is never long ago.
+    if (changed != 0) changed_at_ = BoardClock::from_low_ns(low_ns_[read_ % capacity], settled_);
     ++read_;
 }
 

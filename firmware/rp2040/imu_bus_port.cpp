@@ -90,13 +90,10 @@ Nanoseconds later(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 }  // namespace
 
 void ImuBusPort::set_up() {
-    for (const unsigned pin : {pin_spi_receive, pin_spi_clock, pin_spi_transmit})
-        set_function(pin, function_spi);
+    set_function(pin_spi_receive, function_spi);
     sio().out_set = 1U << pin_spi_select0 | 1U << pin_spi_select1;
     sio().enable_set = 1U << pin_spi_select0 | 1U << pin_spi_select1;
-    set_function(pin_spi_select0, function_sio);
-    set_function(pin_i2c_data, function_i2c);
-    set_function(pin_i2c_clock, function_i2c);
+    for (const unsigned pin : {pin_spi_select0, pin_spi_select1}) set_function(pin, function_sio);
     set_up_i2c();
     set_up_spi();
     transmit_channel().write_address = reinterpret_cast<std::uintptr_t>(&spi0().data);
@@ -297,17 +294,24 @@ void ImuBusPort::time_reached() {
     ask_for_i2c();
 }
 
+/// Until the first transfer they are inputs: the part may be on either bus.
+void ImuBusPort::use_shared_pins(Function function) {
+    if (shared_pins_ == function) return;
+    shared_pins_ = function;
+    for (const unsigned pin : {pin_i2c_data, pin_i2c_clock}) set_function(pin, function);
+}
+
 /// All that can be done before the transfer begins.
 void ImuBusPort::prepare() {
     position_ = 0;
     reply().refused = false;
     select_bit_ = is_spi() ? select_bit(transfer().chip) : 0;
+    use_shared_pins(is_spi() ? function_spi : function_i2c);
     if (select_bit_ == 0) return;
     if (transfer().clock_hz != spi_hz_) {
         spi_hz_ = transfer().clock_hz;
         set_spi_clock(spi_hz_);
     }
-    if (transfer().chip != 0) set_function(pin_spi_select1, function_sio);
     prepare_part();
 }
 
@@ -351,7 +355,6 @@ void ImuBusPort::end_transfer() {
 
 void ImuBusPort::begin_i2c() {
     started_us_ = timer().low;
-    set_function(pin_i2c_clock, function_i2c);
     received_ = 0;
     reply().bytes[0] = transfer().bytes[0];
     i2c1().enable = 0;

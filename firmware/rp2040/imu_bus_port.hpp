@@ -44,6 +44,7 @@ class ImuBusPort final : public firmware::ImuBus {
     void set_alarm(Nanoseconds at);
     void cancel_alarm();
     void prepare();
+    void use_shared_pins(Function function);
     void prepare_part();
     void begin();
     void begin_part();
@@ -68,6 +69,7 @@ class ImuBusPort final : public firmware::ImuBus {
     std::size_t part_ = 0;      ///< of them, that goes on without a gap
     std::size_t received_ = 0;  ///< by I2C, after the first
     std::uint32_t spi_hz_ = 0;
+    Function shared_pins_ = function_none;  ///< of the pins that SPI and I2C share
     unsigned taken_ = 0;
     std::uint32_t select_bit_ = 0;  ///< of the transfer's part; 0: on I2C
     unsigned edge_bank_ = 0;        ///< of the pin that starts the job

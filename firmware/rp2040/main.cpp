@@ -33,9 +33,11 @@ constexpr std::uint32_t fastest_imu_millihertz = 4'000'000;
 struct Ports {
     BoardClock clock;
     Attention attention;
-    OutputPort outputs{clock, attention};
-    EdgePort edges{clock};
-    RoutingPort routing{clock, outputs, edges};
+    LoopSignal loop;
+    LightPort light{clock};
+    OutputPort outputs{clock, attention, light, loop};
+    EdgePort edges{clock, loop};
+    RoutingPort routing{clock, outputs, edges, light};
     ImuBusPort imu_bus{clock, edges, attention};
     UartPort uart{clock, attention};
     NoImuOutput imu_output;
@@ -96,6 +98,7 @@ void start_blocks() {
 
 void start_ports() {
     Ports& all = ports();
+    all.light.set_up();
     all.outputs.set_up();
     all.edges.set_up();
     all.routing.set_up();
@@ -105,8 +108,9 @@ void start_ports() {
         const InterruptsOff undisturbed;
         all.clock.begin();
         const std::uint32_t machines =
-            1U << sequencer::machine | 1U << watcher::machine | 1U << stamper::machine;
+            1U << sequencer::machine | 1U << watcher::machine | 1U << light::machine;
         set_bits(pio(0).control, machines | machines << pio_divider_restart_shift);
+        all.clock.count_cycles();
     }
     enable_interrupt(interrupt_usb, 0);
     enable_interrupt(interrupt_gpio, 0);
@@ -192,7 +196,7 @@ void on_change() {
     ports().edges.changed();
     Attention::wake();
 }
-void on_ring_end() { ports().edges.continue_rings(); }
+void on_ring_end() { ports().edges.count_run(); }
 void on_bus_dma() { ports().imu_bus.transferred(); }
 void on_data_ready() { ports().imu_bus.data_ready(); }
 void on_uart() { ports().uart.moved(); }

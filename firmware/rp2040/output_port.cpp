@@ -10,28 +10,53 @@ namespace {
 
 /// How often words are sent. At half, it takes twice the processor's time; at twice, the sequencer
 /// runs dry, as it does after an interrupt that is held up for 50 us.
-constexpr std::uint32_t commit_interval_us = 250;
+constexpr std::uint32_t commit_interval_us = 330;
 
 /// How far ahead they are sent: a word leaves no sooner after it was pushed. At half, the sequencer
 /// runs dry; at twice, the core comes too late.
-constexpr Nanoseconds ahead = 300'000;
+constexpr Nanoseconds ahead = 380'000;
 
 /// Within that time after a word has left, its room in the sequencer's FIFO is taken again. At
 /// half, an interrupt that is held up makes words late without telling; at twice, more of eight
 /// words that are close together are moved.
 constexpr Nanoseconds refill = 5'000;
 
+constexpr std::uint32_t ahead_cycles = ahead / cycle_ns;
+constexpr std::int32_t step_cycles = sequencer::shortest_cycles;
+
 Nanoseconds later(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 
-/// Bits of the sequencer's word by those of the HAL.
-constexpr std::uint32_t pin_levels(std::uint32_t levels) {
-    std::uint32_t pins = 0;
-    for (const SignalPin& output : output_pins)
-        pins |= (levels >> output.signal & 1U) << (output.pin - first_output);
-    return pins;
+std::int32_t from(std::uint32_t cycle, std::uint32_t to) {
+    return static_cast<std::int32_t>(to - cycle);
+}
+
+/// After so many commits the main loop runs, whatever else. At half, it takes twice the processor's
+/// time; at twice, edges may be too old for their counts.
+constexpr unsigned commits_per_wake = 48;
+
+/// After so many an edge goes through the loop: once a second. At half, twice the stamps to look
+/// at; at twice, a fault is found out a second later.
+constexpr unsigned commits_per_loop = 3'000;
+
+/// The same until stamps are proved. At half, twice the work while they cannot be; at twice, a
+/// start takes twice as long.
+constexpr unsigned commits_per_loop_at_start = 3;
+
+constexpr bool is_set(std::uint32_t signals, std::uint8_t signal) {
+    return (signals >> signal & 1U) != 0;
 }
 
 }  // namespace
+
+[[gnu::always_inline]] inline void OutputPort::send(std::uint32_t cycle, Levels levels) {
+    const std::uint32_t cycles = cycle - sent_;
+    const std::uint32_t pins = levels.pins | (loop_.level ? 1U << (pin_loop - first_output) : 0U);
+    machine_.send((cycles - sequencer::shortest_cycles) | pins << sequencer::delay_bits);
+    light_.pass(cycles);
+    light_.change(cycle, levels.light);
+    sent_ = cycle;
+    levels_ = levels;
+}
 
 void OutputPort::set_up() {
     MachinePins pins;
@@ -44,45 +69,65 @@ void OutputPort::set_up() {
     machine_.set_up(sequencer::place, pins, shifting);
     machine_.make_outputs(first_output, scheduled_outputs);
     machine_.execute(pio_assembly::jump(sequencer::place.first));
-    send(ahead, 0);
+    send(ahead_cycles, {});
     machine_.execute(pio_assembly::pull());
-    last_ = sent_;
+    set_function(pin_loop, function_pio0);
+    last_ = ahead;
     set_bits(timer().interrupt_enable, 1);
 }
 
-void OutputPort::send(Nanoseconds at, std::uint32_t levels) {
-    const std::uint32_t cycles = static_cast<std::uint32_t>(at - sent_) / cycle_ns;
-    machine_.send((cycles - sequencer::shortest_cycles) | levels << sequencer::delay_bits);
-    sent_ = at;
-    levels_ = levels;
+OutputPort::Levels OutputPort::levels_of(std::uint32_t signals) {
+    Levels levels{};
+    std::uint32_t pins = 0;
+    for (const SignalPin& output : output_pins)
+        pins |= (signals >> output.signal & 1U) << (output.pin - first_output);
+    levels.pins = static_cast<std::uint16_t>(pins);
+    if (is_set(signals, firmware::output_light_gate))
+        levels.light = is_set(signals, firmware::output_light_lead) ? LightPort::State::lit
+                                                                    : LightPort::State::follows;
+    return levels;
+}
+
+/// What is due by then, or else a word that changes nothing: the sequencer always has something to
+/// do.
+[[gnu::always_inline]] inline void OutputPort::send_next(std::uint32_t until) {
+    if (size_ == 0 || from(until, front().cycle) >= step_cycles) {
+        if (commits_ >= loop_due_) send_through_loop(until);
+        return send(until, levels_);
+    }
+    send(front().cycle, front().levels);
+    first_ = (first_ + 1) % capacity;
+    size_ = size_ - 1;
+    if (wants_room_) attention_.ask();
+    wants_room_ = false;
 }
 
 void OutputPort::commit() {
     timer().raw_interrupts = 1;
     timer().alarms[0] = timer().low + commit_interval_us;
+    if (++commits_ % commits_per_wake == 0) Attention::wake();
     if (machine_.starved()) restart_at_once();  // the times of all words after are unknown
-    const Nanoseconds until = clock_.now() + ahead;
-    bool more = false;
-    while (!more && sent_ + step <= until) {
-        more = machine_.is_full();
-        if (!more) send_next(until);
+    const std::uint32_t until = clock_.low_cycles() + ahead_cycles;
+    std::uint32_t waits_for = 0;
+    while (waits_for == 0 && from(sent_, until) >= step_cycles) {
+        if (machine_.is_full())
+            waits_for = StateMachine::has_room_interrupt(sequencer::machine);
+        else if (!light_.has_room())
+            waits_for = StateMachine::has_room_interrupt(light::machine);
+        else
+            send_next(until);
     }
-    constexpr std::uint32_t has_room = StateMachine::has_room_interrupt(sequencer::machine);
-    if (more)
-        set_bits(pio(0).interrupt1_enable, has_room);
-    else
-        clear_bits(pio(0).interrupt1_enable, has_room);
+    if (waits_for == 0) light_.go_on();
+    pio(0).interrupt1_enable = waits_for;
 }
 
-/// What is due by then, or else a word that changes nothing: the sequencer always has something to
-/// do.
-void OutputPort::send_next(Nanoseconds until) {
-    if (size_ == 0 || front().at >= until + step) return send(until, levels_);
-    send(front().at, front().levels);
-    first_ = (first_ + 1) % capacity;
-    size_ = size_ - 1;
-    if (wants_room_) attention_.ask();
-    wants_room_ = false;
+/// The next one is sent when this one has come back, or is given up.
+void OutputPort::send_through_loop(std::uint32_t cycle) {
+    if (loop_.awaited) return;
+    loop_.level = !loop_.level;
+    loop_.at_low_ns = cycle * cycle_ns;
+    loop_.awaited = true;
+    loop_due_ = commits_ + (loop_.proved ? commits_per_loop : commits_per_loop_at_start);
 }
 
 Nanoseconds OutputPort::push(Nanoseconds at, std::uint32_t levels) {
@@ -91,21 +136,22 @@ Nanoseconds OutputPort::push(Nanoseconds at, std::uint32_t levels) {
         wants_room_ = true;
         return firmware::never;
     }
-    return add(at, pin_levels(levels));
+    return add(at, levels_of(levels));
 }
 
-Nanoseconds OutputPort::add(Nanoseconds at, std::uint32_t levels) {
+Nanoseconds OutputPort::add(Nanoseconds at, Levels levels) {
     Nanoseconds& eighth_before = recent_[count_++ % fifo];
-    const Nanoseconds soonest = later(later(sent_, last_) + step, eighth_before + refill);
+    const Nanoseconds sent = BoardClock::from_low_ns(sent_ * cycle_ns, clock_.now());
+    const Nanoseconds soonest = later(later(sent, last_) + step, eighth_before + refill);
     last_ = eighth_before = later(at, soonest);
-    words_[(first_ + size_) % capacity] = {last_, levels};
+    words_[(first_ + size_) % capacity] = {BoardClock::cycle_of(last_), levels};
     size_ = size_ + 1;
     return last_;
 }
 
-Nanoseconds OutputPort::rest(std::uint32_t levels) {
+Nanoseconds OutputPort::rest(std::uint32_t signals) {
     const InterruptsOff undisturbed;
-    return add(0, pin_levels(levels));
+    return add(0, levels_of(signals));
 }
 
 }  // namespace versavis::rp2040

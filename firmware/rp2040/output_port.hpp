@@ -4,6 +4,8 @@
 
 #include "attention.hpp"
 #include "board_clock.hpp"
+#include "light_port.hpp"
+#include "loop_signal.hpp"
 #include "state_machine.hpp"
 
 namespace versavis::rp2040 {
@@ -14,7 +16,8 @@ class OutputPort final : public firmware::OutputSchedule {
     static_assert(1U << grain_bits == cycle_ns);
     static constexpr Nanoseconds step = sequencer::shortest_cycles * cycle_ns;
 
-    OutputPort(BoardClock& clock, Attention& attention) : clock_(clock), attention_(attention) {}
+    OutputPort(BoardClock& clock, Attention& attention, LightPort& light, LoopSignal& loop)
+        : clock_(clock), attention_(attention), light_(light), loop_(loop) {}
 
     /// The sequencer is ready to start, and its first word with it.
     void set_up();
@@ -25,30 +28,40 @@ class OutputPort final : public firmware::OutputSchedule {
     Nanoseconds push(Nanoseconds at, std::uint32_t levels) override;
 
     /// The first word of all, so that the outputs rest at these levels; returns when it leaves.
-    Nanoseconds rest(std::uint32_t levels);
+    Nanoseconds rest(std::uint32_t signals);
 
  private:
+    struct Levels {
+        std::uint16_t pins;  ///< but for the loop
+        LightPort::State light;
+    };
     struct Word {
-        Nanoseconds at;
-        std::uint32_t levels;
+        std::uint32_t cycle;  ///< the lower bits of when it leaves
+        Levels levels;
     };
     static constexpr unsigned capacity = 64;
     static constexpr unsigned fifo = 8;
 
-    Nanoseconds add(Nanoseconds at, std::uint32_t levels);
-    void send_next(Nanoseconds until);
-    void send(Nanoseconds at, std::uint32_t levels);
+    static Levels levels_of(std::uint32_t signals);
+    Nanoseconds add(Nanoseconds at, Levels levels);
+    void send_next(std::uint32_t until);
+    void send(std::uint32_t cycle, Levels levels);
+    void send_through_loop(std::uint32_t cycle);
     const Word& front() const { return words_[first_]; }
 
     BoardClock& clock_;
     Attention& attention_;
+    LightPort& light_;
+    LoopSignal& loop_;
     StateMachine machine_{0, sequencer::machine};
     unsigned first_ = 0;
     volatile unsigned size_ = 0;
     volatile bool wants_room_ = false;
-    unsigned count_ = 0;             ///< of words ever pushed
-    std::uint32_t levels_ = 0;       ///< of the last word sent
-    Nanoseconds sent_ = 0;           ///< when the last word leaves that was sent
+    unsigned count_ = 0;  ///< of words ever pushed
+    unsigned commits_ = 0;
+    Levels levels_ = {};             ///< of the last word sent
+    unsigned loop_due_ = 0;          ///< commits until the next edge through the loop
+    std::uint32_t sent_ = 0;         ///< in which cycle the last word leaves that was sent
     Nanoseconds last_ = 0;           ///< and the last one of all
     Nanoseconds recent_[fifo] = {};  ///< when the newest words leave
     Word words_[capacity] = {};

@@ -8,48 +8,47 @@
 
 namespace versavis::rp2040 {
 
-/// A Raspberry Pi Pico leads GPIO 0 to 22 and 26 to 28 out. The other four carry what one state
-/// machine tells another.
+/// GPIO that a Raspberry Pi Pico leads out: 0 to 22 and 26 to 28. What the board of a Pico does
+/// with the others (regulator, USB's supply, LED, a divider with a capacitor) is no business of
+/// ours.
 enum Pin : unsigned {
     pin_uart_transmit = 0,  ///< to the second IMU
     pin_uart_receive = 1,   ///< from it, or from a GNSS receiver
+    // An IMU is on SPI or on I2C, by the same wires.
+    pin_spi_clock = 2,
     pin_i2c_data = 2,
-    pin_i2c_clock = 3,    ///< and, with an IMU on SPI,
-    pin_spi_select1 = 3,  ///< its second select
+    pin_spi_transmit = 3,
+    pin_i2c_clock = 3,
     pin_spi_receive = 4,
     pin_spi_select0 = 5,
-    pin_spi_clock = 6,
-    pin_spi_transmit = 7,
+    pin_spi_select1 = 6,
 
-    pin_imu_ready0 = 8,
-    pin_imu_ready1 = 9,
-    pin_accel_ready = 10,
-    pin_pps = 11,
-    pin_aux0 = 12,
-    pin_aux1 = 13,
-    pin_sync_input = 14,
-    pin_exposure0 = 15,  ///< of camera 0; 16 to 18 of the others
+    pin_imu_ready0 = 7,
+    pin_imu_ready1 = 8,
+    pin_accel_ready = 9,
+    pin_pps = 10,
+    pin_aux0 = 11,
+    pin_aux1 = 12,
+    pin_sync_input = 13,
+    pin_exposure0 = 14,  ///< of camera 0; 15 to 17 of the others
 
+    pin_loop = 18,      ///< free: what is sent there comes back and is stamped
     pin_trigger0 = 19,  ///< of camera 0; 20 to 22 of the others
-    pin_exposing = 23,  ///< internal: a camera of the light exposes
-    pin_lead = 24,      ///< internal
-    pin_gate = 25,      ///< internal, and the LED of a Pico: the light may be on
     pin_sync_output = 26,
     pin_test_output = 27,
     pin_light = 28,
-    pin_strobe = 29,  ///< internal: an input has changed
     pin_count = 30,
 };
 
 // What the state machines rely on: their pins lie side by side.
 inline constexpr unsigned first_input = pin_imu_ready0;
 inline constexpr unsigned watched_inputs = 11;
-inline constexpr unsigned first_output = pin_trigger0;
-inline constexpr unsigned scheduled_outputs = 9;
+inline constexpr unsigned watched_pins = watched_inputs + 1;  ///< with the loop
+inline constexpr unsigned first_output = pin_loop;
+inline constexpr unsigned scheduled_outputs = 10;  ///< three of which no pin shows
 static_assert(pin_exposure0 + firmware::camera_count == first_input + watched_inputs);
-static_assert(first_input + watched_inputs == first_output);
-static_assert(pin_trigger0 + firmware::camera_count == pin_exposing);
-static_assert(pin_lead == pin_exposing + 1 && pin_gate == pin_exposing + 2);
+static_assert(first_input + watched_inputs == pin_loop);
+static_assert(pin_loop + 1 == pin_trigger0);
 static_assert(first_output + scheduled_outputs == pin_light);
 
 struct SignalPin {
@@ -76,13 +75,12 @@ constexpr unsigned pin_of_input(std::uint8_t input) {
     return pin_count;
 }
 
-inline constexpr SignalPin output_pins[firmware::output_count] = {
+/// The gate and the lead of the light have none: what they do is seen at the light.
+inline constexpr SignalPin output_pins[] = {
     {0, pin_trigger0},
     {1, pin_trigger0 + 1},
     {2, pin_trigger0 + 2},
     {3, pin_trigger0 + 3},
-    {firmware::output_light_gate, pin_gate},
-    {firmware::output_light_lead, pin_lead},
     {firmware::output_sync, pin_sync_output},
     {firmware::output_test, pin_test_output},
 };

@@ -12,16 +12,18 @@ enum class When : std::uint16_t {
     always = 0,
     x_is_zero = 1,
     x_counts_down = 2,
+    y_is_zero = 3,
     y_counts_down = 4,
     x_differs_from_y = 5,
     pin_is_high = 6,
 };
 
-enum class From : std::uint16_t { pins = 0, x = 1, y = 2, null = 3, isr = 6, osr = 7 };
+enum class From : std::uint16_t { pins = 0, x = 1, y = 2, isr = 6, osr = 7 };
 enum class To : std::uint16_t {
     pins = 0,
     x = 1,
     y = 2,
+    null = 3,            ///< of out()
     pin_directions = 4,  ///< of out() and set()
     program_counter = 5,
     isr = 6,
@@ -41,12 +43,15 @@ constexpr Code wait_for_pin(bool level, unsigned pin) {
 }
 constexpr Code in(From from, unsigned bits) { return word(2, static_cast<unsigned>(from), bits); }
 constexpr Code out(To to, unsigned bits) { return word(3, static_cast<unsigned>(to), bits); }
-/// Without room, the word is lost, and the machine goes on.
-constexpr Code push() { return word(4, 0, 0); }
 /// Waits for a word.
 constexpr Code pull() { return word(4, 5, 0); }
+/// Without a word, what X holds is taken for one.
+constexpr Code pull_or_x() { return word(4, 4, 0); }
 constexpr Code mov(To to, From from) {
     return word(5, static_cast<unsigned>(to), static_cast<unsigned>(from));
+}
+constexpr Code mov_inverted(To to, From from) {
+    return word(5, static_cast<unsigned>(to), 1U << 3U | static_cast<unsigned>(from));
 }
 constexpr Code raise_flag(unsigned flag) { return word(6, 0, flag); }
 constexpr Code set(To to, unsigned value) { return word(7, static_cast<unsigned>(to), value); }

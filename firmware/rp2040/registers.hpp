@@ -337,6 +337,11 @@ inline void enable_interrupt(Interrupt interrupt, unsigned priority) {
 }
 
 /// No interrupt comes while it lives.
+struct CycleCounter {
+    Register control, reload, current;
+};
+inline CycleCounter& cycle_counter() { return block_at<CycleCounter>(0xE000E010); }
+
 class InterruptsOff {
  public:
     InterruptsOff() { __asm__ volatile("mrs %0, primask\n cpsid i" : "=r"(before_)::"memory"); }

@@ -14,77 +14,68 @@ bool same_light(const Routes& a, const Routes& b) {
            a.light_limit == b.light_limit;
 }
 
-/// Triggers of slaves, and whether a camera of the light exposes, by the cameras that do. Others
-/// are at rest: what is there is what a pin shows from when it is switched over until the router
-/// runs.
-std::uint32_t routed_levels(const Routes& routes, std::uint32_t exposing) {
-    std::uint32_t levels = (exposing & routes.light_cameras) != 0 ? 1U << camera_count : 0;
-    for (unsigned i = 0; i < camera_count; ++i) {
-        const std::uint32_t active =
-            routes.master[i] == not_routed ? 0 : exposing >> routes.master[i];
-        levels |= ((active ^ routes.inverted_triggers >> i) & 1U) << i;
-    }
-    return levels;
+bool same_trigger(const Routes& a, const Routes& b, unsigned camera) {
+    return a.master[camera] == b.master[camera] &&
+           ((a.inverted_triggers ^ b.inverted_triggers) >> camera & 1U) == 0;
 }
 
 }  // namespace
 
 void RoutingPort::set_up() {
-    MachinePins pins;
-    pins.in = pin_exposure0;
-    pins.side = pin_trigger0;
-    pins.side_count = router::side_pins;
-    router_.set_up(router::place, pins, {});
-    router_.make_outputs(pin_trigger0, router::side_pins);
-
-    MachinePins lamp;
-    lamp.in = pin_exposing;
-    lamp.side = pin_light;
-    lamp.side_count = 2;
-    lamp.side_optional = true;
-    light_.load(light::code, light::place);
-    light_.set_up(light::place, lamp, {});
-    light_.make_outputs(pin_light, 1);
-    light_.execute(pio_assembly::set(pio_assembly::To::y, light::table));
-
+    slaves_[0].load(copier::slave_code, copier::slave_place[0]);
     copier_.load(copier::code, copier::place);
-    load(program_of(routes_));
-    router_.execute(pio_assembly::jump(0));
-    // These come from the same clock.
-    set_bits(pio(1).bypass_synchroniser, 1U << pin_exposing | 1U << pin_lead | 1U << pin_gate);
-    set_function(pin_exposing, function_pio1);
-    set_function(pin_lead, function_pio0);
-    set_function(pin_gate, function_pio0);
-    router_.run();
 }
 
 RoutingPort::Switched RoutingPort::route(const Routes& routes, bool force) {
     edges_.invert(routes.inverted_exposures);
     if (!driven_) begin_to_drive(routes);
-    const Program program = program_of(routes);
     const std::uint32_t masters = changed_masters(routes);
+    for (unsigned i = 0; i < camera_count; ++i)
+        if (routes_.master[i] == not_routed && routes.master[i] != not_routed)
+            copy_master(i, routes);
     Switched switched;
     {
-        // Until the router runs again, routed triggers stay as they are.
         const InterruptsOff undisturbed;
-        router_.stop();
         switched.clean = !masters_expose(masters);
         if (switched.clean || force) {
-            load(program);
             for (unsigned i = 0; i < camera_count; ++i)
-                set_function(pin_trigger0 + i,
-                             routes.master[i] == not_routed ? function_pio0 : function_pio1,
-                             override_low);
+                if (!same_trigger(routes, routes_, i)) switch_trigger(i, routes);
             switched.at = clock_.now();
             if (masters_expose(masters)) switched.clean = false;
         }
-        router_.run();
     }
     if (switched.at == firmware::never) return {};
-    if (!same_light(routes, routes_)) load_light(routes);
+    if (!same_light(routes, routes_)) configure_light(routes);
     if (routes.test_input != routes_.test_input) copy_input(routes.test_input);
     routes_ = routes;
     return switched;
+}
+
+/// Its machine does, whether the pin shows it yet or not.
+void RoutingPort::copy_master(unsigned camera, const Routes& routes) {
+    const bool inverted = (routes.inverted_triggers >> camera & 1U) != 0;
+    MachinePins pins;
+    pins.in = pin_exposure0 + routes.master[camera];
+    pins.out = pin_trigger0 + camera;
+    pins.out_count = 1;
+    StateMachine& machine = slaves_[camera];
+    const Place& place = copier::slave_place[inverted ? 1 : 0];
+    machine.stop();
+    machine.set_up(place, pins, {});
+    machine.make_outputs(pins.out, 1, inverted);
+    machine.execute(pio_assembly::jump(place.first));
+    machine.run();
+}
+
+void RoutingPort::switch_trigger(unsigned camera, const Routes& routes) {
+    const unsigned pin = pin_trigger0 + camera;
+    if (routes.master[camera] == not_routed) {
+        set_function(pin, function_pio0);
+        slaves_[camera].stop();
+        return;
+    }
+    if (routes_.master[camera] != not_routed) copy_master(camera, routes);
+    set_function(pin, function_pio1);
 }
 
 /// From high impedance to the levels at rest.
@@ -93,10 +84,10 @@ void RoutingPort::begin_to_drive(const Routes& routes) {
     while (clock_.now() <= at) {
     }
     for (unsigned pin = pin_trigger0; pin < pin_trigger0 + camera_count; ++pin)
-        set_function(pin, function_pio0, override_low);
+        set_function(pin, function_pio0);
     set_function(pin_sync_output, function_pio0);
     set_function(pin_test_output, function_pio0);
-    load_light(routes);
+    configure_light(routes);
     driven_ = true;
 }
 
@@ -118,40 +109,20 @@ bool RoutingPort::masters_expose(std::uint32_t masters) const {
     return false;
 }
 
-RoutingPort::Program RoutingPort::program_of(const Routes& routes) {
-    Program program{};
-    for (unsigned exposing = 0; exposing < router::size; ++exposing)
-        program[exposing] = router::entry(routed_levels(routes, exposing));
-    return program;
-}
-
-void RoutingPort::load(const Program& program) { router_.load(program, router::place); }
-
-void RoutingPort::load_light(const Routes& routes) {
-    const auto limit =
-        static_cast<std::uint64_t>(routes.light_limit) / (light::lit_cycles * cycle_ns);
-    light_.stop();
-    light_.send(static_cast<std::uint32_t>(limit));
-    light_.execute(pio_assembly::pull());
-    light_.execute(pio_assembly::optional_side(pio_assembly::jump(light::dark), false));
-    light_.run();
-    set_function(pin_light, function_pio1, override_none,
-                 routes.light_inverted ? override_invert : override_none);
+void RoutingPort::configure_light(const Routes& routes) {
+    light_.configure(routes.light_cameras, routes.light_inverted, routes.light_limit);
 }
 
 void RoutingPort::copy_input(std::uint8_t input) {
     copier_.stop();
-    if (input != not_routed) {
-        MachinePins pins;
-        pins.in = pin_of_input(input);
-        pins.out = pin_test_output;
-        pins.out_count = 1;
-        copier_.set_up(copier::place, pins, {});
-        copier_.make_outputs(pin_test_output, 1);
-        copier_.execute(pio_assembly::jump(copier::place.first));
-        copier_.run();
-    }
-    set_function(pin_test_output, input == not_routed ? function_pio0 : function_pio1);
+    if (input == not_routed) return;
+    MachinePins pins;
+    pins.in = pin_of_input(input);
+    pins.out = pin_test_output;
+    pins.out_count = 1;
+    copier_.set_up(copier::place, pins, {});
+    copier_.execute(pio_assembly::jump(copier::place.first));
+    copier_.run();
 }
 
 }  // namespace versavis::rp2040

@@ -23,6 +23,7 @@ struct Shifting {
     bool in_right = false;
     bool out_right = true;
     bool autopull = false;
+    unsigned push_at = 0;  ///< bits that IN has shifted; 0: never by itself
     bool join_transmit = false;
     bool join_receive = false;
 };
@@ -42,6 +43,7 @@ class StateMachine {
         machine.execution = place.wrap_bottom << 7U | place.wrap_top << 12U | pins.jump << 24U |
                             (pins.side_optional ? 1U << 30U : 0U);
         machine.shift =
+            (shifting.push_at > 0 ? 1U << 16U | shifting.push_at << 20U : 0U) |
             (shifting.autopull ? 1U << 17U : 0U) | (shifting.in_right ? 1U << 18U : 0U) |
             (shifting.out_right ? 1U << 19U : 0U) | (shifting.join_transmit ? 1U << 30U : 0U) |
             (shifting.join_receive ? 1U << 31U : 0U);
@@ -50,13 +52,13 @@ class StateMachine {
     }
 
     /// `pins` side by side, driven by this block when their function says so.
-    void make_outputs(unsigned first, unsigned pins) {
+    void make_outputs(unsigned first, unsigned pins, bool level = false) {
         PioMachine& machine = pio_.machines[index_];
         const std::uint32_t before = machine.pins;
         for (unsigned pin = first; pin < first + pins; ++pin) {
             machine.pins = pin << 5U | 1U << 26U;
             execute(pio_assembly::set(pio_assembly::To::pin_directions, 1));
-            execute(pio_assembly::set(pio_assembly::To::pins, 0));
+            execute(pio_assembly::set(pio_assembly::To::pins, level ? 1 : 0));
         }
         machine.pins = before;
     }
@@ -73,7 +75,7 @@ class StateMachine {
 
     /// It wanted a word and found none, since this was last forgotten.
     bool starved() const { return (pio_.fifo_debug >> (24U + index_) & 1U) != 0; }
-    /// A word was lost for want of room.
+    /// It had to wait for room.
     bool overflowed() const { return (pio_.fifo_debug >> index_ & 1U) != 0; }
     void forget_faults() { pio_.fifo_debug = 0x01010001U << index_; }
 

@@ -204,6 +204,86 @@ const tests = {
         check(rig.host.all('event').length === 0, JSON.stringify(rig.host.all('event')));
     },
 
+    'the light follows its cameras and no others, whichever they are': () => {
+        for (let cameras = 1; cameras < 16; ++cameras) {
+            const rig = new Rig(image, quick_usb);
+            const exposing = [0, 0, 0, 0];
+            rig.connect();
+            const at = [0, 1, 2, 3].map((output) =>
+                rig.add_camera(output, { exposure: () => 20_000 + 10_101 * output }),
+            );
+            const lights = [];
+            rig.on_pin(pin.light, (cycle, level) => lights.push({ cycle, level }));
+            rig.configure({
+                // Each is alone for a while, and some are together.
+                cameras: [0, 1, 2, 3].map((i) => ({ latency: 8000, phase: i * 200_000 })),
+                light: { cameras, lead: 0, longest: 10_000_000, duty_ppm: 1_000_000 },
+            });
+            rig.host.start();
+            rig.run_ms(300);
+            const edges = at.flatMap(({ starts, ends }, output) => [
+                ...starts.map((cycle) => ({ cycle, output, change: 1 })),
+                ...ends.map((cycle) => ({ cycle, output, change: 0 })),
+            ]).sort((a, b) => a.cycle - b.cycle);
+            const wanted = [];
+            for (const { cycle, output, change } of edges) {
+                const before = exposing.some((level, i) => level && (cameras >> i) & 1);
+                exposing[output] = change;
+                const now = exposing.some((level, i) => level && (cameras >> i) & 1);
+                if (now !== before) wanted.push({ cycle, level: now });
+            }
+            check(wanted.length >= 20, `${wanted.length} lights of ${cameras}`);
+            check(lights.length === wanted.length, `${lights.length} of ${wanted.length} changes`);
+            lights.forEach(({ cycle, level }, i) => {
+                check(level === wanted[i].level, `level of ${cameras}`);
+                check_within((cycle - wanted[i].cycle) * cycle_ns, -88, 160, 'light');
+            });
+        }
+    },
+
+    'a lead begins when it should, and a line that is stuck is lit no longer than allowed': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0, { exposure: (index) => (index < 5 ? 200_000 : 1e9) });
+        const lights = [];
+        rig.on_pin(pin.light, (cycle, level) => lights.push({ cycle, level }));
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            light: { cameras: 1, lead: 100_000, longest: 3_000_000, duty_ppm: 100_000 },
+        });
+        rig.host.start();
+        rig.run_ms(500);
+        check(lights.length >= 12, `${lights.length} changes`);
+        lights.slice(0, 10).forEach(({ cycle, level }, i) => {
+            const edge = level ? camera.starts[i / 2] : camera.ends[(i - 1) / 2];
+            check_within((cycle - edge) * cycle_ns, level ? -100_008 : 0, level ? -99_992 : 100,
+                level ? 'lead' : 'end');
+        });
+        check_within((lights[11].cycle - lights[10].cycle) * cycle_ns, 100_000, 3_000_100, 'stuck');
+    },
+
+    'code that hangs leaves no light': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.add_camera(0, { exposure: () => 1e9 });
+        let lit = 0;
+        const lights = [];
+        rig.on_pin(pin.light, (cycle, level) => {
+            lights.push({ cycle, level });
+            if (level) lit = cycle;
+        });
+        rig.connect();
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            light: { cameras: 1, lead: 0, longest: 3_000_000, duty_ppm: 1_000_000 },
+        });
+        rig.host.start();
+        rig.run_until('lit', () => lit !== 0);
+        hang(rig.machine);
+        rig.run_ms(50);
+        check(lights.length === 2 && !lights[1].level, 'it is lit');
+        check_within((lights[1].cycle - lit) * cycle_ns, 0, 3_000_100, 'light');
+    },
+
     'an IMU is read within 2 us of its edge, and each sample has the edge\'s stamp': () => {
         const rig = new Rig(image, quick_usb);
         const camera = rig.add_camera(0);

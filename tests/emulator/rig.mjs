@@ -8,15 +8,15 @@ export const cycle_ns = 8;
 export const cycles_of_ns = (ns) => Math.round(ns / cycle_ns);
 const cycles_per_ms = 125_000;
 
-export const pin = { exposure: 15, trigger: 19, exposing: 23, lead: 24, gate: 25, sync: 26,
-    test: 27, light: 28, imu_ready: 8, spi_select: 5, pps: 11, aux0: 12, aux1: 13, sync_input: 14 };
+export const pin = { exposure: 14, loop: 18, trigger: 19, sync: 26, test: 27, light: 28,
+    imu_ready: 7, spi_select: 5, pps: 10, aux0: 11, aux1: 12, sync_input: 13 };
 
 export class Rig {
     /// On `machine`, or a new one that starts from the image.
     constructor(image, options = {}, machine = undefined) {
         this.machine =
             machine ?? new Machine({ flash: readFileSync(image), ram_only: true, ...options });
-        this.machine.watch([19, 20, 21, 22, 23, 24, 25, 26, 27, 28]);
+        this.machine.watch([19, 20, 21, 22, 26, 27, 28]);
         this.listeners = [];
         this.levels = 0;
         this.machine.on_output = (entry) => this.moved(entry);
@@ -28,9 +28,10 @@ export class Rig {
         const now = levels & driven;
         const changed = now ^ this.levels;
         this.levels = now;
+        const from = cycle + 1; // a level is there when the cycle of its driver has ended
         for (const listener of this.listeners) {
             const bit = 1 << listener.gpio;
-            if (changed & bit) listener.call(cycle, (now & bit) !== 0);
+            if (changed & bit) listener.call(from, (now & bit) !== 0);
         }
     }
     on_pin(gpio, call) {

@@ -63,7 +63,7 @@ TEST_CASE("pulse_train: many are decided at once, as far as the output has room"
     bench.train.poll(100 * ms - 300'000);
     CHECK(bench.train.next_wake() == 101 * ms - 700'000);
     Bench faster(20'000);
-    faster.train.poll(100 * ms - 300'000);
+    faster.train.poll(100 * ms - 400'000);
     CHECK_FALSE(faster.queue.has_room(output_test));
     CHECK(faster.train.next_wake() == 100 * ms + 600'000 - 700'000);
 }
@@ -79,21 +79,21 @@ TEST_CASE("pulse_train: polled when it asks for it, it leaves no pulse out") {
 
 TEST_CASE("pulse_train: pulses that could leave late are left out") {
     Bench on_time(1'000);
-    on_time.poll(100 * ms - 300'000);
+    on_time.poll(100 * ms - 400'000);
     CHECK(on_time.hardware.changes.at(0) == 100 * ms);
     Bench late(1'000);
-    late.poll(100 * ms - 299'999);
+    late.poll(100 * ms - 399'999);
     CHECK(late.hardware.changes.empty());
     CHECK(late.train.next_wake() == 101 * ms - 700'000);
     late.poll(104 * ms + 500'000);
     CHECK(late.hardware.changes.at(0) == 105 * ms);
 
-    Bench begun_on_time(1'000, 107 * ms - 300'000);
+    Bench begun_on_time(1'000, 107 * ms - 400'000);
     CHECK(begun_on_time.train.next_wake() == 107 * ms - 700'000);
-    Bench begun_late(1'000, 107 * ms - 299'999);
+    Bench begun_late(1'000, 107 * ms - 399'999);
     CHECK(begun_late.train.next_wake() == 108 * ms - 700'000);
     const Nanoseconds months = 10'000'000'000 * ms;  // are skipped in no time
-    CHECK(Bench(10'000, months).train.next_wake() == months + 300'000 - 700'000);
+    CHECK(Bench(10'000, months).train.next_wake() == months + 400'000 - 700'000);
 }
 
 TEST_CASE("pulse_train: it follows the clock that it is in") {
