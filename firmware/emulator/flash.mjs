@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The flash chip, the serial interface in front of it (XIP_SSI) and its chip select (IO_QSPI).
-// Direct mode moves a byte per word; each command lasts from select to deselect.
+// The flash chip, the serial interface in front of it (XIP_SSI) and the pins between (IO_QSPI).
+// Direct mode moves a byte per word; each command lasts from select to deselect. Without each pin
+// at its function the flash is not connected: nothing reaches it, and ones are read.
 import { fault, hex } from './fault.mjs';
 
 export const flash_size = 2 * 1024 * 1024;
@@ -185,6 +186,12 @@ const select_low = 2 << 8; // OUTOVER of SS
 const select_high = 3 << 8;
 const select_mask = 3 << 8;
 
+const qspi_pins = 6;
+const select_pin = 1;
+const function_mask = 0x1f;
+const function_xip = 0;
+const function_none = 0x1f;
+
 /// The interface's registers.
 export class Ssi {
     constructor(clock, chip) {
@@ -209,6 +216,7 @@ export class Ssi {
             0xf8: 0,
         };
         this.override = 0;
+        this.is_connected = false;
     }
 
     get is_direct() {
@@ -251,9 +259,9 @@ export class Ssi {
         const bits = ((this.values[0x00] >>> 16) & 31) + 1;
         if (bits !== 8) fault(`XIP_SSI sends ${bits} bits per word; only 8 are modelled`);
         if (!this.is_direct && this.clock.now >= this.busy_until) this.chip.select(false);
-        if (!this.is_direct) this.chip.select(true);
+        if (!this.is_direct) this.chip.select(this.is_connected);
         if (this.received.length >= fifo_depth) fault("XIP_SSI's receive FIFO overflows");
-        this.received.push(this.chip.exchange(value & 0xff));
+        this.received.push(this.is_connected ? this.chip.exchange(value & 0xff) : 0xff);
         const cycles = 8 * this.values[0x14];
         this.busy_until = Math.max(this.busy_until, this.clock.now) + cycles;
     }
@@ -265,16 +273,19 @@ export class Ssi {
         return this.received.shift();
     }
 
-    write_select(override) {
+    write_select(override, is_connected) {
         this.override = override;
+        this.is_connected = is_connected;
         const kind = override & select_mask;
-        if (kind === select_low) this.chip.select(true);
+        if (!is_connected) this.chip.select(false);
+        else if (kind === select_low) this.chip.select(true);
         else if (kind === select_high || this.clock.now >= this.busy_until) this.chip.select(false);
     }
 
     /// A read through the processor's window.
     read_mapped(offset) {
         if (offset >= flash_size) fault(`read of flash at ${hex(offset)}, behind its end`);
+        if (!this.is_connected) return 0xffffffff;
         if (this.chip.is_busy) fault('flash is read while it erases or programs');
         const reads = (this.values[0x00] & reads_by_command) === reads_by_command;
         if (!reads || !(this.values[0x08] & 1))
@@ -292,24 +303,39 @@ export class Ssi {
 export class QspiIo {
     constructor(ssi) {
         this.ssi = ssi;
-        this.reset();
+        this.controls = new Uint32Array(qspi_pins);
+        this.connect();
+    }
+
+    /// As the boot ROM leaves the pins: given to the flash.
+    connect() {
+        this.give(function_xip);
     }
 
     reset() {
-        this.controls = new Uint32Array(6);
-        this.ssi.write_select(0);
+        this.give(function_none);
+    }
+
+    give(number) {
+        this.controls.fill(number);
+        this.tell();
+    }
+
+    tell() {
+        const is_connected = this.controls.every((c) => (c & function_mask) === function_xip);
+        this.ssi.write_select(this.controls[select_pin], is_connected);
     }
 
     read(offset) {
-        if (offset < 0x30) return offset & 4 ? this.controls[offset >>> 3] : 0;
+        if (offset < 8 * qspi_pins) return offset & 4 ? this.controls[offset >>> 3] : 0;
         if (offset < 0x58) return 0;
         return fault(`IO_QSPI has no register ${hex(offset)}`);
     }
 
     write(offset, value) {
-        if (offset >= 0x30) fault('interrupts of IO_QSPI are not modelled');
+        if (offset >= 8 * qspi_pins) fault('interrupts of IO_QSPI are not modelled');
         if (!(offset & 4)) return;
         this.controls[offset >>> 3] = value;
-        if (offset >>> 3 === 1) this.ssi.write_select(value);
+        this.tell();
     }
 }

@@ -22,7 +22,8 @@ constexpr unsigned command_size = 4;  ///< and its address
 constexpr std::size_t in_flight = 8;
 
 void select_chip(bool selected) {
-    io_qspi().select.control = (selected ? override_low : override_high) << output_override_shift;
+    io_qspi().select.control = function_flash | (selected ? override_low : override_high)
+                                                    << output_override_shift;
 }
 
 void put_address(std::uint8_t* head, std::uint8_t command, std::uint32_t address) {
@@ -36,6 +37,9 @@ void put_address(std::uint8_t* head, std::uint8_t command, std::uint32_t address
 
 void FlashChip::begin() {
     constexpr std::uint32_t frames_of_8_bits = 7U << 16U;
+    select_chip(false);
+    io_qspi().clock.control = function_flash;
+    for (Gpio& data : io_qspi().data) data.control = function_flash;
     FlashInterface& flash = flash_interface();
     flash.enable = 0;
     flash.baud = 6;  // 20.8 MHz

@@ -86,8 +86,7 @@ void name_board(FlashChip& flash, char (&serial)[17]) {
 }
 
 void start_blocks() {
-    restart_blocks(reset_io_bank0 | reset_io_qspi | reset_pads_bank0 | reset_dma | reset_pio0 |
-                   reset_pio1);
+    restart_blocks(reset_io_bank0 | reset_pads_bank0 | reset_dma | reset_pio0 | reset_pio1);
     for (unsigned pin = 0; pin < pin_count; ++pin) {
         set_function(pin, function_none);
         pads().gpio[pin] = pad_input | pad_schmitt | pad_4_ma;

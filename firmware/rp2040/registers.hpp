@@ -32,7 +32,6 @@ enum ResetBit : std::uint32_t {
     reset_dma = 1U << 2U,
     reset_i2c1 = 1U << 4U,
     reset_io_bank0 = 1U << 5U,
-    reset_io_qspi = 1U << 6U,
     reset_pads_bank0 = 1U << 8U,
     reset_pio0 = 1U << 10U,
     reset_pio1 = 1U << 11U,
@@ -98,7 +97,7 @@ inline constexpr std::uint32_t gpio_rises = 1U << 3U;
 inline constexpr std::uint32_t gpio_seen = 1U << 19U;
 
 struct IoQspi {
-    Gpio clock, select, data[4];
+    Gpio clock, select, data[4];  ///< a reset leaves them without a function
 };
 inline IoQspi& io_qspi() { return block_at<IoQspi>(0x40018000); }
 
@@ -109,6 +108,7 @@ struct Pads {
 inline Pads& pads() { return block_at<Pads>(0x4001C000); }
 
 enum Function : std::uint32_t {
+    function_flash = 0,  ///< of IO_QSPI
     function_spi = 1,
     function_uart = 2,
     function_i2c = 3,

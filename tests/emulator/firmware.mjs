@@ -581,6 +581,14 @@ const tests = {
         check(missing > 50 && missing === replaced, `${missing} missing, ${replaced} told`);
     },
 
+    'the serial number is the one of the flash chip': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.connect();
+        const { serial } = rig.host.last('hello');
+        const id = Buffer.from(rig.machine.flash.unique_id).toString('hex').toUpperCase();
+        check(serial === id, `the serial number is ${serial}, not ${id}`);
+    },
+
     'a board restarts when told to, and says so': () => {
         const rig = new Rig(image, quick_usb);
         rig.connect();
