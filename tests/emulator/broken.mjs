@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Images of the firmware with one fault each are caught by the tests of the firmware.
+//
+// usage: broken.mjs FAULTS.json FOLDER     FOLDER/NAME/versavis.uf2 is the image of the fault NAME
+import { spawnSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+import process from 'node:process';
+import { fileURLToPath } from 'node:url';
+import { check, finish } from './check.mjs';
+
+const [faults, folder] = process.argv.slice(2);
+const firmware = join(dirname(fileURLToPath(import.meta.url)), 'firmware.mjs');
+
+/// Whether the test fails on this image, and how.
+function failure_of(image, test) {
+    const { stdout } = spawnSync('node', [firmware, `${image}.uf2`, `${image}.elf`, test], {
+        encoding: 'utf8',
+    });
+    const lines = stdout.split('\n');
+    return lines.find((line) => line.startsWith(`FAILED: ${test}`)) ?? `no failure: ${stdout}`;
+}
+
+for (const [name, { caught_by }] of Object.entries(JSON.parse(readFileSync(faults, 'utf8'))))
+    for (const [test, words] of Object.entries(caught_by)) {
+        const failure = failure_of(join(folder, name, 'versavis'), test);
+        const is_caught = failure.startsWith('FAILED') && failure.includes(words);
+        check(`${name}: '${test}' fails by '${words}' (${failure})`, is_caught, true);
+    }
+finish('broken firmware');
