@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Who answers at which address, for processor and DMA. Each access is aligned and has somebody who
-// answers and is not in reset; everything else is a fault.
+// answers and is not in reset; everything else is a fault. Of registers, only bits are written that
+// the chip lets through.
 import { ram_begin, ram_size } from './chip.mjs';
 import { fault, hex } from './fault.mjs';
+import { RegisterMasks } from './registers.mjs';
 
 const rom_size = 0x4000;
 const xip_begin = 0x10000000;
@@ -41,7 +43,8 @@ export class Bus {
     /// `block` has read(offset) and write(offset, value, raw): `value` is what the register becomes
     /// through an alias, `raw` what was written. `is_held()` tells whether it is in reset.
     add(name, begin, block, is_held = () => false, has_aliases = true) {
-        this.blocks.set(begin >>> block_bits, { name, block, is_held, has_aliases });
+        const masks = new RegisterMasks(begin, block.also_written);
+        this.blocks.set(begin >>> block_bits, { name, block, is_held, has_aliases, masks });
     }
 
     fail(what, address) {
@@ -71,8 +74,8 @@ export class Bus {
             return this.flash.read_mapped(address & (xip_window - 1));
         if (address >= dpram_begin && address < dpram_begin + dpram_size)
             return this.dpram_at('read').read_memory(address - dpram_begin);
-        const { block, has_aliases } = this.block_at('read', address);
-        return block.read(address & (has_aliases ? 0xfff : 0x3fff)) >>> 0;
+        const found = this.block_at('read', address);
+        return found.block.read(this.register_at('read', found, address)) >>> 0;
     }
 
     write(address, value, size) {
@@ -90,12 +93,23 @@ export class Bus {
     }
 
     write_register(address, value) {
-        const { block, has_aliases } = this.block_at('write', address);
-        if (!has_aliases) return block.write(address & 0x3fff, value, value);
-        const alias = (address >>> alias_shift) & 3;
-        const offset = address & 0xfff;
-        const before = alias === write_plain ? 0 : block.read(offset);
-        block.write(offset, aliased(alias, before, value), value);
+        const found = this.block_at('write', address);
+        const { block, has_aliases, masks } = found;
+        const offset = this.register_at('write', found, address);
+        const mask = masks.written[offset >>> 2];
+        if (mask === 0) return;
+        const raw = (value & mask) >>> 0;
+        const alias = has_aliases ? (address >>> alias_shift) & 3 : write_plain;
+        if (alias === write_plain) return block.write(offset, raw, raw);
+        block.write(offset, (aliased(alias, block.read(offset), value) & mask) >>> 0, raw);
+    }
+
+    /// The offset of the register at `address`, if the chip has one.
+    register_at(what, { name, has_aliases, masks }, address) {
+        const offset = address & (has_aliases ? 0xfff : 0x3fff);
+        if (masks.exists[offset >>> 2] === 0)
+            this.fail(`${what}: ${name} has no register ${hex(offset)}, at`, address);
+        return offset;
     }
 
     dpram_at(what) {

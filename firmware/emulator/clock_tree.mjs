@@ -2,7 +2,7 @@
 // Oscillators, PLLs, clock generators and resets: what must be set up, in which order, before the
 // chip runs at 125 MHz. Before that, the real chip is slower; here, each cycle takes 8 ns always.
 import { fault, hex } from './fault.mjs';
-import { PlainRegisters, zeroes } from './registers.mjs';
+import { PlainRegisters, reset_values } from './registers.mjs';
 
 export const clk_sys_hz = 125_000_000;
 const xosc_hz = 12_000_000;
@@ -16,6 +16,7 @@ const lock_cycles = 2500;
 const reset_cycles = 16;
 
 const xosc_enabled = 0xfab;
+const startup_times_4 = 1 << 20;
 const all_blocks = 0x1ffffff;
 
 export const reset_bit = {
@@ -91,7 +92,7 @@ class Xosc {
     constructor(clock) {
         this.clock = clock;
         this.control = 0;
-        this.startup = 0xc4;
+        this.startup = 0;
         this.stable_at = Infinity;
     }
 
@@ -114,19 +115,23 @@ class Xosc {
     }
 
     write(offset, value) {
-        if (offset === 0x0c) this.startup = value & 0x3fff;
+        if (offset === 0x0c) this.startup = value;
         else if (offset === 0x00) this.write_control(value);
+        else if (offset === 0x04) return; // clears what never happens
         else fault(`XOSC's register ${hex(offset)} is not modelled`);
     }
 
     write_control(value) {
         const was_enabled = this.control >>> 12 === xosc_enabled;
-        this.control = value & 0xffffff;
+        this.control = value;
         const is_enabled = this.control >>> 12 === xosc_enabled;
         if (!is_enabled) this.stable_at = Infinity;
-        else if (!was_enabled)
-            this.stable_at =
-                this.clock.now + Math.ceil((this.startup * 256 * clk_sys_hz) / xosc_hz);
+        else if (!was_enabled) this.stable_at = this.clock.now + this.startup_cycles;
+    }
+
+    get startup_cycles() {
+        const delay = (this.startup & 0x3fff) * (this.startup & startup_times_4 ? 4 : 1);
+        return Math.ceil((delay * 256 * clk_sys_hz) / xosc_hz);
     }
 }
 
@@ -190,20 +195,25 @@ const enabled = 1 << 11;
 class Clocks {
     constructor(tree) {
         this.tree = tree;
-        this.values = zeroes(0, 0xc4);
-        for (const divider of [0x4, 0x10, 0x1c, 0x28, 0x34, 0x40, 0x58, 0x64, 0x70])
-            this.values[divider] = 0x100;
+        this.values = reset_values(0x40008000);
+    }
+
+    /// The frequency counter, and which clocks run.
+    check_modelled(offset) {
+        if ((offset >= 0x80 && offset < 0xa0) || offset === 0xb0 || offset === 0xb4)
+            fault(`CLOCKS' register ${hex(offset)} is not modelled`);
     }
 
     read(offset) {
         if (offset === ref_selected) return 1 << (this.values[ref_control] & 3);
         if (offset === sys_selected) return 1 << (this.values[sys_control] & 1);
         if (offset < 0x78 && offset % 12 === 8) return 1;
-        return this.values[offset] ?? fault(`CLOCKS has no register ${hex(offset)}`);
+        this.check_modelled(offset);
+        return this.values[offset];
     }
 
     write(offset, value) {
-        if (!(offset in this.values)) fault(`CLOCKS has no register ${hex(offset)}`);
+        this.check_modelled(offset);
         this.values[offset] = value;
         const { xosc } = this.tree;
         if (offset === ref_control && (value & 3) === 2 && !xosc.is_stable)
@@ -250,20 +260,17 @@ export class ClockTree {
         this.pll_sys = new Pll('PLL_SYS', clock, this.xosc);
         this.pll_usb = new Pll('PLL_USB', clock, this.xosc);
         this.clocks = new Clocks(this);
-        this.rosc = new PlainRegisters(
-            'ROSC',
-            { 0x0: 0xaa0, 0x4: 0, 0x8: 0, 0xc: 0, 0x10: 0, 0x14: 0 },
-            { 0x18: 0x80001000, 0x1c: 1 },
-        );
-        this.psm = new PlainRegisters('PSM', { 0x0: 0, 0x4: 0, 0x8: 0 }, { 0xc: 0x1ffff });
-        this.voltage = new PlainRegisters('VREG_AND_CHIP_RESET', { 0x0: 0xb1, 0x4: 0x91, 0x8: 0 });
-        this.sysinfo = new PlainRegisters(
-            'SYSINFO',
-            {},
-            { 0x0: 0x20002927, 0x4: 0x2, 0x40: 0xe0c912e8 },
-        );
-        this.syscfg = new PlainRegisters('SYSCFG', zeroes(0, 0x18));
-        this.busctrl = new PlainRegisters('BUSCTRL', zeroes(0, 0x24), { 0x4: 1 });
-        this.tbman = new PlainRegisters('TBMAN', {}, { 0x0: 1 });
+        this.rosc = new PlainRegisters(0x40060000, {
+            given: { 0x18: 0x80001000 }, // it runs
+            without: [0x0c, 0x20],
+        });
+        this.psm = new PlainRegisters(0x40010000, { given: { 0xc: 0x1ffff } }); // all is on
+        this.voltage = new PlainRegisters(0x40064000);
+        this.sysinfo = new PlainRegisters(0x40000000, {
+            given: { 0x0: 0x20002927, 0x4: 0x2, 0x10: 0xe0c912e8 },
+        });
+        this.syscfg = new PlainRegisters(0x40004000);
+        this.busctrl = new PlainRegisters(0x40030000, { given: { 0x4: 1 } });
+        this.tbman = new PlainRegisters(0x4006c000);
     }
 }

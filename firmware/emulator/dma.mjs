@@ -45,7 +45,7 @@ class Channel {
     }
 
     reset() {
-        this.control = this.index << 11; // chained to itself: to none
+        this.control = 0; // also chained to channel 0
         this.read = 0;
         this.write = 0;
         this.reload = 0;

@@ -212,7 +212,7 @@ export class Ssi {
             0x50: 0,
             0x54: 0,
             0xf0: 0,
-            0xf4: 0,
+            0xf4: 0x03000000,
             0xf8: 0,
         };
         this.override = 0;
@@ -224,7 +224,7 @@ export class Ssi {
     }
 
     read(offset) {
-        if (offset >= 0x60 && offset < 0xf0) return this.take();
+        if (offset === 0x60) return this.take();
         if (offset in this.values) return this.values[offset];
         const count = this.received.length;
         switch (offset) {
@@ -236,6 +236,8 @@ export class Ssi {
                 const busy = this.clock.now < this.busy_until ? 1 : 0;
                 return busy | 2 | (busy ? 0 : 4) | (count > 0 && !busy ? 8 : 0);
             }
+            case 0x58:
+                return 0x51535049;
             case 0x5c:
                 return 0x3430312a;
             default:
@@ -244,7 +246,7 @@ export class Ssi {
     }
 
     write(offset, value) {
-        if (offset >= 0x60 && offset < 0xf0) return this.send(value);
+        if (offset === 0x60) return this.send(value);
         if (!(offset in this.values))
             fault(`XIP_SSI's register ${hex(offset)} is not modelled (write)`);
         if ((offset === 0x00 || offset === 0x14) && this.values[0x08] & 1)
@@ -328,13 +330,12 @@ export class QspiIo {
 
     read(offset) {
         if (offset < 8 * qspi_pins) return offset & 4 ? this.controls[offset >>> 3] : 0;
-        if (offset < 0x58) return 0;
-        return fault(`IO_QSPI has no register ${hex(offset)}`);
+        return fault(`IO_QSPI's register ${hex(offset)} is not modelled (read)`);
     }
 
     write(offset, value) {
-        if (offset >= 8 * qspi_pins) fault('interrupts of IO_QSPI are not modelled');
-        if (!(offset & 4)) return;
+        if (offset >= 8 * qspi_pins)
+            fault(`IO_QSPI's register ${hex(offset)} is not modelled (write)`);
         this.controls[offset >>> 3] = value;
         this.tell();
     }

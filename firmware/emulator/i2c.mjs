@@ -20,10 +20,14 @@ const interrupt = {
     rx_full: 1 << 2,
     tx_over: 1 << 3,
     tx_empty: 1 << 4,
+    read_request: 1 << 5,
     tx_abort: 1 << 6,
+    rx_done: 1 << 7,
     activity: 1 << 8,
     stop: 1 << 9,
     start: 1 << 10,
+    general_call: 1 << 11,
+    restart: 1 << 12,
 };
 const abort_no_address = 1 << 0;
 const abort_no_data = 1 << 3;
@@ -53,17 +57,20 @@ const defaults = {
     0x94: 0x64,
     0x98: 1,
     0xa0: 7,
-    0xa8: 1,
 };
 // Reading one of these clears a bit.
 const clearing = {
     0x44: interrupt.rx_under,
     0x48: interrupt.rx_over,
     0x4c: interrupt.tx_over,
+    0x50: interrupt.read_request,
     0x54: interrupt.tx_abort,
+    0x58: interrupt.rx_done,
     0x5c: interrupt.activity,
     0x60: interrupt.stop,
     0x64: interrupt.start,
+    0x68: interrupt.general_call,
+    0xa8: interrupt.restart,
 };
 
 export class I2c {
@@ -227,7 +234,11 @@ export class I2c {
             case 0x9c:
                 return this.is_enabled ? 1 : 0;
             case 0xf4:
-                return 0x000f0f0e;
+                return 0;
+            case 0xf8:
+                return 0x3230312a;
+            case 0xfc:
+                return 0x44570140;
             default:
                 return fault(`${this.name}'s register ${hex(offset)} is not modelled (read)`);
         }

@@ -124,7 +124,7 @@ export class Interrupts {
             case 0xd08:
                 return this.vectors;
             case 0xd0c:
-                return 0xfa050000;
+                return 0;
             case 0xd10:
                 return this.control;
             case 0xd20:

@@ -221,26 +221,10 @@ export class Machine {
         this.ssi = new Ssi(this.clock, this.flash);
         this.bus.flash = this.ssi;
         this.bus.add('XIP_SSI', 0x18000000, this.ssi, undefined, false);
-        this.bus.add(
-            'XIP_CTRL',
-            0x14000000,
-            new PlainRegisters(
-                'XIP_CTRL',
-                { 0x0: 3, 0x4: 0, 0xc: 0, 0x10: 0, 0x14: 0, 0x18: 0 },
-                { 0x8: 2, 0x1c: 0 },
-            ),
-        );
+        const cache = new PlainRegisters(0x14000000, { without: [0x14, 0x18, 0x1c] }); // streams
+        this.bus.add('XIP_CTRL', 0x14000000, cache);
         this.add_block('io_qspi', 0x40018000, new QspiIo(this.ssi));
-        const pads = new PlainRegisters('PADS_QSPI', {
-            0x0: 0,
-            0x4: 0x56,
-            0x8: 0x52,
-            0xc: 0x52,
-            0x10: 0x52,
-            0x14: 0x52,
-            0x18: 0x5a,
-        });
-        this.add_block('pads_qspi', 0x40020000, pads);
+        this.add_block('pads_qspi', 0x40020000, new PlainRegisters(0x40020000));
     }
 
     add_usb({ usb_times }) {

@@ -12,6 +12,7 @@ const synchroniser_cycles = 2;
 
 // Pads after reset: input on, pull-down, 4 mA, Schmitt trigger.
 const pad_default = 0x56;
+const debug_pad_defaults = [0xda, 0x5a];
 const pad_output_disable = 0x80;
 const pad_input_enable = 0x40;
 const pad_pull_up = 0x08;
@@ -67,7 +68,8 @@ export class Pins {
     }
 
     reset_pads() {
-        this.pads = new Uint8Array(pin_count).fill(pad_default);
+        this.pads = new Uint8Array(pin_count + 2).fill(pad_default);
+        this.pads.set(debug_pad_defaults, pin_count);
         this.voltage = 0;
         this.output_disable = 0;
         this.input_enable = all_pins;
@@ -261,9 +263,10 @@ export class Pins {
 
     write_io(offset, value, raw) {
         if (offset < 8 * pin_count) {
-            if (offset & 4) this.write_control(offset >>> 3, value);
+            this.write_control(offset >>> 3, value);
             return;
         }
+        if (offset >= 0x120) fault(`IO_BANK0's register ${hex(offset)} is not modelled (write)`);
         const first = 2 * (offset & 0xf);
         for (let i = 0; i < 8 && first + i < pin_count; ++i) {
             const gpio = first + i;
@@ -291,16 +294,16 @@ export class Pins {
 
     read_pads(offset) {
         if (offset === 0) return this.voltage;
-        if (offset <= 4 * pin_count) return this.pads[offset / 4 - 1];
-        return offset === 0x7c ? 0xda : 0x5a; // the pins of the debugger
+        return this.pads[offset / 4 - 1];
     }
 
     write_pads(offset, value) {
         if (offset === 0) this.voltage = value & 1;
-        if (offset === 0 || offset > 4 * pin_count) return;
+        if (offset === 0) return;
         const gpio = offset / 4 - 1;
-        const bit = 1 << gpio;
         this.pads[gpio] = value;
+        if (gpio >= pin_count) return; // the pins of the debugger
+        const bit = 1 << gpio;
         const set = (word, flag) => (value & flag ? word | bit : word & ~bit);
         this.output_disable = set(this.output_disable, pad_output_disable);
         this.input_enable = set(this.input_enable, pad_input_enable);

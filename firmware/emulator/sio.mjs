@@ -75,6 +75,7 @@ export class Sio {
             return;
         }
         if (offset >= 0x060 && offset < 0x07c) return this.write_divider(offset, value);
+        if (offset === 0x050) return; // clears what never happens
         fault(`SIO's register ${hex(offset)} is not modelled (write)`);
     }
 

@@ -177,6 +177,8 @@ export class Spi {
                 return this.raw_interrupts();
             case 0x1c:
                 return this.raw_interrupts() & this.values[0x14];
+            case 0x20:
+                return 0;
             default:
                 return fault(`${this.name}'s register ${hex(offset)} is not modelled (read)`);
         }

@@ -22,6 +22,7 @@ export class Timer {
         this.begin = undefined; // the cycle at which the timer was zero; undefined: it stands
         this.standing = 0;
         this.paused = false;
+        this.debug_pause = 7;
         this.latched_high = 0;
         this.written_low = 0;
         this.raised = 0;
@@ -87,7 +88,7 @@ export class Timer {
             case 0x28:
                 return us % low_range;
             case 0x2c:
-                return 3;
+                return this.debug_pause;
             case 0x30:
                 return this.paused ? 1 : 0;
             case 0x34:
@@ -116,7 +117,8 @@ export class Timer {
                 this.alarms.forEach((alarm, i) => (raw >>> i) & 1 && this.disarm(alarm));
                 return;
             case 0x2c:
-                return; // pauses under the debugger only
+                this.debug_pause = value | 1; // pauses under the debugger only
+                return;
             case 0x30:
                 this.paused = (value & 1) === 1;
                 return this.run_or_stand();

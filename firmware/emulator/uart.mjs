@@ -43,6 +43,7 @@ export class Uart {
         this.rx = [];
         this.latched = 0;
         this.lost = false;
+        this.has_sent = false;
         this.clock.cancel(this.event);
         this.clock.cancel(this.timeout);
         this.event = undefined;
@@ -162,6 +163,7 @@ export class Uart {
                 return character;
             }
             case 0x04:
+            case 0x44:
                 return 0;
             case 0x18:
                 return this.flags();

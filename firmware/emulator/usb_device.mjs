@@ -58,6 +58,8 @@ export class UsbDevice {
         this.clocks = clocks;
         this.memory = new Uint8Array(memory_size);
         this.view = new DataView(this.memory.buffer);
+        // Writing these bits clears the interrupts of their changes.
+        this.also_written = { 0x50: suspended | connected };
         this.host = undefined; // told by on_attach(is_attached) and on_armed()
         this.written_at = new Float64Array(2 * endpoint_count).fill(-settle_cycles);
         this.reset();

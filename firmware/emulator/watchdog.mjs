@@ -50,7 +50,7 @@ export class Watchdog {
             case 0x08:
                 return this.reason;
             case 0x2c:
-                return this.tick_control | (this.tick_control & 0x200 ? 0x400 : 0);
+                return this.tick_control | (this.tick_control > 0x200 ? 0x400 : 0);
             default:
                 return fault(`WATCHDOG's register ${hex(offset)} cannot be read`);
         }

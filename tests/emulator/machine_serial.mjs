@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // DMA, SPI, UART, I2C and flash of the machine: what they move, when, and what they refuse.
 import { check, check_fault, check_within, finish } from './check.mjs';
+import { reset_bit } from './clock_tree.mjs';
 import { Machine } from './machine.mjs';
 import { assemble, pio as code } from './program.mjs';
 import { peek, poke, release, sio_output, start_clocks } from './setup.mjs';
@@ -399,6 +400,32 @@ function window() {
     check_fault('in direct mode', 'not set up for that', () => peek(direct, 0x10000100));
 }
 
+/// The flash is reached by all of its pins or not at all, and a reset takes their functions.
+function flash_pins() {
+    const id = [0xef, 0x40, 0x15];
+    const nothing = [0xff, 0xff, 0xff];
+    const made = flash_machine();
+    for (const pin of [0, 2, 3, 4, 5]) {
+        const control = 0x40018004 + 8 * pin;
+        poke(made, control, 0x1f);
+        check(`without pin ${pin}`, flash_command(made, [0x9f], 3), nothing);
+        flash_command(made, [0x06]);
+        poke(made, control, 0);
+        check(`with pin ${pin}`, flash_command(made, [0x9f], 3), id);
+    }
+    check('what was sent without a pin', flash_command(made, [0x05], 1), [0]);
+    poke(made, select_control, (2 << 8) | 0x1f);
+    check('a select without function', made.flash.selected, false);
+    const other = machine();
+    restart_io_qspi(other);
+    check('the window after a reset', peek(other, 0x10000100), 0xffffffff);
+}
+
+function restart_io_qspi(made) {
+    poke(made, 0x4000e000, 1 << reset_bit.io_qspi);
+    release(made, 'io_qspi');
+}
+
 function power_cut() {
     const made = flash_machine();
     made.flash.bytes.fill(0x00, 0x10000, 0x11000);
@@ -424,5 +451,6 @@ uart();
 i2c();
 flash();
 window();
+flash_pins();
 power_cut();
 finish('DMA and serial interfaces of the machine');
