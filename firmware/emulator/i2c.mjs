@@ -7,6 +7,7 @@
 //     device is, the address is not acknowledged.
 // i2c.hold(is_held): somebody holds the bus after the byte under way, or releases it.
 import { fault, hex } from './fault.mjs';
+import { pin_function, pins_that } from './pins.mjs';
 
 const fifo_depth = 16;
 
@@ -74,8 +75,11 @@ const clearing = {
 };
 
 export class I2c {
-    constructor({ name, clock, interrupts, line }) {
-        Object.assign(this, { name, clock, interrupts, line });
+    constructor({ name, number, clock, pins, interrupts, line }) {
+        Object.assign(this, { name, clock, pins, interrupts, line });
+        this.own_pins = [0, 1].map((role) =>
+            pins_that((gpio) => ((gpio >>> 1) & 1) === number && (gpio & 1) === role),
+        );
         this.devices = new Map();
         this.is_held = false;
         this.signal = () => {};
@@ -126,6 +130,8 @@ export class I2c {
     advance() {
         if (this.event !== undefined || this.tx.length === 0 || !this.is_enabled) return;
         if (this.is_held) return;
+        if (!this.own_pins.every((pins) => this.pins.is_read(pin_function.i2c, pins)))
+            fault(`${this.name} is used, but no pins have its data and clock`);
         const command = this.tx.shift();
         this.signal(false);
         const is_read = (command & is_read_command) !== 0;

@@ -173,15 +173,16 @@ export class Machine {
         const { clocks } = this.tree;
         this.spi = [0, 1].map((number) => {
             const name = `spi${number}`;
-            return new Spi({ name, clock, pins, interrupts, line: irq.spi0 + number, clocks });
+            return new Spi({ name, number, clock, pins, interrupts, line: irq.spi0 + number, clocks });
         });
         this.uart = [0, 1].map((number) => {
             const name = `uart${number}`;
-            return new Uart({ name, clock, pins, interrupts, irq: irq.uart0 + number, clocks });
+            const line = irq.uart0 + number;
+            return new Uart({ name, number, clock, pins, interrupts, irq: line, clocks });
         });
         this.i2c = [0, 1].map((number) => {
             const name = `i2c${number}`;
-            return new I2c({ name, clock, interrupts, line: irq.i2c0 + number });
+            return new I2c({ name, number, clock, pins, interrupts, line: irq.i2c0 + number });
         });
         this.add_block('i2c0', 0x40044000, this.i2c[0]);
         this.add_block('i2c1', 0x40048000, this.i2c[1]);

@@ -111,6 +111,16 @@ export class Pins {
             .map(([name, pins]) => ({ source: this.sources.get(name), pins }));
     }
 
+    /// Whether a block that is function `number` reads one of the pins of `mask`.
+    is_read(number, mask) {
+        return (this.selected.get(number) & this.input_enable & mask) !== 0;
+    }
+
+    /// Whether it drives one of them.
+    is_driven(number, mask) {
+        return (this.selected.get(number) & ~this.output_disable & mask) !== 0;
+    }
+
     /// Works the levels out anew, because a source, a pad or a multiplexer changed. They hold from
     /// the end of this cycle.
     drive() {
@@ -311,6 +321,13 @@ export class Pins {
         this.pull_down = set(this.pull_down, pad_pull_down);
         this.drive();
     }
+}
+
+/// A word with a bit for each GPIO for which `belongs` holds.
+export function pins_that(belongs) {
+    let word = 0;
+    for (let gpio = 0; gpio < pin_count; ++gpio) if (belongs(gpio)) word |= 1 << gpio;
+    return word;
 }
 
 /// The two blocks of registers.

@@ -9,6 +9,7 @@
 // spi.hold(is_held): the clock stands still after the frame under way, or runs again.
 // spi.exchange_as_master(word): for the slave mode; returns what the chip sends meanwhile.
 import { fault, hex } from './fault.mjs';
+import { pin_function, pins_that } from './pins.mjs';
 
 const fifo_depth = 8;
 // Where CPHA is 0, the chip raises its own select between words, which takes so many half periods.
@@ -19,8 +20,13 @@ const timeout_bits = 32;
 const interrupt = { overrun: 1, timeout: 2, receive: 4, transmit: 8 };
 
 export class Spi {
-    constructor({ name, clock, pins, interrupts, line, clocks }) {
+    constructor({ name, number, clock, pins, interrupts, line, clocks }) {
         Object.assign(this, { name, clock, pins, interrupts, line, clocks });
+        const pins_of = (role) =>
+            pins_that((gpio) => ((gpio >>> 3) & 1) === number && (gpio & 3) === role);
+        this.rx_pins = pins_of(0);
+        this.clock_pins = pins_of(2);
+        this.tx_pins = pins_of(3);
         this.devices = [];
         this.signal = () => {}; // (is_receive) to the DMA
         this.is_held = false;
@@ -80,6 +86,7 @@ export class Spi {
         if (this.event !== undefined || this.tx.length === 0) return;
         if (!this.is_enabled || this.is_slave || this.is_held) return;
         this.check_clock();
+        this.check_pins();
         const word = this.tx.shift();
         this.signal(false);
         const begin = this.clock.now;
@@ -100,14 +107,29 @@ export class Spi {
         if (!this.clocks.peri_runs) fault(`${this.name} is used, but clk_peri does not run`);
     }
 
+    get loops() {
+        return (this.values[0x04] & 1) !== 0;
+    }
+
+    check_pins() {
+        if (this.loops || this.pins.is_driven(pin_function.spi, this.clock_pins)) return;
+        fault(`${this.name} is used, but no pin has its clock`);
+    }
+
+    /// What the selected device answers, as far as there are pins for it.
+    exchange(word, frame) {
+        const { pins } = this;
+        const sent = pins.is_driven(pin_function.spi, this.tx_pins) ? word : 0;
+        let found = 0; // nobody drives the line
+        for (const { device, selected } of this.devices)
+            if (selected) found = device.exchange(sent, frame);
+        return pins.is_read(pin_function.spi, this.rx_pins) ? found : 0;
+    }
+
     end_frame(word, frame) {
         this.event = undefined;
         const mask = 2 ** frame.bits - 1;
-        const loops = (this.values[0x04] & 1) !== 0;
-        let found = loops ? word : 0; // nobody drives the line
-        for (const { device, selected } of this.devices)
-            if (selected) found = device.exchange(word & mask, frame);
-        this.receive(found & mask);
+        this.receive((this.loops ? word : this.exchange(word & mask, frame)) & mask);
         const pause = this.values[0x00] & 0x80 ? 0 : (pause_half_periods * this.period) / 2;
         if (this.tx.length > 0 && pause > 0) this.pause(pause);
         else this.begin_frame();

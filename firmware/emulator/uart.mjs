@@ -5,6 +5,7 @@
 // uart.send(bytes, at, baud): what somebody sends to it, from the cycle `at` on; at another speed
 //     than the chip's, it sees framing errors.
 import { fault, hex } from './fault.mjs';
+import { pin_function, pins_that } from './pins.mjs';
 
 const deep = 32;
 // The receive timeout's interrupt comes after so many bits without a character.
@@ -19,9 +20,14 @@ const framing_error = 0x100;
 const overrun_error = 0x800;
 const levels = [4, 8, 16, 24, 28];
 
+/// Which of the two has this GPIO.
+const uart_of = (gpio) => [0, 1, 1, 0, 0, 1, 1, 0][gpio >>> 2];
+
 export class Uart {
-    constructor({ name, clock, pins, interrupts, irq, clocks }) {
+    constructor({ name, number, clock, pins, interrupts, irq, clocks }) {
         Object.assign(this, { name, clock, pins, interrupts, irq, clocks });
+        this.tx_pins = pins_that((gpio) => uart_of(gpio) === number && (gpio & 3) === 0);
+        this.rx_pins = pins_that((gpio) => uart_of(gpio) === number && (gpio & 3) === 1);
         this.signal = () => {};
         this.on_byte = () => {};
         this.arrives_until = 0;
@@ -81,7 +87,8 @@ export class Uart {
         const cycles = Math.round(this.frame_bits * this.bit_cycles);
         this.event = this.clock.after(cycles, () => {
             this.event = undefined;
-            this.on_byte(byte, this.clock.now);
+            if (this.pins.is_driven(pin_function.uart, this.tx_pins))
+                this.on_byte(byte, this.clock.now);
             this.begin();
             this.update_line();
         });
@@ -105,6 +112,7 @@ export class Uart {
 
     receive(character) {
         if ((this.values[0x30] & 0x201) !== 0x201) return;
+        if (!this.pins.is_read(pin_function.uart, this.rx_pins)) return;
         if (character & framing_error) this.latched |= interrupt.framing;
         if (this.rx.length >= this.depth) {
             this.lost = true;
@@ -206,16 +214,12 @@ export class Uart {
 export class UartPins {
     constructor(uarts) {
         this.uarts = uarts;
-        this.out = 0;
-        for (let gpio = 0; gpio < 30; ++gpio) if ((gpio & 3) === 0) this.out |= 1 << gpio;
+        this.out = pins_that((gpio) => (gpio & 3) === 0);
     }
 
     get enable() {
-        const blocks = [0, 1, 1, 0, 0, 1, 1, 0]; // of four GPIO each
-        let word = 0;
-        blocks.forEach((number, i) => {
-            if (this.uarts[number].values[0x30] & 1) word |= 1 << (4 * i);
-        });
-        return word & 0x3fffffff;
+        return pins_that(
+            (gpio) => (gpio & 3) === 0 && (this.uarts[uart_of(gpio)].values[0x30] & 1) !== 0,
+        );
     }
 }

@@ -119,6 +119,24 @@ const tests = {
         check((rig.machine.driven & driven) === driven, 'an output is not driven');
     },
 
+    'function and pad of each pin are stated at start': () => {
+        const rig = new Rig(image, quick_usb);
+        const { bus } = rig.machine;
+        const written = new Set();
+        const write = bus.write_register.bind(bus);
+        bus.write_register = (address, value) => {
+            written.add(address);
+            write(address, value);
+        };
+        rig.connect();
+        for (let gpio = 0; gpio < 30; ++gpio) {
+            check(written.has(0x40014004 + 8 * gpio), `not the function of GPIO ${gpio}`);
+            check(written.has(0x4001c004 + 4 * gpio), `not the pad of GPIO ${gpio}`);
+        }
+        for (let number = 0; number < 6; ++number)
+            check(written.has(0x40018004 + 8 * number), `not pin ${number} of the flash`);
+    },
+
     'a trigger that is low when active rests high from its first moment on': () => {
         const rig = new Rig(image, quick_usb);
         const levels = [];

@@ -4,7 +4,8 @@ import { check, check_fault, check_within, finish } from './check.mjs';
 import { reset_bit } from './clock_tree.mjs';
 import { Machine } from './machine.mjs';
 import { assemble, pio as code } from './program.mjs';
-import { peek, poke, release, sio_output, start_clocks } from './setup.mjs';
+import { pin_function } from './pins.mjs';
+import { give_pins, peek, poke, release, sio_output, start_clocks } from './setup.mjs';
 
 const ram = 0x20010000;
 const spi0 = 0x4003c000;
@@ -123,8 +124,9 @@ function echo() {
     return device;
 }
 
-function spi_machine(control, divider) {
+function spi_machine(control, divider, pins = [2, 3, 4]) {
     const made = machine('spi0', 'dma');
+    give_pins(made, pin_function.spi, ...pins);
     sio_output(made, 5);
     poke(made, 0xd0000014, 1 << 5);
     const device = echo();
@@ -194,6 +196,30 @@ function spi_pauses_and_faults() {
     check('an overrun', peek(overrun, spi0 + 0x18) & 1, 1);
 }
 
+/// A transfer of a word whose pins are these.
+function spi_with_pins(...pins) {
+    const { made, device } = spi_machine(0x7 | 0x80, 2, pins);
+    poke(made, 0xd0000018, 1 << 5);
+    poke(made, spi0 + 8, 0x33);
+    made.run_for(100);
+    return [device.frames[0].word, peek(made, spi0 + 8)];
+}
+
+function spi_pins() {
+    check('with all pins', spi_with_pins(2, 3, 4), [0x33, 0x5a]);
+    check('with the pins of another place', spi_with_pins(18, 19, 20), [0x33, 0x5a]);
+    check('without its output', spi_with_pins(2, 4), [0, 0x5a]);
+    check('without its input', spi_with_pins(2, 3), [0x33, 0]);
+    check('with the input of spi1', spi_with_pins(2, 3, 12), [0x33, 0]);
+    check_fault('without its clock', 'no pin has its clock', () => spi_with_pins(3, 4));
+    const { made } = spi_machine(0x7 | 0x80, 2);
+    poke(made, 0x4001c004 + 4 * 4, 0x16); // input off
+    poke(made, 0xd0000018, 1 << 5);
+    poke(made, spi0 + 8, 0x33);
+    made.run_for(100);
+    check('with its input disabled at the pad', peek(made, spi0 + 8), 0);
+}
+
 function spi_by_dma() {
     const { made, device } = spi_machine(0xf | 0x80, 126);
     for (let i = 0; i < 12; ++i) made.bus.write16(ram + 2 * i, 100 + i);
@@ -240,6 +266,7 @@ function spi_as_slave() {
 
 function uart() {
     const made = machine('uart0');
+    give_pins(made, pin_function.uart, 0, 1);
     poke(made, uart0 + 0x24, 67); // 115200
     poke(made, uart0 + 0x28, 52);
     poke(made, uart0 + 0x2c, 0x70);
@@ -273,6 +300,12 @@ function uart() {
     made.uart[0].send([7], made.now, 57600);
     made.run_for(4 * character);
     check('another speed', peek(made, uart0) & 0x100, 0x100);
+    give_pins(made, 31, 0, 1);
+    poke(made, uart0, 68);
+    made.uart[0].send([8]);
+    made.run_for(4 * character);
+    check('without its output', sent.length, 3);
+    check('without its input', (peek(made, uart0 + 0x18) >>> 4) & 1, 1);
 }
 
 function flash_command(made, bytes, reads = 0) {
@@ -318,6 +351,7 @@ function register_device() {
 
 function i2c() {
     const made = machine('i2c0');
+    give_pins(made, pin_function.i2c, 0, 1);
     const device = register_device();
     made.i2c[0].attach(0x68, device);
     poke(made, i2c0 + 0x04, 0x68);
@@ -355,6 +389,10 @@ function i2c() {
     peek(made, i2c0 + 0x54);
     check('cleared', peek(made, i2c0 + 0x34) & 0x40, 0);
     check_fault('set up while it is enabled', 'while it is enabled', () => poke(made, i2c0 + 4, 1));
+    give_pins(made, 31, 0);
+    check_fault('without a pin', 'no pins have its data and clock', () =>
+        poke(made, i2c0 + 0x10, 0x200),
+    );
 }
 
 const ms = 125_000;
@@ -445,6 +483,7 @@ chains();
 pio_to_ring();
 spi_words();
 spi_pauses_and_faults();
+spi_pins();
 spi_by_dma();
 spi_as_slave();
 uart();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Sets a machine up by its registers, for tests whose program does not.
 import { reset_bit } from './clock_tree.mjs';
+import { pin_function } from './pins.mjs';
 
 const settle_cycles = 300_000; // crystal and PLLs
 
@@ -38,8 +39,13 @@ export function start_clocks(machine) {
     poke(machine, 0x4005802c, 0x200 | 12);
 }
 
+/// Gives GPIO to a function (`pin_function` of pins.mjs).
+export function give_pins(machine, number, ...gpios) {
+    for (const gpio of gpios) poke(machine, 0x40014004 + 8 * gpio, number);
+}
+
 /// GPIO `gpio` by SIO, as output.
 export function sio_output(machine, gpio) {
-    poke(machine, 0x40014004 + 8 * gpio, 5);
+    give_pins(machine, pin_function.sio, gpio);
     poke(machine, 0xd0000024, 1 << gpio);
 }
