@@ -188,6 +188,7 @@ const sys_control = 0x3c;
 const sys_divider = 0x40;
 const sys_selected = 0x44;
 const peri_control = 0x48;
+const peri_divider = 0x4c;
 const usb_control = 0x54;
 const usb_divider = 0x58;
 const enabled = 1 << 11;
@@ -230,11 +231,12 @@ class Clocks {
             fault(`clk_sys would run at ${divided} Hz (source ${source}), not ${clk_sys_hz}`);
     }
 
-    /// Whether clk_peri, for SPI and UART, comes from clk_sys.
+    /// Whether clk_peri, for SPI and UART, comes from clk_sys, undivided.
     get peri_runs() {
         const value = this.values[peri_control];
         const source = (value >>> 5) & 7;
-        return (value & enabled) !== 0 && source <= 1 && this.sys_runs;
+        const is_whole = this.values[peri_divider] === 0x100;
+        return (value & enabled) !== 0 && source <= 1 && is_whole && this.sys_runs;
     }
 
     get sys_runs() {

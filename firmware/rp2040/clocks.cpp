@@ -34,11 +34,23 @@ void start_pll(Pll& pll, std::uint32_t multiplier, std::uint32_t first, std::uin
     clear_bits(pll.power, post_dividers_down);
 }
 
+/// Of a divider, whose lower 8 bits are a fraction. A reset by another program's watchdog may leave
+/// others.
+constexpr std::uint32_t undivided = 1U << 8U;
+
 /// One bit of `selected` is set for each source that such a clock can switch to without a glitch.
 void select(ClockGenerator& clock, std::uint32_t source, std::uint32_t auxiliary) {
+    clock.divider = undivided;
     clock.control = auxiliary << 5U | source;
     while (clock.selected != 1U << source) {
     }
+}
+
+/// From its first source, which is the right one for both that have none without a glitch.
+void start(ClockGenerator& clock) {
+    constexpr std::uint32_t enable = 1U << 11U;
+    clock.divider = undivided;
+    clock.control = enable;
 }
 
 }  // namespace
@@ -47,7 +59,6 @@ void start_clocks() {
     constexpr std::uint32_t from_crystal = 2;
     constexpr std::uint32_t from_reference = 0;
     constexpr std::uint32_t from_auxiliary = 1;
-    constexpr std::uint32_t generator_enable = 1U << 11U;
     clocks().resuscitate = 0;
     start_crystal();
     // After a reset by the watchdog the PLLs may be in use.
@@ -57,8 +68,8 @@ void start_clocks() {
     start_pll(pll_sys(), 125, 6, 2);  // 12 * 125 / 12 = 125 MHz
     start_pll(pll_usb(), 100, 5, 5);  // 12 * 100 / 25 = 48 MHz
     select(clocks().system, from_auxiliary, 0);
-    clocks().peripherals.control = generator_enable;
-    clocks().usb.control = generator_enable;
+    start(clocks().peripherals);
+    start(clocks().usb);
     constexpr std::uint32_t tick_enable = 1U << 9U;
     watchdog_timer().tick = tick_enable | crystal_mhz;
     restart_blocks(reset_timer);

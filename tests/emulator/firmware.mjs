@@ -137,6 +137,14 @@ const tests = {
             check(written.has(0x40018004 + 8 * number), `not pin ${number} of the flash`);
     },
 
+    'clocks run right whatever divided them before': () => {
+        const rig = new Rig(image, quick_usb);
+        const { values } = rig.machine.tree.clocks;
+        for (const divider of [0x34, 0x40, 0x4c, 0x58]) values[divider] = 0x200;
+        rig.connect();
+        check(rig.machine.tree.clocks.peri_runs, 'clk_peri is divided');
+    },
+
     'a trigger that is low when active rests high from its first moment on': () => {
         const rig = new Rig(image, quick_usb);
         const levels = [];
