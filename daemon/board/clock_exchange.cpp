@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/clock_exchange.hpp"
 
+#include <algorithm>
+
 namespace versavis::daemon {
 
 namespace {
@@ -31,7 +33,7 @@ ClockExchange::ClockExchange(double rate_hz, clock::Translator& translator, Cloc
 
 void ClockExchange::begin() {
     answers_ = 0;
-    request_open_ = false;
+    open_.clear();
     exchange_.reset();
 }
 
@@ -42,12 +44,18 @@ void ClockExchange::board_restarted(std::uint32_t nonce) {
 
 wire::ClockRequest ClockExchange::request() {
     settle();
-    request_open_ = true;
+    const HostTime now = host_now();
+    while (!open_.empty() && now - open_.front().sent > request_timeout) open_.pop_front();
     wire::ClockRequest request{};
     request.id = ++request_id_;
+    open_.push_back({request.id, now});
     plan_next_request();
     leaves();
     return request;
+}
+
+void ClockExchange::leaves() {
+    if (!open_.empty()) open_.back().sent = host_now();
 }
 
 void ClockExchange::plan_next_request() {
@@ -56,21 +64,33 @@ void ClockExchange::plan_next_request() {
     next_request_ = host_now() + Duration{static_cast<std::int64_t>(ns)};
 }
 
+/// What was asked before it is answered in order, or was lost.
+std::optional<ClockExchange::Request> ClockExchange::request_of(const wire::ClockAnswer& answer) {
+    const auto found = std::find_if(open_.begin(), open_.end(), [&](const Request& request) {
+        return request.id == answer.id;
+    });
+    if (found == open_.end()) return std::nullopt;
+    const Request request = *found;
+    open_.erase(open_.begin(), found + 1);
+    return request;
+}
+
 /// The board cannot have had the request for longer than the host waited.
 std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTime received) {
-    if (!request_open_ || answer.id != request_id_ || received - request_sent_ > request_timeout)
-        return std::nullopt;
-    request_open_ = false;
+    const auto request = request_of(answer);
+    if (!request || received - request->sent > request_timeout) return std::nullopt;
+    settle();
     ++answers_;
-    const clock::Exchange exchange{request_sent_, {answer.received_ns}, {answer.sent_ns}, received};
+    const clock::Exchange exchange{request->sent, {answer.received_ns}, {answer.sent_ns}, received};
     if (const auto doubt = contradicts_causality(exchange)) return doubt;
     exchange_ = exchange;
+    exchange_id_ = answer.id;
     return std::nullopt;
 }
 
 /// The answer left after it was written.
 std::optional<Doubt> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
-    if (!exchange_ || follow_up.id != request_id_) return std::nullopt;
+    if (!exchange_ || follow_up.id != exchange_id_) return std::nullopt;
     clock::Exchange exchange = *exchange_;
     if (follow_up.sent_ns < exchange.answered.ns)
         return Doubt{EventReason::implausible_time, follow_up.sent_ns, exchange.answered.ns};
@@ -92,7 +112,7 @@ void ClockExchange::take(const wire::ImuSample& sample, HostTime received) {
 
 void ClockExchange::settle() {
     if (!exchange_) return;
-    recorder_.exchange(request_id_, *exchange_);
+    recorder_.exchange(exchange_id_, *exchange_);
     translator_.add(*exchange_);
     exchange_.reset();
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <random>
 
@@ -30,7 +31,7 @@ class ClockExchange {
     wire::ClockRequest request();
 
     /// The request leaves now: it must be written at once.
-    void leaves() { request_sent_ = host_now(); }
+    void leaves();
     HostTime next_request() const { return next_request_; }
 
     /// Doubted: what contradicts causality is not used.
@@ -47,16 +48,22 @@ class ClockExchange {
     void settle();
 
  private:
+    struct Request {
+        std::uint32_t id = 0;
+        HostTime sent;
+    };
+
     void plan_next_request();
+    std::optional<Request> request_of(const wire::ClockAnswer& answer);
 
     Duration interval_;
     clock::Translator& translator_;
     ClockRecorder& recorder_;
     std::mt19937 random_{std::random_device{}()};
     std::uint32_t request_id_ = 0;
-    HostTime request_sent_;
-    bool request_open_ = false;
+    std::deque<Request> open_;  ///< in their order: a slow link holds several of them
     std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still be told
+    std::uint32_t exchange_id_ = 0;            ///< of its request
     unsigned answers_ = 0;
     HostTime next_request_;
 };

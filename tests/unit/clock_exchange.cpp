@@ -40,12 +40,13 @@ TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the
     CHECK(bench.exchanges() == 2);
 }
 
-TEST_CASE("clock_exchange: answers that are late, of another request or repeated are ignored") {
+TEST_CASE("clock_exchange: answers that are late, of no request or repeated are ignored") {
     Bench bench;
     const auto first = bench.exchange.request();
-    const auto second = bench.exchange.request();
-    bench.answer(first, milliseconds(1));
-    bench.answer(second, milliseconds(501));
+    bench.answer(first, milliseconds(501));
+    wire::ClockRequest unasked{};
+    unasked.id = first.id + 1;
+    bench.answer(unasked, milliseconds(1));
     CHECK(bench.exchange.answers() == 0);
     const auto third = bench.exchange.request();
     bench.answer(third, milliseconds(1));
@@ -53,6 +54,33 @@ TEST_CASE("clock_exchange: answers that are late, of another request or repeated
     CHECK(bench.exchange.answers() == 1);
     static_cast<void>(bench.exchange.request());
     CHECK(bench.exchanges() == 1);
+}
+
+TEST_CASE("clock_exchange: a link that holds several requests loses no answer") {
+    Bench bench;
+    const auto first = bench.exchange.request();
+    const auto second = bench.exchange.request();
+    const auto third = bench.exchange.request();
+    bench.answer(first, milliseconds(200));
+    bench.answer(second, milliseconds(200));
+    bench.exchange.take(wire::ClockFollowUp{first.id, 0, host_now().ns});  // too late
+    CHECK(bench.exchange.expects_follow_up());
+    bench.exchange.take(wire::ClockFollowUp{second.id, 0, host_now().ns});
+    CHECK_FALSE(bench.exchange.expects_follow_up());
+    CHECK(bench.exchange.answers() == 2);
+    CHECK(bench.exchanges() == 2);
+    bench.exchange.begin();
+    bench.answer(third, milliseconds(200));  // of the conversation before
+    CHECK(bench.exchange.answers() == 0);
+}
+
+TEST_CASE("clock_exchange: an answer that overtakes another makes that one void") {
+    Bench bench;
+    const auto first = bench.exchange.request();
+    const auto second = bench.exchange.request();
+    bench.answer(second, milliseconds(1));
+    bench.answer(first, milliseconds(2));
+    CHECK(bench.exchange.answers() == 1);
 }
 
 TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
