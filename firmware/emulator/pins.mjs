@@ -25,6 +25,11 @@ export const pin_function = { spi: 1, uart: 2, i2c: 3, pwm: 4, sio: 5, pio0: 6, 
 // whose loop was skipped looks back one iteration, over pins that did not change meanwhile.
 const history_size = 16;
 
+// GPIO29 of a Pico measures its supply: a divider with a capacitor.
+const pico_loads = [[29, 12_500]];
+
+const due = 'due'; // a loaded pin whose level lasted long enough
+
 /// Words that say which pins a two-bit override changes, and how.
 class Override {
     constructor() {
@@ -59,6 +64,8 @@ export class Pins {
         this.out = 0; // as driven, before the pads
         this.driven = 0;
         this.pad = 0; // the levels at the pins
+        this.loads = new Map(pico_loads); // cycles that a level must last to be seen, by GPIO
+        this.changing = new Map(); // events of loaded pins whose level is about to change
         this.times = new Float64Array(history_size);
         this.words = new Uint32Array(history_size); // inputs before each of `times`
         this.newest = 0;
@@ -137,9 +144,10 @@ export class Pins {
 
     set_levels(out, driven, time) {
         const floating = this.pull_up & ~this.externally_driven;
-        const pad =
+        const wanted =
             ((out & driven) | (~driven & ((this.external & this.externally_driven) | floating))) &
             all_pins;
+        const pad = this.behind_loads(wanted);
         const changed = (pad ^ this.pad) | (driven ^ this.driven);
         this.out = out;
         this.driven = driven;
@@ -148,6 +156,36 @@ export class Pins {
         if (changed !== 0) for (const listener of this.pad_listeners) listener();
         const inputs = this.in_override.apply(pad & this.input_enable) & all_pins;
         if (inputs !== this.inputs) this.set_inputs(inputs, time);
+    }
+
+    /// What is joined to a pin: levels shorter than this do not pass, others come so much later.
+    set_load(gpio, cycles) {
+        this.loads.set(gpio, cycles);
+    }
+
+    behind_loads(wanted) {
+        let pad = wanted;
+        for (const [gpio, cycles] of this.loads) {
+            const bit = 1 << gpio;
+            const event = this.changing.get(gpio);
+            if (((wanted ^ this.pad) & bit) === 0) {
+                if (event !== undefined) this.clock.cancel(event);
+                this.changing.delete(gpio);
+            } else if (event !== due) {
+                pad ^= bit;
+                if (event === undefined) this.change_in(gpio, cycles);
+            }
+        }
+        return pad;
+    }
+
+    change_in(gpio, cycles) {
+        const event = this.clock.at(this.clock.now + 1 + cycles, () => {
+            this.changing.set(gpio, due);
+            this.set_levels(this.out, this.driven, this.clock.now);
+            this.changing.delete(gpio);
+        });
+        this.changing.set(gpio, event);
     }
 
     note() {

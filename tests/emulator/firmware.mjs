@@ -569,6 +569,25 @@ const tests = {
         }
     },
 
+    'without a free pin for the loop no exposure is measured, and all are with one': () => {
+        const measured = (load) => {
+            const rig = new Rig(image, quick_usb);
+            if (load > 0) rig.machine.pins.set_load(pin.loop, load);
+            const camera = rig.add_camera(0);
+            rig.connect();
+            rig.configure({ cameras: [{ latency: 8000 }] });
+            rig.host.start();
+            rig.run_ms(1200);
+            const records = rig.host.all('exposure');
+            check(records.length >= camera.triggers.length - 2, `${records.length} records`);
+            check(load === 0 || rig.host.last('health').edges_lost > 0, 'nothing is lost');
+            return records.filter(({ flags }) => (flags & 1) !== 0).length / records.length;
+        };
+        check(measured(0) === 1, 'not all are measured');
+        check(measured(20) === 0, 'some are measured with a load of 160 ns');
+        check(measured(12_500) === 0, 'some are measured with a load of 100 us');
+    },
+
     'a line that never rests is ignored, and harms nothing else': () => {
         const rig = new Rig(image, quick_usb);
         const camera = rig.add_camera(0);
