@@ -13,7 +13,8 @@ struct LoopSignal {
     volatile bool awaited = false;  ///< an edge was sent, and nothing is known of it yet
     volatile bool proved = false;   ///< the newest edges came back at their times
     bool level = false;
-    std::uint32_t at_low_ns = 0;  ///< when it leaves, or left: the lower bits of board time
+    volatile std::uint32_t at_low_ns =
+        0;  ///< when it leaves, or left: the lower bits of board time
 };
 
 }  // namespace versavis::rp2040

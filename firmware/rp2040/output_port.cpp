@@ -30,9 +30,10 @@ std::int32_t from(std::uint32_t cycle, std::uint32_t to) {
     return static_cast<std::int32_t>(to - cycle);
 }
 
-/// After so many commits the main loop runs, whatever else. At half, it takes twice the processor's
-/// time; at twice, edges may be too old for their counts.
-constexpr unsigned commits_per_wake = 48;
+/// After so many commits, 21 ms, the main loop runs, whatever else. At half, it takes twice the
+/// processor's time; at twice, edges may be too old for their counts. A power of two: the processor
+/// has no instruction that divides.
+constexpr unsigned commits_per_wake = 64;
 
 /// After so many an edge goes through the loop: once a second. At half, twice the stamps to look
 /// at; at twice, a fault is found out a second later.

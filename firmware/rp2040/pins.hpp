@@ -8,9 +8,8 @@
 
 namespace versavis::rp2040 {
 
-/// GPIO that a Raspberry Pi Pico leads out: 0 to 22 and 26 to 28. What the board of a Pico does
-/// with the others (regulator, USB's supply, LED, a divider with a capacitor) is no business of
-/// ours.
+/// A Raspberry Pi Pico leads GPIO 0 to 22 and 26 to 28 out. The others belong to its own circuits:
+/// regulator, USB's supply, LED, a divider with a capacitor.
 enum Pin : unsigned {
     pin_uart_transmit = 0,  ///< to the second IMU
     pin_uart_receive = 1,   ///< from it, or from a GNSS receiver
