@@ -203,10 +203,13 @@ TEST_CASE("cameras: a clock of another unit than it says is named, and frames co
     Stack stack({"tickunit", 89, 1, 20, "clock_rate = 8", "", ""});
     stack.start_rig();
     stack.start_service();
-    const auto status = stack.wait_for_status([](const auto& s) {
-        return healthy(s) && s["cameras"][0]["hint"].template get<std::string>().find(
-                                 "its clock runs 8 times as fast as it says") == 0;
+    double rate = 0;
+    const auto status = stack.wait_for_status([&](const auto& s) {
+        const auto hint = s["cameras"][0]["hint"].template get<std::string>();
+        return healthy(s) &&
+               std::sscanf(hint.c_str(), "its clock runs %lf times as fast as it says", &rate) == 1;
     });
+    CHECK(rate == Approx(8).epsilon(0.01));  // it is measured by arrivals
     CHECK(status["cameras"][0]["frames_published"] > 0);
     CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(0.5));
 }
