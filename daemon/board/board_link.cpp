@@ -9,6 +9,7 @@
 #include "configuration/board_configuration.hpp"
 #include "configuration/board_parts.hpp"
 #include "engine/board/firmware_file.hpp"
+#include "thread_name.hpp"
 
 namespace versavis::daemon {
 
@@ -140,6 +141,7 @@ BoardReport BoardLink::report() const {
 }
 
 void BoardLink::run() {
+    name_thread("link");
     set_state(BoardState::absent, "looking for it");
     for (bool go_on = true; go_on;) {
         auto stream = open_();

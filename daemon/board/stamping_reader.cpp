@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "log.hpp"
+#include "thread_name.hpp"
 
 namespace versavis::daemon {
 
@@ -58,6 +59,7 @@ StampingReader::~StampingReader() {
 }
 
 void StampingReader::run() {
+    name_thread("stamping");
     ask_for_realtime();
     int idle_wakes = 0;
     std::array<std::uint8_t, largest_chunk> buffer{};

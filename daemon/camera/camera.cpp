@@ -13,6 +13,7 @@
 #include "camera/camera_setup.hpp"
 #include "camera/image_receiver.hpp"
 #include "camera/receive_mode.hpp"
+#include "thread_name.hpp"
 
 namespace versavis::daemon {
 
@@ -166,6 +167,7 @@ void Camera::set_setting_up_since(HostTime since) {
 }
 
 void Camera::run() {
+    name_thread("camera " + configuration_.name);
     set_state(CameraState::opening, "");
     for (;;) {
         auto ended = session();

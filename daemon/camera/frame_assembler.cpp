@@ -37,6 +37,10 @@ constexpr std::uint64_t numbers_of_late_frames = 100;
 /// slots.
 constexpr std::size_t most_open = 4;
 
+/// Frames after which most of a longer length is believed; a shorter one is at once. At half, a
+/// burst of loss makes the frames after it late; at twice, a slower link costs wake-ups for longer.
+constexpr int length_memory = 8;
+
 /// A frame is never of more packets: numbers of 24 bits must do.
 constexpr std::size_t most_packets = 1 << 24;
 
@@ -99,11 +103,14 @@ void FrameAssembler::note(Open& frame, const gvsp::Packet& packet) const {
     frame.newest_id = std::max(frame.newest_id, packet.id);
 }
 
-void FrameAssembler::finish_if_complete(Open& frame) const {
+void FrameAssembler::finish_if_complete(Open& frame) {
     if (frame.done || frame.trailer == 0 || !frame.leader || frame.here_count <= frame.trailer)
         return;
     frame.done = true;
     frame.complete = frame.short_id == 0 || frame.short_id + 1 == frame.trailer;
+    if (!frame.complete) return;
+    const Duration length = frame.newest - frame.first_data;
+    length_ = std::min(length, length_ + (length - length_) / length_memory);
 }
 
 FrameAssembler::Open* FrameAssembler::find(const gvsp::Packet& packet) {
@@ -208,7 +215,8 @@ std::optional<Duration> FrameAssembler::time_left(HostTime now) const {
     if (frame.newest_id == 0) return Duration{};
     const Duration so_far = now - frame.first_data;
     const Duration left = so_far * (frame.last_id() - frame.newest_id) / frame.newest_id;
-    return std::min(left, so_far * 2);  // it may have begun slowly
+    // It may have begun slowly. Of what others took, half is sure: they were seen late, too.
+    return std::max(std::min(left, so_far * 2), (length_ - so_far) / 2);
 }
 
 std::vector<std::uint32_t> FrameAssembler::close() {

@@ -54,8 +54,8 @@ class FrameAssembler {
     /// When advance() has to be called, even if nothing arrives; none: no frame is open.
     std::optional<HostTime> deadline(HostTime now) const;
 
-    /// How long the rest of the newest frame will probably take, as fast as it came so far; none:
-    /// nothing but what is sent again is expected.
+    /// How long the rest of the newest frame will probably take, as fast as it came so far and as
+    /// long as others took; none: nothing but what is sent again is expected.
     std::optional<Duration> time_left(HostTime now) const;
 
     /// Slots of frames that are open: they are the owner's again.
@@ -84,7 +84,7 @@ class FrameAssembler {
     Open* begin(const gvsp::Packet& packet);
     void take_data(Open& frame, const gvsp::Packet& packet) const;
     void note(Open& frame, const gvsp::Packet& packet) const;
-    void finish_if_complete(Open& frame) const;
+    void finish_if_complete(Open& frame);
     void ask(Open& frame, std::uint32_t until, HostTime now);
     void ask_for_missing(Open& frame, bool followed, HostTime now);
     static std::uint32_t due_until(const Open& frame, bool followed);
@@ -93,6 +93,7 @@ class FrameAssembler {
     Owner& owner_;
     std::deque<Open> frames_;
     std::uint64_t newest_block_ = 0;  ///< 0: none yet
+    Duration length_;                 ///< from a frame's first data to its end, usually
 };
 
 }  // namespace versavis::daemon

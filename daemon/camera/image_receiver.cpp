@@ -7,6 +7,8 @@
 
 #include <algorithm>
 
+#include "thread_name.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -89,6 +91,7 @@ ImageReceiver::~ImageReceiver() {
 }
 
 void ImageReceiver::run() {
+    name_thread("receive " + configuration_.name);
     pollfd stopped{stop_, POLLIN, 0};
     while (::poll(&stopped, 1, 0) == 0) {
         const HostTime now = host_now();

@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "camera/gvcp.hpp"
+#include "thread_name.hpp"
 
 namespace versavis::daemon {
 
@@ -114,6 +115,7 @@ MessageChannel::~MessageChannel() {
 }
 
 void MessageChannel::run() {
+    name_thread("messages");
     for (;;) {
         pollfd ready[] = {{socket_, POLLIN, 0}, {stop_, POLLIN, 0}};
         if (::poll(ready, 2, -1) < 0) continue;  // stop_ ends it

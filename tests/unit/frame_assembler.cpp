@@ -403,6 +403,28 @@ TEST_CASE(
     CHECK_FALSE(bench.assembler.time_left(bench.now));  // but for what is sent again
 }
 
+TEST_CASE("frame_assembler: a frame is expected to take as long as the shortest of late") {
+    Bench bench;
+    std::uint64_t block = 0;
+    const auto send = [&](Duration length) {
+        bench.send(++block, {0, 1, 2, 3, 4});
+        bench.pass(length);
+        bench.send(block, {5, 6});
+        bench.pass(microseconds(100));
+    };
+    const auto expected = [&] {
+        bench.send(++block, {0, 1});
+        const auto left = bench.assembler.time_left(bench.now);
+        bench.send(block, {2, 3, 4, 5, 6});
+        bench.pass(microseconds(100));
+        return left.value();
+    };
+    for (int i = 0; i < 60; ++i) send(microseconds(800));
+    send(milliseconds(5));
+    CHECK(expected() > microseconds(395));
+    CHECK(expected() < microseconds(10));
+}
+
 TEST_CASE(
     "frame_assembler: damage of any kind neither writes beside a frame nor ends the service") {
     std::mt19937 random(1);
