@@ -59,8 +59,6 @@ constexpr Duration restart_time = seconds(6);
 /// none is named a second later.
 constexpr Duration record_patience = milliseconds(1500);
 
-bool is_one(Fault fault) { return fault != Fault::none && fault != Fault::starting; }
-
 struct CameraView {
     const CameraStatus& it;
     const Status& all;
@@ -391,6 +389,13 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("no triggers: the board refuses, see its own hint");
      }},
+    {Fault::board_stamps,
+     [](const CameraView& c) {
+         return c.triggered() && c.strobe() && c.all.board_diagnosis.fault == Fault::board_stamps;
+     },
+     [](const CameraView& /*c*/) {
+         return std::string("its exposures are not measured: see the board's hint");
+     }},
     {Fault::block_ids, [](const CameraView& c) { return c.it.camera.stuck_ids; },
      [](const CameraView& /*c*/) {
          return std::string(
@@ -531,6 +536,12 @@ constexpr Rule camera_rules[] = {
      }},
 };
 
+/// Nothing comes from a board with this fault.
+bool cut_off(Fault fault) {
+    return fault == Fault::board_gone || fault == Fault::board_silent ||
+           fault == Fault::board_refuses;
+}
+
 bool young(HostTime since, HostTime now) { return now - since < start_patience; }
 
 /// Whatever is wrong, who never delivered is given its time first.
@@ -587,6 +598,7 @@ const char* to_string(Fault fault) {
         case Fault::board_gone: return "board_gone";
         case Fault::board_silent: return "board_silent";
         case Fault::board_refuses: return "board_refuses";
+        case Fault::board_stamps: return "board_stamps";
         case Fault::clock_unknown: return "clock_unknown";
         case Fault::clock_holdover: return "clock_holdover";
         case Fault::clock_step: return "clock_step";
@@ -672,6 +684,11 @@ Diagnosis diagnose_board(const Status& status) {
         case BoardState::running: break;
     }
     if (quiet) return conclude(Fault::board_silent, silence, known, in_time);
+    if (board.health.stamp_test == wire::StampTest::failed)
+        return conclude(Fault::board_stamps,
+                        "its test of its own stamps fails, so that none is measured: disconnect "
+                        "what is at GPIO18, power it off and on, else replace it",
+                        true, in_time);
     return conclude(Fault::none, board_remark(status), known, in_time);
 }
 
@@ -681,7 +698,7 @@ Diagnosis diagnose_clock(const Status& status) {
     if (!status.board_needed) return {};
     using clock::ClockState;
     const ClockState state = status.clock.state;
-    if (is_one(cause) && state != ClockState::locked)
+    if (cut_off(cause) && state != ClockState::locked)
         return conclude(cause, "no exchanges: see the board's hint", status.clock.slots > 0,
                         in_time);
     switch (state) {
@@ -727,8 +744,10 @@ Diagnosis diagnose(const ImuStatus& imu, const Status& all) {
         return conclude(fault, hint, imu.delivery.ever, young(all.started, all.now));
     };
     const ImuReport& report = imu.report;
-    if (is_one(all.board_diagnosis.fault))
-        return because(all.board_diagnosis.fault, "no samples: the board is gone or silent");
+    const Fault cause = all.board_diagnosis.fault;
+    if (cut_off(cause)) return because(cause, "no samples: the board is gone or silent");
+    if (cause == Fault::board_stamps && !imu.delivery.full)
+        return because(cause, "its samples are not stamped: see the board's hint");
     if (some(imu.recent.faulty, imu.recent.published))
         return because(Fault::imu_faulty,
                        fmt::format("{} of the last {} samples failed their check: check wiring, "

@@ -29,6 +29,7 @@ enum class Fault {
     board_gone,
     board_silent,
     board_refuses,
+    board_stamps,
     // Of the clock.
     clock_unknown,
     clock_holdover,

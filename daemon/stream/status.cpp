@@ -77,7 +77,8 @@ json board_json(const BoardReport& board, bool needed, bool outdated) {
             {"reset_cause", board::to_string(health.reset_cause)},
             {"pps", board::to_string(health.pps_state)},
             {"pps_error_ppb", good_pps ? json(health.pps_error_ppb) : json(nullptr)},
-            {"sync", board::to_string(health.sync_state)}};
+            {"sync", board::to_string(health.sync_state)},
+            {"stamp_test", board::to_string(health.stamp_test)}};
 }
 
 json clock_json(const clock::ClockReport& clock, const GridReport& grid) {

@@ -507,6 +507,7 @@ void Board::poll_health(Nanoseconds now) {
     health_.pps_state = pps_.state(now);
     health_.pps_error_ppb = pps_.error_ppb(now);
     health_.sync_state = grid_clock_.sync_state(now);
+    health_.stamp_test = hal_.edges.stamp_test();
     for (CameraChannel& camera : cameras_) health_.glitches += camera.take_glitches();
     health_.glitches += spi_imu_.take_glitches();
     send(health_);

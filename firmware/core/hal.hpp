@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "wire/messages.hpp"
+
 namespace versavis::firmware {
 
 // For all calls: the core makes them from Board's constructor and from Board::poll(), never from an
@@ -82,6 +84,8 @@ struct EdgeStream {
     virtual Nanoseconds settled() = 0;
     /// Edges lost since the last call because they were not popped in time.
     virtual std::uint32_t take_lost() = 0;
+    /// What the port's own proof of its stamps says. While it fails, edges are lost.
+    virtual wire::StampTest stamp_test() = 0;
 
  protected:
     ~EdgeStream() = default;

@@ -104,6 +104,7 @@ class NativeBoard final : public VirtualBoard,
     bool pop(Edge& edge) override;
     Nanoseconds settled() override;
     std::uint32_t take_lost() override;
+    wire::StampTest stamp_test() override { return wire::StampTest::none; }
     Switched route(const Routes& routes, bool force) override;
     bool arm(const ImuJob& job) override;
     bool take_reply(ImuReply& reply) override;

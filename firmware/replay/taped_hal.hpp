@@ -76,6 +76,9 @@ struct TapedEdges final : Taped<EdgeStream, Tape> {
     std::uint32_t take_lost() override {
         return this->call("edges.take_lost", &EdgeStream::take_lost);
     }
+    wire::StampTest stamp_test() override {
+        return this->call("edges.stamp_test", &EdgeStream::stamp_test);
+    }
 };
 
 template <class Tape>

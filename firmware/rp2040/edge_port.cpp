@@ -205,6 +205,8 @@ void EdgePort::judge_loop(bool as_expected) {
         attention_ = true;
     }
     loop_.proved = proved;
+    if (proved) stamp_test_ = wire::StampTest::passed;
+    if (!as_expected) stamp_test_ = wire::StampTest::failed;
 }
 
 /// Which edges there were is no longer known.

@@ -21,6 +21,7 @@ class EdgePort final : public firmware::EdgeStream {
     bool pop(firmware::Edge& edge) override;
     Nanoseconds settled() override { return settled_; }
     std::uint32_t take_lost() override;
+    wire::StampTest stamp_test() override { return stamp_test_; }
 
     /// Exposure lines whose low level means exposing, for the state machines too.
     void invert(std::uint32_t inputs);
@@ -80,6 +81,7 @@ class EdgePort final : public firmware::EdgeStream {
     std::uint32_t listened_ = 0;  ///< pins
     std::uint32_t inverted_ = 0;  ///< pins
     unsigned loops_good_ = 0;     ///< edges through the loop, one after the other
+    wire::StampTest stamp_test_ = wire::StampTest::none;
     bool attention_ = false;
     Nanoseconds settled_ = 0;
     /// Pins whose changes are, for now, none of the line, but of what the watcher sees of it.

@@ -218,6 +218,10 @@ enum class PpsState : std::uint8_t { none = 0, acquiring = 1, good = 2 };
 /// Of the grid and the pulses of the sync input.
 enum class SyncState : std::uint8_t { none = 0, lost = 1, followed = 2 };
 
+/// Of what a board can do to prove its stamps while it runs: an edge of its own comes back stamped
+/// with the time at which it left.
+enum class StampTest : std::uint8_t { none = 0, failed = 1, passed = 2 };
+
 /// Once a second; counters since boot, high-water marks since the previous report.
 struct Health {
     static constexpr Type type = Type::health;
@@ -245,7 +249,8 @@ struct Health {
     std::uint16_t ignored;   ///< messages of the host that were out of range, modulo 2^16
     std::uint32_t glitches;  ///< edges that the filters of the inputs left out
     SyncState sync_state;
-    std::uint8_t reserved[7];
+    StampTest stamp_test;
+    std::uint8_t reserved[6];
 };
 
 enum class LogLevel : std::uint8_t { error = 3, warning = 4, info = 6, debug = 7 };

@@ -67,6 +67,7 @@ const readers = {
         sent: stamp(v, 16) }),
     0x06: (v) => ({ kind: 'health', time: stamp(v, 0), replaced: v.getUint32(8, true),
         late: v.getUint32(44, true), edges_lost: v.getUint32(48, true),
+        stamp_test: v.getUint8(89),
         stray: v.getUint32(52, true),
         skipped: v.getUint32(56, true), longest_ns: v.getUint32(72, true) }),
     0x07: (v) => ({ kind: 'log', level: v.getUint8(0), text: text(v, 1, 95) }),

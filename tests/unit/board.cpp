@@ -261,6 +261,9 @@ TEST_CASE("board: health counts what both IMUs did, and what the cameras skipped
     CHECK(health.imu_restarts < 100);
     CHECK(health.receive_errors == 1);
     CHECK(health.sync_state == wire::SyncState::none);
+    CHECK(health.stamp_test == wire::StampTest::none);
+    bench.port.test = wire::StampTest::failed;
+    CHECK(bench.health().stamp_test == wire::StampTest::failed);
     CHECK(health.skipped_triggers == 20);
     CHECK(bench.health().skipped_triggers == 20);
 }

@@ -63,6 +63,7 @@ struct BenchPort final : Clock64,
     }
     Nanoseconds settled() override { return time - edge_lag; }
     std::uint32_t take_lost() override { return std::exchange(lost, 0); }
+    versavis::wire::StampTest stamp_test() override { return test; }
     Switched route(const Routes& wanted, bool force) override {
         if (master_exposes && !force) return {};
         routes = wanted;
@@ -108,6 +109,7 @@ struct BenchPort final : Clock64,
     Nanoseconds edge_takes = 0;  ///< to pop one
     Nanoseconds edge_lag = 0;    ///< until an edge is known
     std::uint32_t lost = 0;
+    versavis::wire::StampTest test = versavis::wire::StampTest::none;
     std::uint32_t inputs = ~0U;
     Routes routes;
     bool forced = false;

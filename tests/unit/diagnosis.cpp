@@ -176,6 +176,21 @@ TEST_CASE("diagnosis: a board that does not answer, or refuses, is the cause as 
     check(bench.camera(), Fault::board_refuses, "refuses");
 }
 
+TEST_CASE("diagnosis: a board whose stamps fail their test is the cause of what is not measured") {
+    Bench bench;
+    bench.status.board.health.stamp_test = wire::StampTest::passed;
+    CHECK(bench.board().health == Health::ok);
+    bench.status.board.health.stamp_test = wire::StampTest::failed;
+    check(bench.board(), Fault::board_stamps, "GPIO18");
+    check(bench.camera(), Fault::board_stamps, "see the board's hint");
+    CHECK(bench.status.clock_diagnosis.health == Health::ok);
+    CHECK(bench.imu().fault == Fault::none);  // it does without a data-ready line
+    bench.status.imus[0].delivery.full = false;
+    check(bench.imu(), Fault::board_stamps, "see the board's hint");
+    bench.cam().configuration.strobe = Strobe::none;
+    CHECK(bench.camera().health == Health::ok);
+}
+
 TEST_CASE("diagnosis: the clock says what its state means") {
     Bench bench;
     const std::pair<clock::ClockState, Fault> states[] = {

@@ -18,6 +18,7 @@ struct Edges final : EdgeStream {
     bool pop(Edge& /*edge*/) override { return false; }
     Nanoseconds settled() override { return 0; }
     std::uint32_t take_lost() override { return 0; }
+    versavis::wire::StampTest stamp_test() override { return {}; }
 };
 
 struct Bench {

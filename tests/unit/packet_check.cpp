@@ -137,9 +137,13 @@ TEST_CASE("packet_check: states of a report are those that there are") {
     wire::Health health{};
     health.pps_state = wire::PpsState::good;
     health.sync_state = wire::SyncState::followed;
+    health.stamp_test = wire::StampTest::passed;
     health.reset_cause = wire::ResetCause::software;
     CHECK(possible(health));
     health.sync_state = static_cast<wire::SyncState>(3);
+    CHECK_FALSE(possible(health));
+    health = {};
+    health.stamp_test = static_cast<wire::StampTest>(3);
     CHECK_FALSE(possible(health));
     health = {};
     health.pps_state = static_cast<wire::PpsState>(3);

@@ -178,6 +178,16 @@ TEST_CASE("status: the board's clock against PPS is known while PPS is good, and
     CHECK_THAT(client::clock_text(document), Catch::Contains("-250 ppb"));
 }
 
+TEST_CASE("status: what the board proves of its stamps") {
+    Status status = healthy();
+    for (const auto& [test, word] : {std::pair(wire::StampTest::none, "none"),
+                                     {wire::StampTest::failed, "failed"},
+                                     {wire::StampTest::passed, "passed"}}) {
+        status.board.health.stamp_test = test;
+        CHECK(nlohmann::json::parse(to_json(status))["board"]["stamp_test"] == word);
+    }
+}
+
 TEST_CASE("status: pulses of the sync input, glitches and repeated samples") {
     Status status = healthy();
     status.board.health.glitches = 12;

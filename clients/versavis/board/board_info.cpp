@@ -65,6 +65,7 @@ json from_hello(const Greeting& greeting) {
 void add_health(json& info, const wire::Health& health) {
     info["pps"] = board::to_string(health.pps_state);
     info["sync"] = board::to_string(health.sync_state);
+    info["stamp_test"] = board::to_string(health.stamp_test);
     info["loop_max_ns"] = health.loop_max_ns;
     info["late_outputs"] = health.late_outputs;
     info["lost_edges"] = health.lost_edges;

@@ -49,4 +49,13 @@ const char* to_string(wire::SyncState state) {
     return "unknown";
 }
 
+const char* to_string(wire::StampTest test) {
+    switch (test) {
+        case wire::StampTest::none: return "none";
+        case wire::StampTest::failed: return "failed";
+        case wire::StampTest::passed: return "passed";
+    }
+    return "unknown";
+}
+
 }  // namespace versavis::board

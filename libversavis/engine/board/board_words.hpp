@@ -21,5 +21,6 @@ std::vector<std::string> part_names(std::uint32_t present);
 const char* to_string(wire::ResetCause cause);
 const char* to_string(wire::PpsState state);
 const char* to_string(wire::SyncState state);
+const char* to_string(wire::StampTest test);
 
 }  // namespace versavis::board
