@@ -5,11 +5,14 @@
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
+#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "../support/process.hpp"
 #include "../support/stack.hpp"
 #include "../support/temporary_directory.hpp"
+#include "board/bring_up.hpp"
 #include "looped_board.hpp"
 #include "simulated_pico.hpp"
 #include "usb_bridge.hpp"
@@ -46,6 +49,21 @@ nlohmann::json line(const nlohmann::json& test, const std::string& output,
     for (const auto& found : test["lines"])
         if (found["output"] == output && found["input"] == input) return found;
     return nlohmann::json::object();
+}
+
+/// All wires that the bring-up asks for.
+const std::vector<LoopWire> all_loops{
+    {firmware::pin_test, aux0}, {firmware::pin_sync, sync_input}, {0, 0}, {1, 1}, {2, 2}, {3, 3}};
+
+/// When this pin changed to this level, in what came after the first `from` changes.
+std::vector<std::int64_t> edges_of(const std::vector<OutputChange>& changes, std::size_t from,
+                                   unsigned pin, bool level) {
+    std::vector<std::int64_t> edges;
+    for (std::size_t i = from; i < changes.size(); ++i) {
+        const auto is = [&](std::size_t k) { return (changes[k].pins >> pin & 1U) != 0; };
+        if (is(i) == level && is(i) != (i > 0 && is(i - 1))) edges.push_back(changes[i].at);
+    }
+    return edges;
 }
 
 }  // namespace
@@ -163,10 +181,10 @@ TEST_CASE("board: the self-test measures what wires join, and leaves the outputs
     CHECK_THAT(bench.said,
                Contains("test     ok      at aux0: period 10.000 ms, width 1000.0 us") &&
                    Contains("trigger0 open"));
-    const unsigned changes = board.output_changes();
+    const std::size_t changes = board.output_changes().size();
     CHECK(changes > 0);
     CHECK(bench.board({"info"}) == 0);  // which takes the board's time until its next report
-    CHECK(board.output_changes() == changes);
+    CHECK(board.output_changes().size() == changes);
 }
 
 TEST_CASE("board: the self-test finds lines that are loaded, and wires that are not there") {
@@ -188,4 +206,67 @@ TEST_CASE("board: a self-test of a board without wires does not pass") {
     const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
     CHECK(bench.board({"selftest"}) == 1);
     CHECK_THAT(bench.said, Contains("nothing was tested") && Contains("docs/user/board.md"));
+}
+
+TEST_CASE("board: the bring-up sends in each step what its row in the manual says") {
+    const GObjectPtr<UMockdevTestbed> testbed{umockdev_testbed_new()};
+    const LoopedBoard board(testbed.get(), "LOOP0001", all_loops);
+    std::map<std::string, std::vector<OutputChange>> sent;
+    client::BringUpSettings settings;
+    settings.look = [&](const client::BringUpStep& step) {
+        const std::size_t before = board.output_changes().size();
+        const std::string name = step.name;
+        if (name != "supply" && name != "rest") board.wait_for_changes(before + 60);
+        auto changes = board.output_changes();
+        sent[name] = {changes.begin() + static_cast<std::ptrdiff_t>(before), changes.end()};
+        return true;
+    };
+    const auto done = client::bring_up(settings);
+    INFO((done ? client::to_text(*done, false) : done.error().message()));
+    REQUIRE(done);
+    CHECK(done->passed());
+    const auto check = [&](const char* step, unsigned pin, std::int64_t period_ns,
+                           std::int64_t width_ns) {
+        INFO(step << ", output " << pin);
+        auto rises = edges_of(sent[step], 1, pin, true);
+        auto falls = edges_of(sent[step], 1, pin, false);
+        REQUIRE(rises.size() > 5);
+        rises.erase(rises.begin());  // which the change of configuration may have cut
+        for (std::size_t i = 1; i < rises.size(); ++i) CHECK(rises[i] - rises[i - 1] == period_ns);
+        std::erase_if(falls, [&](std::int64_t at) { return at < rises.front(); });
+        for (std::size_t i = 0; i < falls.size(); ++i) CHECK(falls[i] - rises[i] == width_ns);
+    };
+    for (unsigned camera = 0; camera < 4; ++camera)
+        check("triggers", camera, 20'000'000, 1'000'000);
+    CHECK(edges_of(sent["triggers"], 1, 0, true) == edges_of(sent["triggers"], 1, 3, true));
+    check("test output", firmware::pin_test, 1'000'000, 100'000);
+    check("sync output", firmware::pin_sync, 1'000'000, 100'000);
+    check("light", 0, 20'000'000, 1'000'000);
+    check("light", firmware::pin_light, 20'000'000, 1'100'000);
+    CHECK(sent["rest"].empty());
+
+    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/board.md");
+    const std::string manual{std::istreambuf_iterator<char>(file), {}};
+    for (const client::BringUpStep& step : client::bring_up_steps())
+        CHECK_THAT(manual, Contains(std::string("| ") + step.name + " | " + step.connect + " | " +
+                                    step.where + " | " + step.expect + " |"));
+}
+
+TEST_CASE("board: a bring-up that nobody looks at tests the loops") {
+    Bench bench;
+    {
+        const LoopedBoard board(bench.testbed.get(), "LOOP0001", all_loops);
+        const int code = bench.board({"selftest", "--bringup", "--json"});
+        INFO(bench.said);
+        REQUIRE(code == 0);
+        const auto json = nlohmann::json::parse(bench.said.substr(bench.said.find("{\"")));
+        CHECK(json["passed"] == true);
+        CHECK(json["steps"].size() == 7);
+        CHECK(json["steps"][2]["result"] == "not looked at");
+        CHECK(json["steps"][6]["result"] == "ok");
+    }
+    const LoopedBoard board(bench.testbed.get(), "LOOP0002", {});
+    CHECK(bench.board({"selftest", "--bringup"}) == 1);
+    CHECK_THAT(bench.said, Contains("measure: 25, 26, 27, 29") && Contains("not looked at") &&
+                               Contains("failed  at exposure0; no pulse came"));
 }

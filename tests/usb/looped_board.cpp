@@ -44,9 +44,14 @@ unsigned LoopedBoard::reboots() const {
     return reboots_;
 }
 
-unsigned LoopedBoard::output_changes() const {
+std::vector<OutputChange> LoopedBoard::output_changes() const {
     const std::lock_guard lock(mutex_);
     return output_changes_;
+}
+
+void LoopedBoard::wait_for_changes(std::size_t count) const {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return output_changes_.size() >= count; });
 }
 
 void LoopedBoard::boot(wire::ResetCause cause) {
@@ -75,8 +80,9 @@ void LoopedBoard::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) 
     const std::uint32_t changed = pins ^ std::exchange(pins_, pins);
     {
         const std::lock_guard lock(mutex_);
-        ++output_changes_;
+        output_changes_.push_back({at, pins});
     }
+    changed_.notify_all();
     for (const LoopWire& wire : wires_) {
         if ((changed >> wire.pin & 1U) == 0) continue;
         const bool level = (pins >> wire.pin & 1U) != 0;

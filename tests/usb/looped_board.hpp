@@ -26,6 +26,11 @@ struct LoopWire {
     firmware::Nanoseconds late_fall = 0;
 };
 
+struct OutputChange {
+    firmware::Nanoseconds at;
+    std::uint32_t pins;  ///< levels from then on
+};
+
 class LoopedBoard {
  public:
     LoopedBoard(UMockdevTestbed* testbed, std::string serial, std::vector<LoopWire> wires);
@@ -35,7 +40,10 @@ class LoopedBoard {
 
     /// It was told to reboot, which it did.
     unsigned reboots() const;
-    unsigned output_changes() const;
+    std::vector<OutputChange> output_changes() const;
+
+    /// Returns once its outputs have changed so many times since it was plugged in.
+    void wait_for_changes(std::size_t count) const;
 
  private:
     void run();
@@ -49,10 +57,11 @@ class LoopedBoard {
     const std::vector<LoopWire> wires_;
 
     mutable std::mutex mutex_;
+    mutable std::condition_variable changed_;
     std::condition_variable heard_;
     std::vector<std::uint8_t> received_;
     unsigned reboots_ = 0;
-    unsigned output_changes_ = 0;
+    std::vector<OutputChange> output_changes_;
     bool stop_ = false;
 
     // Of the thread.

@@ -2,14 +2,17 @@
 #include "board/board_commands.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sysexits.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <iostream>
 
 #include "board/board_info.hpp"
+#include "board/bring_up.hpp"
 #include "engine/board/firmware_file.hpp"
 
 namespace versavis::client {
@@ -42,6 +45,25 @@ class ProgressLine {
     const bool terminal_ = isatty(STDERR_FILENO) != 0;
     bool shown_ = false;
 };
+
+/// One line of whoever sits at the terminal; none: nobody does, or the program is to end.
+std::optional<std::string> answer(const std::string& question, const std::function<bool()>& stop) {
+    if (isatty(STDIN_FILENO) == 0) return std::nullopt;
+    fmt::print(stderr, "{}", question);
+    constexpr int look_at_stop_ms = 100;
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    while (::poll(&input, 1, look_at_stop_ms) <= 0)
+        if (stop()) return std::nullopt;
+    std::string line;
+    if (!std::getline(std::cin, line)) return std::nullopt;
+    return line;
+}
+
+void show(const BringUpStep& step) {
+    fmt::print(stderr, "\n{}\n  connect: {}\n", step.name, step.connect);
+    if (*step.where != '\0') fmt::print(stderr, "  measure: {}\n", step.where);
+    fmt::print(stderr, "  expect:  {}\n", step.expect);
+}
 
 }  // namespace
 
@@ -98,6 +120,9 @@ void BoardCommands::add_self_test() {
                      "A wire that must be there, test=aux0 for example; may be repeated")
         ->type_name("OUTPUT=INPUT")
         ->allow_extra_args(false);
+    self_test_->add_flag("--bringup", bring_up_,
+                         "Lead through the first power-up of a board: each step says what to "
+                         "connect and what a scope shows, and asks");
     self_test_->add_flag("--json", json_, "Print a JSON object");
 }
 
@@ -114,7 +139,8 @@ int BoardCommands::run(const std::string& instance) {
     instance_ = instance;
     if (flash_->parsed()) return flash_board();
     if (info_->parsed()) return show_info();
-    return reset_->parsed() ? reset() : test();
+    if (reset_->parsed()) return reset();
+    return bring_up_ ? lead_through() : test();
 }
 
 int BoardCommands::flash_board() {
@@ -159,6 +185,24 @@ int BoardCommands::test() {
     if (!tested) return fail(tested.error());
     fmt::print("{}", to_text(*tested, json_));
     return tested->passed ? EX_OK : EXIT_FAILURE;
+}
+
+int BoardCommands::lead_through() {
+    BringUpSettings settings{choice_, instance_};
+    settings.stop = stop_;
+    settings.prepare = [&](const BringUpStep& step) {
+        show(step);
+        if (*step.where == '\0') answer("  joined? [Enter] ", stop_);
+    };
+    settings.look = [&](const BringUpStep&) -> std::optional<bool> {
+        const auto seen = answer("  as expected? [Y/n] ", stop_);
+        if (!seen) return std::nullopt;
+        return seen->empty() || seen->front() == 'y' || seen->front() == 'Y';
+    };
+    const auto done = bring_up(settings);
+    if (!done) return fail(done.error());
+    fmt::print("{}", to_text(*done, json_));
+    return done->passed() ? EX_OK : EXIT_FAILURE;
 }
 
 }  // namespace versavis::client

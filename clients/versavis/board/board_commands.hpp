@@ -38,6 +38,7 @@ class BoardCommands {
     int show_info();
     int reset();
     int test();
+    int lead_through();
 
     CLI::App* flash_;
     CLI::App* board_;
@@ -50,6 +51,7 @@ class BoardCommands {
     std::function<bool()> stop_;
     std::string file_;
     std::vector<std::string> wires_;
+    bool bring_up_ = false;
 };
 
 }  // namespace versavis::client

@@ -10,8 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "board/board_access.hpp"
-
 namespace versavis::client {
 
 namespace {
@@ -33,9 +31,6 @@ constexpr std::size_t pulse_count = 20;
 /// Until so many have come, or none will. At half, a host that is busy misses some; at twice, lines
 /// that are not wired take twice the time.
 constexpr Duration collect_patience = milliseconds(800);
-
-/// For the answer to a configuration, which waits for exposures under way.
-constexpr Duration answer_patience = seconds(1);
 
 constexpr std::array output_names{"test", "trigger0", "trigger1", "trigger2", "trigger3", "sync"};
 constexpr std::array input_names{"pps", "aux0", "aux1", "sync_input"};
@@ -64,25 +59,23 @@ using EdgesByInput = std::array<std::vector<std::int64_t>, wire::pulse_input_cou
 
 class Tester {
  public:
-    Tester(const SelfTestSettings& settings, Conversation& board, const wire::BoardHello& hello)
-        : settings_(settings), board_(board), present_(hello.present) {}
+    Tester(const SelfTestSettings& settings, TestBoard& board)
+        : settings_(settings), board_(board) {}
 
     Expected<> run() {
         auto done = test_outputs();
         // Whatever was found, its outputs rest.
-        auto rested = configure({});
+        auto rested = board_.configure({});
         return done ? rested : done;
     }
 
     std::vector<TestedLine> lines;
 
  private:
-    bool has(std::uint32_t part) const { return (present_ & part) != 0; }
-
     Expected<> test_outputs() {
         for (unsigned output = 0; output < output_names.size(); ++output) {
             settings_.progress("testing", output, output_names.size());
-            if (!has(part_of(output))) continue;
+            if (!board_.has(part_of(output))) continue;
             if (settings_.stop()) return failure("self-test", "stopped");
             const std::size_t before = lines.size();
             if (auto done = test_pulses(output); !done) return done;
@@ -117,24 +110,24 @@ class Tester {
     Expected<EdgesByInput> collect_pulses(unsigned output, bool falling) {
         wire::Configuration configuration{};
         configuration.ports.inputs =
-            static_cast<std::uint8_t>(present_ / wire::present_pulse0 & 0x0FU);
+            static_cast<std::uint8_t>(board_.present() / wire::present_pulse0 & 0x0FU);
         configuration.ports.falling = falling ? configuration.ports.inputs : std::uint8_t{0};
         configuration.ports.test = wire::test_rate;
         configuration.ports.test_rate_millihertz = pulse_rate_millihertz;
         configuration.ports.test_output = static_cast<std::uint8_t>(output);
         configuration.ports.pulse_ns = static_cast<std::uint32_t>(pulse_width.ns);
-        if (auto done = configure(configuration); !done) return Unexpected(done.error());
+        if (auto done = board_.configure(configuration); !done) return Unexpected(done.error());
         EdgesByInput edges;
         const auto enough = [&](const wire::Packet& packet) {
             wire::Event event{};
             if (!packet.read(event)) return false;
             const auto input = input_of(event);
             // Those of the configuration before may still come.
-            if (!input || event.time_ns < configured_ns_) return false;
+            if (!input || event.time_ns < board_.configured_ns()) return false;
             edges[*input].push_back(event.time_ns);
             return edges[*input].size() > pulse_count;
         };
-        if (auto heard = board_.listen(enough, collect_patience); !heard)
+        if (auto heard = board_.link().listen(enough, collect_patience); !heard)
             return Unexpected(heard.error());
         return edges;
     }
@@ -148,15 +141,15 @@ class Tester {
         tested.pulse_ns = static_cast<std::uint32_t>(pulse_width.ns);
         tested.exposure_ns = pulse_width.ns;
         tested.max_exposure_ns = exposure_period.ns / 2;
-        if (auto done = configure(configuration); !done) return done;
+        if (auto done = board_.configure(configuration); !done) return done;
         const auto mask = static_cast<std::uint8_t>(1U << camera);
-        if (auto sent = board_.send(wire::Start{mask, 0, {}}); !sent) return sent;
+        if (auto sent = board_.link().send(wire::Start{mask, 0, {}}); !sent) return sent;
         SeenEdges edges;
         std::optional<std::int64_t> first;  // trigger: pulses begin at whole periods from it
         const auto enough = [&](const wire::Packet& packet) {
             wire::Exposure record{};
             if (!packet.read(record) || record.camera != camera ||
-                record.trigger_ns < configured_ns_)
+                record.trigger_ns < board_.configured_ns())
                 return false;
             if (!first) first = record.trigger_ns;
             if (record.start_ns != wire::no_time)
@@ -164,9 +157,8 @@ class Tester {
             if (record.end_ns != wire::no_time) edges.falling_ns.push_back(record.end_ns - *first);
             return std::min(edges.rising_ns.size(), edges.falling_ns.size()) >= pulse_count;
         };
-        if (auto heard = board_.listen(enough, collect_patience); !heard)
+        if (auto heard = board_.link().listen(enough, collect_patience); !heard)
             return Unexpected(heard.error());
-        if (auto sent = board_.send(wire::Stop{mask, {}}); !sent) return sent;
         const LoopFinding finding = check_loop({exposure_period, pulse_width, pulse_count}, edges);
         if (finding.result != LoopResult::open)
             lines.push_back(
@@ -174,36 +166,8 @@ class Tester {
         return {};
     }
 
-    Expected<> configure(wire::Configuration configuration) {
-        configuration.id = ++id_;
-        if (auto sent = board_.send(configuration); !sent) return sent;
-        wire::ConfigurationAnswer answer{};
-        std::string refusals;
-        const auto answered = [&](const wire::Packet& packet) {
-            wire::Refusal refusal{};
-            if (packet.read(refusal) && refusal.id == id_)
-                refusals +=
-                    fmt::format(" (part {}, field {}, value {})", static_cast<int>(refusal.part),
-                                static_cast<int>(refusal.field), refusal.value);
-            return packet.read(answer) && answer.id == id_;
-        };
-        const auto heard = board_.listen(answered, answer_patience);
-        if (!heard) return Unexpected(heard.error());
-        if (!*heard)
-            return failure("self-test", "the board does not answer its configuration",
-                           "reset it: versavis board reset");
-        if (answer.status != wire::ConfigurationStatus::taken)
-            return failure("self-test", "the board refuses to send test pulses" + refusals,
-                           "update its firmware: versavis flash");
-        configured_ns_ = answer.origin_ns;
-        return {};
-    }
-
     const SelfTestSettings& settings_;
-    Conversation& board_;
-    const std::uint32_t present_;
-    std::uint32_t id_ = 0;
-    std::int64_t configured_ns_ = 0;  ///< board time
+    TestBoard& board_;
 };
 
 struct Wire {
@@ -294,30 +258,29 @@ nlohmann::json line_json(const TestedLine& line) {
 
 }  // namespace
 
-Expected<SelfTest> self_test(const SelfTestSettings& settings) {
+Expected<SelfTest> self_test(const SelfTestSettings& settings, TestBoard& board) {
     const auto wires = parse(settings.wires);
     if (!wires) return Unexpected(wires.error());
-    const auto bus = UsbBus::open();
-    if (!bus) return Unexpected(bus.error());
-    const auto found = find_board(*bus, settings.board);
-    if (!found) return Unexpected(found.error());
-    if (found->in_boot_loader)
-        return failure("board at " + found->device.port(), "is in its boot loader",
-                       "put firmware into it first: versavis flash");
-    auto board = open_board(*found, settings.instance);
-    if (!board) return Unexpected(board.error());
-    const auto greeting = board->greet();
-    if (!greeting) return Unexpected(greeting.error());
-    if (!greeting->understood)
-        return failure("board at " + found->device.port(),
-                       "has " + greeting->firmware() + ", which this program does not speak",
-                       "flash the firmware of the same release: versavis flash");
-    Tester tester(settings, *board, greeting->hello);
+    Tester tester(settings, board);
     if (auto done = tester.run(); !done) return Unexpected(done.error());
-    SelfTest test{greeting->serial(), greeting->firmware(), std::move(tester.lines)};
+    const Greeting& greeting = board.greeting();
+    SelfTest test{greeting.serial(), greeting.firmware(), std::move(tester.lines)};
     demand(test.lines, *wires);
     test.passed = passed(test.lines);
     return test;
+}
+
+Expected<SelfTest> self_test(const SelfTestSettings& settings) {
+    if (auto wires = parse(settings.wires); !wires) return Unexpected(wires.error());
+    auto board = TestBoard::open(settings.board, settings.instance);
+    if (!board) return Unexpected(board.error());
+    return self_test(settings, *board);
+}
+
+std::string lines_text(const SelfTest& test) {
+    std::string text;
+    for (const TestedLine& line : test.lines) text += line_text(line);
+    return text;
 }
 
 std::string to_text(const SelfTest& test, bool json) {
@@ -332,7 +295,7 @@ std::string to_text(const SelfTest& test, bool json) {
                "\n";
     }
     std::string out = fmt::format("board {}, {}\n", test.serial, test.firmware);
-    for (const TestedLine& line : test.lines) out += line_text(line);
+    out += lines_text(test);
     const bool wired = std::any_of(test.lines.begin(), test.lines.end(),
                                    [](const TestedLine& line) { return !line.input.empty(); });
     if (!wired) out += "nothing was tested: wire outputs to inputs (docs/user/board.md)\n";

@@ -10,6 +10,7 @@
 
 #include "board/board_search.hpp"
 #include "board/loop_check.hpp"
+#include "board/test_board.hpp"
 
 namespace versavis::client {
 
@@ -40,6 +41,10 @@ struct SelfTest {
 };
 
 Expected<SelfTest> self_test(const SelfTestSettings& settings);
+Expected<SelfTest> self_test(const SelfTestSettings& settings, TestBoard& board);
+
+/// A line for each output.
+std::string lines_text(const SelfTest& test);
 
 std::string to_text(const SelfTest& test, bool json);
 
