@@ -225,6 +225,7 @@ Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration
     const ssize_t count = libusb_get_device_list(context, &devices);
     UsbHandle found;
     std::optional<int> refused;
+    bool hangs = false;
     for (ssize_t i = 0; i < count && !found; ++i) {
         libusb_device_descriptor descriptor{};
         libusb_get_device_descriptor(devices[i], &descriptor);
@@ -236,13 +237,21 @@ Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration
             continue;
         }
         UsbHandle candidate(handle);
-        if (wanted.serial.empty() ||
-            text_descriptor(handle, descriptor.iSerialNumber) == wanted.serial)
+        const std::string serial = text_descriptor(handle, descriptor.iSerialNumber);
+        if (serial.empty() && descriptor.iSerialNumber != 0) {
+            // Its controller hangs. It starts anew when nothing comes after a reset of the bus.
+            libusb_reset_device(handle);
+            hangs = true;
+        } else if (wanted.serial.empty() || serial == wanted.serial) {
             found = std::move(candidate);
+        }
     }
     if (count >= 0) libusb_free_device_list(devices, 1);
     if (found) return found;
     if (refused) return usb_failure("cannot be opened", *refused);
+    if (hangs)
+        return failure("USB board", "does not answer; it was reset",
+                       "unplug it if it does not come back");
     return failure("USB board",
                    fmt::format("no device {:04x}:{:04x}{}", wanted.usb_vendor, wanted.usb_product,
                                wanted.serial.empty() ? "" : " with serial " + wanted.serial),

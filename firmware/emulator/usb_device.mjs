@@ -35,6 +35,7 @@ const connected = 1 << 16;
 const setup_received = 1 << 17;
 const trans_complete = 1 << 18;
 const bus_reset = 1 << 19;
+const crc_error = 1 << 24;
 const sequence_error = 2 ** 31;
 const cleared_by_writing = 0xff0f0800 | suspended | connected;
 
@@ -86,6 +87,8 @@ export class UsbDevice {
         this.aborting = 0;
         this.frame = 0;
         this.sof_seen = false;
+        this.hung = undefined;
+        this.in_reset = false;
         this.connection_changed = false;
         this.suspend_changed = false;
         this.enable = 0;
@@ -235,7 +238,10 @@ export class UsbDevice {
             const detected = (value & 0xc) === 0xc; // VBUS_DETECT by its override
             this.status = detected ? this.status | vbus_detected : this.status & ~vbus_detected;
         }
-        if (this.is_attached !== was_attached) this.host?.on_attach(!was_attached);
+        if (this.is_attached !== was_attached) {
+            this.is_idle = !was_attached; // by its own pull-up
+            this.host?.on_attach(!was_attached);
+        }
         if (offset === 0x68) this.host?.on_armed();
     }
 
@@ -272,6 +278,7 @@ export class UsbDevice {
     /// The reset begins; `on_bus_reset_end` ends it.
     on_bus_reset() {
         this.is_idle = false;
+        this.in_reset = true;
         this.status |= bus_reset;
         if (!(this.status & connected)) this.connection_changed = true;
         this.status |= connected;
@@ -279,12 +286,25 @@ export class UsbDevice {
         this.update_line();
     }
 
-    on_bus_reset_end() {
+    /// Erratum E5: on a bus that does not rest for 800 us then, the controller stays in reset.
+    on_bus_reset_end(is_busy) {
         this.is_idle = true;
+        this.in_reset = is_busy;
+    }
+
+    /// Erratum E15, which only a reset of the controller ends. What else it does then is not
+    /// documented: 'deaf', it does not even count frames; 'failed', it does, and tells of an error;
+    /// 'mute', nothing shows it.
+    hang(kind) {
+        this.hung = kind;
+        if (kind === 'failed') this.status |= crc_error;
+    }
+    get answers_nothing() {
+        return this.in_reset || this.hung !== undefined;
     }
 
     on_disconnect() {
-        this.is_idle = false;
+        this.is_idle = this.is_attached;
         if (this.status & connected) this.connection_changed = true;
         this.status &= ~connected;
         this.update_line();
@@ -300,6 +320,7 @@ export class UsbDevice {
     }
 
     on_sof(frame) {
+        if (this.in_reset || this.hung === 'deaf') return;
         this.frame = frame & 0x7ff;
         this.sof_seen = true;
         this.update_line();

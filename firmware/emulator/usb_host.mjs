@@ -8,6 +8,8 @@
 // failed. set_line_coding(baud), set_line_state(dtr, rts), suspend(), resume(), disconnect(),
 // connect(), reset(). on_lost = () => ...: the device has left by itself. `state` is 'detached',
 // 'attached', 'configured' or 'suspended'; with `logs` set, `log` has each transaction.
+// busy_resets: after so many resets, neighbours keep the bus busy. `corrupts`: a packet that ends
+// close to the next frame is corrupted, and the device hangs in this way.
 import { fault } from './fault.mjs';
 
 // 12 Mbit/s at 125 MHz.
@@ -28,6 +30,9 @@ const gap_bits = 4;
 const retry_cycles = 1000;
 // An OUT packet that is refused takes the bus for up to so many of these slots.
 const slots_of_out = 8;
+
+const suspended_after_ms = 3;
+const corrupted_cycles = 12_500; // at the end of a frame
 
 // From the pull-up to the reset, and for the reset. The standard asks for 100 and 10 ms.
 const debounce_ms = 100;
@@ -72,6 +77,8 @@ export class UsbHost {
         this.log = [];
         this.plugged = true;
         this.sends_frames = false;
+        this.busy_resets = 0;
+        this.corrupts = undefined;
         this.clear();
         device.host = this;
     }
@@ -106,7 +113,15 @@ export class UsbHost {
     begin() {
         this.state = 'attached';
         this.session = (this.session ?? 0) + 1;
+        this.rest();
         this.in_session(cycles_of_ms(this.times.debounce_ms), () => this.reset_bus());
+    }
+
+    /// Nothing is on the bus but the device's pull-up.
+    rest() {
+        this.in_session(cycles_of_ms(suspended_after_ms), () => {
+            if (this.device.is_idle && !this.sends_frames) this.device.on_suspend(true);
+        });
     }
 
     lose() {
@@ -126,6 +141,7 @@ export class UsbHost {
         this.plugged = false;
         this.lose();
         this.device.on_disconnect();
+        this.rest();
     }
 
     connect() {
@@ -146,7 +162,7 @@ export class UsbHost {
         this.out_data1 = false;
         this.device.on_bus_reset();
         this.in_session(cycles_of_ms(this.times.reset_ms), () => {
-            this.device.on_bus_reset_end();
+            this.device.on_bus_reset_end(this.busy_resets-- > 0);
             this.start_frames();
             this.in_session(cycles_of_ms(this.times.recovery_ms), () => this.enumerate());
         });
@@ -180,7 +196,7 @@ export class UsbHost {
         this.clock.cancel(this.slot);
         this.was = this.state;
         this.state = 'suspended';
-        this.in_session(cycles_of_ms(3), () => this.device.on_suspend(true));
+        this.rest();
     }
 
     resume() {
@@ -288,7 +304,8 @@ export class UsbHost {
     }
 
     answers() {
-        return this.device.is_attached && this.device.address === this.address;
+        const { device } = this;
+        return device.is_attached && !device.answers_nothing && device.address === this.address;
     }
 
     transact_in(endpoint, then) {
@@ -315,6 +332,11 @@ export class UsbHost {
     take_in(endpoint, found, then) {
         const acknowledged = gap_bits + handshake_bits;
         this.in_session(cycles_of_bits(acknowledged), () => {
+            const is_late = this.clock.now > this.next_sof - corrupted_cycles;
+            if (this.corrupts !== undefined && endpoint !== 0 && is_late) {
+                this.device.hang(this.corrupts);
+                return this.finish_without_answer('in', endpoint, then);
+            }
             this.device.on_in_done(endpoint);
             this.note('in', endpoint, 'ack', found.bytes);
             this.release(0, true);
@@ -592,6 +614,15 @@ export class UsbHost {
             this.state = 'configured';
             this.on_configured();
             this.plan(this.clock.now);
+        });
+    }
+
+    /// The endpoint as descriptors name it.
+    clear_halt(endpoint, on_end = () => {}) {
+        this.control({ type: 2, request: 1, index: endpoint }, (result) => {
+            if (endpoint === (0x80 | this.endpoints.bulk_in)) this.in_data1 = false;
+            if (endpoint === this.endpoints.bulk_out) this.out_data1 = false;
+            on_end(result);
         });
     }
 

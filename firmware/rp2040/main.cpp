@@ -122,8 +122,9 @@ void start_ports() {
     enable_interrupt(interrupt_uart0, 2);
     enable_interrupt(interrupt_pio0, 2);
     enable_interrupt(interrupt_usb_work, 2);
+    enable_interrupt(interrupt_timer3, 2);
     enable_interrupt(interrupt_timer2, 3);
-    set_bits(timer().interrupt_enable, 1U << 2U);
+    set_bits(timer().interrupt_enable, 1U << 2U | 1U << 3U);
     all.outputs.commit();
 }
 
@@ -189,6 +190,7 @@ void on_wake_time() {
     timer().raw_interrupts = 1U << 2U;
     ports().attention.ask();
 }
+void on_usb_watch() { ports().usb.watch(); }
 void on_usb() { ports().usb.note(); }
 void on_usb_work() { ports().usb.work(); }
 void on_change() {

@@ -316,6 +316,7 @@ enum Interrupt : unsigned {
     interrupt_timer0 = 0,
     interrupt_timer1 = 1,
     interrupt_timer2 = 2,
+    interrupt_timer3 = 3,
     interrupt_usb = 5,
     interrupt_pio0 = 7,
     interrupt_pio0_1 = 8,

@@ -33,11 +33,12 @@ struct Vectors {
 [[gnu::section(".vectors"), gnu::used]] extern const Vectors vectors = {
     stack_top,
     {start, lost, lost, lost, lost, lost, lost, lost, lost, lost, lost, lost, lost, lost, lost},
-    {on_commit_time, on_bus_time,    on_wake_time, lost,   lost,        on_usb,      lost,
-     on_change,      on_commit_time, lost,         lost,   on_ring_end, on_bus_dma,  on_data_ready,
-     lost,           lost,           lost,         lost,   lost,        lost,        on_uart,
-     lost,           lost,           lost,         on_i2c, lost,        on_usb_work, lost,
-     lost,           lost,           lost,         lost},
+    {on_commit_time, on_bus_time,   on_wake_time,   on_usb_watch, lost, on_usb,
+     lost,           on_change,     on_commit_time, lost,         lost, on_ring_end,
+     on_bus_dma,     on_data_ready, lost,           lost,         lost, lost,
+     lost,           lost,          on_uart,        lost,         lost, lost,
+     on_i2c,         lost,          on_usb_work,    lost,         lost, lost,
+     lost,           lost},
 };
 }
 

@@ -7,6 +7,7 @@ extern "C" {
 void on_commit_time();
 void on_bus_time();
 void on_wake_time();
+void on_usb_watch();
 void on_usb();
 void on_usb_work();
 void on_change();

@@ -8,6 +8,7 @@
 
 namespace versavis::rp2040::usb {
 
+inline constexpr std::uint8_t data_interface = 1;
 inline constexpr std::uint8_t data_endpoint = 1;
 inline constexpr std::uint8_t notice_endpoint = 2;
 inline constexpr std::uint8_t packet_size = 64;

@@ -29,9 +29,34 @@ enum InterruptBit : std::uint32_t {
     usb_buffer_done = 1U << 4U,
     usb_bus_reset = 1U << 12U,
     usb_setup = 1U << 16U,
+    usb_frame = 1U << 17U,
 };
+constexpr std::uint32_t status_line = 3U << 2U;  // 0: in reset
+constexpr std::uint32_t status_suspended = 1U << 4U;
 constexpr std::uint32_t status_setup = 1U << 17U;
 constexpr std::uint32_t status_bus_reset = 1U << 19U;
+/// Checksum, bit stuffing, overflow, an acknowledgement that did not come, wrong sequence.
+constexpr std::uint32_t status_errors = 0xFU << 24U | 1U << 31U;
+
+constexpr std::uint32_t pull_up = 1U << 16U;
+
+/// Between looks at the controller, and how long the board stays off the bus. At half, a hub may
+/// not notice; at twice, the link is away for longer.
+constexpr std::uint32_t watch_us = 100'000;
+/// What looks in a row must say against the controller. At half, a host that is busy at its start
+/// is too slow; at twice, the link is away for longer.
+constexpr unsigned patience = 20;
+constexpr unsigned is_certain = 4;
+constexpr unsigned is_likely = 1;
+/// Frames come each millisecond; after 3 ms without a bus is suspended. At half, that may not be
+/// known; at twice, nothing changes.
+constexpr std::uint32_t deaf_after_us = 10'000;
+
+/// Erratum E15: a hub may corrupt what ends close to the next frame, and the controller then hangs.
+/// No packet is offered in the rest of a frame. At half, the link is half as fast; later, a packet
+/// (53 us) and the wait for the host come too close to the end.
+constexpr std::uint32_t late_us = 800;
+constexpr std::uint32_t frame_us = 1000;
 
 enum Request : std::uint8_t {
     get_status = 0,
@@ -56,6 +81,7 @@ constexpr std::uint8_t of_class = 0x20;
 constexpr std::uint8_t kind_mask = 0x60;
 constexpr std::uint8_t recipient_mask = 0x1F;
 constexpr std::uint8_t an_endpoint = 2;
+constexpr std::uint8_t endpoint_mask = 0x0F;
 
 /// A host that sets this rate and drops DTR wants the boot loader.
 constexpr std::uint32_t touch_baud = 1200;
@@ -76,18 +102,36 @@ void hand_over(Register& buffer, std::uint32_t word) {
     buffer = word | buffer_available;
 }
 
+/// Of an endpoint as requests name them, but 0.
+Register* buffer_of(std::uint16_t index) {
+    UsbEndpoint& data = usb_memory().buffers[usb::data_endpoint];
+    switch (index) {
+        case usb::data_endpoint: return &data.out;
+        case to_host | usb::data_endpoint: return &data.in;
+        case to_host | usb::notice_endpoint: return &usb_memory().buffers[usb::notice_endpoint].in;
+        default: return nullptr;
+    }
+}
+
 const char* const texts[] = {nullptr, "VersaVIS", "VersaVIS trigger board"};
 
 }  // namespace
 
 void UsbDevice::begin(const char* serial) {
+    serial_ = serial;
+    start();
+    watch();
+}
+
+void UsbDevice::start() {
     constexpr std::uint32_t to_phy = 1U << 0U;
     constexpr std::uint32_t soft_connect = 1U << 3U;
     constexpr std::uint32_t detect_supply = 1U << 2U;
     constexpr std::uint32_t detect_by_force = 1U << 3U;
     constexpr std::uint32_t interrupt_each_buffer = 1U << 29U;
-    constexpr std::uint32_t pull_up = 1U << 16U;
-    serial_ = serial;
+    host_ = Host::silent;
+    was_reset_ = has_setup_ = has_failed_ = detached_ = false;
+    evidence_ = 0;
     restart_blocks(reset_usb);
     auto* const memory = &usb_memory().controls[0].in;
     for (unsigned i = 0; i < 2 * (15 + 16); ++i) memory[i] = 0;
@@ -95,7 +139,7 @@ void UsbDevice::begin(const char* serial) {
     usb_registers().power = detect_supply | detect_by_force;
     usb_registers().control = 1;
     usb_registers().serial_control = interrupt_each_buffer;
-    usb_registers().interrupt_enable = usb_buffer_done | usb_bus_reset | usb_setup;
+    usb_registers().interrupt_enable = usb_buffer_done | usb_bus_reset | usb_setup | usb_frame;
     set_bits(usb_registers().serial_control, pull_up);
 }
 
@@ -108,6 +152,11 @@ void UsbDevice::note() {
         done_ = done_ | done;
         if ((done & data_in) != 0) data_in_at_us_ = at_us;
         if ((done & data_out) != 0) data_out_at_us_ = at_us;
+    }
+    if ((causes & usb_frame) != 0) {
+        static_cast<void>(usb_registers().start_of_frame);  // which takes the cause away
+        frame_at_us_ = at_us;
+        if (causes == usb_frame && !awaits_frame_) return;
     }
     if ((causes & usb_bus_reset) != 0) {
         usb_registers().serial_status = status_bus_reset;
@@ -125,13 +174,7 @@ void UsbDevice::work() {
         was_reset_ = false;
         reset_bus();
     }
-    std::uint32_t done = 0;
-    {
-        const InterruptsOff undisturbed;
-        done = done_;
-        done_ = 0;
-    }
-    handle_buffers(done);
+    if (done_ != 0) handle_buffers(take_done());
     if (has_setup_) {
         has_setup_ = false;
         handle_setup();
@@ -141,7 +184,37 @@ void UsbDevice::work() {
     send_data();
 }
 
+void UsbDevice::watch() {
+    timer().raw_interrupts = 1U << 3U;
+    timer().alarms[3] = timer().low + watch_us;
+    if (detached_) return start();
+    const unsigned found = evidence();
+    evidence_ = found == 0 ? 0 : evidence_ + found;
+    if (evidence_ < patience) return;
+    usb_registers().interrupt_enable = 0;
+    clear_bits(usb_registers().serial_control, pull_up);
+    reset_bus();
+    detached_ = true;
+}
+
+/// Of a hang, which the controller does not tell. Nor does it show what the host asks for: a packet
+/// that waits may be one that nobody wants. But
+/// - a bus that is not suspended has frames: who hears none is deaf (erratum E5, too);
+/// - after a reset, a host has a request;
+/// - a packet that failed is asked for again at once.
+unsigned UsbDevice::evidence() {
+    const std::uint32_t status = usb_registers().serial_status;
+    const bool deaf = timer().low - frame_at_us_ > deaf_after_us;
+    usb_registers().serial_status = status & (status_errors | (deaf ? 0 : status_suspended));
+    if ((status & status_errors) != 0) has_failed_ = true;
+    const bool at_rest = (status & status_suspended) != 0 || (status & status_line) == 0;
+    if (host_ == Host::silent || at_rest) return 0;
+    if (deaf) return is_certain;
+    return host_ == Host::has_reset || (has_failed_ && sending_) ? is_likely : 0;
+}
+
 void UsbDevice::reset_bus() {
+    host_ = Host::has_reset;
     usb_registers().address = 0;
     address_ = 0;
     done_ = 0;
@@ -150,7 +223,15 @@ void UsbDevice::reset_bus() {
     configure(false);
 }
 
+std::uint32_t UsbDevice::take_done() {
+    const InterruptsOff undisturbed;
+    const std::uint32_t done = done_;
+    done_ = 0;
+    return done;
+}
+
 void UsbDevice::handle_buffers(std::uint32_t done) {
+    has_failed_ = false;
     if ((done & control_in) != 0) {
         if (address_ != 0) {
             usb_registers().address = address_;
@@ -176,6 +257,7 @@ void UsbDevice::handle_setup() {
         return static_cast<std::uint16_t>(bytes[at] | bytes[at + 1] << 8U);
     };
     const Setup setup{bytes[0], bytes[1], word(2), word(4), word(6)};
+    host_ = Host::asks;
     more_ = nullptr;
     takes_coding_ = false;
     toggles_[toggle_control] = buffer_odd;
@@ -204,18 +286,30 @@ bool UsbDevice::answer(const Setup& setup) {
             reply(answer_, 1, setup.length);
             return true;
         case get_status:
-            answer_[0] = endpoint && ((setup.index & to_host) != 0 ? halted_in_ : halted_out_);
-            answer_[1] = 0;
+            answer_[0] = answer_[1] = 0;
+            if (endpoint && (setup.index & endpoint_mask) != 0) {
+                const Register* const buffer = buffer_of(setup.index);
+                if (buffer == nullptr) return false;
+                answer_[0] = (*buffer & buffer_stall) != 0;
+            }
             reply(answer_, 2, setup.length);
             return true;
         case clear_feature:
-        case set_feature: return endpoint && halt(setup, setup.request == set_feature);
+        case set_feature:
+            if (!endpoint || setup.value != 0 || !halt(setup.index, setup.request == set_feature))
+                return false;
+            reply(nullptr, 0, 0);
+            return true;
         case get_interface:
             answer_[0] = 0;
             reply(answer_, 1, setup.length);
             return true;
         case set_interface:
             if (setup.value != 0) return false;
+            if (setup.index == usb::data_interface) {
+                halt(usb::data_endpoint, false);
+                halt(to_host | usb::data_endpoint, false);
+            }
             reply(nullptr, 0, 0);
             return true;
         default: return false;
@@ -235,7 +329,7 @@ bool UsbDevice::answer_class(const Setup& setup) {
                                        static_cast<std::uint32_t>(coding_[2]) << 16U |
                                        static_cast<std::uint32_t>(coding_[3]) << 24U;
             if (ready_ && !ready && baud == touch_baud) enter_boot_loader();
-            if (ready && !ready_) link_.forget();
+            if (ready && !ready_) link_.forget(sending_ ? sent_size_ : 0);
             ready_ = ready;
             reply(nullptr, 0, 0);
             return true;
@@ -277,23 +371,18 @@ void UsbDevice::describe_text(unsigned index) {
     answer_[1] = text;
 }
 
-bool UsbDevice::halt(const Setup& setup, bool halted) {
-    const unsigned endpoint = setup.index & 0x0FU;
-    if (setup.value != 0 || endpoint != usb::data_endpoint) return false;
-    UsbEndpoint& buffers = usb_memory().buffers[usb::data_endpoint];
-    if ((setup.index & to_host) != 0) {
-        halted_in_ = halted;
-        toggles_[toggle_in] = 0;
-        buffers.in = halted ? std::uint32_t{buffer_stall} : 0U;
-        // The packet that was to be sent is lost; the host sees it by the numbers.
-        sending_ = false;
-    } else {
-        halted_out_ = halted;
+/// Either way, the next packet is DATA0.
+bool UsbDevice::halt(std::uint16_t index, bool halted) {
+    Register* const buffer = buffer_of(index);
+    if (buffer == nullptr) return (index & endpoint_mask) == 0 && !halted;
+    *buffer = halted ? std::uint32_t{buffer_stall} : 0U;
+    if (index == usb::data_endpoint) {
         toggles_[toggle_out] = 0;
-        buffers.out = halted ? std::uint32_t{buffer_stall} : 0U;
         receiving_ = false;
+    } else if (index == (to_host | usb::data_endpoint)) {
+        toggles_[toggle_in] = 0;
+        if (sending_ && !halted) hand_in();  // what the host does not have yet
     }
-    reply(nullptr, 0, 0);
     return true;
 }
 
@@ -310,11 +399,10 @@ void UsbDevice::configure(bool configured) {
     memory.buffers[usb::data_endpoint].out = 0;
     memory.buffers[usb::notice_endpoint].in = 0;
     toggles_[toggle_in] = toggles_[toggle_out] = 0;
-    receiving_ = halted_in_ = halted_out_ = false;
-    sending_ = false;
+    receiving_ = sending_ = awaits_frame_ = false;
     sent_size_ = 0;
     configured_ = configured;
-    link_.forget();
+    link_.forget(0);
 }
 
 /// Data for the host, at most as much as it wanted, or, without any, the end of a request.
@@ -351,20 +439,27 @@ void UsbDevice::take_control_data() {
 }
 
 void UsbDevice::receive_data() {
-    if (receiving_ || halted_out_ || !link_.can_receive()) return;
+    Register& buffer = usb_memory().buffers[usb::data_endpoint].out;
+    if (receiving_ || (buffer & buffer_stall) != 0 || !link_.can_receive()) return;
     receiving_ = true;
-    hand_over(usb_memory().buffers[usb::data_endpoint].out,
-              usb::packet_size | toggles_[toggle_out]);
+    hand_over(buffer, usb::packet_size | toggles_[toggle_out]);
     toggles_[toggle_out] ^= buffer_odd;
 }
 
 /// A host that got a full packet waits for more: another packet follows, if only an empty one.
 void UsbDevice::send_data() {
-    if (sending_ || halted_in_) return;
-    const bool ended = sent_size_ != usb::packet_size;
+    awaits_frame_ = false;
+    if (sending_) return;
+    if (!link_.has_more() && sent_size_ != usb::packet_size) return;
+    if ((usb_memory().buffers[usb::data_endpoint].in & buffer_stall) != 0) return;
+    awaits_frame_ = timer().low - frame_at_us_ - late_us < frame_us - late_us;
+    if (awaits_frame_) return;
     sent_size_ = link_.fill(in_packet());
-    if (sent_size_ == 0 && ended) return;
     sending_ = true;
+    hand_in();
+}
+
+void UsbDevice::hand_in() {
     hand_over(usb_memory().buffers[usb::data_endpoint].in,
               static_cast<std::uint32_t>(sent_size_) | buffer_full | toggles_[toggle_in]);
     toggles_[toggle_in] ^= buffer_odd;

@@ -17,6 +17,9 @@ class UsbDevice {
     void note();
     /// From an interrupt that note() asks for: does it.
     void work();
+    /// From the interrupt of an alarm that it sets itself, as urgent as work(): takes the board off
+    /// the bus, resets the controller and comes back when the controller no longer works.
+    void watch();
 
  private:
     struct Setup {
@@ -26,40 +29,50 @@ class UsbDevice {
         std::uint16_t index;
         std::uint16_t length;
     };
+    /// What the host has done since the controller was started.
+    enum class Host { silent, has_reset, asks };
 
+    void start();
+    unsigned evidence();
     void reset_bus();
     void handle_setup();
+    std::uint32_t take_done();
     void handle_buffers(std::uint32_t done);
     bool answer(const Setup& setup);
     bool answer_class(const Setup& setup);
     bool describe(const Setup& setup);
     void describe_text(unsigned index);
-    bool halt(const Setup& setup, bool halted);
+    bool halt(std::uint16_t index, bool halted);
     void configure(bool configured);
     void reply(const void* data, std::size_t size, std::size_t wanted);
     void send_more();
     void take_control_data();
     void receive_data();
     void send_data();
+    void hand_in();
 
     UsbLink& link_;
     const char* serial_ = nullptr;
     volatile std::uint32_t done_ = 0;  ///< buffers, by the bits of the controller
     volatile bool has_setup_ = false;
     volatile bool was_reset_ = false;
+    volatile bool awaits_frame_ = false;  ///< to send
+    bool configured_ = false;
+    bool receiving_ = false;   ///< the controller waits for a packet of the host
+    bool sending_ = false;     ///< the controller has a packet for the host
+    bool has_failed_ = false;  ///< a packet, and none has succeeded since
+    bool detached_ = false;
     volatile std::uint32_t data_in_at_us_ = 0;
     volatile std::uint32_t data_out_at_us_ = 0;
+    volatile std::uint32_t frame_at_us_ = 0;  ///< its begin, which was seen last
 
-    bool configured_ = false;
-    bool receiving_ = false;  ///< the controller waits for a packet of the host
-    bool halted_in_ = false;
-    bool halted_out_ = false;
-    bool sending_ = false;           ///< the controller has a packet for the host
     std::size_t sent_size_ = 0;      ///< of that packet, or of the last
     std::uint32_t toggles_[3] = {};  ///< of the next packet: control in, data in, data out
-    std::uint8_t address_ = 0;       ///< to be taken on
-    bool takes_coding_ = false;      ///< the data stage of the request is a line coding
-    bool ready_ = false;             ///< DTR
+    Host host_ = Host::silent;
+    unsigned evidence_ = 0;      ///< of looks in a row
+    std::uint8_t address_ = 0;   ///< to be taken on
+    bool takes_coding_ = false;  ///< the data stage of the request is a line coding
+    bool ready_ = false;         ///< DTR
     const std::uint8_t* more_ = nullptr;
     std::size_t more_size_ = 0;
     bool ends_short_ = false;

@@ -75,7 +75,6 @@ std::size_t UsbLink::fill(std::uint8_t* packet) {
     const std::size_t first = size < capacity - at ? size : capacity - at;
     std::memcpy(packet, outgoing_ + at, first);
     if (first < size) std::memcpy(packet + first, outgoing_, size - first);
-    sending_ = size != 0;
     taken_ = taken_ + size;
     if (was_full_ && written_ - taken_ < capacity / 2) {
         was_full_ = false;
@@ -102,8 +101,9 @@ void UsbLink::receive(const std::uint8_t* data, std::size_t size, std::uint32_t 
     attention_.ask();
 }
 
-void UsbLink::forget() {
-    taken_ = sent_count_ = written_;
+void UsbLink::forget(std::uint32_t in_flight) {
+    taken_ = written_;
+    sent_count_ = taken_ - in_flight;
     watching_ = departed_ = sending_ = false;
 }
 

@@ -28,8 +28,9 @@ class UsbLink final : public firmware::ByteLink {
     void sent(std::size_t size, std::uint32_t at_us);
     bool can_receive() const { return received_ - read_ < packets; }
     void receive(const std::uint8_t* data, std::size_t size, std::uint32_t at_us);
-    /// A new host, or none: what waits is for nobody.
-    void forget();
+    bool has_more() { return sending_ = written_ != taken_; }
+    /// A new host, or none: what waits is for nobody. So many bytes are still to be acknowledged.
+    void forget(std::uint32_t in_flight);
 
  private:
     struct Packet {

@@ -75,7 +75,7 @@ function busy_rig(options, period) {
         ready: pin.imu_ready,
         period,
     });
-    for (const output of [0, 1, 2, 3]) rig.add_camera(output);
+    [rig.camera] = [0, 1, 2, 3].map((output) => rig.add_camera(output));
     rig.connect();
     rig.configure({
         cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })),
@@ -536,6 +536,167 @@ const tests = {
             check_within(nearest(received, sent), -2000, 2000, 'received');
         for (const follow_up of follow_ups)
             check_within(nearest(follow_up.sent, came), -2000, 0, 'sent');
+    },
+
+    'after the port was opened anew, answers still say when they left': () => {
+        const rig = busy_rig(1, 152_439);
+        const { usb } = rig.machine;
+        const { camera } = rig;
+        rig.run_ms(50);
+        const zero = zero_of(rig, camera);
+        const left = new Map(); // cycles, by the number of the answer
+        const { on_bytes } = usb;
+        usb.on_bytes = (bytes, cycle) => {
+            const before = rig.host.all('clock').length;
+            on_bytes(bytes, cycle);
+            for (const { id } of rig.host.all('clock').slice(before)) left.set(id, cycle);
+        };
+        const handshake_ns = (19 + 4) * (1000 / 12);
+        const opened = 60;
+        for (let id = 0; id < opened; ++id) {
+            usb.set_reading(false); // so that a packet waits, and what follows queues up
+            rig.run_ms(2 + 0.017 * id);
+            usb.set_line_state(false, false);
+            usb.set_line_state(true, true);
+            rig.run_ms(1); // what follows half a message is lost with it
+            rig.host.ask_time(id);
+            rig.run_ms(2);
+            usb.set_reading(true);
+            rig.run_ms(10.1);
+        }
+        const follow_ups = rig.host.all('follow_up').filter(({ id }) => left.has(id));
+        check(follow_ups.length >= opened * 0.9, `${follow_ups.length} answers`);
+        for (const { id, sent } of follow_ups) {
+            const error = sent - (left.get(id) - zero) * cycle_ns + handshake_ns;
+            check_within(error, -2000, 0, 'sent');
+        }
+    },
+
+    'a hub that corrupts what ends late in a frame does not hang the controller': () => {
+        const rig = busy_rig(1, 152_439);
+        rig.machine.usb.corrupts = 'deaf';
+        rig.run_ms(500);
+        check(rig.machine.usb_device.hung === undefined, 'it hangs');
+        const { bad, gaps } = rig.host;
+        check(bad === 0 && gaps === 0, `${bad} bad packets, ${gaps} gaps`);
+    },
+
+    'a controller that hangs is reset, while triggers and stamps go on': () => {
+        for (const kind of ['deaf', 'failed', 'mute']) {
+            const rig = busy_rig(1, 152_439);
+            const { usb, usb_device } = rig.machine;
+            const { camera } = rig;
+            rig.run_ms(100);
+            const { nonce } = rig.host;
+            usb.set_reading(false); // so that a packet waits
+            rig.run_ms(5);
+            usb.set_reading(true);
+            usb_device.hang(kind);
+            if (kind === 'mute') usb.reset(); // as a host does when nobody answers
+            rig.run_until('lost', () => usb.state === 'detached', kind === 'deaf' ? 700 : 2200);
+            rig.run_until('configured again', () => usb.state === 'configured');
+            usb.set_line_state(true, true);
+            rig.host.pending = [];
+            rig.run_ms(100);
+            check(rig.host.nonce === nonce, 'the board was reset');
+            const records = rig.host.all('exposure').filter((record) => record.camera === 0);
+            const zero = zero_of(rig, camera);
+            for (const { trigger, triggered, flags } of records) {
+                const at = (camera.triggers[trigger - 1] - zero) * cycle_ns;
+                check(triggered === at && (flags & 1) !== 0, `${kind}: trigger ${trigger}`);
+            }
+            const missed = camera.triggers.length - records.at(-1).trigger;
+            check(missed <= 2, `${kind}: ${missed} records are missing at the end`);
+            camera.triggers.slice(1).forEach((cycle, index) =>
+                check_within(cycle - camera.triggers[index], 2_499_990, 2_500_010, 'period'));
+        }
+    },
+
+    'a host that sleeps, is unplugged or does not read resets nothing': () => {
+        const rig = busy_rig(1, 152_439);
+        const { usb, usb_device } = rig.machine;
+        const attach = usb.on_attach.bind(usb);
+        let left = 0;
+        usb.on_attach = (is_attached) => {
+            ++left;
+            attach(is_attached);
+        };
+        const still_answers = (id) => {
+            rig.host.ask_time(id);
+            rig.run_until('an answer', () => rig.host.last('clock')?.id === id);
+        };
+        usb.set_reading(false);
+        rig.run_ms(2000);
+        usb.set_reading(true);
+        still_answers(1);
+        usb.suspend();
+        rig.run_ms(2000);
+        check(usb.state === 'suspended', `it is ${usb.state}`);
+        usb.resume();
+        rig.run_ms(30);
+        still_answers(2);
+        for (let i = 0; i < 20; ++i) {
+            usb_device.status |= 1 << 24; // a packet failed, and succeeded at the second attempt
+            rig.run_ms(100);
+        }
+        still_answers(3);
+        const { bad, gaps } = rig.host;
+        check(bad === 0 && gaps === 0, `${bad} bad packets, ${gaps} gaps`);
+        usb.disconnect();
+        rig.run_ms(2000);
+        usb.connect();
+        rig.run_until('configured again', () => usb.state === 'configured');
+        check(left === 0, 'it left the bus');
+    },
+
+    'a bus that is busy after resets is joined in the end': () => {
+        const rig = new Rig(image, quick_usb);
+        rig.machine.usb.busy_resets = 2;
+        rig.run_until('configured', () => rig.machine.usb.state === 'configured', 3000);
+        rig.connect();
+    },
+
+    'halts of endpoints are set, told and cleared; nothing is lost by it': () => {
+        const rig = busy_rig(1, 152_439);
+        const { usb } = rig.machine;
+        const asked = (request) => {
+            let result;
+            usb.control(request, (found) => (result = found));
+            rig.run_until('the request ends', () => result !== undefined);
+            return typeof result === 'string' ? result : [...result];
+        };
+        const status = (index) => asked({ type: 0x82, request: 0, index, length: 2 })[0];
+        const { bulk_in, bulk_out, notify } = usb.endpoints;
+        let id = 0;
+        const read_again = () => {
+            usb.set_reading(true);
+            rig.host.ask_time(++id);
+            rig.run_until('an answer', () => rig.host.last('clock')?.id === id);
+        };
+        for (const endpoint of [0x80 | bulk_in, bulk_out, 0x80 | notify])
+            for (let i = 0; i < 5; ++i) {
+                usb.set_reading(false);
+                rig.run_ms(3.3);
+                check(asked({ type: 2, request: 3, index: endpoint }).length === 0, 'not halted');
+                check(status(endpoint) === 1, `${endpoint} is not said to be halted`);
+                let cleared = false;
+                usb.clear_halt(endpoint, (result) => (cleared = result.length === 0));
+                rig.run_until(`${endpoint} is cleared`, () => cleared);
+                check(status(endpoint) === 0, `${endpoint} is said to be halted`);
+                read_again();
+            }
+        for (let i = 0; i < 3; ++i) {
+            usb.set_reading(false);
+            rig.run_ms(3.3);
+            check(asked({ type: 1, request: 11, index: 1 }).length === 0, 'set interface');
+            usb.in_data1 = usb.out_data1 = false;
+            read_again();
+        }
+        check(asked({ type: 2, request: 1, index: 0 }).length === 0, 'endpoint 0');
+        for (const endpoint of [0x83, 0x02])
+            check(asked({ type: 2, request: 1, index: endpoint }) === 'stall', 'not refused');
+        const { bad, gaps } = rig.host;
+        check(bad === 0 && gaps === 0, `${bad} bad packets, ${gaps} gaps`);
     },
 
     'pulses at the inputs are stamped within 48 ns': () => {

@@ -150,6 +150,45 @@ function erratum() {
     check_fault('without its clock', 'clk_usb', () => poke(made, 0x50110040, 1));
 }
 
+/// Only a reset of the controller ends a hang; a host that resets the bus does not.
+function hangs() {
+    const counts = (machine) => {
+        const first = peek(machine, 0x50110048);
+        machine.run_for(5 * ms);
+        return peek(machine, 0x50110048) - first;
+    };
+    for (const [kind, frames, errors] of [
+        ['deaf', 0, 0],
+        ['failed', 5, 1],
+        ['mute', 5, 0],
+    ]) {
+        const machine = configured();
+        machine.usb.write([5], machine.now + ms);
+        machine.usb_device.hang(kind);
+        check(`${kind}: frames`, counts(machine), frames);
+        check(`${kind}: errors`, (peek(machine, 0x50110050) >>> 24) & 1, errors);
+        check(`${kind}: what the host sees`, machine.usb.error, 'bulk OUT: silence');
+        machine.usb.reset();
+        machine.run_for(12 * ms);
+        check(`${kind}: after a reset`, machine.usb.state, 'attached');
+        poke(machine, 0x4000e000, 1 << 24);
+        check(`${kind}: without the controller`, machine.usb.state, 'detached');
+        check(`${kind}: after it was reset`, machine.usb_device.answers_nothing, false);
+    }
+    const machine = start();
+    machine.usb.busy_resets = 1;
+    machine.run_for(12 * ms);
+    check('a busy bus after the reset', [machine.usb.state, counts(machine)], ['attached', 0]);
+    machine.usb.reset();
+    machine.run_for(12 * ms);
+    check('one that rests', machine.usb.state, 'configured');
+    const corrupted = configured();
+    corrupted.usb.corrupts = 'deaf';
+    for (let i = 0; i < 40; ++i) corrupted.usb.write([i], corrupted.now + 0.53 * ms * i);
+    corrupted.run_for(25 * ms);
+    check('a packet that ends late in a frame', corrupted.usb.error, 'bulk IN: silence');
+}
+
 function everything_at_once(naive) {
     const machine = configured({ naive });
     const pio0 = 0x50200000;
@@ -212,5 +251,6 @@ echoes();
 back_pressure();
 plugging();
 erratum();
+hangs();
 leaving_out();
 finish('USB of the machine');

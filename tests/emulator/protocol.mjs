@@ -181,6 +181,7 @@ export class Host {
             ++this.bad;
             return;
         }
+        this.nonce = view.getUint32(4, true);
         const number = view.getUint32(8, true);
         if (this.next !== undefined && number !== this.next) ++this.gaps;
         this.next = (number + 1) >>> 0;

@@ -45,6 +45,23 @@ TEST_CASE("usb: the board is found, drives the cameras, is unplugged and comes b
     CHECK(stack.service().terminate() == 0);
 }
 
+TEST_CASE("usb: a board that hangs is reset, and comes back under another address") {
+    const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
+    Stack stack({"usbhang", 32, 1, 20, "", "", "", 320, 240, "usb"});
+    stack.start_rig();
+    UsbBridge bridge(testbed.get(), stack.socket_path(), "RIG0001");
+    stack.start_service();
+    const auto status = stack.wait_for_status(healthy);
+    bridge.hang();
+    stack.wait_for_status([&](const auto&) { return !bridge.hangs(); });
+    bridge.unplug();
+    bridge.plug();
+    const auto again = stack.wait_for_status(healthy);
+    CHECK(again["board"]["connections"] == 2);
+    CHECK(again["clock"]["epoch"] == status["clock"]["epoch"]);
+    CHECK(stack.service().terminate() == 0);
+}
+
 TEST_CASE("usb: no board, or the wrong one, is said with what to do") {
     const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
     Stack stack({"nousb", 31, 1, 20, "", "", "", 320, 240, "usb"});

@@ -39,6 +39,9 @@ class SimulatedUsbDevice {
     /// Bytes not yet fetched by the host are lost.
     void unplug() { device_.unplug(); }
     void plug() { device_.plug(); }
+    /// See UsbfsNode.
+    void hang() { device_.node().hang(); }
+    bool hangs() { return device_.node().hangs(); }
     /// True once the host has raised DTR with SET_CONTROL_LINE_STATE.
     bool line_state_set() const;
 

@@ -22,6 +22,8 @@ class UsbBridge {
 
     void unplug() { device_->unplug(); }
     void plug() { device_->plug(); }
+    void hang() { device_->hang(); }
+    bool hangs() { return device_->hangs(); }
     bool line_state_set() const { return device_->line_state_set(); }
 
  private:

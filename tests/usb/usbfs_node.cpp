@@ -156,6 +156,11 @@ bool UsbfsNode::halted(std::uint8_t endpoint) const {
     return pipes_.at(endpoint).halted;
 }
 
+void UsbfsNode::hang() {
+    hangs_ = true;
+    post_pump();
+}
+
 int UsbfsNode::clear_halt(std::uint8_t endpoint) {
     {
         const std::lock_guard lock{mutex_};
@@ -165,6 +170,13 @@ int UsbfsNode::clear_halt(std::uint8_t endpoint) {
     }
     function_->halt_cleared(endpoint);
     return 0;
+}
+
+int UsbfsNode::reset() {
+    if (!hangs_) return 0;
+    detach();
+    hangs_ = false;
+    return -ENODEV;
 }
 
 // The testbed's context is private; this is the first chance to learn it, and
@@ -218,7 +230,7 @@ int UsbfsNode::execute(Client* client, unsigned long request) {
             return read_argument(client, usbdevfs_setinterface{}).altsetting == 0 ? 0 : -EINVAL;
         case USBDEVFS_CLEAR_HALT:
             return clear_halt(static_cast<std::uint8_t>(read_argument(client, 0U)));
-        case USBDEVFS_RESET: return 0;
+        case USBDEVFS_RESET: return reset();
         case USBDEVFS_GETDRIVER:
         case USBDEVFS_IOCTL: return -ENODATA;  // no kernel driver is ever bound
         case USBDEVFS_SUBMITURB: return submit(client);
@@ -271,6 +283,10 @@ int UsbfsNode::submit(Client* client) {
 
 int UsbfsNode::start(Urb urb) {
     const usbdevfs_urb& fields = urb.fields();
+    if (hangs_) {
+        finish(std::move(urb), -EPROTO);
+        return 0;
+    }
     if (fields.type == USBDEVFS_URB_TYPE_CONTROL) {
         if (urb.payload().size() < setup_size) return -EINVAL;
         control(urb);
@@ -444,8 +460,8 @@ void UsbfsNode::fill_in_urbs() {
     for (Urb& urb : std::exchange(pending_, {})) {
         const std::uint8_t endpoint = urb.fields().endpoint;
         Pipe& pipe = pipes_.at(endpoint);
-        if (pipe.halted) {
-            finish(std::move(urb), -EPIPE);
+        if (pipe.halted || hangs_) {
+            finish(std::move(urb), hangs_ ? -EPROTO : -EPIPE);
             continue;
         }
         const Progress progress = waiting.contains(endpoint) ? Progress::waiting : fill(urb, pipe);

@@ -6,6 +6,7 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -96,6 +97,9 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     /// The endpoint answers STALL, and what it had queued is gone, until the host clears the halt.
     void halt(std::uint8_t endpoint);
     bool halted(std::uint8_t endpoint) const;
+    /// No transfer succeeds any more, until the host resets the device, which then leaves the bus.
+    void hang();
+    bool hangs() const { return hangs_; }
 
     /// The handler's signals, on the testbed's GLib thread.
     void on_connected(Client* client);
@@ -138,6 +142,7 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     int start(Urb urb);
     int discard(Client* client);
     int clear_halt(std::uint8_t endpoint);
+    int reset();
     void control(Urb& urb);
     int answer_control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> out,
                        Bytes& reply);
@@ -161,6 +166,7 @@ class UsbfsNode : public std::enable_shared_from_this<UsbfsNode> {
     std::string path_;  // empty while detached
     GMainContext* context_ = nullptr;
     bool pump_posted_ = false;
+    std::atomic<bool> hangs_ = false;
     std::map<std::uint8_t, Pipe> pipes_;  // by endpoint address; its keys never change
 
     std::deque<Urb> pending_;
