@@ -122,10 +122,10 @@ const tests = {
     'function and pad of each pin are stated at start': () => {
         const rig = new Rig(image, quick_usb);
         const { bus } = rig.machine;
-        const written = new Set();
+        const written = new Map();
         const write = bus.write_register.bind(bus);
         bus.write_register = (address, value) => {
-            written.add(address);
+            written.set(address, value);
             write(address, value);
         };
         rig.connect();
@@ -133,6 +133,9 @@ const tests = {
             check(written.has(0x40014004 + 8 * gpio), `not the function of GPIO ${gpio}`);
             check(written.has(0x4001c004 + 4 * gpio), `not the pad of GPIO ${gpio}`);
         }
+        // Of the Pico itself, or of a Pico W's radio, which 23 would switch on.
+        for (const gpio of [23, 24, 25, 29])
+            check((written.get(0x4001c004 + 4 * gpio) & 0xcc) === 4, `GPIO ${gpio} is not pulled down`);
         for (let number = 0; number < 6; ++number)
             check(written.has(0x40018004 + 8 * number), `not pin ${number} of the flash`);
     },
