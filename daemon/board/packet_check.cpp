@@ -65,7 +65,7 @@ bool possible(const wire::Event& message) {
 bool possible(const wire::Health& message) {
     return in_life(message.board_time_ns) && message.pps_state <= wire::PpsState::good &&
            message.sync_state <= wire::SyncState::followed &&
-           message.reset_cause <= wire::ResetCause::software;
+           message.reset_cause <= wire::ResetCause::update;
 }
 
 bool possible(const wire::ClockAnswer& message) {

@@ -652,6 +652,18 @@ const tests = {
         rig.connect();
         rig.host.reboot(true);
         check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+        const updated = next_life(rig);
+        check(updated.host.last('hello').reset_cause === 5, 'it does not say update');
+        // The next life is another matter.
+        hang(updated.machine);
+        check(end_of(updated, 1100) === 'watchdog', 'no reset');
+        check(next_life(updated).host.last('hello').reset_cause === 2, 'another cause');
+    },
+
+    'a new board that its boot loader started says so': () => {
+        const rig = new Rig(image, { ...quick_usb, reason: 1 });
+        rig.connect();
+        check(rig.host.last('hello').reset_cause === 5, 'it does not say update');
     },
 
     'the boot loader comes by a touch at 1200 baud, even when the code hangs': () => {
@@ -662,6 +674,7 @@ const tests = {
         rig.machine.usb.set_line_coding(1200);
         rig.machine.usb.set_line_state(false, false);
         check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+        check(next_life(rig).host.last('hello').reset_cause === 5, 'it does not say update');
     },
 
     'code that hangs is ended by the watchdog within a second': () => {
