@@ -6,7 +6,7 @@ set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/versavis)
 install(TARGETS versavisd versavis_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY daemon/camera/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
     FILES_MATCHING PATTERN *.toml)
-# Built by the target `firmware`, which needs a compiler for the chip.
+# Only where there is a compiler for the chip.
 install(FILES ${CMAKE_BINARY_DIR}/firmware/versavis.uf2
     DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis OPTIONAL)
 if(TARGET versavis-rig)

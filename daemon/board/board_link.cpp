@@ -74,7 +74,7 @@ std::string describe_mismatch(const wire::BoardHello& hello) {
                        wire::protocol_major, wire::protocol_minor,
                        older ? "flash the firmware of this release of the service: stop it, then "
                                "run 'versavis flash " +
-                                   board::installed_firmware().string() + "'"
+                                   board::firmware_file().string() + "'"
                              : "install the service of its firmware's release, or flash the "
                                "firmware of this one");
 }

@@ -66,7 +66,7 @@ bool possible(const wire::Health& message) {
     return in_life(message.board_time_ns) && message.pps_state <= wire::PpsState::good &&
            message.sync_state <= wire::SyncState::followed &&
            message.stamp_test <= wire::StampTest::passed &&
-           message.reset_cause <= wire::ResetCause::software;
+           message.reset_cause <= wire::ResetCause::update;
 }
 
 bool possible(const wire::ClockAnswer& message) {

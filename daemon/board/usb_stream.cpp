@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "usb_handles.hpp"
+#include "wire/usb_identity.hpp"
 
 namespace versavis::daemon {
 
@@ -54,6 +55,16 @@ Unexpected<> usb_failure(const std::string& what, int code) {
                                                : "");
 }
 
+/// As the kernel names it: bus, then the ports of the hubs on the way.
+std::string port_of(libusb_device* device) {
+    std::array<std::uint8_t, 7> ports{};
+    const int depth = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
+    std::string name = fmt::format("usb:{}", libusb_get_bus_number(device));
+    for (int i = 0; i < depth; ++i)
+        name += fmt::format("{}{}", i == 0 ? '-' : '.', ports[static_cast<std::size_t>(i)]);
+    return name;
+}
+
 class UsbStream final : public ByteStream {
  public:
     UsbStream(UsbContext context, UsbHandle handle, const CdcFunction& function)
@@ -87,17 +98,7 @@ class UsbStream final : public ByteStream {
         return {};
     }
 
-    /// As the kernel names it: bus, then the ports of the hubs on the way.
-    std::string port() const override {
-        libusb_device* device = libusb_get_device(handle_.get());
-        std::array<std::uint8_t, 7> ports{};
-        const int depth =
-            libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
-        std::string name = fmt::format("usb:{}", libusb_get_bus_number(device));
-        for (int i = 0; i < depth; ++i)
-            name += fmt::format("{}{}", i == 0 ? '-' : '.', ports[static_cast<std::size_t>(i)]);
-        return name;
-    }
+    std::string port() const override { return port_of(libusb_get_device(handle_.get())); }
 
     /// Only here are events handled, so what completes is seen, and stamped, by this thread: none
     /// of it can complete between the look and the wait.
@@ -219,6 +220,19 @@ CdcFunction find_function(libusb_device* device) {
     return function;
 }
 
+/// What a boot loader means for a board that is not there. None: it is no boot loader.
+std::optional<Error> boot_loader(libusb_device* device, const libusb_device_descriptor& found) {
+    if (found.idVendor != wire::boot_loader_vendor) return std::nullopt;
+    if (found.idProduct == wire::boot_loader_rp2040)
+        return Error{"", "a board waits in its boot loader at " + port_of(device),
+                     "put firmware into it with 'versavis flash', or start what it has with "
+                     "'versavis board reset'"};
+    if (found.idProduct == wire::boot_loader_rp2350)
+        return Error{"", "there is a Pico 2, whose chip is another, at " + port_of(device),
+                     "take a board with an RP2040: a Pico, Pico H, Pico W or Pico WH"};
+    return std::nullopt;
+}
+
 /// The first device of the vendor and product whose serial number fits.
 Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration& wanted) {
     libusb_device** devices = nullptr;
@@ -226,9 +240,11 @@ Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration
     UsbHandle found;
     std::optional<int> refused;
     bool hangs = false;
+    std::optional<Error> waiting;
     for (ssize_t i = 0; i < count && !found; ++i) {
         libusb_device_descriptor descriptor{};
         libusb_get_device_descriptor(devices[i], &descriptor);
+        if (!waiting) waiting = boot_loader(devices[i], descriptor);
         if (descriptor.idVendor != wanted.usb_vendor || descriptor.idProduct != wanted.usb_product)
             continue;
         libusb_device_handle* handle = nullptr;
@@ -253,9 +269,10 @@ Expected<UsbHandle> find_board(libusb_context* context, const BoardConfiguration
         return failure("USB board", "does not answer; it was reset",
                        "unplug it if it does not come back");
     return failure("USB board",
-                   fmt::format("no device {:04x}:{:04x}{}", wanted.usb_vendor, wanted.usb_product,
-                               wanted.serial.empty() ? "" : " with serial " + wanted.serial),
-                   "plug it in; 'lsusb' lists what is there");
+                   fmt::format("no device {:04x}:{:04x}{}{}", wanted.usb_vendor, wanted.usb_product,
+                               wanted.serial.empty() ? "" : " with serial " + wanted.serial,
+                               waiting ? ", but " + waiting->what : ""),
+                   waiting ? waiting->cure : "plug it in; 'lsusb' lists what is there");
 }
 
 }  // namespace

@@ -576,7 +576,7 @@ std::string board_remark(const Status& status) {
         return fmt::format(
             "its firmware, {}, is older than this service, {}: stop the service, "
             "then run 'versavis flash {}'",
-            board.firmware, status.release, board::installed_firmware().string());
+            board.firmware, status.release, board::firmware_file().string());
     return "";
 }
 

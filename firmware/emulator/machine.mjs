@@ -99,7 +99,10 @@ export class Machine {
         this.add_dma();
         this.add_flash(options);
         this.add_usb(options);
-        this.rom = new BootRom(this.bus, this.processor, () => this.end('boot loader'));
+        this.rom = new BootRom(this.bus, this.processor, (...given) => {
+            this.watchdog.restart_into_boot_loader(given);
+            this.end('boot loader');
+        });
         if (options.flash !== undefined) this.rom.start(this.flash.bytes);
     }
 

@@ -92,6 +92,15 @@ export class Watchdog {
         this.event = this.clock.after(cycles, () => this.bite(false));
     }
 
+    /// What is left when the boot loader, which was called with two words, has started the chip again:
+    /// it comes and goes by the watchdog, and finds these words in the first two scratch registers
+    /// (raspberrypi/pico-bootrom-rp2040, reset_usb_boot).
+    restart_into_boot_loader(given) {
+        given.forEach((word, at) => (this.scratch[at] = word));
+        this.scratch[4] = 0;
+        this.reason = 1;
+    }
+
     bite(forced) {
         this.reason = forced ? 2 : 1;
         this.on_bite(forced);

@@ -9,8 +9,6 @@ namespace versavis::rp2040 {
 
 class FlashChip {
  public:
-    static constexpr std::uint32_t sector_size = 4096;
-    static constexpr std::uint32_t page_size = 256;
     static constexpr std::size_t id_size = 8;
 
     /// From now on the chip gets its commands from here.

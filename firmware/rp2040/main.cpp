@@ -93,6 +93,7 @@ void start_blocks() {
     }
     for (const unsigned pin : {pin_i2c_data, pin_i2c_clock})
         pads().gpio[pin] = pad_input | pad_schmitt | pad_4_ma | pad_pull_up;
+    for (const unsigned pin : own_pins) pads().gpio[pin] = pad_schmitt | pad_4_ma | pad_pull_down;
 }
 
 void start_ports() {

@@ -9,7 +9,10 @@
 namespace versavis::rp2040 {
 
 /// A Raspberry Pi Pico leads GPIO 0 to 22 and 26 to 28 out. The others belong to its own circuits:
-/// regulator, USB's supply, LED, a divider with a capacitor.
+/// regulator, USB's supply, LED, a divider with a capacitor; on a Pico W to the radio, which is off
+/// while 23 is low.
+inline constexpr unsigned own_pins[] = {23, 24, 25, 29};
+
 enum Pin : unsigned {
     pin_uart_transmit = 0,  ///< to the second IMU
     pin_uart_receive = 1,   ///< from it, or from a GNSS receiver

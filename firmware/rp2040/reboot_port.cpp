@@ -11,8 +11,10 @@ namespace {
 /// It counts twice each microsecond (erratum RP2040-E1).
 constexpr std::uint32_t watchdog_limit = 2 * 1'000'000;
 
-/// In a register that survives all but a loss of power: the restart was asked for.
+/// In a register that survives all but a loss of power: how the firmware last ended. A restart by
+/// the watchdog with neither is the boot loader's, which restarts the chip by that, too.
 constexpr std::uint32_t asked_for = 0x56495341;
+constexpr std::uint32_t still_running = 0x56495342;
 
 /// Everything but the oscillators.
 constexpr std::uint32_t all_blocks = 0x1FFFC;
@@ -35,6 +37,7 @@ Function rom_function(char first, char second) {
 }  // namespace
 
 void enter_boot_loader() {
+    watchdog_timer().scratch[0] = 0;
     using Enter = void (*)(std::uint32_t activity_pins, std::uint32_t disabled_interfaces);
     rom_function<Enter>('U', 'B')(0, 0);
     for (;;) {
@@ -43,12 +46,11 @@ void enter_boot_loader() {
 
 wire::ResetCause reset_cause() {
     constexpr std::uint32_t had_run_pin = 1U << 16U;
-    const bool asked = watchdog_timer().scratch[0] == asked_for;
-    watchdog_timer().scratch[0] = 0;
-    const std::uint32_t reason = watchdog_timer().reason;
-    if (reason != 0) {
-        if (asked) return wire::ResetCause::software;
-        return wire::ResetCause::watchdog;
+    const std::uint32_t end = watchdog_timer().scratch[0];
+    watchdog_timer().scratch[0] = still_running;
+    if (watchdog_timer().reason != 0) {
+        if (end == asked_for) return wire::ResetCause::software;
+        return end == still_running ? wire::ResetCause::watchdog : wire::ResetCause::update;
     }
     if ((regulator().chip_reset & had_run_pin) != 0) return wire::ResetCause::pin;
     return wire::ResetCause::power_on;  // or a brown-out, which has the same bit

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "wire/crc32.hpp"
+#include "wire/flash_map.hpp"
 
 namespace versavis::rp2040 {
 
@@ -12,14 +13,13 @@ namespace {
 /// Bytes that one step writes or reads. At half, twice as many steps of a millisecond; at twice, a
 /// step holds the core up for 40 us.
 constexpr std::size_t chunk = 32;
-static_assert(FlashChip::page_size % chunk == 0);
+static_assert(wire::flash_page % chunk == 0);
 
 constexpr std::uint32_t magic = 0x53495656;
-constexpr std::uint32_t flash_size = 2 * 1024 * 1024;
 
-/// The last sectors, far behind the firmware.
+/// For the flash chip, which counts from its own begin.
 constexpr std::uint32_t address_of(unsigned place) {
-    return flash_size - (place + 1) * FlashChip::sector_size;
+    return wire::settings_begin - wire::flash_begin + place * wire::flash_sector;
 }
 
 }  // namespace
@@ -40,13 +40,13 @@ bool SettingsStore::read_place(unsigned place) {
 
 std::size_t SettingsStore::load(std::uint8_t* data, std::size_t room) {
     std::size_t size = 0;
-    for (unsigned place = 0; place < places; ++place) {
+    for (unsigned place = 0; place < wire::settings_places; ++place) {
         if (!read_place(place)) continue;
         const Head& head = record_.head;
         if (size != 0 && static_cast<std::int32_t>(head.number - number_) < 0) continue;
         if (head.size > room) continue;
         number_ = head.number;
-        next_place_ = (place + 1) % places;
+        next_place_ = (place + 1) % wire::settings_places;
         size = head.size;
         std::memcpy(data, record_.data, size);
     }
@@ -93,7 +93,7 @@ void SettingsStore::work() {
     if (done_ < all) return;
     if (step_ == Step::write) return begin(Step::verify);
     number_ = record_.head.number;
-    next_place_ = (next_place_ + 1) % places;
+    next_place_ = (next_place_ + 1) % wire::settings_places;
     end(Outcome::stored);
 }
 

@@ -34,8 +34,6 @@ class SettingsStore final : public firmware::Persist {
     };
     enum class Step : std::uint8_t { idle, erase, write, verify };
 
-    static constexpr unsigned places = 2;
-
     bool read_place(unsigned place);
     static std::uint32_t check_of(const Record& record);
     void begin(Step step);

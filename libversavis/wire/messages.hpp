@@ -33,7 +33,8 @@ enum class ResetCause : std::uint8_t {
     pin = 1,
     watchdog = 2,
     brown_out = 3,
-    software = 4
+    software = 4,
+    update = 5  ///< the boot loader started the board, as it does after it was flashed
 };
 
 enum Capability : std::uint32_t {

@@ -122,10 +122,10 @@ const tests = {
     'function and pad of each pin are stated at start': () => {
         const rig = new Rig(image, quick_usb);
         const { bus } = rig.machine;
-        const written = new Set();
+        const written = new Map();
         const write = bus.write_register.bind(bus);
         bus.write_register = (address, value) => {
-            written.add(address);
+            written.set(address, value);
             write(address, value);
         };
         rig.connect();
@@ -133,6 +133,9 @@ const tests = {
             check(written.has(0x40014004 + 8 * gpio), `not the function of GPIO ${gpio}`);
             check(written.has(0x4001c004 + 4 * gpio), `not the pad of GPIO ${gpio}`);
         }
+        // Of the Pico itself, or of a Pico W's radio, which 23 would switch on.
+        for (const gpio of [23, 24, 25, 29])
+            check((written.get(0x4001c004 + 4 * gpio) & 0xcc) === 4, `GPIO ${gpio} is not pulled down`);
         for (let number = 0; number < 6; ++number)
             check(written.has(0x40018004 + 8 * number), `not pin ${number} of the flash`);
     },
@@ -812,6 +815,18 @@ const tests = {
         rig.connect();
         rig.host.reboot(true);
         check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+        const updated = next_life(rig);
+        check(updated.host.last('hello').reset_cause === 5, 'it does not say update');
+        // The next life is another matter.
+        hang(updated.machine);
+        check(end_of(updated, 1100) === 'watchdog', 'no reset');
+        check(next_life(updated).host.last('hello').reset_cause === 2, 'another cause');
+    },
+
+    'a new board that its boot loader started says so': () => {
+        const rig = new Rig(image, { ...quick_usb, reason: 1 });
+        rig.connect();
+        check(rig.host.last('hello').reset_cause === 5, 'it does not say update');
     },
 
     'the boot loader comes by a touch at 1200 baud, even when the code hangs': () => {
@@ -822,6 +837,7 @@ const tests = {
         rig.machine.usb.set_line_coding(1200);
         rig.machine.usb.set_line_state(false, false);
         check(end_of(rig, 100) === 'boot loader', 'no boot loader');
+        check(next_life(rig).host.last('hello').reset_cause === 5, 'it does not say update');
     },
 
     'code that hangs is ended by the watchdog within a second': () => {

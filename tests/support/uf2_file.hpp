@@ -8,11 +8,18 @@
 #include <vector>
 
 #include "board/uf2.hpp"
+#include "wire/crc32.hpp"
 
 namespace versavis::test {
 
 inline void put_word(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t value) {
     for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<std::uint8_t>(value >> 8 * i);
+}
+
+/// Puts the seal of our firmware on an image, which is then what it says.
+inline void seal(std::vector<std::uint8_t>& image) {
+    put_word(image, image.size() - 8, wire::firmware_seal);
+    put_word(image, image.size() - 4, wire::crc32(image.data(), image.size() - 4));
 }
 
 /// `pages` of an image from the begin of the flash; its first page is one that the chip starts.
@@ -22,6 +29,7 @@ inline std::vector<std::uint8_t> flash_image(std::size_t pages, std::uint8_t see
     for (std::size_t i = 0; i < image.size(); ++i)
         image[i] = static_cast<std::uint8_t>(seed + i + i / client::flash_page * 7);
     put_word(image, 252, client::boot_stage_crc({image.data(), 252}));
+    seal(image);
     return image;
 }
 

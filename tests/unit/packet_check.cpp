@@ -138,7 +138,7 @@ TEST_CASE("packet_check: states of a report are those that there are") {
     health.pps_state = wire::PpsState::good;
     health.sync_state = wire::SyncState::followed;
     health.stamp_test = wire::StampTest::passed;
-    health.reset_cause = wire::ResetCause::software;
+    health.reset_cause = wire::ResetCause::update;
     CHECK(possible(health));
     health.sync_state = static_cast<wire::SyncState>(3);
     CHECK_FALSE(possible(health));
@@ -149,6 +149,6 @@ TEST_CASE("packet_check: states of a report are those that there are") {
     health.pps_state = static_cast<wire::PpsState>(3);
     CHECK_FALSE(possible(health));
     health = {};
-    health.reset_cause = static_cast<wire::ResetCause>(5);
+    health.reset_cause = static_cast<wire::ResetCause>(6);
     CHECK_FALSE(possible(health));
 }

@@ -8,6 +8,7 @@
 #include "../support/judged.hpp"
 #include "../support/stack.hpp"
 #include "judge.hpp"
+#include "simulated_pico.hpp"
 #include "usb_bridge.hpp"
 
 using namespace versavis;
@@ -59,6 +60,27 @@ TEST_CASE("usb: a board that hangs is reset, and comes back under another addres
     const auto again = stack.wait_for_status(healthy);
     CHECK(again["board"]["connections"] == 2);
     CHECK(again["clock"]["epoch"] == status["clock"]["epoch"]);
+}
+
+TEST_CASE("usb: a boot loader where the board should be is named, with what to do") {
+    const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
+    PicoSettings settings{"PICO0001", "1-2", ""};
+    const char* words = "a board waits in its boot loader at usb:1-2";
+    const char* cure = "'versavis flash'";
+    SECTION("of the board") {}
+    SECTION("of a Pico 2") {
+        settings.faults.product = 0x000F;
+        words = "there is a Pico 2, whose chip is another, at usb:1-2";
+        cure = "take a board with an RP2040";
+    }
+    const SimulatedPico pico(testbed.get(), settings);
+    Stack stack({"bootusb", 35, 1, 20, "", "", "", 320, 240, "usb"});
+    stack.start_service();
+    stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    std::string said;
+    stack.tool({"status"}, &said);
+    CHECK_THAT(said, Catch::Contains("no device 1209:5653, but " + std::string(words)) &&
+                         Catch::Contains(cure));
     CHECK(stack.service().terminate() == 0);
 }
 

@@ -40,13 +40,13 @@ enum Status : std::uint32_t {
     unknown_error = 8,
 };
 
-UsbDescription describe() {
+UsbDescription describe(std::uint16_t product) {
     UsbDescription usb;
     // clang-format off
     usb.device = {
         18, 1, 0x10, 0x01,  // USB 1.1
         0, 0, 0,            // class by interface
-        64, 0x8a, 0x2e, 0x03, 0x00, 0x00, 0x01,
+        64, 0x8a, 0x2e, static_cast<std::uint8_t>(product), 0x00, 0x00, 0x01,
         1, 2, 3,            // manufacturer, product, serial
         1};
     usb.configuration = {
@@ -106,7 +106,10 @@ bool Flash::starts() const {
 }
 
 BootLoader::BootLoader(Flash& flash, const BootLoaderFaults& faults, BootLoaderEvents events)
-    : description_(describe()), flash_(flash), faults_(faults), events_(std::move(events)) {}
+    : description_(describe(faults.product)),
+      flash_(flash),
+      faults_(faults),
+      events_(std::move(events)) {}
 
 int BootLoader::control(std::span<const std::uint8_t> setup, std::span<const std::uint8_t> /*out*/,
                         Bytes& reply) {

@@ -38,6 +38,7 @@ class Flash {
 };
 
 struct BootLoaderFaults {
+    std::uint16_t product = 0x0003;        ///< 0x000F: it is a Pico 2's
     std::uint8_t refused_command = 0;      ///< by its id
     std::uint8_t held_command = 0;         ///< is done, but not answered until release()
     std::optional<std::size_t> gone_at{};  ///< is pulled out while it writes this page

@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "../support/process.hpp"
@@ -122,11 +123,24 @@ TEST_CASE("flash: a wrong file is refused before the board is touched") {
         CHECK(bench.flash() == 69);
         CHECK_THAT(bench.said, Contains("is no UF2 file"));
     }
-    SECTION("none was named, and none is installed") {
-        CHECK(run({program("versavis"), "flash"}, bench.directory.path() / "log", &bench.said) ==
-              69);
+    SECTION("that overwrites the settings") {
+        put_word(file, 512 + 12, wire::settings_begin);
+        bench.write(file);
+        CHECK(bench.flash() == 69);
         CHECK_THAT(bench.said,
-                   Contains("share/versavis/versavis.uf2: is not installed; name a UF2 file"));
+                   Contains("block 1") && Contains("where the board keeps its settings"));
+    }
+    SECTION("that reaches beyond the flash") {
+        put_word(file, 512 + 12, 0x10200000);
+        bench.write(file);
+        CHECK(bench.flash() == 69);
+        CHECK_THAT(bench.said, Contains("0x10200000, outside of the flash, which is 2048 KiB"));
+    }
+    SECTION("damaged") {
+        file[20 * 512 + 100] ^= 1;
+        bench.write(file);
+        CHECK(bench.flash({"--all"}) == 69);
+        CHECK_THAT(bench.said, Contains("is damaged, or no firmware of VersaVIS"));
     }
     SECTION("none") {
         bench.file += "x";
@@ -215,7 +229,8 @@ TEST_CASE("flash: new firmware that says nothing is told") {
     Bench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     auto image = pico_firmware(new_version, pages);
-    image[client::flash_page] = 0;  // its version: this is none of ours
+    image[client::flash_page] = 0;  // its version: it does not speak
+    seal(image);
     bench.write(uf2_file(image));
     CHECK(bench.flash() == 69);
     CHECK_THAT(bench.said, Contains("written and verified") && Contains("has not said hello"));
@@ -239,6 +254,91 @@ TEST_CASE("flash: of two boards one is chosen") {
     CHECK_THAT(bench.said, Contains("usb:1-1 (boot loader)"));
     CHECK(bench.flash({"--port", "usb:1-1"}) == 0);
     CHECK(holds(first, new_version));
+}
+
+TEST_CASE("flash: the firmware that was installed is taken, else the one that was built") {
+    Bench bench;
+    SimulatedPico pico(bench.testbed.get(), {});
+    const auto prefix = bench.directory.path();
+    const auto tool = prefix / "bin/versavis";
+    for (const char* folder : {"bin", "firmware", "share/versavis"})
+        std::filesystem::create_directories(prefix / folder);
+    std::filesystem::copy_file(program("versavis"), tool);
+    const auto flash = [&] {
+        return run({tool, "--instance", "no-such-service", "flash"}, prefix / "log", &bench.said);
+    };
+    CHECK(flash() == 69);
+    CHECK_THAT(bench.said, Contains("share/versavis/versavis.uf2: is not there") &&
+                               Contains("install gcc-arm-none-eabi") &&
+                               Contains("name a UF2 file"));
+    CHECK(holds(pico, old_version));
+    std::filesystem::copy_file(bench.file, prefix / "firmware/versavis.uf2");
+    CHECK(flash() == 0);
+    CHECK(holds(pico, new_version));
+    bench.directory.write("share/versavis/versavis.uf2",
+                          as_text(uf2_file(pico_firmware("versavis 0.0.3", pages))));
+    CHECK(flash() == 0);
+    CHECK(holds(pico, "versavis 0.0.3"));
+}
+
+TEST_CASE("flash: all boards of a fleet, whatever becomes of one of them") {
+    Bench bench;
+    CHECK(bench.flash({"--all"}) == 69);
+    CHECK_THAT(bench.said, Contains("no board") && Contains("BOOTSEL"));
+    SimulatedPico first(bench.testbed.get(), {"PICO0001", "1-1"});
+    SimulatedPico second(bench.testbed.get(), {"PICO0002", "1-2"});
+    SimulatedPico third(bench.testbed.get(), {"PICO0003", "1-3", ""});
+    BootLoaderFaults faults;
+    faults.refused_command = 0x05;
+    second.set_faults(faults);
+    CHECK(bench.flash({"--all"}) == 69);
+    CHECK_THAT(bench.said, Contains("board PICO0001 at usb:1-1: " + new_version) &&
+                               Contains("boot loader at usb:1-2: cannot write") &&
+                               Contains("board PICO0003 at usb:1-3: " + new_version) &&
+                               Contains("2 of 3 boards have the new firmware"));
+    CHECK(holds(first, new_version));
+    CHECK(holds(third, new_version));
+
+    CHECK(bench.flash({"--all", "--serial", "PICO0001"}) != 0);
+    CHECK_THAT(bench.said, Contains("excludes"));
+    second.set_faults({});
+    second.plug(true);
+    CHECK(bench.flash({"--all", "--json"}) == 0);
+    const auto boards = nlohmann::json::parse(bench.said)["boards"];
+    REQUIRE(boards.size() == 3);
+    for (const auto& board : boards) CHECK(board["after"] == new_version);
+    CHECK(holds(second, new_version));
+}
+
+TEST_CASE("flash: a Pico 2 is refused, and does not stand in the way of a board") {
+    Bench bench;
+    PicoSettings settings{"", "1-2", ""};
+    settings.faults.product = 0x000F;
+    const SimulatedPico other(bench.testbed.get(), settings);
+    for (const std::vector<std::string>& more :
+         {std::vector<std::string>{}, {"--port", "usb:1-2"}, {"--all"}}) {
+        CHECK(bench.flash(more) == 69);
+        CHECK_THAT(bench.said, Contains("board at usb:1-2: is a Pico 2") && Contains("RP2350") &&
+                                   Contains("take a board with an RP2040"));
+    }
+    const SimulatedPico pico(bench.testbed.get(), {});
+    CHECK(bench.flash() == 0);
+    CHECK(holds(pico, new_version));
+    CHECK(bench.flash({"--all", "--json"}) == 69);
+    CHECK_THAT(bench.said, Contains(R"("error":"board at usb:1-2: is a Pico 2)"));
+    CHECK(other.flash().read(0, 1).front() == 0xFF);
+}
+
+TEST_CASE("flash: the firmware of this build may be flashed") {
+    const auto bin = std::filesystem::path(program("versavis")).parent_path();
+    const auto own = bin.parent_path() / "firmware/versavis.uf2";
+    if (!exists(own)) {
+        WARN("no compiler for the chip: not built");
+        return;
+    }
+    const auto image = client::read_uf2(own);
+    INFO((image ? "" : image.error().message()));
+    CHECK(image.has_value());
 }
 
 TEST_CASE("flash: interrupted, it says what state the board is in") {

@@ -18,6 +18,7 @@ constexpr std::size_t version_at = client::flash_page;
 std::vector<std::uint8_t> pico_firmware(const std::string& version, std::size_t pages) {
     auto image = flash_image(pages, static_cast<std::uint8_t>(version.size() + version.back()));
     std::copy_n(version.c_str(), version.size() + 1, image.begin() + version_at);
+    seal(image);
     return image;
 }
 

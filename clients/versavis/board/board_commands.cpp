@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
 #include "board/board_info.hpp"
 #include "board/bring_up.hpp"
@@ -23,28 +24,6 @@ int fail(const Error& error) {
     fmt::print(stderr, "versavis: {}\n", error.message());
     return EX_UNAVAILABLE;
 }
-
-/// One line that is written over and over. To a file it would be a line for each step.
-class ProgressLine {
- public:
-    ~ProgressLine() { end(); }
-
-    void show(const char* what, std::size_t done, std::size_t all) {
-        if (!terminal_) return;
-        fmt::print(stderr, "\r\x1b[K{} {} %", what, 100 * done / all);
-        std::fflush(stderr);
-        shown_ = true;
-    }
-
-    void end() {
-        if (shown_) fmt::print(stderr, "\r\x1b[K");
-        shown_ = false;
-    }
-
- private:
-    const bool terminal_ = isatty(STDERR_FILENO) != 0;
-    bool shown_ = false;
-};
 
 /// One line of whoever sits at the terminal; none: nobody does, or the program is to end.
 std::optional<std::string> answer(const std::string& question, const std::function<bool()>& stop) {
@@ -67,12 +46,34 @@ void show(const BringUpStep& step) {
 
 }  // namespace
 
+/// One line that is written over and over. To a file it would be a line for each step.
+class ProgressLine {
+ public:
+    ~ProgressLine() { end(); }
+
+    void show(const std::string& what, std::size_t done, std::size_t all) {
+        if (!terminal_) return;
+        fmt::print(stderr, "\r\x1b[K{} {} %", what, 100 * done / all);
+        std::fflush(stderr);
+        shown_ = true;
+    }
+
+    void end() {
+        if (shown_) fmt::print(stderr, "\r\x1b[K");
+        shown_ = false;
+    }
+
+ private:
+    const bool terminal_ = isatty(STDERR_FILENO) != 0;
+    bool shown_ = false;
+};
+
 BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
     : flash_(app.add_subcommand(
           "flash",
           "Put new firmware into the board: erase, write and verify it, then wait until it runs. "
-          "The service must not have the board. When interrupted, run it again "
-          "(docs/user/board.md)")),
+          "The service must not have the board. When interrupted, run it again. Exits 0 if all "
+          "boards that were meant have it (docs/user/board.md)")),
       board_(app.add_subcommand("board", "The trigger board itself: facts, reset, self-test")),
       stop_(std::move(stop)) {
     board_->require_subcommand(1);
@@ -83,8 +84,12 @@ BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
 }
 
 void BoardCommands::add_flash() {
-    flash_->add_option("file", file_, "UF2 file (default: the one that was installed)");
+    flash_->add_option("file", file_,
+                       "UF2 file (default: the one that was installed, share/versavis/versavis.uf2 "
+                       "below the prefix, or else built with this program)");
     add_choice(*flash_);
+    flash_->add_flag("--all", all_, "All boards that are there, one after the other")
+        ->excludes("--serial", "--port");
     flash_->add_flag("--json", json_, "Print the outcome as a JSON object");
 }
 
@@ -144,20 +149,47 @@ int BoardCommands::run(const std::string& instance) {
 }
 
 int BoardCommands::flash_board() {
-    const auto installed = board::installed_firmware();
-    if (file_.empty() && !std::filesystem::exists(installed))
-        return fail({installed.string(), "is not installed",
-                     "name a UF2 file: './dev firmware' builds one, and releases have it"});
+    const auto own = board::firmware_file();
+    if (file_.empty() && !std::filesystem::exists(own))
+        return fail({own.string(), "is not there",
+                     "install gcc-arm-none-eabi, libnewlib-dev and libstdc++-arm-none-eabi-dev, "
+                     "then build and install again; or name a UF2 file of a release"});
     ProgressLine line;
-    FlashSettings settings{file_.empty() ? installed.string() : file_, choice_, instance_, stop_};
-    settings.progress = [&](const char* what, std::size_t done, std::size_t all) {
+    FlashSettings settings{file_.empty() ? own.string() : file_, choice_, instance_, stop_};
+    settings.progress = [&](const std::string& what, std::size_t done, std::size_t all) {
         line.show(what, done, all);
     };
+    if (all_) return flash_fleet(settings, line);
     const auto flashed = flash(settings);
     line.end();
     if (!flashed) return fail(flashed.error());
-    fmt::print("{}", to_text(*flashed, json_));
+    fmt::print("{}", json_ ? to_json(*flashed).dump() + "\n" : to_text(*flashed));
     return EX_OK;
+}
+
+int BoardCommands::flash_fleet(const FlashSettings& settings, ProgressLine& line) {
+    std::size_t good = 0;
+    auto outcomes = nlohmann::json::array();
+    const auto finished = [&](const FoundBoard& board, const Expected<Flashed>& flashed) {
+        line.end();
+        if (!flashed) {
+            fail(flashed.error());
+            outcomes.push_back({{"port", board.device.port()},
+                                {"serial", board.serial},
+                                {"error", flashed.error().message()}});
+            return;
+        }
+        ++good;
+        outcomes.push_back(to_json(*flashed));
+        if (json_) return;
+        fmt::print("{}", to_text(*flashed));
+        std::fflush(stdout);
+    };
+    const auto count = flash_all(settings, finished);
+    if (!count) return fail(count.error());
+    fmt::print("{}", json_ ? nlohmann::json{{"boards", outcomes}}.dump() + "\n"
+                           : fmt::format("{} of {} boards have the new firmware\n", good, *count));
+    return good == *count ? EX_OK : EX_UNAVAILABLE;
 }
 
 int BoardCommands::show_info() {

@@ -14,6 +14,8 @@
 
 namespace versavis::client {
 
+class ProgressLine;
+
 class BoardCommands {
  public:
     /// Adds the commands to the options of the program; `stop` returns true when the program is to
@@ -35,6 +37,7 @@ class BoardCommands {
     void add_self_test();
     void add_choice(CLI::App& command);
     int flash_board();
+    int flash_fleet(const FlashSettings& settings, ProgressLine& line);
     int show_info();
     int reset();
     int test();
@@ -50,6 +53,7 @@ class BoardCommands {
     std::string instance_;
     std::function<bool()> stop_;
     std::string file_;
+    bool all_ = false;
     std::vector<std::string> wires_;
     bool bring_up_ = false;
 };

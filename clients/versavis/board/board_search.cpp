@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <time.h>
 
-#include "board/picoboot.hpp"
 #include "wire/usb_identity.hpp"
 
 namespace versavis::client {
@@ -20,14 +19,13 @@ bool fits(const FoundBoard& board, const BoardChoice& choice) {
            (choice.serial.empty() || choice.serial == board.serial);
 }
 
-Unexpected<> no_board(const std::vector<FoundBoard>& all, const BoardChoice& choice) {
-    if (all.empty())
-        return failure("USB",
-                       fmt::format("no board ({:04x}:{:04x}), and no boot loader ({:04x}:{:04x})",
-                                   wire::usb_vendor, wire::usb_product, boot_loader_vendor,
-                                   boot_loader_product),
-                       "plug it in, or hold its BOOTSEL button while you do; 'lsusb' lists what is "
-                       "there");
+Unexpected<> none_fits(const std::vector<FoundBoard>& all, const BoardChoice& choice) {
+    for (const FoundBoard& board : all)
+        if (board.is_pico_2 && fits(board, choice))
+            return failure("board at " + board.device.port(),
+                           "is a Pico 2: its chip, an RP2350, is not the one that the firmware is "
+                           "made for",
+                           "take a board with an RP2040: a Pico, Pico H, Pico W or Pico WH");
     std::string others;
     for (const FoundBoard& board : all) others += (others.empty() ? "" : ", ") + board.text();
     const std::string wanted = choice.serial.empty() ? choice.port : "serial " + choice.serial;
@@ -39,32 +37,43 @@ Unexpected<> no_board(const std::vector<FoundBoard>& all, const BoardChoice& cho
 }  // namespace
 
 std::string FoundBoard::text() const {
-    return fmt::format(
-        "{} ({})", device.port(),
-        in_boot_loader ? "boot loader" : "serial " + (serial.empty() ? "unknown" : serial));
+    const std::string name = serial.empty() ? "serial unknown" : "serial " + serial;
+    return fmt::format("{} ({})", device.port(),
+                       is_pico_2        ? "Pico 2"
+                       : in_boot_loader ? "boot loader"
+                                        : name);
 }
 
-std::vector<FoundBoard> list_boards(const UsbBus& bus) {
+Expected<std::vector<FoundBoard>> list_boards(const UsbBus& bus) {
     std::vector<FoundBoard> boards;
     for (const UsbDevice& device : bus.find(wire::usb_vendor, wire::usb_product)) {
         const auto handle = device.open();
-        boards.push_back({device, false, handle ? handle->serial() : ""});
+        boards.push_back({device, false, false, handle ? handle->serial() : ""});
     }
-    for (const UsbDevice& device : bus.find(boot_loader_vendor, boot_loader_product))
-        boards.push_back({device, true, ""});
-    return boards;
+    for (const UsbDevice& device : bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2040))
+        boards.push_back({device, true, false, ""});
+    for (const UsbDevice& device : bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2350))
+        boards.push_back({device, true, true, ""});
+    if (!boards.empty()) return boards;
+    return failure("USB",
+                   fmt::format("no board ({:04x}:{:04x}), and no boot loader ({:04x}:{:04x})",
+                               wire::usb_vendor, wire::usb_product, wire::boot_loader_vendor,
+                               wire::boot_loader_rp2040),
+                   "plug it in, or hold its BOOTSEL button while you do; 'lsusb' lists what is "
+                   "there");
 }
 
 Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice) {
-    const std::vector<FoundBoard> all = list_boards(bus);
+    const auto all = list_boards(bus);
+    if (!all) return Unexpected(all.error());
     std::vector<FoundBoard> fitting;
     std::string names;
-    for (const FoundBoard& board : all) {
-        if (!fits(board, choice)) continue;
+    for (const FoundBoard& board : *all) {
+        if (board.is_pico_2 || !fits(board, choice)) continue;
         fitting.push_back(board);
         names += (names.empty() ? "" : ", ") + board.text();
     }
-    if (fitting.empty()) return no_board(all, choice);
+    if (fitting.empty()) return none_fits(*all, choice);
     if (fitting.size() > 1)
         return failure("USB", fmt::format("{} boards: {}", fitting.size(), names),
                        "choose one with --serial or --port");
@@ -74,8 +83,8 @@ Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice) {
 std::optional<UsbDevice> wait_for_board(const UsbBus& bus, const std::string& port,
                                         bool in_boot_loader, Duration timeout,
                                         const std::function<bool()>& stop) {
-    const std::uint16_t vendor = in_boot_loader ? boot_loader_vendor : wire::usb_vendor;
-    const std::uint16_t product = in_boot_loader ? boot_loader_product : wire::usb_product;
+    const std::uint16_t vendor = in_boot_loader ? wire::boot_loader_vendor : wire::usb_vendor;
+    const std::uint16_t product = in_boot_loader ? wire::boot_loader_rp2040 : wire::usb_product;
     const HostTime deadline = host_now() + timeout;
     while (!stop() && host_now() < deadline) {
         for (const UsbDevice& device : bus.find(vendor, product))

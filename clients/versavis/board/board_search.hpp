@@ -20,14 +20,16 @@ struct BoardChoice {
 struct FoundBoard {
     UsbDevice device;
     bool in_boot_loader = false;
+    bool is_pico_2 = false;  ///< whose chip the firmware is not for; in its boot loader
     std::string serial;  ///< empty: in its boot loader, which does not know it, or not to be opened
 
     std::string text() const;
 };
 
-std::vector<FoundBoard> list_boards(const UsbBus& bus);
+/// Error: there is none.
+Expected<std::vector<FoundBoard>> list_boards(const UsbBus& bus);
 
-/// Error: none fits, or more than one.
+/// Error: none fits, or more than one, or it is a Pico 2.
 Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice);
 
 /// The board at this port, once it is there and runs, or is in its boot loader. None: not in time,

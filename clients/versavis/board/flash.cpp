@@ -34,22 +34,19 @@ const char* const half_written =
 
 class Flasher {
  public:
-    explicit Flasher(const FlashSettings& settings) : settings_(settings) {}
+    Flasher(const FlashSettings& settings, const FlashImage& image)
+        : settings_(settings), image_(image) {}
 
-    Expected<Flashed> run() {
+    Expected<Flashed> run(const UsbBus& bus, const BoardChoice& choice) {
         const HostTime begun = host_now();
-        const auto image = read_uf2(settings_.file);
-        if (!image) return Unexpected(image.error());
-        const auto bus = UsbBus::open();
-        if (!bus) return Unexpected(bus.error());
-        const auto found = find_board(*bus, settings_.board);
+        const auto found = find_board(bus, choice);
         if (!found) return Unexpected(found.error());
         flashed_.port = found->device.port();
-        flashed_.bytes = image->pages * flash_page;
-        const auto device = boot_loader_of(*bus, *found);
+        flashed_.bytes = image_.pages * flash_page;
+        const auto device = boot_loader_of(bus, *found);
         if (!device) return Unexpected(device.error());
-        if (auto done = fill(*device, image->sectors); !done) return Unexpected(done.error());
-        if (auto done = meet(*bus); !done) return Unexpected(done.error());
+        if (auto done = fill(*device, image_.sectors); !done) return Unexpected(done.error());
+        if (auto done = meet(bus); !done) return Unexpected(done.error());
         flashed_.took = host_now() - begun;
         return flashed_;
     }
@@ -152,29 +149,61 @@ class Flasher {
     }
 
     const FlashSettings& settings_;
+    const FlashImage& image_;
     Flashed flashed_;
 };
 
+double seconds_of(Duration took) { return static_cast<double>(took.ns) * 1e-9; }
+
 }  // namespace
 
-Expected<Flashed> flash(const FlashSettings& settings) { return Flasher(settings).run(); }
+Expected<Flashed> flash(const FlashSettings& settings) {
+    const auto image = read_uf2(settings.file);
+    if (!image) return Unexpected(image.error());
+    const auto bus = UsbBus::open();
+    if (!bus) return Unexpected(bus.error());
+    return Flasher(settings, *image).run(*bus, settings.board);
+}
 
-std::string to_text(const Flashed& flashed, bool json) {
-    const double took_s = static_cast<double>(flashed.took.ns) * 1e-9;
-    if (json)
-        return nlohmann::json{{"port", flashed.port},
-                              {"serial", flashed.serial},
-                              {"before", flashed.before.empty() ? nlohmann::json(nullptr)
-                                                                : nlohmann::json(flashed.before)},
-                              {"after", flashed.after},
-                              {"bytes", flashed.bytes},
-                              {"took_s", took_s}}
-                   .dump() +
-               "\n";
+Expected<std::size_t> flash_all(
+    const FlashSettings& settings,
+    const std::function<void(const FoundBoard&, const Expected<Flashed>&)>& finished) {
+    const auto image = read_uf2(settings.file);
+    if (!image) return Unexpected(image.error());
+    const auto bus = UsbBus::open();
+    if (!bus) return Unexpected(bus.error());
+    const auto boards = list_boards(*bus);
+    if (!boards) return Unexpected(boards.error());
+    for (const FoundBoard& board : *boards) {
+        const std::string port = board.device.port();
+        if (settings.stop()) {
+            finished(board, failure("board at " + port, "not begun: stopped", "run this again"));
+            continue;
+        }
+        FlashSettings one = settings;
+        one.progress = [&](const std::string& what, std::size_t done, std::size_t all) {
+            settings.progress(port + ": " + what, done, all);
+        };
+        finished(board, Flasher(one, *image).run(*bus, {"", port}));
+    }
+    return boards->size();
+}
+
+nlohmann::json to_json(const Flashed& flashed) {
+    return {{"port", flashed.port},
+            {"serial", flashed.serial},
+            {"before",
+             flashed.before.empty() ? nlohmann::json(nullptr) : nlohmann::json(flashed.before)},
+            {"after", flashed.after},
+            {"bytes", flashed.bytes},
+            {"took_s", seconds_of(flashed.took)}};
+}
+
+std::string to_text(const Flashed& flashed) {
     return fmt::format("board {} at {}: {}, before {}; {} bytes written and verified in {:.1f} s\n",
                        flashed.serial, flashed.port, flashed.after,
                        flashed.before.empty() ? "in its boot loader" : flashed.before,
-                       flashed.bytes, took_s);
+                       flashed.bytes, seconds_of(flashed.took));
 }
 
 }  // namespace versavis::client

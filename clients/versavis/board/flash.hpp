@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "board/board_search.hpp"
@@ -18,8 +19,8 @@ struct FlashSettings {
     std::string instance;  ///< of the service, which may have the board
     std::function<bool()> stop = [] { return false; };
     /// What is being done, and how much of it is.
-    std::function<void(const char* what, std::size_t done, std::size_t all)> progress =
-        [](const char*, std::size_t, std::size_t) {};
+    std::function<void(const std::string& what, std::size_t done, std::size_t all)> progress =
+        [](const std::string&, std::size_t, std::size_t) {};
 };
 
 struct Flashed {
@@ -35,6 +36,13 @@ struct Flashed {
 /// its boot loader, whenever it lost power, and is flashed again.
 Expected<Flashed> flash(const FlashSettings& settings);
 
-std::string to_text(const Flashed& flashed, bool json);
+/// All boards that are there, one after the other, whatever becomes of each; `finished` is told.
+/// How many there are. Error: none was begun.
+Expected<std::size_t> flash_all(
+    const FlashSettings& settings,
+    const std::function<void(const FoundBoard&, const Expected<Flashed>&)>& finished);
+
+std::string to_text(const Flashed& flashed);
+nlohmann::json to_json(const Flashed& flashed);
 
 }  // namespace versavis::client

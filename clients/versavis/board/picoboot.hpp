@@ -11,10 +11,6 @@
 
 namespace versavis::client {
 
-/// How the chip names itself while its boot loader runs.
-inline constexpr std::uint16_t boot_loader_vendor = 0x2E8A;
-inline constexpr std::uint16_t boot_loader_product = 0x0003;
-
 /// Each call waits for its end. After an error the boot loader takes commands again, if it is still
 /// there.
 class Picoboot {

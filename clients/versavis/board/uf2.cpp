@@ -10,6 +10,8 @@
 #include <optional>
 #include <system_error>
 
+#include "wire/crc32.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -22,13 +24,15 @@ constexpr std::uint32_t magic_last = 0x0AB16F30;
 constexpr std::uint32_t flag_not_flash = 0x00000001;
 constexpr std::uint32_t flag_family = 0x00002000;
 constexpr std::uint32_t family_rp2040 = 0xE48BFF56;
+constexpr std::uint32_t first_rp2350 = 0xE48BFF59;  // secure ARM, RISC-V, ARM
+constexpr std::uint32_t last_rp2350 = 0xE48BFF5B;
 
 /// Bytes of the boot stage that its check covers; the check follows them.
 constexpr std::size_t boot_stage_size = 252;
 
 /// The largest file that is read: twice the flash, as half of each block is payload. At half, an
 /// image that fills the flash is refused; at twice, a wrong file takes more memory before it is.
-constexpr std::size_t largest_file = 2 * std::size_t{flash_end - flash_begin};
+constexpr std::size_t largest_file = 2 * std::size_t{wire::flash_size};
 
 const char* const cure = "take the versavis.uf2 of this release, or copy it again";
 
@@ -66,9 +70,13 @@ std::optional<Problem> problem(const Block& block, std::size_t number, std::size
     if ((block.flags & flag_family) == 0)
         return Problem{"names no family of chips", "take a file that is made for the RP2040"};
     if (block.family != family_rp2040)
-        return Problem{fmt::format("is for chips of family {:#010x}, the RP2040 is {:#010x}",
-                                   block.family, family_rp2040),
-                       "take the file for the board's chip"};
+        return Problem{
+            fmt::format("is for chips of family {:#010x}{}, the RP2040 is {:#010x}", block.family,
+                        block.family >= first_rp2350 && block.family <= last_rp2350
+                            ? " (RP2350, of a Pico 2)"
+                            : "",
+                        family_rp2040),
+            "take the file for the board's chip"};
     if ((block.flags & flag_not_flash) != 0)
         return Problem{"is not for the flash", "take a file with nothing but the flash"};
     if (block.number != number)
@@ -81,9 +89,16 @@ std::optional<Problem> problem(const Block& block, std::size_t number, std::size
         return Problem{fmt::format("has {} bytes, not {}", block.payload, flash_page), cure};
     if (block.address % flash_page != 0)
         return Problem{fmt::format("begins within a page, at {:#010x}", block.address), cure};
-    if (block.address < flash_begin || block.address >= flash_end)
-        return Problem{fmt::format("is for {:#010x}, outside of the flash", block.address),
-                       "take a file that is linked to run from the flash"};
+    if (block.address < flash_begin || block.address - flash_begin >= wire::flash_size)
+        return Problem{fmt::format("is for {:#010x}, outside of the flash, which is {} KiB from "
+                                   "{:#010x}",
+                                   block.address, wire::flash_size / 1024, flash_begin),
+                       "take the versavis.uf2 of a release"};
+    if (block.address >= wire::settings_begin)
+        return Problem{fmt::format("is for {:#010x}, where the board keeps its settings, from "
+                                   "{:#010x}",
+                                   block.address, wire::settings_begin),
+                       "take the versavis.uf2 of a release"};
     return std::nullopt;
 }
 
@@ -99,6 +114,18 @@ bool starts(const FlashImage& image) {
     if (first == image.sectors.end()) return false;
     const std::span<const std::uint8_t> stage(first->second);
     return word(stage, boot_stage_size) == boot_stage_crc(stage.first(boot_stage_size));
+}
+
+/// False: it does not end with the seal of our firmware, or was changed since it got that.
+bool is_sealed(const FlashImage& image) {
+    std::vector<std::uint8_t> bytes;
+    for (const auto& [address, sector] : image.sectors)
+        bytes.insert(bytes.end(), sector.begin(), sector.end());
+    // Less, or more, if pages are missing between: then the check does not fit.
+    bytes.resize(image.pages * flash_page);
+    const std::size_t check_at = bytes.size() - sizeof(std::uint32_t);
+    return word(bytes, check_at - sizeof(std::uint32_t)) == wire::firmware_seal &&
+           word(bytes, check_at) == wire::crc32(bytes.data(), check_at);
 }
 
 }  // namespace
@@ -141,6 +168,9 @@ Expected<FlashImage> parse_uf2(std::span<const std::uint8_t> bytes, const std::s
     if (!starts(image))
         return failure(fmt::format("{}, block 0", file),
                        "the chip would not start this: its boot stage is missing or damaged", cure);
+    if (!is_sealed(image))
+        return failure(file, "is damaged, or no firmware of VersaVIS: its check sum is not right",
+                       cure);
     return image;
 }
 

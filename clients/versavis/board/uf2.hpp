@@ -10,16 +10,13 @@
 #include <vector>
 
 #include "versavis/error.hpp"
+#include "wire/flash_map.hpp"
 
 namespace versavis::client {
 
-/// Where the RP2040 sees its flash, and the most that it can address there.
-inline constexpr std::uint32_t flash_begin = 0x10000000;
-inline constexpr std::uint32_t flash_end = 0x11000000;
-
-/// The flash is written by pages and erased by sectors.
-inline constexpr std::uint32_t flash_page = 256;
-inline constexpr std::uint32_t flash_sector = 4096;
+using wire::flash_begin;
+using wire::flash_page;
+using wire::flash_sector;
 
 /// What the flash shall hold: whole sectors by their addresses. Bytes that the file leaves open are
 /// as erasing leaves them.
@@ -28,8 +25,8 @@ struct FlashImage {
     std::size_t pages = 0;  ///< that the file has
 };
 
-/// `file` names it in errors. What is returned would start: its first page is a boot stage that the
-/// chip accepts.
+/// `file` names it in errors. What is returned is firmware of VersaVIS, undamaged, that the chip
+/// accepts, and leaves the board's settings alone.
 Expected<FlashImage> parse_uf2(std::span<const std::uint8_t> bytes, const std::string& file);
 Expected<FlashImage> read_uf2(const std::string& file);
 

@@ -27,6 +27,7 @@ const char* to_string(wire::ResetCause cause) {
         case wire::ResetCause::watchdog: return "watchdog";
         case wire::ResetCause::brown_out: return "brown_out";
         case wire::ResetCause::software: return "software";
+        case wire::ResetCause::update: return "update";
     }
     return "unknown";
 }
