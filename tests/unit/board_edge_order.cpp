@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Edges of all lines are judged in the order in which they happened, however late the core looks:
 // what it reports is held against what cameras, an IMU and pulses really did. VERSAVIS_PULSES says
-// how many triggers and exposures that are at least; 50'000 without it.
+// how many exposures have to be measured; 200'000 without it.
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
