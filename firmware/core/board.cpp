@@ -266,6 +266,7 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
                                   : Vn100::true_rate(imu.rate_millihertz);
     }
     std::uint32_t inputs = std::uint32_t{configuration.ports.inputs} << input_pulse;
+    masters_ = 0;
     for (unsigned i = 0; i < camera_count; ++i) {
         cameras_[i].stop();  // a slave may still run
         cameras_[i].give_up();
@@ -275,6 +276,8 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
         // Before any trigger, and not so soon that a port whose words take time is late.
         outputs_.rest(i, cameras_[i].trigger_inverted(), now + OutputQueue::horizon);
         if (cameras_[i].has_strobe()) inputs |= 1U << i;
+        if (cameras_[i].is_slave())
+            masters_ = static_cast<std::uint8_t>(masters_ | 1U << cameras_[i].master());
     }
     for (unsigned port = 0; port < wire::imu_count; ++port)
         if ((configuration.imus[port].options & wire::imu_data_ready) != 0)
@@ -282,6 +285,7 @@ void Board::apply(const wire::Configuration& configuration, Nanoseconds now) {
     if ((configuration.imus[0].options & wire::imu_accel_ready) != 0)
         inputs |= 1U << input_accel_ready;
     noise_.listen(inputs);
+    waiting_.clear();
     exposing_ = 0;
     routed_ = 0;
     light_.configure(configuration.illumination, now);

@@ -5,6 +5,7 @@
 
 #include "camera_channel.hpp"
 #include "configuration_check.hpp"
+#include "edge_order.hpp"
 #include "hal.hpp"
 #include "illumination.hpp"
 #include "imu/spi_imu.hpp"
@@ -57,7 +58,8 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void poll_health(Nanoseconds now);
     void take_edge(const Edge& edge, Nanoseconds now);
     void take_exposure_edge(const Edge& edge);
-    void settle_exposures(unsigned camera, Nanoseconds settled);
+    void settle_exposures(Nanoseconds known);
+    void judge_exposure_edge(const Edge& edge);
     void grid_moved();
     void take_pulse(wire::PulseInput input, Nanoseconds at);
     void handle(const wire::Packet& packet, Nanoseconds received);
@@ -94,6 +96,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled
     std::uint8_t refused_ = 0;
     std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
+    std::uint8_t masters_ = 0;   ///< cameras that slaves follow
     std::uint8_t slaves_ = 0;    ///< slaves that are to run
     std::uint8_t routed_ = 0;    ///< slaves whose triggers follow their masters
     wire::Start on_sync_{};      ///< waits for a sync pulse
@@ -122,6 +125,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     wire::Configuration configuration_{};  ///< in force
     wire::Configuration wanted_;           ///< waits for the last pulses and exposures to end
     PpsMonitor pps_;
+    EdgeOrder waiting_;  ///< edges of exposure lines, for another line to settle
     Illumination light_;
     Vn100 uart_imu_;
     SpiImu spi_imu_;

@@ -42,14 +42,10 @@ void Board::poll_edges(Nanoseconds now) {
         more_ = true;
     else
         settled = hal_.edges.settled();
-    for (unsigned i = 0; i < camera_count && bouncing_ != 0; ++i) {
-        if ((bouncing_ >> i & 1U) == 0) continue;
-        settle_exposures(i, settled);
-        if (!cameras_[i].is_bouncing())
-            bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << i));
-        settled = cameras_[i].settled(settled);
-    }
-    if (settled > settled_) settled_ = settled;
+    if (bouncing_ != 0)
+        settle_exposures(settled);
+    else if (settled > settled_)
+        settled_ = settled;
     if (!losing_) return;
     // Of the edges that waited, some came before the lost ones and some after.
     edges_lost();
@@ -58,6 +54,7 @@ void Board::poll_edges(Nanoseconds now) {
 
 void Board::edges_lost() {
     for (CameraChannel& camera : cameras_) camera.edges_lost();
+    waiting_.clear();
     light_.edges_lost();
     spi_imu_.edges_lost();
     exposing_ = 0;
@@ -88,7 +85,12 @@ void Board::take_edge(const Edge& edge, Nanoseconds now) {
 /// Light and slaves follow the line itself, bounces included; records wait until it has settled.
 void Board::take_exposure_edge(const Edge& edge) {
     CameraChannel& camera = cameras_[edge.input];
-    settle_exposures(edge.input, edge.at);
+    if (camera.is_bouncing()) {
+        settle_exposures(edge.at);
+        Edge before = edge;  // another line bounces
+        if (camera.take_edge(edge.at, before.at, before.level) && !waiting_.add(before))
+            edges_lost();
+    }
     camera.edge(edge.at, edge.level);
     stirred_ = true;
     const bool exposing = camera.exposing(edge.level);
@@ -99,16 +101,40 @@ void Board::take_exposure_edge(const Edge& edge) {
     if (!exposing) switch_slaves();
 }
 
-void Board::settle_exposures(unsigned camera, Nanoseconds settled) {
-    CameraChannel& master = cameras_[camera];
-    Nanoseconds at = 0;
-    bool exposing = false;
-    if (!master.take_edge(settled, at, exposing)) return;
+/// All edges before `known` are. What counts of them is judged in one order over all lines: a
+/// slave's exposure may be over before its master's line has settled. Of two edges with one stamp,
+/// the slave's follows from the other one.
+void Board::settle_exposures(Nanoseconds known) {
+    Nanoseconds settled = known;
+    for (;; settled = known) {
+        unsigned first = camera_count;
+        for (unsigned i = 0; bouncing_ >> i != 0; ++i) {
+            if ((bouncing_ >> i & 1U) == 0) continue;
+            const Nanoseconds at = cameras_[i].settled(known);
+            if (at > settled || (at == settled && cameras_[i].is_slave())) continue;
+            settled = at;
+            first = i;
+        }
+        Edge edge;
+        while (waiting_.take(settled, edge)) judge_exposure_edge(edge);
+        if (first == camera_count) break;
+        edge.input = static_cast<std::uint8_t>(first);
+        const bool counts = cameras_[first].take_edge(known, edge.at, edge.level);
+        if (cameras_[first].is_bouncing()) break;
+        bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << first));
+        if (counts) judge_exposure_edge(edge);
+    }
+    if (settled > settled_) settled_ = settled;
+}
+
+void Board::judge_exposure_edge(const Edge& edge) {
+    CameraChannel& master = cameras_[edge.input];
     stirred_ = true;
-    const std::uint64_t tick = master.tick_at(at);
-    master.exposure_edge(at, exposing);
+    master.exposure_edge(edge.at, edge.level);
+    if ((masters_ >> edge.input & 1U) == 0) return;
     for (CameraChannel& slave : cameras_)
-        if (slave.enabled() && slave.master() == camera) slave.master_edge(at, exposing, tick);
+        if (slave.master() == edge.input)
+            slave.master_edge(edge.at, edge.level, master.tick_at(edge.at));
 }
 
 void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {

@@ -208,6 +208,10 @@ void CameraChannel::send_trigger(Nanoseconds now) {
     reports_.exposure_planned(camera_, sent + configuration_.latency_ns, exposure);
 }
 
+bool CameraChannel::take_edge(Nanoseconds settled, Nanoseconds& at, bool& exposing) {
+    return filter_.take(settled, at, exposing);
+}
+
 void CameraChannel::exposure_edge(Nanoseconds at, bool exposing) {
     if (!has_strobe()) return;  // no exposure line is wired
     const ExposureTracker::Completed completed = tracker().edge(at, exposing);

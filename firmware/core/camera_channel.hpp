@@ -57,9 +57,7 @@ class CameraChannel {
     /// An edge of the exposure line; edges come in order.
     void edge(Nanoseconds at, bool level) { filter_.edge(at, exposing(level)); }
     /// True, for each edge that counts, once all before `settled` are known.
-    bool take_edge(Nanoseconds settled, Nanoseconds& at, bool& exposing) {
-        return filter_.take(settled, at, exposing);
-    }
+    bool take_edge(Nanoseconds settled, Nanoseconds& at, bool& exposing);
     /// An edge waits for whether it counts.
     bool is_bouncing() const { return filter_.next_wake() != never; }
     /// Before this instant no more edge will count.

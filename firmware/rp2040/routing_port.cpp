@@ -33,13 +33,16 @@ RoutingPort::Switched RoutingPort::route(const Routes& routes, bool force) {
     for (unsigned i = 0; i < camera_count; ++i)
         if (routes_.master[i] == not_routed && routes.master[i] != not_routed)
             copy_master(i, routes);
+    unsigned changed = 0;
+    for (unsigned i = 0; i < camera_count; ++i)
+        if (!same_trigger(routes, routes_, i)) changed |= 1U << i;
     Switched switched;
     {
         const InterruptsOff undisturbed;
         switched.clean = !masters_expose(masters);
         if (switched.clean || force) {
-            for (unsigned i = 0; i < camera_count; ++i)
-                if (!same_trigger(routes, routes_, i)) switch_trigger(i, routes);
+            for (unsigned i = 0; changed >> i != 0; ++i)
+                if ((changed >> i & 1U) != 0) switch_trigger(i, routes);
             switched.at = clock_.now();
             if (masters_expose(masters)) switched.clean = false;
         }

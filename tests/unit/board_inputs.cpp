@@ -34,6 +34,34 @@ struct Running : Bench {
     Nanoseconds began = 0;
 };
 
+/// Camera 0 follows camera 1, of which a pulse has begun.
+struct Following : Bench {
+    Following() {
+        add_camera(0, wire::camera_slave);
+        add_camera(1);
+        configuration.cameras[0].master = 1;
+        configuration.cameras[0].glitch = 1;
+        configure();
+        send(wire::Start{3, 0, {}});
+        next_pulse();
+    }
+    void next_pulse() {
+        const std::size_t before = pulses(1).size();
+        while (pulses(1).size() == before) poll(board.next_wake());
+        began = pulses(1).back();
+        poll(began);
+    }
+    std::vector<wire::Exposure> records_of_slave() {
+        run(began + 40 * ms);
+        std::vector<wire::Exposure> records = all<wire::Exposure>();
+        records.erase(std::remove_if(records.begin(), records.end(),
+                                     [](const auto& record) { return record.camera != 0; }),
+                      records.end());
+        return records;
+    }
+    Nanoseconds began = 0;
+};
+
 }  // namespace
 
 TEST_CASE("board_inputs: each pulse is an event, with the number of its input") {
@@ -272,6 +300,48 @@ TEST_CASE("board_inputs: a slave has the master's edges, and its grid point") {
     CHECK(both[2].tick == both[0].tick + 1);
     CHECK(both[2].start_ns == next);
     CHECK(both[2].end_ns == next + 4 * ms);
+}
+
+TEST_CASE("board_inputs: what a slave does while its master's line bounces is of that exposure") {
+    for (const Nanoseconds delay : {Nanoseconds{0}, 1 * us}) {
+        Following world;
+        const Nanoseconds at = world.began + 10 * us;
+        world.edge(0, at - 5 * us + delay);  // of which the master knows nothing
+        world.edge(0, at - 4 * us + delay, false);
+        if (delay == 0) world.edge(0, at);  // stamped at once
+        world.edge(1, at);
+        if (delay != 0) world.edge(0, at + delay);
+        world.edge(1, at + 4 * us, false);
+        world.edge(1, at + 5 * us);
+        world.edge(0, at + 7 * us, false);
+        world.edge(1, at + 4 * ms, false);
+        const auto records = world.records_of_slave();
+        REQUIRE(records.size() == 1);
+        CHECK(records[0].flags == wire::exposure_measured);
+        CHECK(records[0].trigger_ns == at);
+        CHECK(records[0].start_ns == at + delay);
+        CHECK(records[0].end_ns == at + 7 * us);
+        CHECK(world.health().stray_edges == 2);
+    }
+}
+
+TEST_CASE("board_inputs: edges that wait for too long behind a line that bounces are lost") {
+    for (const unsigned pairs : {4U, 5U}) {
+        Following world;
+        const Nanoseconds at = world.began + 10 * us;
+        for (unsigned i = 0; i < 2 * pairs; ++i) {
+            world.edge(1, at + i * 4 * us, i % 2 == 0);
+            world.edge(0, at + i * 4 * us + us, i % 2 == 0);
+        }
+        world.edge(1, at + 2 * pairs * 4 * us);
+        world.edge(1, at + 4 * ms, false);
+        CHECK(world.records_of_slave().size() == (pairs == 4 ? 1 : 0));
+        world.next_pulse();
+        world.edge(1, world.began);
+        world.edge(1, world.began + 4 * ms, false);
+        CHECK((world.records_of_slave().back().flags & wire::exposure_uncounted) ==
+              (pairs == 4 ? 0 : wire::exposure_uncounted));
+    }
 }
 
 TEST_CASE("board_inputs: a noisy input is told, and spoils the exposures only of the cameras") {

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Edges of exposure lines that count, until they can be judged in the order in which they happened.
+#pragma once
+
+#include "hal.hpp"
+
+namespace versavis::firmware {
+
+/// Lines do not settle in the order of their edges: while one bounces, others go on. What they do
+/// waits here until it is known what the first one did.
+class EdgeOrder {
+ public:
+    /// False: there is no room.
+    bool add(const Edge& edge) {
+        if (count_ == capacity) return false;
+        edges_[count_++] = edge;
+        return true;
+    }
+
+    /// The first one, if it is before `settled`.
+    bool take(Nanoseconds settled, Edge& edge) {
+        unsigned first = capacity;
+        for (unsigned i = 0; i < count_; ++i) {
+            if (edges_[i].at >= settled) continue;
+            settled = edges_[i].at;
+            first = i;
+        }
+        if (first == capacity) return false;
+        edge = edges_[first];
+        edges_[first] = edges_[--count_];
+        return true;
+    }
+
+    void clear() { count_ = 0; }
+
+ private:
+    /// Three cameras begin and end within one bounce, and one of them once more. At half, bounces
+    /// cost records; at twice, nothing changes.
+    static constexpr unsigned capacity = 8;
+
+    unsigned count_ = 0;
+    Edge edges_[capacity] = {};
+};
+
+}  // namespace versavis::firmware
