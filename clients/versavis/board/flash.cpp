@@ -182,7 +182,7 @@ Expected<std::size_t> flash_all(
         }
         FlashSettings one = settings;
         one.progress = [&](const std::string& what, std::size_t done, std::size_t all) {
-            settings.progress(port + ": " + what, done, all);
+            settings.progress(fmt::format("{}: {}", port, what), done, all);
         };
         finished(board, Flasher(one, *image).run(*bus, {"", port}));
     }
