@@ -83,4 +83,5 @@ host.configure({ cameras: [{}] });
 check('a configuration is answered', pico.run_until(answers('answer'), 100 * ms), true);
 check('and taken', [host.last('answer')?.status, host.last('answer')?.refusals], [0, 0]);
 check('packets that do not read, or are missing', [host.bad, host.gaps], [0, 0]);
+for (const block of pico.chip.pio) block.stop(); // they would run on beside, for ever
 finish('rp2040js as published');
