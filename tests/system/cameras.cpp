@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <set>
 
@@ -93,6 +94,23 @@ TEST_CASE(
     CHECK(reasons(stack, "cam0").count(EventReason::trigger_ignored) == 1);
     CHECK(reasons(stack, "cam1").count(EventReason::frame_missing) == 1);
     CHECK(reasons(stack, "cam2").count(EventReason::trigger_ignored) == 1);
+}
+
+TEST_CASE("cameras: threads have names, by which the load of each can be seen") {
+    Stack stack({"threads", 91, 1, 20, "", "", "receive = \"packet\""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    std::set<std::string> names;
+    const auto threads = "/proc/" + std::to_string(stack.service().pid()) + "/task";
+    for (const auto& thread : std::filesystem::directory_iterator(threads)) {
+        std::ifstream file(thread.path() / "comm");
+        std::string name;
+        std::getline(file, name);
+        names.insert(name);
+    }
+    for (const char* name : {"stamping", "link", "camera cam0", "receive cam0", "messages"})
+        CHECK(names.count(name) == 1);
 }
 
 TEST_CASE("cameras: one that gives all frames one block id is named as such") {

@@ -59,9 +59,9 @@ struct Camera {
     std::vector<wire::Exposure> records;
 };
 
-class Story {
+class Simulation {
  public:
-    explicit Story(std::uint64_t seed) : random_(seed), model_(draw_model(seed)) {
+    explicit Simulation(std::uint64_t seed) : random_(seed), model_(draw_model(seed)) {
         Environment around;
         around.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
         around.imu_transfer = [this](auto at, const auto& transfer, auto received) {
@@ -75,7 +75,7 @@ class Story {
         draw_cameras();
     }
 
-    void tell(Findings& findings) {
+    void run(Findings& findings) {
         send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}});
         board_->run_until(20 * ms);
         send(configuration_);
@@ -327,7 +327,7 @@ class Story {
             ++(right ? findings.right : findings.wrong)["auxiliary pulse"];
         }
         if (health_.stray_edges != 0) findings.wrong["stray edge"] += health_.stray_edges;
-        if (health_.lost_edges + health_.noisy_inputs != 0) ++findings.wrong["story with losses"];
+        if (health_.lost_edges + health_.noisy_inputs != 0) ++findings.wrong["losses"];
     }
 
     static constexpr Nanoseconds duration_ = 2 * second;
@@ -368,8 +368,8 @@ TEST_CASE("board: each record has the edges of its own trigger, however late the
     Findings found;
     std::uint64_t wrong = 0;
     for (std::uint64_t seed = 1; wrong < 1000 && found.right["measured"] < pulses; ++seed) {
-        Story(seed).tell(found);
-        if (total(found.wrong) > wrong) FAIL_CHECK("story " << seed);
+        Simulation(seed).run(found);
+        if (total(found.wrong) > wrong) FAIL_CHECK("seed " << seed);
         wrong = total(found.wrong);
     }
     for (const auto& [what, count] : found.wrong) FAIL_CHECK("wrong: " << what << ": " << count);

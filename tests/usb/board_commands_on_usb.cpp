@@ -267,6 +267,6 @@ TEST_CASE("board: a bring-up that nobody looks at tests the loops") {
     }
     const LoopedBoard board(bench.testbed.get(), "LOOP0002", {});
     CHECK(bench.board({"selftest", "--bringup"}) == 1);
-    CHECK_THAT(bench.said, Contains("measure: 25, 26, 27, 29") && Contains("not looked at") &&
+    CHECK_THAT(bench.said, Contains("measure: pins 25, 26, 27, 29") && Contains("not looked at") &&
                                Contains("failed  at exposure0; no pulse came"));
 }

@@ -40,7 +40,7 @@ std::optional<std::string> answer(const std::string& question, const std::functi
 
 void show(const BringUpStep& step) {
     fmt::print(stderr, "\n{}\n  connect: {}\n", step.name, step.connect);
-    if (*step.where != '\0') fmt::print(stderr, "  measure: {}\n", step.where);
+    if (*step.where != '\0') fmt::print(stderr, "  measure: pins {}\n", step.where);
     fmt::print(stderr, "  expect:  {}\n", step.expect);
 }
 
@@ -125,9 +125,11 @@ void BoardCommands::add_self_test() {
                      "A wire that must be there, test=aux0 for example; may be repeated")
         ->type_name("OUTPUT=INPUT")
         ->allow_extra_args(false);
-    self_test_->add_flag("--bringup", bring_up_,
-                         "Lead through the first power-up of a board: each step says what to "
-                         "connect and what a scope shows, and asks");
+    self_test_
+        ->add_flag("--bringup", bring_up_,
+                   "Lead through the first power-up of a board: each step says what to "
+                   "connect and what a scope shows, and asks")
+        ->excludes("--wire");
     self_test_->add_flag("--json", json_, "Print a JSON object");
 }
 

@@ -23,7 +23,7 @@ constexpr std::array<BringUpStep, step_count> steps{
      {"sync output", "USB only", "31", "1.000 ms, high for 100.0 us"},
      {"light", "USB only", "34 and 25",
       "34 rises 100.0 us before 25, and falls within 0.2 us of it"},
-     {"loops", "25-19, 26-20, 27-21, 29-22, 32-15, 31-17", "", "each loop is ok"}}};
+     {"loops", "pins 25-19, 26-20, 27-21, 29-22, 32-15, 31-17", "", "each loop is ok"}}};
 
 constexpr std::uint32_t camera_pulse_ns = 1'000'000;
 constexpr std::uint32_t slow_rate_uhz = 50'000'000;
