@@ -78,7 +78,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     void stop(std::uint8_t cameras);
     void align(const wire::AlignGrid& wanted);
     void switch_slaves();
-    void edges_lost();
+    void edges_lost(std::uint32_t lines);
     void follow_sync(Nanoseconds at);
     bool any_running() const;
     bool all_idle() const;
@@ -90,7 +90,6 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     bool greeted_ = false;
     bool storing_ = false;
     bool outputs_blocked_ = false;
-    bool losing_ = false;        ///< edges were lost, and some from before are still to be read
     bool more_ = false;          ///< to do at once
     bool stirred_ = true;        ///< cameras, light and outputs may have something to do
     std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled

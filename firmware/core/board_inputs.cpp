@@ -15,27 +15,29 @@ constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 /// waits longer.
 constexpr unsigned edges_a_poll = 24;
 
+constexpr std::uint32_t all_lines = (1U << camera_count) - 1;
+
 }  // namespace
 
 void Board::poll_edges(Nanoseconds now) {
     noise_.poll(now);
-    if (const std::uint32_t lost = hal_.edges.take_lost()) {
-        edges_lost();
-        losing_ = true;
-        health_.lost_edges += lost;
-        event(wire::EventKind::edge_overflow, 0, now, lost, 0);
-    }
-    Edge edge;
+    Edge edge{settled_, 0, false};
     unsigned count = 0;
-    while (count < edges_a_poll && hal_.edges.pop(edge)) {
-        ++count;
-        if (noise_.take(edge)) {
+    for (; count < edges_a_poll; ++count) {
+        if (!hal_.edges.pop(edge)) {
+            const std::uint32_t lost = hal_.edges.take_lost();
+            if (lost == 0) break;
+            edges_lost(all_lines);
+            spi_imu_.edges_lost();
+            health_.lost_edges += lost;
+            event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+        } else if (noise_.take(edge)) {
             take_edge(edge, now);
-            continue;
+        } else {
+            ++health_.noisy_inputs;
+            if (edge.input < camera_count) edges_lost(1U << edge.input);
+            event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
         }
-        ++health_.noisy_inputs;
-        if (edge.input < camera_count) edges_lost();
-        event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
     }
     Nanoseconds settled = edge.at;
     if (count == edges_a_poll)
@@ -46,18 +48,19 @@ void Board::poll_edges(Nanoseconds now) {
         settle_exposures(settled);
     else if (settled > settled_)
         settled_ = settled;
-    if (!losing_) return;
-    // Of the edges that waited, some came before the lost ones and some after.
-    edges_lost();
-    losing_ = count == edges_a_poll;
 }
 
-void Board::edges_lost() {
-    for (CameraChannel& camera : cameras_) camera.edges_lost();
-    waiting_.clear();
-    light_.edges_lost();
-    spi_imu_.edges_lost();
-    exposing_ = 0;
+/// Edges of these exposure lines are unknown, and so are pulses of the slaves that follow them.
+void Board::edges_lost(std::uint32_t lines) {
+    for (std::uint8_t i = 0; i < camera_count; ++i) {
+        CameraChannel& camera = cameras_[i];
+        const bool follows = camera.is_slave() && (lines >> camera.master() & 1U) != 0;
+        if ((lines >> i & 1U) == 0 && !follows) continue;
+        camera.edges_lost();
+        waiting_.drop(i);
+    }
+    light_.edges_lost(lines);
+    exposing_ = static_cast<std::uint8_t>(exposing_ & ~lines);
     stirred_ = true;
 }
 
@@ -89,7 +92,7 @@ void Board::take_exposure_edge(const Edge& edge) {
         settle_exposures(edge.at);
         Edge before = edge;  // another line bounces
         if (camera.take_edge(edge.at, before.at, before.level) && !waiting_.add(before))
-            edges_lost();
+            edges_lost(all_lines);
     }
     camera.edge(edge.at, edge.level);
     stirred_ = true;

@@ -235,7 +235,11 @@ void CameraChannel::master_edge(Nanoseconds at, bool exposing, std::uint64_t tic
 
 void CameraChannel::edges_lost() {
     filter_.edges_lost();
-    tracker().edges_lost();
+    // Pulses of a master that were lost are unknown here: what starts next may be theirs.
+    if (is_slave())
+        tracker().give_up();
+    else
+        tracker().edges_lost();
     uncounted_ = true;
 }
 

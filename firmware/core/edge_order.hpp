@@ -31,6 +31,13 @@ class EdgeOrder {
         return true;
     }
 
+    void drop(std::uint8_t input) {
+        unsigned kept = 0;
+        for (unsigned i = 0; i < count_; ++i)
+            if (edges_[i].input != input) edges_[kept++] = edges_[i];
+        count_ = kept;
+    }
+
     void clear() { count_ = 0; }
 
  private:

@@ -33,16 +33,21 @@ class GlitchFilter {
         if (!pending() || settled < newest_ + width_) return false;
         at = first_;
         first_ = never;
-        if (line_ == level_) {
+        const bool certain = !edges_lost_;
+        edges_lost_ = false;
+        if (certain && line_ == level_) {
             ++left_out_;
             return false;
         }
         level = level_ = line_;
-        return true;
+        return certain;
     }
 
-    /// The levels from before say nothing about those from here on.
-    void edges_lost() { first_ = never; }
+    /// The next level does not count: the first edge towards it may be among the lost ones.
+    void edges_lost() {
+        first_ = never;
+        edges_lost_ = true;
+    }
 
     /// Before this instant nothing more will count.
     Nanoseconds settled(Nanoseconds settled) const { return first_ < settled ? first_ : settled; }
@@ -65,6 +70,7 @@ class GlitchFilter {
     bool line_ = false;          ///< of the newest edge
     Nanoseconds first_ = never;  ///< edge towards a level that does not count yet
     Nanoseconds newest_ = 0;
+    bool edges_lost_ = false;  ///< since a level was known
     std::uint32_t left_out_ = 0;
 };
 

@@ -77,12 +77,14 @@ struct EdgeStream {
     /// Edges of inputs outside of the mask cost nothing and are not reported. The first edge of an
     /// input that is listened to anew is a true change of its line, after this call.
     virtual void listen(std::uint32_t inputs) = 0;
-    /// The next edge, in the order of their stamps over all inputs.
+    /// The next edge, in the order of their stamps over all inputs. False: there is none, or edges
+    /// between the last one and the next one were lost, which take_lost() then counts.
     virtual bool pop(Edge& edge) = 0;
-    /// Once pop() has said false: all edges stamped before this instant were popped or lost. At
-    /// most 5 us before now().
+    /// Once pop() has said false, and take_lost() 0: all edges stamped before this instant were
+    /// popped or lost. At most 5 us before now().
     virtual Nanoseconds settled() = 0;
-    /// Edges lost since the last call because they were not popped in time.
+    /// Edges lost after the last one that was popped, and before the next one that will be, because
+    /// they were not popped in time.
     virtual std::uint32_t take_lost() = 0;
     /// What the port's own proof of its stamps says. While it fails, edges are lost.
     virtual wire::StampTest stamp_test() = 0;

@@ -139,8 +139,8 @@ void Illumination::close_gate(Nanoseconds now) {
     gate_off_ = never;
 }
 
-void Illumination::edges_lost() {
-    exposing_ = 0;
+void Illumination::edges_lost(std::uint32_t lines) {
+    exposing_ = static_cast<std::uint8_t>(exposing_ & ~lines);
     over_ = false;
 }
 

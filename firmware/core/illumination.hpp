@@ -24,8 +24,8 @@ class Illumination {
     /// An exposure line changed, bounces included.
     void edge(std::uint8_t camera, bool exposing);
 
-    /// The levels of the lines are unknown from here on, until they change.
-    void edges_lost();
+    /// The levels of these lines are unknown from here on, until they change.
+    void edges_lost(std::uint32_t lines);
 
     /// An edge of the gate due at `asked` left at `left`: the light was on for longer.
     void moved(bool open, Nanoseconds asked, Nanoseconds left);

@@ -89,12 +89,12 @@ Nanoseconds NativeBoard::job_end() const {
 Nanoseconds NativeBoard::next_attention() const {
     if (attention_ || !received_.empty()) return now_;
     Nanoseconds next = std::min(board_.next_wake(), job_end());
-    const auto edge = std::find_if(stamped_.begin(), stamped_.end(), [](const Edge& waiting) {
-        return !is_data_ready(waiting.input);
-    });
-    if (edge != stamped_.end()) next = std::min(next, edge->at + model_.edge_lag_ns);
+    const auto edge =
+        std::find_if(stamped_.begin(), stamped_.end(),
+                     [](const StampedEdge& waiting) { return !is_data_ready(waiting.edge.input); });
+    if (edge != stamped_.end()) next = std::min(next, edge->edge.at + model_.edge_lag_ns);
     if (stamped_.size() >= model_.edges / 2)
-        next = std::min(next, stamped_.front().at + model_.edge_lag_ns);
+        next = std::min(next, stamped_.front().edge.at + model_.edge_lag_ns);
     if (!uart_bytes_.empty()) next = std::min(next, uart_bytes_.front().at);
     return next;
 }
@@ -175,7 +175,7 @@ void NativeBoard::apply(const Edge& edge) {
     if (stamped_.size() == model_.edges)
         ++lost_edges_;
     else
-        stamped_.push_back({stamp, edge.input, edge.level});
+        stamped_.push_back({{stamp, edge.input, edge.level}, std::exchange(lost_edges_, 0)});
 }
 
 bool NativeBoard::exposing(unsigned camera) const {
@@ -239,8 +239,9 @@ void NativeBoard::listen(std::uint32_t inputs) {
 
 bool NativeBoard::pop(Edge& edge) {
     spend();
-    if (stamped_.empty() || !visible(stamped_.front())) return false;
-    edge = stamped_.front();
+    if (stamped_.empty() || stamped_.front().lost_before != 0 || !visible(stamped_.front().edge))
+        return false;
+    edge = stamped_.front().edge;
     stamped_.pop_front();
     return true;
 }
@@ -248,12 +249,12 @@ bool NativeBoard::pop(Edge& edge) {
 Nanoseconds NativeBoard::settled() {
     spend();
     const Nanoseconds known = now_ - model_.edge_lag_ns;
-    return stamped_.empty() ? known : std::min(known, stamped_.front().at);
+    return stamped_.empty() ? known : std::min(known, stamped_.front().edge.at);
 }
 
 std::uint32_t NativeBoard::take_lost() {
     spend();
-    return std::exchange(lost_edges_, 0);
+    return std::exchange(stamped_.empty() ? lost_edges_ : stamped_.front().lost_before, 0);
 }
 
 Routing::Switched NativeBoard::route(const Routes& routes, bool force) {

@@ -140,6 +140,10 @@ class NativeBoard final : public VirtualBoard,
     Nanoseconds transfer_end(Nanoseconds at, const ImuTransfer& transfer) const;
     void begin_job(Nanoseconds at);
     Nanoseconds job_end() const;
+    struct StampedEdge {
+        Edge edge;
+        std::uint32_t lost_before;  ///< between the one before and this one
+    };
     bool visible(const Edge& edge) const { return edge.at + model_.edge_lag_ns <= now_; }
     void set_input(std::uint8_t input, bool level);
     void apply(const Edge& edge);
@@ -167,7 +171,7 @@ class NativeBoard final : public VirtualBoard,
     bool light_cut_ = false;         ///< the limit was reached
     std::uint32_t listened_ = 0;
     std::priority_queue<Edge, std::vector<Edge>, Later> edges_;
-    std::deque<Edge> stamped_;
+    std::deque<StampedEdge> stamped_;
     std::uint32_t lost_edges_ = 0;
     std::optional<ArmedJob> armed_;
     Nanoseconds imu_free_at_ = 0;             ///< when the newest transfer ended

@@ -250,6 +250,7 @@ bool EdgePort::pop(firmware::Edge& edge) {
         }
         take_change();
     }
+    if (lost_ != 0) return false;  // before this one
     unsigned pin = 0;
     while ((changes_ >> pin & 1U) == 0) ++pin;
     changes_ &= changes_ - 1;

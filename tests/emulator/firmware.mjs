@@ -5,10 +5,9 @@
 import { Icm42688p } from './icm42688p.mjs';
 import { readFileSync } from 'node:fs';
 import { Image } from './image.mjs';
-import { Rig, cycle_ns, pin } from './rig.mjs';
+import { Rig, busy_rig, cycle_ns, pin, quick_usb } from './rig.mjs';
 
 const [image, symbols, ...names] = process.argv.slice(2);
-const quick_usb = { usb_times: { debounce_ms: 1, reset_ms: 1, recovery_ms: 1 } };
 
 function check(condition, what) {
     if (!condition) throw new Error(what);
@@ -64,27 +63,6 @@ function count_pulses(rig, ms) {
 function zero_of(rig, camera, output = 0) {
     const first = rig.host.all('exposure').find((record) => record.camera === output);
     return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
-}
-
-/// With four cameras and an IMU at work; its options are 1 on SPI, 5 on I2C, 0 on SPI
-/// without data-ready.
-function busy_rig(options, period) {
-    const rig = new Rig(image, quick_usb);
-    const imu = new Icm42688p(rig.machine, {
-        select: options === 5 ? undefined : pin.spi_select,
-        ready: pin.imu_ready,
-        period,
-    });
-    [rig.camera] = [0, 1, 2, 3].map((output) => rig.add_camera(output));
-    rig.connect();
-    rig.configure({
-        cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })),
-        imus: [{ kind: 6, options, rate_mhz: 1_000_000 }],
-    });
-    rig.run_until('set up the IMU', () => rig.host.has_event(10));
-    rig.host.start();
-    imu.run(rig.machine.now + 125_000, rig.machine.now + 700 * period);
-    return rig;
 }
 
 /// How many microseconds each interrupt of priority 0 takes, from here on.
@@ -542,7 +520,7 @@ const tests = {
     },
 
     'after the port was opened anew, answers still say when they left': () => {
-        const rig = busy_rig(1, 152_439);
+        const rig = busy_rig(image, 1, 152_439);
         const { usb } = rig.machine;
         const { camera } = rig;
         rig.run_ms(50);
@@ -576,7 +554,7 @@ const tests = {
     },
 
     'a hub that corrupts what ends late in a frame does not hang the controller': () => {
-        const rig = busy_rig(1, 152_439);
+        const rig = busy_rig(image, 1, 152_439);
         rig.machine.usb.corrupts = 'deaf';
         rig.run_ms(500);
         check(rig.machine.usb_device.hung === undefined, 'it hangs');
@@ -586,7 +564,7 @@ const tests = {
 
     'a controller that hangs is reset, while triggers and stamps go on': () => {
         for (const kind of ['deaf', 'failed', 'mute']) {
-            const rig = busy_rig(1, 152_439);
+            const rig = busy_rig(image, 1, 152_439);
             const { usb, usb_device } = rig.machine;
             const { camera } = rig;
             rig.run_ms(100);
@@ -616,7 +594,7 @@ const tests = {
     },
 
     'a host that sleeps, is unplugged or does not read resets nothing': () => {
-        const rig = busy_rig(1, 152_439);
+        const rig = busy_rig(image, 1, 152_439);
         const { usb, usb_device } = rig.machine;
         const attach = usb.on_attach.bind(usb);
         let left = 0;
@@ -660,7 +638,7 @@ const tests = {
     },
 
     'halts of endpoints are set, told and cleared; nothing is lost by it': () => {
-        const rig = busy_rig(1, 152_439);
+        const rig = busy_rig(image, 1, 152_439);
         const { usb } = rig.machine;
         const asked = (request) => {
             let result;
@@ -900,21 +878,12 @@ const tests = {
 
     'the most urgent interrupts take at most 1 us, entry and exit included': () => {
         for (const options of [0, 1, 5]) {
-            const rig = busy_rig(options, 125_000);
+            const rig = busy_rig(image, options, 125_000);
             const times = urgent_times(rig.machine);
             rig.run_ms(600);
             check(times.length > 1000, `${times.length} of them`);
             for (const us of times) check_within(us, 0, 1, 'interrupt');
         }
-    },
-
-    'four cameras at 50 Hz and an IMU at 820 Hz take at most 10 % of the processor': () => {
-        const rig = busy_rig(1, 152_439);
-        rig.run_ms(200);
-        const { now, sleep_cycles } = rig.machine;
-        rig.run_ms(400);
-        const slept = (rig.machine.sleep_cycles - sleep_cycles) / (rig.machine.now - now);
-        check_within(100 * (1 - slept), 0, 10, 'percent of the processor');
     },
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The firmware on the emulated chip, with cameras at its pins and a host on its USB.
 import { readFileSync } from 'node:fs';
+import { Icm42688p } from './icm42688p.mjs';
 import { Machine } from './machine.mjs';
 import { Host } from './protocol.mjs';
 
@@ -10,6 +11,9 @@ const cycles_per_ms = 125_000;
 
 export const pin = { exposure: 14, loop: 18, trigger: 19, sync: 26, test: 27, light: 28,
     imu_ready: 7, spi_select: 5, pps: 10, aux0: 11, aux1: 12, sync_input: 13 };
+
+/// A host that waits for nothing.
+export const quick_usb = { usb_times: { debounce_ms: 1, reset_ms: 1, recovery_ms: 1 } };
 
 export class Rig {
     /// On `machine`, or a new one that starts from the image.
@@ -86,4 +90,25 @@ export class Rig {
             throw new Error(`refused: ${JSON.stringify(this.host.all('refusal'))}`);
         return answer;
     }
+}
+
+/// With four cameras and an IMU at work; its options are 1 on SPI, 5 on I2C, 0 on SPI
+/// without data-ready.
+export function busy_rig(image, options, period) {
+    const rig = new Rig(image, quick_usb);
+    const imu = new Icm42688p(rig.machine, {
+        select: options === 5 ? undefined : pin.spi_select,
+        ready: pin.imu_ready,
+        period,
+    });
+    [rig.camera] = [0, 1, 2, 3].map((output) => rig.add_camera(output));
+    rig.connect();
+    rig.configure({
+        cameras: [0, 1, 2, 3].map(() => ({ latency: 8000 })),
+        imus: [{ kind: 6, options, rate_mhz: 1_000_000 }],
+    });
+    rig.run_until('set up the IMU', () => rig.host.has_event(10));
+    rig.host.start();
+    imu.run(rig.machine.now + 125_000, rig.machine.now + 700 * period);
+    return rig;
 }

@@ -205,7 +205,7 @@ TEST_CASE("illumination: lost edges leave it on for as long as an exposure may c
         bench.run(10'050 * us);
         bench.light.edge(0, false);
     }
-    bench.light.edges_lost();
+    bench.light.edges_lost(0xF);
     bench.run(20 * ms);
     CHECK(bench.gate() == Times{9'900 * us, 11'900 * us});
 }
