@@ -4,14 +4,14 @@ include(GNUInstallDirs)
 set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/versavis)
 
 install(TARGETS versavisd versavis_tool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(DIRECTORY daemon/camera/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
+install(DIRECTORY daemon/settings/presets DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis
     FILES_MATCHING PATTERN *.toml)
 # Only where there is a compiler for the chip.
 install(FILES ${CMAKE_BINARY_DIR}/firmware/versavis.uf2
     DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis OPTIONAL)
 if(TARGET versavis-rig)
     install(TARGETS versavis-rig RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-    install(DIRECTORY tests/rig/scenarios tests/rig/models
+    install(DIRECTORY clients/rig/scenarios clients/rig/models
         DESTINATION ${CMAKE_INSTALL_DATADIR}/versavis)
 endif()
 

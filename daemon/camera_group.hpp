@@ -10,8 +10,8 @@
 
 #include "board/board_link.hpp"
 #include "camera/camera.hpp"
-#include "stream/camera_pipeline.hpp"
-#include "stream/status.hpp"
+#include "pipeline/camera_pipeline.hpp"
+#include "health/status.hpp"
 
 namespace versavis::daemon {
 

@@ -13,11 +13,11 @@
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
-#include "configuration/configuration.hpp"
-#include "configuration/problem_report.hpp"
-#include "library_log.hpp"
-#include "log.hpp"
-#include "memory_lock.hpp"
+#include "settings/configuration.hpp"
+#include "settings/problem_report.hpp"
+#include "base/library_log.hpp"
+#include "base/log.hpp"
+#include "base/memory_lock.hpp"
 #include "service.hpp"
 
 namespace {

@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "board/board_event.hpp"
-#include "camera/line_delays.hpp"
-#include "configuration/board_configuration.hpp"
-#include "configuration/board_parts.hpp"
-#include "log.hpp"
-#include "state_directory.hpp"
-#include "stream/diagnosis.hpp"
-#include "versavis/ring/path.hpp"
+#include "settings/line_delays.hpp"
+#include "settings/board_configuration.hpp"
+#include "settings/board_parts.hpp"
+#include "base/log.hpp"
+#include "base/state_directory.hpp"
+#include "health/diagnosis.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace versavis::daemon {
 

@@ -11,14 +11,14 @@
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
 #include "camera_group.hpp"
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "engine/ring/directory.hpp"
-#include "stream/clock_recorder.hpp"
-#include "stream/event_journal.hpp"
-#include "stream/event_witness.hpp"
-#include "stream/imu_pipeline.hpp"
-#include "stream/output_step_watch.hpp"
-#include "stream/status_publisher.hpp"
+#include "publish/clock_recorder.hpp"
+#include "publish/event_journal.hpp"
+#include "plausibility/event_witness.hpp"
+#include "pipeline/imu_pipeline.hpp"
+#include "health/output_step_watch.hpp"
+#include "health/status_publisher.hpp"
 
 namespace versavis::daemon {
 

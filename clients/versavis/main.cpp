@@ -10,20 +10,20 @@
 #include <fstream>
 #include <iostream>
 
-#include "board/board_commands.hpp"
-#include "camera/camera_commands.hpp"
-#include "clock/clock.hpp"
-#include "evaluate/evaluate_commands.hpp"
+#include "commands/board_commands.hpp"
+#include "commands/camera_commands.hpp"
+#include "commands/clock.hpp"
+#include "commands/evaluate_commands.hpp"
 #include "pairing/pair_replay.hpp"
-#include "process/process_command.hpp"
-#include "record/record_command.hpp"
-#include "recording/file_commands.hpp"
+#include "commands/process_command.hpp"
+#include "commands/record_command.hpp"
+#include "commands/file_commands.hpp"
 #include "status/status_document.hpp"
 #include "status/status_view.hpp"
-#include "stream/list.hpp"
-#include "stream/snapshot.hpp"
-#include "stream/tail.hpp"
-#include "versavis/ring/path.hpp"
+#include "commands/list.hpp"
+#include "commands/snapshot.hpp"
+#include "commands/tail.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace {
 

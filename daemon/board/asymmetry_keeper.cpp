@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/asymmetry_keeper.hpp"
 
-#include "log.hpp"
+#include "base/log.hpp"
 
 namespace versavis::daemon {
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "state_directory.hpp"
+#include "base/state_directory.hpp"
 
 namespace versavis::daemon {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "log.hpp"
-#include "stream/event_journal.hpp"
+#include "base/log.hpp"
+#include "publish/event_journal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::daemon {

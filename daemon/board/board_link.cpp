@@ -6,10 +6,10 @@
 #include <cstring>
 #include <random>
 
-#include "configuration/board_configuration.hpp"
-#include "configuration/board_parts.hpp"
+#include "settings/board_configuration.hpp"
+#include "settings/board_parts.hpp"
 #include "engine/board/firmware_file.hpp"
-#include "thread_name.hpp"
+#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 

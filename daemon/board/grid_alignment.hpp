@@ -6,7 +6,7 @@
 #include <mutex>
 #include <optional>
 
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
 
 namespace versavis::daemon {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "log.hpp"
-#include "thread_name.hpp"
+#include "base/log.hpp"
+#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "board/byte_stream.hpp"
-#include "board/wake_up.hpp"
+#include "base/wake_up.hpp"
 
 namespace versavis::daemon {
 

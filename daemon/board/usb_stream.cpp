@@ -11,7 +11,7 @@
 #include <mutex>
 #include <optional>
 
-#include "usb_handles.hpp"
+#include "base/usb_handles.hpp"
 #include "wire/usb_identity.hpp"
 
 namespace versavis::daemon {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "camera/frame_source.hpp"
-#include "camera/patient_work.hpp"
+#include "base/patient_work.hpp"
 #include "engine/pairing/block_id.hpp"
 
 namespace versavis::daemon {

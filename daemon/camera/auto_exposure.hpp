@@ -8,7 +8,7 @@
 #include <optional>
 #include <span>
 
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {

@@ -12,8 +12,8 @@
 #include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
 #include "camera/image_receiver.hpp"
-#include "camera/receive_mode.hpp"
-#include "thread_name.hpp"
+#include "settings/receive_mode.hpp"
+#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

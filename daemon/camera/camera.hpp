@@ -15,17 +15,17 @@
 
 #include "camera/auto_exposure.hpp"
 #include "camera/bandwidth_plan.hpp"
-#include "camera/camera_preset.hpp"
+#include "settings/camera_preset.hpp"
 #include "camera/camera_state.hpp"
 #include "camera/description_vetting.hpp"
 #include "camera/device_claims.hpp"
 #include "camera/gvcp.hpp"
-#include "camera/patient_work.hpp"
+#include "base/patient_work.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/retry.hpp"
 #include "camera/sensor_features.hpp"
-#include "configuration/configuration.hpp"
-#include "stream/camera_pipeline.hpp"
+#include "settings/configuration.hpp"
+#include "pipeline/camera_pipeline.hpp"
 
 struct _ArvCamera;  // NOLINT(bugprone-reserved-identifier): Aravis names it so
 using ArvCamera = _ArvCamera;

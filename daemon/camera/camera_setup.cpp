@@ -9,7 +9,7 @@
 #include <cstring>
 
 #include "camera/u3v_client.hpp"
-#include "log.hpp"
+#include "base/log.hpp"
 
 namespace versavis::daemon {
 

@@ -3,11 +3,11 @@
 #pragma once
 
 #include "camera/aravis_node_map.hpp"
-#include "camera/camera_preset.hpp"
-#include "camera/line_delays.hpp"
+#include "settings/camera_preset.hpp"
+#include "settings/line_delays.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/sensor_features.hpp"
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {

@@ -9,7 +9,7 @@
 
 #include "camera/auto_exposure.hpp"
 #include "camera/camera_setup.hpp"
-#include "stream/camera_pipeline.hpp"
+#include "pipeline/camera_pipeline.hpp"
 
 namespace versavis::daemon {
 

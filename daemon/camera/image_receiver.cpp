@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-#include "thread_name.hpp"
+#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

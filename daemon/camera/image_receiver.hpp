@@ -11,7 +11,7 @@
 #include "camera/frame_source.hpp"
 #include "camera/gvcp.hpp"
 #include "camera/packet_ring.hpp"
-#include "camera/patient_work.hpp"
+#include "base/patient_work.hpp"
 #include "engine/pairing/block_id.hpp"
 
 namespace versavis::daemon {

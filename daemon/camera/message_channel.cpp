@@ -10,7 +10,7 @@
 #include <algorithm>
 
 #include "camera/gvcp.hpp"
-#include "thread_name.hpp"
+#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

@@ -14,17 +14,9 @@
 #include <thread>
 #include <vector>
 
-#include "versavis/time.hpp"
+#include "pipeline/camera_event.hpp"
 
 namespace versavis::daemon {
-
-enum class CameraEventKind { exposure_start, exposure_end, trigger_missed, ptp_lost, ptp_locked };
-
-struct CameraEvent {
-    CameraEventKind kind = CameraEventKind::trigger_missed;
-    std::uint64_t block_id = 0;  ///< as the camera counts; 0: it does not say
-    CameraTime at;
-};
 
 /// Of GigE Vision's EVENT and EVENTDATA commands, before its kind is known.
 struct EventItem {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "camera/camera_preset.hpp"
+#include "settings/camera_preset.hpp"
 #include "camera/node_map.hpp"
 
 namespace versavis::daemon {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <optional>
 
-#include "usb_handles.hpp"
+#include "base/usb_handles.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {

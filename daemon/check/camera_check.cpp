@@ -15,7 +15,7 @@
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_setup.hpp"
 #include "engine/ring/directory.hpp"
-#include "stream/clock_recorder.hpp"
+#include "publish/clock_recorder.hpp"
 
 namespace versavis::daemon {
 

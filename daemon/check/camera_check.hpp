@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "check/wiring.hpp"
-#include "configuration/configuration.hpp"
+#include "settings/configuration.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::daemon {

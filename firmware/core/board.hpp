@@ -6,7 +6,7 @@
 #include "camera_channel.hpp"
 #include "configuration_check.hpp"
 #include "edge_order.hpp"
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "illumination.hpp"
 #include "imu/spi_imu.hpp"
 #include "imu/vn100.hpp"

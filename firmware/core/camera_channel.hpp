@@ -6,7 +6,7 @@
 #include "announcements.hpp"
 #include "exposure_tracker.hpp"
 #include "glitch_filter.hpp"
-#include "grid.hpp"
+#include "base/grid.hpp"
 #include "grid_clock.hpp"
 #include "output_queue.hpp"
 

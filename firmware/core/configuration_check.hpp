@@ -2,7 +2,7 @@
 // Checks a configuration from the host against what the board can do.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {

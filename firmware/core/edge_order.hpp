@@ -2,7 +2,7 @@
 // Edges of exposure lines that count, until they can be judged in the order in which they happened.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

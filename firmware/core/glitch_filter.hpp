@@ -2,7 +2,7 @@
 // An exposure line whose contacts bounce or that picks up spikes: which of its edges count.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

@@ -3,7 +3,7 @@
 // or the host's time.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "pulse_rival.hpp"
 #include "wire/messages.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

@@ -3,7 +3,7 @@
 // time, and leaves out the echoes of pulses.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/configuration.hpp"
 
 namespace versavis::firmware {

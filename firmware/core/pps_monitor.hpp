@@ -2,7 +2,7 @@
 // How fast the board's clock runs against pulses that come once a second.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "pulse_rival.hpp"
 #include "wire/messages.hpp"
 

@@ -3,7 +3,7 @@
 // followed instead.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

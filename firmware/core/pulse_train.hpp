@@ -2,7 +2,7 @@
 // Regular pulses at an output: sync to other boards, or the ticks of an IMU.
 #pragma once
 
-#include "grid.hpp"
+#include "base/grid.hpp"
 #include "grid_clock.hpp"
 #include "output_queue.hpp"
 

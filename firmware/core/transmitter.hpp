@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/packet.hpp"
 
 namespace versavis::firmware {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "board.hpp"
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "port_model.hpp"
 #include "virtual_board.hpp"
 

@@ -3,7 +3,7 @@
 // as a chip has it.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {

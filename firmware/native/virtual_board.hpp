@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

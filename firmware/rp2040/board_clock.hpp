@@ -3,7 +3,7 @@
 #pragma once
 
 #include "clocks.hpp"
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "registers.hpp"
 
 namespace versavis::rp2040 {

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::rp2040 {
 

@@ -2,7 +2,7 @@
 // Restarts of the chip: on request, by the watchdog, into the boot loader; and why it last did.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::rp2040 {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "flash_chip.hpp"
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::rp2040 {
 

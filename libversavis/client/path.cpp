@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/ring/path.hpp"
+#include "versavis/ring_path.hpp"
 
 #include <cstdlib>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/ring/payload.hpp"
+#include "versavis/ring_payload.hpp"
 
 #include <atomic>
 #include <cstring>

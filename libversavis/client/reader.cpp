@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "versavis/error.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 
 namespace versavis::ring {
 

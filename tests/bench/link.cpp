@@ -15,9 +15,9 @@
 #include "board/board_link.hpp"
 #include "engine/clock/recording.hpp"
 #include "metric.hpp"
-#include "stream/camera_pipeline.hpp"
-#include "stream/imu_pipeline.hpp"
-#include "versavis/ring/reader.hpp"
+#include "pipeline/camera_pipeline.hpp"
+#include "pipeline/imu_pipeline.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::bench {
 

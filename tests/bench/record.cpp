@@ -27,7 +27,7 @@
 #include "recording/repair.hpp"
 #include "ring/child.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/path.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace versavis::bench {
 

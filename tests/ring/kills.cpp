@@ -12,7 +12,7 @@
 #include "engine/ring/directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "stepped.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

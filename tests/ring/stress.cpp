@@ -15,7 +15,7 @@
 
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

@@ -2,7 +2,7 @@
 // What a look at a ring found, item or none, as one value that a test can compare in a line.
 #pragma once
 
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::test {
 

@@ -10,7 +10,7 @@
 
 #include "recording/mcap_summary.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/answer_watch.hpp"
+#include "pipeline/answer_watch.hpp"
 
 #include <catch2/catch.hpp>
 

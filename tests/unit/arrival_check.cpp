@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/arrival_check.hpp"
+#include "plausibility/arrival_check.hpp"
 
 #include <catch2/catch.hpp>
 

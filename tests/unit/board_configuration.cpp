@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration/board_configuration.hpp"
+#include "settings/board_configuration.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration/board_parts.hpp"
+#include "settings/board_parts.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,7 +10,7 @@
 #include <set>
 
 #include "../support/temporary_directory.hpp"
-#include "configuration/board_configuration.hpp"
+#include "settings/board_configuration.hpp"
 #include "configuration_check.hpp"
 #include "engine/board/board_words.hpp"
 

@@ -12,7 +12,7 @@ using namespace versavis::rig;
 
 namespace {
 
-const std::string models = VERSAVIS_SOURCE_DIR "/tests/rig/models";
+const std::string models = VERSAVIS_SOURCE_DIR "/clients/rig/models";
 
 CameraFamily load(const std::string& name) {
     auto family = load_camera_family(models, name);

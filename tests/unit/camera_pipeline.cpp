@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/camera_pipeline.hpp"
+#include "pipeline/camera_pipeline.hpp"
 #include "../support/look.hpp"
 
 #include <atomic>

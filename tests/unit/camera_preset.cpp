@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/camera_preset.hpp"
+#include "settings/camera_preset.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -13,7 +13,7 @@ using namespace versavis::daemon;
 namespace {
 
 std::vector<CameraPreset> all() {
-    auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/camera/presets");
+    auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/settings/presets");
     REQUIRE(presets);
     return *presets;
 }

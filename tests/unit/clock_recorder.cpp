@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/clock_recorder.hpp"
+#include "publish/clock_recorder.hpp"
 #include "../support/look.hpp"
 
 #include <catch2/catch.hpp>
@@ -7,7 +7,7 @@
 #include "../support/temporary_directory.hpp"
 #include "simulated_clocks.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::clock;

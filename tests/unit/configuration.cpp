@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration/configuration.hpp"
-#include "configuration/board_configuration.hpp"
+#include "settings/configuration.hpp"
+#include "settings/board_configuration.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>

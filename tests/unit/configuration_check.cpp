@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration/configuration_check.hpp"
+#include "settings/configuration_check.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 
 #include "../support/temporary_directory.hpp"
-#include "configuration/board_configuration.hpp"
+#include "settings/board_configuration.hpp"
 #include "configuration_check.hpp"
 #include "imu/imu_part.hpp"
 #include "imu/vn100.hpp"

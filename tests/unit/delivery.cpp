@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/delivery.hpp"
+#include "health/delivery.hpp"
 
 #include <catch2/catch.hpp>
 

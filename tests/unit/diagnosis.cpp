@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/diagnosis.hpp"
+#include "health/diagnosis.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <set>
 #include <sstream>
 
-#include "stream/status.hpp"
+#include "health/status.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/edge_difference.hpp"
+#include "plausibility/edge_difference.hpp"
 
 #include <catch2/catch.hpp>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/event_lengths.hpp"
+#include "pipeline/event_lengths.hpp"
 
 #include <catch2/catch.hpp>
 

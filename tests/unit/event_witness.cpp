@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/event_witness.hpp"
+#include "plausibility/event_witness.hpp"
 
 #include <catch2/catch.hpp>
 

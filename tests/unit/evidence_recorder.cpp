@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/evidence_recorder.hpp"
+#include "publish/evidence_recorder.hpp"
 #include "../support/look.hpp"
 
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/exposure_check.hpp"
+#include "plausibility/exposure_check.hpp"
 
 #include <catch2/catch.hpp>
 

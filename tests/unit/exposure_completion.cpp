@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/exposure_completion.hpp"
+#include "publish/exposure_completion.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/exposure_witness.hpp"
+#include "plausibility/exposure_witness.hpp"
 
 #include <rapidcheck.h>
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/frame_publisher.hpp"
+#include "publish/frame_publisher.hpp"
 #include "../support/look.hpp"
 
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "grid.hpp"
+#include "base/grid.hpp"
 
 #include <catch2/catch.hpp>
 

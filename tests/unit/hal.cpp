@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>

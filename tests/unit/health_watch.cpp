@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/health_watch.hpp"
+#include "health/health_watch.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/imu_pipeline.hpp"
+#include "pipeline/imu_pipeline.hpp"
 #include "../support/look.hpp"
 
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "export/kalibr_yaml.hpp"
+#include "recording/kalibr_yaml.hpp"
 
 #include <catch2/catch.hpp>
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "library_log.hpp"
+#include "base/library_log.hpp"
 
 #include <fcntl.h>
 #include <glib.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/line_delays.hpp"
+#include "settings/line_delays.hpp"
 
 #include <catch2/catch.hpp>
 
-#include "camera/camera_preset.hpp"
+#include "settings/camera_preset.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;

@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <set>
 
-#include "recording/byte_cursor.hpp"
+#include "base/byte_cursor.hpp"
 #include "recording_file.hpp"
 
 using namespace versavis;

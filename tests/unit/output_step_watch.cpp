@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/output_step_watch.hpp"
+#include "health/output_step_watch.hpp"
 
 #include <catch2/catch.hpp>
 

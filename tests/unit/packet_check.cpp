@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "board/packet_check.hpp"
+#include "plausibility/packet_check.hpp"
 
 #include <catch2/catch.hpp>
 #include <limits>

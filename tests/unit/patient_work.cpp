@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/patient_work.hpp"
+#include "base/patient_work.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -8,8 +8,8 @@
 #include "../support/temporary_directory.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
-#include "stream/event_journal.hpp"
-#include "versavis/ring/reader.hpp"
+#include "publish/event_journal.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::test {
 

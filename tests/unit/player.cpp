@@ -10,8 +10,8 @@
 #include "play/pace.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
-#include "versavis/ring/path.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_path.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::client;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "configuration/problem_report.hpp"
+#include "settings/problem_report.hpp"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

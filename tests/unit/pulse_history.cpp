@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/pulse_history.hpp"
+#include "plausibility/pulse_history.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/receive_mode.hpp"
+#include "settings/receive_mode.hpp"
 
 #include <catch2/catch.hpp>
 

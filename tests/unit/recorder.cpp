@@ -22,11 +22,11 @@
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "record/item_writer.hpp"
-#include "record/record_command.hpp"
+#include "commands/record_command.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"
-#include "versavis/ring/path.hpp"
+#include "versavis/ring_path.hpp"
 
 using namespace versavis;
 using namespace versavis::client;

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "recording/recording_info.hpp"
-#include "recording/shallow_json.hpp"
+#include "base/shallow_json.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 

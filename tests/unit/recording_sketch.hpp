@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::test {

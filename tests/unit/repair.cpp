@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "recording/file_descriptor.hpp"
+#include "base/file_descriptor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/reported_exposure.hpp"
+#include "plausibility/reported_exposure.hpp"
 
 #include <catch2/catch.hpp>
 

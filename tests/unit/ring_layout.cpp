@@ -15,7 +15,7 @@
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 using namespace versavis;

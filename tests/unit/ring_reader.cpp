@@ -24,7 +24,7 @@
 #include "client/futex.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

@@ -23,7 +23,7 @@
 #include "client/trust.hpp"
 #include "engine/ring/directory.hpp"
 #include "engine/ring/writer.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

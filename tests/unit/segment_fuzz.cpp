@@ -15,10 +15,10 @@
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
-#include "stream/list.hpp"
-#include "stream/tail.hpp"
+#include "commands/list.hpp"
+#include "commands/tail.hpp"
 #include "versavis.h"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/stamp_guard.hpp"
+#include "publish/stamp_guard.hpp"
 
 #include <catch2/catch.hpp>
 

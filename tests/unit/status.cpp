@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/status.hpp"
+#include "health/status.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>

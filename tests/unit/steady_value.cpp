@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/steady_value.hpp"
+#include "plausibility/steady_value.hpp"
 
 #include <catch2/catch.hpp>
 #include <random>

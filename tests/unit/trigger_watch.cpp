@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/trigger_watch.hpp"
+#include "pipeline/trigger_watch.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -13,7 +13,7 @@
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "engine/ring/writer.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

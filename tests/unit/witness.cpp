@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stream/witness.hpp"
+#include "plausibility/witness.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -24,7 +24,7 @@
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;

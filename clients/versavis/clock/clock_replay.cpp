@@ -11,7 +11,7 @@
 #include <numeric>
 
 #include "clock/clock_csv.hpp"
-#include "clock/plausible_time.hpp"
+#include "base/plausible_time.hpp"
 
 namespace versavis::client {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "clock/clock_plot.hpp"
-#include "clock/plausible_time.hpp"
+#include "base/plausible_time.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::client {

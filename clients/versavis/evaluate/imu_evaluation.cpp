@@ -10,7 +10,7 @@
 #include "evaluate/grey_image.hpp"
 #include "evaluate/recorded_imu.hpp"
 #include "export/export.hpp"
-#include "export/kalibr_yaml.hpp"
+#include "recording/kalibr_yaml.hpp"
 
 namespace versavis::client {
 

@@ -13,7 +13,7 @@
 #include "export/metadata_csv.hpp"
 #include "export/text_file.hpp"
 #include "pairing/evidence_json.hpp"
-#include "recording/shallow_json.hpp"
+#include "base/shallow_json.hpp"
 
 namespace versavis::client {
 

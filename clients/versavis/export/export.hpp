@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "export/bag_writer.hpp"
-#include "export/kalibr_yaml.hpp"
+#include "recording/kalibr_yaml.hpp"
 #include "export/selection.hpp"
 
 namespace versavis::client {

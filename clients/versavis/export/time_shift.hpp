@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "export/kalibr_yaml.hpp"
+#include "recording/kalibr_yaml.hpp"
 #include "recording/recording.hpp"
 #include "versavis/time.hpp"
 

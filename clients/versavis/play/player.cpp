@@ -14,7 +14,7 @@
 #include "engine/ring/directory.hpp"
 #include "engine/ring/writer.hpp"
 #include "play/pace.hpp"
-#include "versavis/ring/path.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace versavis::client {
 

@@ -11,8 +11,8 @@
 #include <filesystem>
 #include <system_error>
 
-#include "recording/byte_cursor.hpp"
-#include "recording/file_descriptor.hpp"
+#include "base/byte_cursor.hpp"
+#include "base/file_descriptor.hpp"
 #include "recording/mcap_summary.hpp"
 
 namespace versavis::client {

@@ -12,7 +12,7 @@
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
 #include "recording/recording.hpp"
-#include "recording/shallow_json.hpp"
+#include "base/shallow_json.hpp"
 
 namespace versavis::client {
 

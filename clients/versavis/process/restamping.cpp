@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "process/restamping.hpp"
 
-#include "clock/plausible_time.hpp"
+#include "base/plausible_time.hpp"
 
 namespace versavis::client {
 

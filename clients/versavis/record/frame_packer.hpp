@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "record/png_encoder.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::client {
 

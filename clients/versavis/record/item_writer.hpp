@@ -12,7 +12,7 @@
 #include "recording/ros_messages.hpp"
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::client {
 

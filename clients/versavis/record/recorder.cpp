@@ -17,13 +17,13 @@
 #include <random>
 #include <utility>
 
-#include "export/kalibr_yaml.hpp"
+#include "recording/kalibr_yaml.hpp"
 #include "record/frame_packer.hpp"
 #include "record/item_writer.hpp"
 #include "record/write_back.hpp"
 #include "status/status_document.hpp"
-#include "versavis/ring/path.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_path.hpp"
+#include "versavis/ring_reader.hpp"
 #include "versavis/wait_set.hpp"
 
 namespace versavis::client {

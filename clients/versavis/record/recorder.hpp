@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "versavis/error.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::client {

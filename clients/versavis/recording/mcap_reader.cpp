@@ -16,7 +16,7 @@
 #include <system_error>
 #include <utility>
 
-#include "recording/byte_cursor.hpp"
+#include "base/byte_cursor.hpp"
 
 namespace versavis::client {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "recording/file_descriptor.hpp"
+#include "base/file_descriptor.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {

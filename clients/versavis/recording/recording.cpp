@@ -9,12 +9,12 @@
 #include <optional>
 #include <set>
 
-#include "clock/plausible_time.hpp"
-#include "recording/byte_cursor.hpp"
+#include "base/plausible_time.hpp"
+#include "base/byte_cursor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
-#include "recording/shallow_json.hpp"
-#include "versavis/ring/path.hpp"
+#include "base/shallow_json.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace versavis::client {
 

@@ -13,7 +13,7 @@
 
 #include "versavis/error.hpp"
 #include "versavis/metadata.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::client {

@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "stream/kind_name.hpp"
+#include "kind_name.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "recording/byte_cursor.hpp"
+#include "base/byte_cursor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/mcap_summary.hpp"
 

@@ -7,7 +7,7 @@
 #include <csetjmp>
 #include <cstring>
 
-#include "recording/byte_cursor.hpp"
+#include "base/byte_cursor.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {

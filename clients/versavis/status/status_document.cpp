@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "recording/shallow_json.hpp"
+#include "base/shallow_json.hpp"
 
 namespace versavis::client {
 

@@ -3,7 +3,7 @@
 // checked.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {

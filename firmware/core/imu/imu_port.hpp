@@ -2,8 +2,8 @@
 // What both IMU ports have in common: numbers, failures and the events about them.
 #pragma once
 
-#include "exposure_tracker.hpp"
-#include "grid.hpp"
+#include "base/channel_reports.hpp"
+#include "base/grid.hpp"
 
 namespace versavis::firmware {
 

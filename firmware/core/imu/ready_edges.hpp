@@ -2,7 +2,7 @@
 // The newest edges of a data-ready line, without its echoes: which one came before a reading.
 #pragma once
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::firmware {
 

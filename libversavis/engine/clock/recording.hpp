@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "versavis/error.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/stream.hpp"
 #include "versavis/time.hpp"
 

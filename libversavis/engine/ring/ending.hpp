@@ -2,7 +2,7 @@
 // The end of a segment, told to its readers.
 #pragma once
 
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 
 namespace versavis::ring {
 

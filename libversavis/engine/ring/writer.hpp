@@ -10,7 +10,7 @@
 #include <string>
 
 #include "versavis/error.hpp"
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::ring {

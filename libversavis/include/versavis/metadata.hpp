@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "versavis/export.hpp"
-#include "versavis/ring/layout.hpp"
+#include "ring_layout.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis {

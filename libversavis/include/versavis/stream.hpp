@@ -8,8 +8,8 @@
 
 #include "versavis/metadata.hpp"
 #include "versavis/pixel_format.hpp"
-#include "versavis/ring/path.hpp"
-#include "versavis/ring/reader.hpp"
+#include "ring_path.hpp"
+#include "ring_reader.hpp"
 
 namespace versavis {
 

@@ -8,7 +8,7 @@
 
 #include "versavis/error.hpp"
 #include "versavis/export.hpp"
-#include "versavis/ring/reader.hpp"
+#include "ring_reader.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis {

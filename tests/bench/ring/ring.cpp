@@ -12,7 +12,7 @@
 #include "engine/ring/writer.hpp"
 #include "race.hpp"
 #include "set_reading.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::bench {
 

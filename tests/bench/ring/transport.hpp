@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "versavis/ring/layout.hpp"
+#include "versavis/ring_layout.hpp"
 
 namespace versavis::bench {
 

@@ -10,7 +10,7 @@
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
 #include "transport.hpp"
-#include "versavis/ring/reader.hpp"
+#include "versavis/ring_reader.hpp"
 
 namespace versavis::bench {
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "hal.hpp"
+#include "base/hal.hpp"
 
 namespace versavis::scenario {
 

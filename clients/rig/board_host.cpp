@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "board_host.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <random>
+#include <system_error>
+
+#include "engine/clock/output_clock.hpp"
+#include "../../firmware/native/native_board.hpp"
+
+namespace versavis::rig {
+
+namespace {
+
+constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is noticed after this time
+
+devices::Inertial felt(const Motion& motion, HostTime at) {
+    constexpr double degrees = 180 / 3.14159265358979;
+    constexpr double standard_gravity = 9.80665;
+    const Eigen::Vector3d rate = motion.rate_rad_s(at) * degrees;
+    const Eigen::Vector3d force = motion.specific_force_m_s2(at) / standard_gravity;
+    devices::Inertial felt;
+    felt.gyro_deg_s = {rate.x(), rate.y(), rate.z()};
+    felt.accel_g = {force.x(), force.y(), force.z()};
+    felt.magnetic_gauss = {0.2, 0, 0.4};
+    felt.temperature_c = 36;
+    return felt;
+}
+
+constexpr Duration lateness = milliseconds(600);
+constexpr Duration marked_ahead = milliseconds(500);
+/// Edges of the IMU's data-ready line are scheduled so long before they are due. At half, a busy
+/// host makes more of them late; at twice, more of them have the old rate after a new one was set.
+constexpr Duration signalled_ahead = milliseconds(2);
+constexpr Duration ready_width = microseconds(100);
+constexpr Duration sentence_after = milliseconds(150);
+constexpr Duration byte_at_9600_baud = nanoseconds(1'041'667);
+
+/// As a receiver in Zurich reports it.
+std::string rmc(std::int64_t utc_s) {
+    const std::time_t seconds = utc_s;
+    std::tm utc{};
+    gmtime_r(&seconds, &utc);
+    const std::string body = fmt::format(
+        "GPRMC,{:02}{:02}{:02}.00,A,4722.6,N,00832.9,E,0.0,0.0,{:02}{:02}{:02},,,A", utc.tm_hour,
+        utc.tm_min, utc.tm_sec, utc.tm_mday, utc.tm_mon + 1, utc.tm_year % 100);
+    unsigned sum = 0;
+    for (const char c : body) sum ^= static_cast<unsigned char>(c);
+    return fmt::format("${}*{:02X}\r\n", body, sum);
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
+                                                       const std::string& socket_path,
+                                                       HostTime zero, Surroundings& surroundings,
+                                                       GroundTruth& truth,
+                                                       std::vector<TriggeredCamera*> cameras) {
+    std::unique_ptr<EmulatedChip> chip;
+    if (!scenario.board.image.empty()) {
+        auto emulated = EmulatedChip::create(scenario.board.image);
+        if (!emulated) return Unexpected(emulated.error());
+        chip = std::move(*emulated);
+    }
+    sockaddr_un self{};
+    self.sun_family = AF_UNIX;
+    if (socket_path.size() >= sizeof self.sun_path)
+        return failure(socket_path, "the path of the socket is too long",
+                       "choose a shorter one with --socket");
+    std::memcpy(self.sun_path, socket_path.c_str(), socket_path.size() + 1);
+    ::unlink(socket_path.c_str());
+    const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (::bind(listener, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 ||
+        ::listen(listener, 1) != 0) {
+        const std::string reason = std::generic_category().message(errno);
+        ::close(listener);
+        return failure(socket_path, fmt::format("cannot listen: {}", reason),
+                       "choose another with --socket");
+    }
+    try {
+        return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, surroundings,
+                                                        truth, std::move(cameras), std::move(chip),
+                                                        listener));
+    } catch (const std::exception& error) {
+        ::close(listener);
+        return failure(scenario.board.image, error.what(),
+                       "see the line before; ./dev firmware builds an image that starts");
+    }
+}
+
+BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
+                     Surroundings& surroundings, GroundTruth& truth,
+                     std::vector<TriggeredCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
+                     int listener)
+    : serial_(scenario.board.serial),
+      seed_(scenario.seed),
+      clock_errors_(scenario.board.clock),
+      link_delay_{std::llround(scenario.board.link_ms * 1e6)},
+      imu_name_(scenario.imu),
+      socket_path_(std::move(socket_path)),
+      imu_(devices::AdisModel::adis16448b,
+           [&motion = surroundings.motion](firmware::Nanoseconds at) {
+               return felt(motion, HostTime{at});
+           }),
+      leds_(surroundings.leds.get()),
+      truth_(truth),
+      cameras_(std::move(cameras)),
+      listener_(listener),
+      chip_(std::move(chip)) {
+    if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
+    boot({}, clock_errors_, zero);
+    thread_ = std::thread([this] { run(); });
+}
+
+BoardHost::~BoardHost() {
+    stop_ = true;
+    thread_.join();
+    if (leds_ != nullptr) leds_->settle(HostTime{INT64_MAX});  // nobody waits for the rest
+    drop_host();
+    ::close(listener_);
+    ::unlink(socket_path_.c_str());
+}
+
+void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero) {
+    ++life_;
+    identity.nonce = static_cast<std::uint32_t>(std::mt19937_64(seed_ + life_)() ^
+                                                static_cast<std::uint64_t>(host_now().ns));
+    serial_.copy(identity.serial, sizeof identity.serial - 1);
+    pins_ = 0;
+    imu_samples_ = 0;
+    next_utc_s_ = 0;
+    signalled_ = host_now();
+    std::fill(std::begin(pulses_), std::end(pulses_), 0);
+    firmware::Environment environment;
+    environment.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
+    environment.imu_transfer = [this](auto at, const auto& transfer, auto received) {
+        imu_transfer(at, transfer, received);
+        return true;
+    };
+    environment.reboot = [this](bool) { reset(); };
+    if (chip_) {
+        // Its time begins with it, and it says itself who it is.
+        board_ = std::make_unique<EmulatedBoard>(*chip_, std::move(environment));
+        ClockErrors from_start = clock;
+        from_start.offset_ns = board_->time();
+        clock_ = std::make_unique<SkewedClock>(host_now(), from_start);
+        return;
+    }
+    clock_ = std::make_unique<SkewedClock>(zero, clock);
+    board_ = std::make_unique<firmware::NativeBoard>(identity, std::move(environment), board_now());
+}
+
+void BoardHost::restart() {
+    drop_host();
+    ClockErrors from_zero = clock_errors_;
+    from_zero.offset_ns = 0;
+    boot({0, wire::ResetCause::software, {}}, from_zero, host_now());
+}
+
+void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
+                             std::span<std::uint8_t> received) {
+    const HostTime instant = clock_->host(at);
+    if (suffers(FaultKind::imu_missing)) {
+        std::fill(received.begin(), received.end(), std::uint8_t{0xFF});
+        return;
+    }
+    if (suffers(FaultKind::imu_noisy)) imu_.corrupt(1);
+    imu_.transfer(instant.ns, transfer, received);
+    // Register accesses have gaps, and come word by word where the chip makes them.
+    const bool sample = transfer.word_gap_ns == 0 && transfer.size > 2;
+    if (sample)
+        truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++,
+                                 HostTime{imu_.motion_shown(instant.ns)}});
+}
+
+void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
+    const std::uint32_t changed = pins ^ pins_;
+    pins_ = pins;
+    const HostTime instant = clock_->host(at);
+    if (leds_ != nullptr && (changed & pins) >> leds_->output() & 1U) leds_->pulse(instant);
+    for (TriggeredCamera* camera : cameras_) {
+        const unsigned output = camera->settings().output;
+        if ((changed >> output & 1U) == 0) continue;
+        const bool level = (pins >> output & 1U) != 0;
+        if (level) ++pulses_[output];
+        const auto line = camera->trigger_line(level, {life_, pulses_[output], instant});
+        if (camera->settings().line == LineShows::trigger)
+            line_changes(camera->settings(), instant, level);
+        else if (line)
+            show_exposure(camera->settings(), *line);
+    }
+}
+
+void BoardHost::show_exposure(const CameraScenario& camera, const LineActive& line) {
+    const auto late = [](double us) { return Duration{std::llround(us * 1e3)}; };
+    HostTime end = line.end;
+    if (camera.line == LineShows::fixed) end = line.begin + milliseconds(1);
+    if (camera.line == LineShows::readout) end = end + late(camera.readout_us);
+    for (unsigned i = 0; i < line.times; ++i) {
+        const Duration shift = line.every * static_cast<std::int64_t>(i);
+        line_changes(camera, line.begin + shift + late(camera.line_rising_us), !line.inverted);
+        line_changes(camera, end + shift + late(camera.line_falling_us), line.inverted);
+    }
+}
+
+void BoardHost::line_changes(const CameraScenario& camera, HostTime at, bool active) {
+    const int input = camera.input < 0 ? static_cast<int>(camera.output) : camera.input;
+    for (const int wired : {input, camera.second_input})
+        if (wired >= 0)
+            board_->schedule_edge({clock_->device_ns(at), static_cast<std::uint8_t>(wired),
+                                   active != camera.line_inverted});
+}
+
+void BoardHost::run() {
+    try {
+        live();
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "versavis-rig: {}\n", error.what());
+        ::kill(::getpid(), SIGTERM);
+    }
+}
+
+void BoardHost::live() {
+    while (!stop_) {
+        if (reset_pending_.exchange(false)) restart();
+        if (utc_) hear_gnss();
+        const HostTime next_sample = signal_samples();
+        board_->set_imu_bus_stuck(suffers(FaultKind::imu_stuck));
+        const firmware::Nanoseconds now = board_now();
+        board_->run_until(now);
+        if (leds_ != nullptr) leds_->settle(clock_->host(now));
+        plug(!suffers(FaultKind::board_gone));
+        if (!suffers(FaultKind::board_mute)) exchange_bytes();
+        const HostTime wake =
+            clock_->host(std::min(board_->next_wake(), board_now() + longest_wait.ns));
+        const HostTime leaves = late_.empty() ? wake : late_.front().first;
+        const HostTime comes = coming_.empty() ? wake : coming_.front().first;
+        wait(std::min({wake, leaves, comes, next_sample, host_now() + longest_wait}));
+    }
+}
+
+/// The pulse at each second, and its sentence.
+void BoardHost::hear_gnss() {
+    constexpr std::int64_t second_ns = 1'000'000'000;
+    const Duration offset = utc_->offset();
+    const HostTime now = host_now();
+    if (next_utc_s_ == 0) next_utc_s_ = (now + offset + marked_ahead).ns / second_ns + 1;
+    const HostTime pulse = HostTime{next_utc_s_ * second_ns} - offset;
+    if (pulse - now > marked_ahead) return;
+    const auto input = static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_pps});
+    board_->schedule_edge({clock_->device_ns(pulse), input, true});
+    board_->schedule_edge({clock_->device_ns(pulse + milliseconds(100)), input, false});
+    const std::string text = rmc(next_utc_s_++);
+    const HostTime complete =
+        pulse + sentence_after + byte_at_9600_baud * static_cast<std::int64_t>(text.size());
+    board_->uart_receive({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
+                         clock_->device_ns(complete));
+}
+
+/// Edges of the data-ready line, where the part was told to use it. Returns when to come again.
+HostTime BoardHost::signal_samples() {
+    const HostTime now = host_now();
+    if (!imu_.signals(now.ns) || suffers(FaultKind::imu_missing)) {
+        signalled_ = now;
+        return now + longest_wait;
+    }
+    const devices::UpdateTimes times = imu_.updates();
+    for (auto index = times.index_at(signalled_.ns) + 1;; ++index) {
+        const HostTime sample{times.time(index)};
+        if (sample - now > signalled_ahead) return sample - signalled_ahead;
+        board_->schedule_edge({clock_->device_ns(sample), firmware::input_imu_ready, true});
+        board_->schedule_edge(
+            {clock_->device_ns(sample + ready_width), firmware::input_imu_ready, false});
+        signalled_ = sample;
+    }
+}
+
+void BoardHost::wait(HostTime until) const {
+    const std::int64_t left_ns = std::max<std::int64_t>(0, (until - host_now()).ns);
+    const timespec timeout{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
+    pollfd readable{host_ >= 0 ? host_ : listener_, POLLIN, 0};
+    ::ppoll(&readable, 1, &timeout, nullptr);
+}
+
+void BoardHost::accept_host() {
+    if (host_ < 0) host_ = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+}
+
+void BoardHost::drop_host() {
+    if (host_ >= 0) ::close(host_);
+    host_ = -1;
+    late_.clear();
+    coming_.clear();
+}
+
+void BoardHost::suffer(const Fault& fault) {
+    if (fault.kind == FaultKind::board_reset) return reset();
+    const HostTime until = host_now() + Duration{std::llround(fault.seconds * 1e9)};
+    suffers_until_ns_[static_cast<std::size_t>(fault.kind)] = until.ns;
+}
+
+bool BoardHost::suffers(FaultKind kind) const {
+    return host_now().ns < suffers_until_ns_[static_cast<std::size_t>(kind)];
+}
+
+/// Without its name nobody finds the socket.
+void BoardHost::plug(bool in) {
+    if (in == plugged_) return;
+    plugged_ = in;
+    const std::string unplugged = socket_path_ + ".unplugged";
+    std::rename((in ? unplugged : socket_path_).c_str(), (in ? socket_path_ : unplugged).c_str());
+    if (!in) drop_host();
+}
+
+/// What the board wrote leaves when it is due, in its order.
+void BoardHost::write_late(HostTime now) {
+    const auto out = board_->transmitted();
+    if (!out.empty()) {
+        const Duration delay = suffers(FaultKind::late_records) ? lateness : link_delay_;
+        late_.emplace_back(now + delay, std::vector(out.begin(), out.end()));
+        board_->consume(out.size(), board_now());
+    }
+    for (; !late_.empty() && late_.front().first <= now; late_.pop_front())
+        ::send(host_, late_.front().second.data(), late_.front().second.size(), MSG_NOSIGNAL);
+}
+
+void BoardHost::exchange_bytes() {
+    accept_host();
+    if (host_ < 0) {
+        board_->consume(board_->transmitted().size(), board_now());
+        return;
+    }
+    std::uint8_t buffer[4096];
+    ssize_t size = 0;
+    while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0)
+        coming_.emplace_back(host_now() + link_delay_, std::vector(buffer, buffer + size));
+    if (size == 0 || errno != EAGAIN) return drop_host();
+    for (; !coming_.empty() && coming_.front().first <= host_now(); coming_.pop_front()) {
+        const firmware::Nanoseconds at = board_now();
+        board_->run_until(at);  // nothing answers before it is asked
+        board_->receive(coming_.front().second, at);
+        board_->run_until(at);
+    }
+    if (suffers(FaultKind::late_records) || link_delay_.ns > 0 || !late_.empty())
+        return write_late(host_now());
+    const auto out = board_->transmitted();
+    // Stamped before writing: the host may receive the bytes before this process continues.
+    const firmware::Nanoseconds leaving = board_now();
+    const ssize_t sent = out.empty() ? 0 : ::send(host_, out.data(), out.size(), MSG_NOSIGNAL);
+    if (sent > 0) board_->consume(static_cast<std::size_t>(sent), leaving);
+}
+
+}  // namespace versavis::rig

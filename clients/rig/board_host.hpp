@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the firmware in real time behind a unix socket, wired to the emulated cameras and the IMU.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "adis_device.hpp"
+#include "board.hpp"
+#include "camera_view.hpp"
+#include "emulated_board.hpp"
+#include "engine/clock/output_clock.hpp"
+#include "ground_truth.hpp"
+#include "skewed_clock.hpp"
+#include "triggered_camera.hpp"
+#include "../../firmware/native/virtual_board.hpp"
+
+namespace versavis::rig {
+
+class BoardHost {
+ public:
+    /// Error: the socket cannot be created.
+    static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
+                                                       const std::string& socket_path,
+                                                       HostTime zero, Surroundings& surroundings,
+                                                       GroundTruth& truth,
+                                                       std::vector<TriggeredCamera*> cameras);
+    ~BoardHost();
+    BoardHost(const BoardHost&) = delete;
+    BoardHost& operator=(const BoardHost&) = delete;
+
+    /// From now on, for as long as the fault says. Callable from any thread.
+    void suffer(const Fault& fault);
+
+ private:
+    BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
+              Surroundings& surroundings, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
+              std::unique_ptr<EmulatedChip> chip, int listener);
+
+    void run();
+    void live();
+    void boot(firmware::Identity identity, const ClockErrors& clock, HostTime zero);
+    void restart();
+    void wait(HostTime until) const;
+    void exchange_bytes();
+    void hear_gnss();
+    HostTime signal_samples();
+    void accept_host();
+    void drop_host();
+    void reset() { reset_pending_ = true; }
+    bool suffers(FaultKind kind) const;
+    void plug(bool in);
+    void write_late(HostTime now);
+    void outputs_changed(firmware::Nanoseconds at, std::uint32_t pins);
+    void show_exposure(const CameraScenario& camera, const LineActive& line);
+    void line_changes(const CameraScenario& camera, HostTime at, bool active);
+    void imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransfer& transfer,
+                      std::span<std::uint8_t> received);
+    firmware::Nanoseconds board_now() const { return clock_->device_ns(host_now()); }
+
+    std::string serial_;
+    std::uint64_t seed_;
+    ClockErrors clock_errors_;
+    std::optional<clock::OutputClock> utc_;  ///< what the GNSS receiver sends, if there is one
+    Duration link_delay_;
+    std::string imu_name_;
+    std::string socket_path_;
+    devices::AdisDevice imu_;
+    TimingBoard* leds_;  ///< nullptr: there is none
+    GroundTruth& truth_;
+    std::vector<TriggeredCamera*> cameras_;
+    int listener_;
+    int host_ = -1;
+
+    std::unique_ptr<SkewedClock> clock_;
+    std::unique_ptr<EmulatedChip> chip_;  ///< none: the core runs in this process
+    std::unique_ptr<firmware::VirtualBoard> board_;
+    std::uint64_t life_ = 0;
+    std::uint32_t pins_ = 0;
+    std::uint64_t pulses_[firmware::camera_count] = {};
+    std::uint64_t imu_samples_ = 0;
+    HostTime signalled_{};         ///< until here edges of the data-ready line are scheduled
+    std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
+    using Parcels = std::deque<std::pair<HostTime, std::vector<std::uint8_t>>>;
+    Parcels late_;    ///< on its way to the host
+    Parcels coming_;  ///< on its way from there
+    bool plugged_ = true;
+    std::array<std::atomic<std::int64_t>, fault_kinds> suffers_until_ns_{};
+    std::atomic<bool> reset_pending_{false};
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
+};
+
+}  // namespace versavis::rig

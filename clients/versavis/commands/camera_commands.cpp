@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_commands.hpp"
+
+#include <fmt/format.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+namespace versavis::client {
+
+CameraCommands::CameraCommands(CLI::App& app) {
+    auto* camera = app.add_subcommand("camera", "Cameras without the service");
+    camera->require_subcommand(1);
+    probe_ = camera->add_subcommand(
+        "probe",
+        "Set up one camera as the service would and show what it is, what was set, and what stands "
+        "in the way. Exits 0 if it is ready. The service must not use it meanwhile");
+    probe_->add_option("device", device_, "IP or MAC address, serial number, name, or all")
+        ->required();
+    probe_->add_option("--config", configuration_,
+                       "Take the camera's keys from this configuration of the service");
+    probe_->add_option("--bundle", bundle_,
+                       "Also write description, values of all features, and a draft of a preset to "
+                       "this file, for a report");
+    probe_->add_flag("--json", json_, "Print one JSON object per camera");
+    check_ = camera->add_subcommand(
+        "check",
+        "Prove the wiring of all cameras by pulses at one output after the other: trigger lines, "
+        "exposure lines, polarity, delays, lost triggers, swapped cables. Takes a minute, and "
+        "exits 0 if all is right. The service must not run meanwhile");
+    check_->add_option("--config", configuration_,
+                       "Configuration of the service; default: the installed one");
+    check_->add_flag("--json", json_, "Print one JSON object");
+}
+
+int CameraCommands::run() {
+    std::error_code error;
+    const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
+    const std::string program = self.parent_path() / "versavisd";
+    std::vector<std::string> arguments{program, "--check-cameras"};
+    if (probe_->parsed()) arguments = {program, "--probe-camera", device_};
+    if (!configuration_.empty()) arguments.insert(arguments.end(), {"--config", configuration_});
+    if (!bundle_.empty()) arguments.insert(arguments.end(), {"--bundle", bundle_});
+    if (json_) arguments.emplace_back("--json");
+    std::vector<char*> pointers;
+    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    pointers.push_back(nullptr);
+    ::execv(program.c_str(), pointers.data());
+    fmt::print(stderr, "versavis: {}: cannot be run: {}; install the service beside this program\n",
+               program, std::generic_category().message(errno));
+    return EX_UNAVAILABLE;
+}
+
+}  // namespace versavis::client

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "record_command.hpp"
+
+#include <fmt/format.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+namespace versavis::client {
+
+namespace {
+
+/// Something is not in the recording: scripts should know.
+constexpr int exit_lost = 1;
+
+struct Unit {
+    const char* name;
+    double factor;
+    bool time;
+};
+
+constexpr Unit units[]{
+    {"GiB", 1 << 30U, false}, {"MiB", 1 << 20U, false}, {"GB", 1e9, false}, {"MB", 1e6, false},
+    {"min", 60, true},        {"h", 3600, true},        {"s", 1, true}};
+
+Duration from_seconds(double seconds) { return {static_cast<std::int64_t>(seconds * 1e9)}; }
+
+double in_seconds(Duration duration) { return static_cast<double>(duration.ns) * 1e-9; }
+
+double rate_of(const StreamReport& stream) {
+    const double seconds = in_seconds(stream.last - stream.first);
+    return stream.items > 1 && seconds > 0 ? static_cast<double>(stream.items - 1) / seconds : 0;
+}
+
+/// In place, on a terminal.
+class Progress {
+ public:
+    ~Progress() {
+        if (shown_) fmt::print(stderr, "\r\x1b[K");
+    }
+    void show(const RecordReport& report, std::uint64_t room) {
+        if (isatty(STDERR_FILENO) == 0) return;
+        const double seconds = std::max(in_seconds(report.duration), 1.0);
+        const double rate = static_cast<double>(report.bytes) / seconds;
+        fmt::print(
+            stderr, "\r\x1b[K{:.0f} s, {} items, {} lost, {:.1f} MB/s, {:.2f} GB; {}", seconds,
+            report.items(), report.lost(), rate * 1e-6, static_cast<double>(report.bytes) * 1e-9,
+            rate > 0 ? fmt::format("disk full in {:.0f} min", static_cast<double>(room) / rate / 60)
+                     : "");
+        std::fflush(stderr);
+        shown_ = true;
+    }
+
+ private:
+    bool shown_ = false;
+};
+
+nlohmann::ordered_json to_json(const RecordReport& report) {
+    nlohmann::ordered_json streams = nlohmann::ordered_json::object();
+    for (const auto& [name, stream] : report.streams)
+        streams[name] = {{"items", stream.items},       {"lost", stream.lost},
+                         {"restarts", stream.restarts}, {"epochs", stream.epochs},
+                         {"first_ns", stream.first.ns}, {"last_ns", stream.last.ns},
+                         {"rate_hz", rate_of(stream)}};
+    nlohmann::ordered_json document{{"files", report.files},
+                                    {"bytes", report.bytes},
+                                    {"seconds", in_seconds(report.duration)},
+                                    {"items", report.items()},
+                                    {"lost", report.lost()},
+                                    {"pairing_slips", report.slips},
+                                    {"streams", streams},
+                                    {"left_out", report.left_out}};
+    document["stopped_early"] = report.stopped_early
+                                    ? nlohmann::ordered_json(report.stopped_early->message())
+                                    : nlohmann::ordered_json();
+    return document;
+}
+
+}  // namespace
+
+Expected<> read_split(const std::string& text, RecordSettings& settings) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    for (const Unit& unit : units) {
+        if (std::string(end) != unit.name || !(value > 0) || !std::isfinite(value)) continue;
+        if (unit.time)
+            settings.split_length = from_seconds(value * unit.factor);
+        else
+            settings.split_bytes = static_cast<std::uint64_t>(value * unit.factor);
+        return {};
+    }
+    return failure("--split " + text, "is neither a size nor a time",
+                   "write 2GiB, 500MB, 10min, 1h or 30s, say");
+}
+
+std::string to_text(const RecordReport& report, bool json) {
+    if (json) return to_json(report).dump() + "\n";
+    std::string text =
+        fmt::format("{:.1f} s, {:.1f} MB in {}\n", in_seconds(report.duration),
+                    static_cast<double>(report.bytes) * 1e-6, fmt::join(report.files, ", "));
+    for (const auto& [name, stream] : report.streams) {
+        text += fmt::format("{:<20} {:>9} items {:>8.1f} Hz {:>6} lost", name, stream.items,
+                            rate_of(stream), stream.lost);
+        if (stream.restarts > 0) text += fmt::format(", {} restarts", stream.restarts);
+        if (stream.epochs > 0) text += fmt::format(", {} new epochs", stream.epochs);
+        text += "\n";
+    }
+    if (report.slips > 0) text += fmt::format("the pairing slipped {} times\n", report.slips);
+    for (const std::string& why : report.left_out) text += "not recorded: " + why + "\n";
+    if (report.stopped_early)
+        text += fmt::format("stopped early: {}\n", report.stopped_early->message());
+    return text;
+}
+
+RecordCommand::RecordCommand(CLI::App& app, std::function<bool()> stop)
+    : command_(app.add_subcommand(
+          "record",
+          "Record streams into an MCAP file that ROS 2, Foxglove and Lichtblick open. Ends with "
+          "Ctrl-C. Exits 0, or 1 if items were lost or the disk was full "
+          "(docs/user/recording.md)")) {
+    settings_.stop = std::move(stop);
+    command_->add_option("stream", settings_.streams, "Streams to record; all if none is named");
+    command_->add_option("-o,--output", settings_.output,
+                         "File to write; versavis-DATE-TIME.mcap if none is named");
+    command_->add_option("--seconds", seconds_, "End after so many")->check(CLI::PositiveNumber);
+    command_->add_option("--split", split_,
+                         "Begin a new file at this size or time, as 2GiB, 10min");
+    command_->add_option("--before", before_s_, "Begin so many seconds ago, as far as the rings go")
+        ->check(CLI::PositiveNumber);
+    command_
+        ->add_option("--compress", compress_,
+                     "none, or png: lossless, about half the size, a third of a processor for each "
+                     "camera")
+        ->check(CLI::IsMember({"none", "png"}))
+        ->capture_default_str();
+    command_->add_option("--calibration", settings_.calibration,
+                         "Files of Kalibr to keep with it: camchain.yaml, imu.yaml");
+    command_->add_flag("--json", json_, "Print the closing report as a JSON object");
+}
+
+bool RecordCommand::chosen() const { return command_->parsed(); }
+
+int RecordCommand::run(const std::string& instance) {
+    const auto fail = [](const Error& error) {
+        fmt::print(stderr, "versavis: {}\n", error.message());
+        return EX_UNAVAILABLE;
+    };
+    settings_.instance = instance;
+    settings_.png = compress_ == "png";
+    if (seconds_ > 0) settings_.length = from_seconds(seconds_);
+    if (before_s_ > 0) settings_.before = from_seconds(before_s_);
+    if (!split_.empty())
+        if (const auto read = read_split(split_, settings_); !read) {
+            fmt::print(stderr, "versavis: {}\n", read.error().message());
+            return EX_USAGE;
+        }
+    auto report = [&] {
+        Progress progress;
+        settings_.progress = [&](const RecordReport& so_far, std::uint64_t room) {
+            progress.show(so_far, room);
+        };
+        return record(settings_);
+    }();
+    if (!report) return fail(report.error());
+    fmt::print("{}", to_text(*report, json_));
+    return report->lost() > 0 || report->stopped_early ? exit_lost : EX_OK;
+}
+
+}  // namespace versavis::client

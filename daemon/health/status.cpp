@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "status.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "settings/receive_mode.hpp"
+#include "engine/board/board_words.hpp"
+#include "engine/board/firmware_version.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int schema = 1;
+
+/// The keys that every device has; they replace those of the same name.
+json with_diagnosis(json device, const Diagnosis& diagnosis) {
+    device.update({{"health", to_string(diagnosis.health)},
+                   {"fault", to_string(diagnosis.fault)},
+                   {"since_ns", diagnosis.since.ns},
+                   {"hint", diagnosis.hint}});
+    return device;
+}
+
+/// What is not known is null: a zero would be a claim.
+json known(bool is_known, Duration value) { return is_known ? json(value.ns) : json(nullptr); }
+/// Of an IMU, which the board drives.
+const char* state(const ImuStatus& imu, const Status& status) {
+    if (status.board.state != BoardState::running) return "absent";
+    if (imu.delivery.full || imu.report.working) return "running";
+    return imu.report.failure.times > 0 ? "failed" : "opening";
+}
+
+json board_json(const BoardReport& board, bool needed, bool outdated) {
+    const wire::Health& health = board.health;
+    const bool known = board.connections > 0;
+    const bool good_pps = health.pps_state == wire::PpsState::good;
+    return {{"state", needed ? to_string(board.state) : "unused"},
+            {"port", board.port},
+            {"serial", board.serial},
+            {"firmware", board.firmware},
+            {"firmware_outdated", known ? json(outdated) : json(nullptr)},
+            {"present", known ? json(board::part_names(board.present)) : json(nullptr)},
+            {"fastest_imu_hz", known ? json(board.fastest_imu_millihertz * 1e-3) : json(nullptr)},
+            {"nonce", board.nonce},
+            {"connections", board.connections},
+            {"packets", board.packets},
+            {"lost_packets", board.lost_packets},
+            {"malformed_packets", board.malformed},
+            {"impossible_packets", board.impossible},
+            {"exchanges_doubted", board.exchanges_doubted},
+            {"dropped_bytes", board.dropped_bytes},
+            {"dropped_by_board", health.dropped_exposures + health.dropped_clock_answers +
+                                     health.dropped_events + health.dropped_imu_samples +
+                                     health.dropped_logs},
+            {"dropped",
+             {{"exposures", health.dropped_exposures},
+              {"clock_answers", health.dropped_clock_answers},
+              {"events", health.dropped_events},
+              {"imu_samples", health.dropped_imu_samples},
+              {"logs", health.dropped_logs}}},
+            {"late_outputs", health.late_outputs},
+            {"lost_edges", health.lost_edges},
+            {"stray_edges", health.stray_edges},
+            {"glitches", health.glitches},
+            {"noisy_inputs", health.noisy_inputs},
+            {"skipped_triggers", health.skipped_triggers},
+            {"imu_errors", health.imu_errors[0] + health.imu_errors[1]},
+            {"imu_restarts", health.imu_restarts},
+            {"loop_max_ns", health.loop_max_ns},
+            {"reset_cause", board::to_string(health.reset_cause)},
+            {"pps", board::to_string(health.pps_state)},
+            {"pps_error_ppb", good_pps ? json(health.pps_error_ppb) : json(nullptr)},
+            {"sync", board::to_string(health.sync_state)},
+            {"stamp_test", board::to_string(health.stamp_test)}};
+}
+
+json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
+    const bool clock_known =
+        clock.state != clock::ClockState::init && clock.state != clock::ClockState::reset;
+    return {{"state", clock::to_string(clock.state)},
+            {"output", clock::to_string(clock.output)},
+            {"sigma_ns", known(clock_known, clock.sigma)},
+            {"bound_ns", known(clock_known, clock.bound)},
+            {"residual_ns", clock.residual.ns},
+            {"innovation_ns", clock.innovation.ns},
+            {"since_contact_ns", clock.since_contact.ns},
+            {"round_trip_ns", clock.round_trip.ns},
+            {"smallest_round_trip_ns", clock.smallest_round_trip.ns},
+            {"skew_ppm", clock.skew_ppm},
+            {"skew_sigma_ppm", clock.skew_sigma_ppm},
+            {"exchanges", clock.exchanges},
+            {"one_way_messages", clock.one_way_messages},
+            {"slots", clock.slots},
+            {"surprises", clock.surprises},
+            {"restarts", clock.restarts},
+            {"epoch", clock.epoch},
+            {"output_minus_host_ns", clock.output_minus_host.ns},
+            {"output_steps", clock.output_steps},
+            {"host_suspends", clock.host_suspends},
+            {"host_synchronised", clock.kernel.synchronised},
+            {"host_max_error_ns", clock.kernel.max_error.ns},
+            {"tai_offset_s", clock.kernel.tai_offset_s},
+            {"tai_valid", clock.kernel.tai_offset_s != 0},
+            {"asymmetry_ns", clock.asymmetry.offset.ns},
+            {"asymmetry_sigma_ns", clock.asymmetry.sigma.ns},
+            {"asymmetry_source", to_string(clock.asymmetry_source)},
+            {"pps", to_string(clock.pps.state)},
+            {"pps_residual_ns", clock.pps.residual.ns},
+            {"pps_pulses", clock.pps.pulses},
+            {"pps_rejected", clock.pps.rejected},
+            {"grid_aligned", grid.aligned},
+            {"grid_error_ns", grid.error.ns}};
+}
+
+json step_json(const StepResult& step) {
+    return {{"group", step.group},
+            {"node", step.node()},
+            {"wanted", step.wanted},
+            {"actual", step.actual.empty() ? json(nullptr) : json(step.actual)},
+            {"outcome", to_string(step.outcome)},
+            {"needed", step.needed},
+            {"reason", step.reason}};
+}
+
+/// What the preset set, or could not set; not what the camera lacks and need not have.
+json setup_json(const std::vector<StepResult>& steps) {
+    json setup = json::array();
+    for (const StepResult& step : steps)
+        if (step.needed || step.outcome != StepOutcome::left_out) setup.push_back(step_json(step));
+    return setup;
+}
+
+json camera_json(const CameraStatus& status) {
+    const CameraReport& camera = status.camera;
+    const PipelineReport& pipeline = status.pipeline;
+    const bool triggered = status.triggered();
+    return {{"name", status.name},
+            {"state", to_string(camera.state)},
+            {"configured_hz", status.configuration.rate_hz},
+            {"delivered_hz", status.delivery.rate_hz},
+            {"trigger", triggered ? "board" : "free"},
+            {"pairing", triggered ? pairing::to_string(pipeline.pairing) : "none"},
+            {"stamp_instant", pairing::to_string(pipeline.stamp_instant)},
+            {"vendor", camera.vendor},
+            {"preset", camera.preset},
+            {"setup", setup_json(camera.steps)},
+            {"gain", camera.sensor.gain},
+            {"gain_feature", camera.gain_feature},
+            {"temperature_c", camera.sensor.temperature_c},
+            {"needed_mbps", camera.bandwidth.needed_mbps},
+            {"link_needed_mbps", camera.bandwidth.link_needed_mbps},
+            {"link_mbps", camera.bandwidth.link_mbps},
+            {"packet_delay_ns", camera.bandwidth.packet_delay.ns},
+            {"model", camera.model},
+            {"serial", camera.serial},
+            {"packet_size", camera.packet_size},
+            {"receive", to_string(camera.receive)},
+            {"connections", camera.connections},
+            {"frames_received", pipeline.received},
+            {"frames_incomplete", pipeline.incomplete},
+            {"frames_published", pipeline.published},
+            {"frames_without_trigger", pipeline.frames_without_trigger},
+            {"triggers", pipeline.triggers},
+            {"triggers_without_frame", pipeline.triggers_without_frame},
+            {"triggers_missed", pipeline.triggers_missed},
+            {"exposures_unmeasured", pipeline.unmeasured},
+            {"records_doubted", pipeline.records_doubted},
+            {"frames_suspect", pipeline.suspect},
+            {"frames_without_buffer", pipeline.no_buffer},
+            {"exposure_ns", pipeline.exposure.ns},
+            {"camera_exposure_ns", pipeline.camera_exposure.ns},
+            {"exposure_source", to_string(pipeline.exposure_source)},
+            {"line", pipeline.lines.line},
+            {"line_delay_start_ns", pipeline.lines.start.delay.ns},
+            {"line_delay_end_ns", pipeline.lines.end.delay.ns},
+            {"line_delay_sigma_ns", middle_sigma(pipeline.lines).ns},
+            {"line_delay_source", to_string(pipeline.lines.source)},
+            {"trigger_delay_ns", pipeline.lines.trigger.delay.ns},
+            {"edge_difference_ns", known(pipeline.edges.frames != 0, pipeline.edges.difference)},
+            {"edge_difference_sigma_ns", known(pipeline.edges.frames != 0, pipeline.edges.sigma)},
+            {"edge_correction_ns", pipeline.edges.correction.ns},
+            {"locks", pipeline.locks},
+            {"slips", pipeline.slips},
+            {"last_frame_ns", pipeline.last_frame.ns}};
+}
+
+}  // namespace
+
+bool firmware_outdated(const Status& status) {
+    return board::is_older(status.board.firmware, status.release);
+}
+
+Health health(const Status& status) {
+    Health worst = std::max(status.board_diagnosis.health, status.clock_diagnosis.health);
+    for (const CameraStatus& camera : status.cameras)
+        worst = std::max(worst, camera.diagnosis.health);
+    for (const ImuStatus& imu : status.imus) worst = std::max(worst, imu.diagnosis.health);
+    return worst;
+}
+
+std::string to_json(const Status& status) {
+    json cameras = json::array();
+    for (const CameraStatus& camera : status.cameras)
+        cameras.push_back(with_diagnosis(camera_json(camera), camera.diagnosis));
+    json imus = json::array();
+    for (const ImuStatus& imu : status.imus)
+        imus.push_back(
+            with_diagnosis({{"name", imu.report.name},
+                            {"model", imu.report.model},
+                            {"state", state(imu, status)},
+                            {"configured_hz", imu.report.rate_hz},
+                            {"delivered_hz", imu.delivery.rate_hz},
+                            {"published", imu.report.published},
+                            {"lost", imu.report.lost},
+                            {"no_clock", imu.report.no_clock},
+                            {"faulty", imu.report.faulty},
+                            {"repeated", imu.report.repeated},
+                            {"doubted", imu.report.doubted},
+                            {"filter_delay_ns", imu.report.filter.delay.ns},
+                            {"filter_delay_sigma_ns", imu.report.filter.sigma.ns},
+                            {"filter_delay_source", imu::to_string(imu.report.filter.source)},
+                            {"last_sample_ns", imu.report.last_sample.ns}},
+                           imu.diagnosis));
+    json streams = json::array();
+    for (const StreamStatus& stream : status.streams)
+        streams.push_back({{"name", stream.name},
+                           {"kind", stream.kind},
+                           {"items", stream.items},
+                           {"rate_hz", stream.rate_hz}});
+    const json document{
+        {"schema", schema},
+        {"instance", status.instance},
+        {"release", status.release},
+        {"configuration", status.configuration},
+        {"pid", ::getpid()},
+        {"started_ns", status.started.ns},
+        {"host_time_ns", status.now.ns},
+        {"health", to_string(health(status))},
+        {"board",
+         with_diagnosis(board_json(status.board, status.board_needed, firmware_outdated(status)),
+                        status.board_diagnosis)},
+        {"clock", with_diagnosis(clock_json(status.clock, status.grid), status.clock_diagnosis)},
+        {"cameras", cameras},
+        {"imus", imus},
+        {"streams", streams}};
+    // Names from devices may hold anything; what is no UTF-8 is replaced.
+    return document.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace versavis::daemon

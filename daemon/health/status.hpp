@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The status document (docs/contracts/status.md) from the reports of the parts.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "board/board_link.hpp"
+#include "board/grid_alignment.hpp"
+#include "camera/camera.hpp"
+#include "engine/clock/translator.hpp"
+#include "pipeline/camera_pipeline.hpp"
+#include "delivery.hpp"
+#include "diagnosis.hpp"
+#include "pipeline/imu_pipeline.hpp"
+
+namespace versavis::daemon {
+
+struct CameraStatus {
+    std::string name;
+    CameraConfiguration configuration;
+    CameraReport camera;
+    PipelineReport pipeline;
+    PipelineReport recent{};  ///< its counters, of the last moments only
+    DeliveryReport delivery{};
+    Diagnosis diagnosis{};
+
+    bool triggered() const { return configuration.trigger == TriggerSource::board; }
+};
+
+struct ImuStatus {
+    ImuReport report;
+    ImuReport recent{};  ///< its counters, of the last moments only
+    DeliveryReport delivery{};
+    Diagnosis diagnosis{};
+};
+
+struct StreamStatus {
+    std::string name;
+    std::string kind;
+    std::uint64_t items = 0;
+    double rate_hz = 0;  ///< over the last interval
+};
+
+struct Status {
+    std::string instance;
+    std::string release;        ///< of the service
+    std::string configuration;  ///< its file
+    HostTime started;
+    HostTime now;
+    bool board_needed = true;
+    BoardReport board;
+    Diagnosis board_diagnosis;
+    clock::ClockReport clock;
+    Diagnosis clock_diagnosis;
+    GridReport grid;
+    std::vector<CameraStatus> cameras;
+    std::vector<ImuStatus> imus;
+    std::vector<StreamStatus> streams;
+};
+
+/// The board's firmware is of an older release than the service.
+bool firmware_outdated(const Status& status);
+
+/// That of the device that is worst off.
+Health health(const Status& status);
+
+std::string to_json(const Status& status);
+
+}  // namespace versavis::daemon

@@ -1,0 +1,495 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "camera_pipeline.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "settings/receive_mode.hpp"
+#include "engine/rounding.hpp"
+#include "plausibility/arrival_check.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// Slots that hold published frames while all others wait for proof or are being received. At half,
+/// a reader loses a frame while it copies it; at twice, fewer frames can wait for proof.
+constexpr std::uint32_t slots_for_readers = 2;
+
+/// Pulses by which the board's start pattern may last longer than its length says. At half, a
+/// pattern could be asked for again before it ended; at twice, a lost start costs two pulses more.
+constexpr int pattern_margin = 2;
+
+/// Majority of records that agree, after nothing was known, until those that do not are doubted
+/// rather than they themselves. At half, one lie at the beginning makes the truth wait until it is
+/// a step; at twice, lies soon after make more searches.
+constexpr int records_to_confirm = 3;
+
+pairing::Limits limits_of(const CameraConfiguration& configuration) {
+    pairing::Limits limits;
+    limits.latest_arrival =
+        from_us(configuration.latest_arrival_ms * 1e3) + receive_lateness(configuration);
+    limits.period = period_of(configuration);
+    limits.pattern_duration = limits.period * (wire::start_pattern_length + pattern_margin);
+    limits.frames_held = configuration.slots - configuration.buffers - slots_for_readers;
+    limits.camera_clock = configuration.camera_clock;
+    return limits;
+}
+
+/// What the line's own difference of edges adds is taken off.
+/// As the camera's account corrects or completes it.
+pairing::Exposure corrected(pairing::Exposure exposure, const ExposureVerdict& verdict) {
+    const EdgeCorrection& correction = verdict.correction;
+    exposure.start = exposure.start - correction.start;
+    exposure.end = exposure.end - correction.end;
+    exposure.delay = exposure.delay + correction.middle();
+    exposure.delay_sigma = rounded(std::hypot(exposure.delay_sigma.ns, correction.sigma.ns));
+    exposure.length_by_camera = verdict.length.ns != 0;
+    if (exposure.length_by_camera) exposure.end = exposure.start + verdict.length;
+    return exposure;
+}
+
+clock::Stamp moved(clock::Stamp stamp, Duration by) {
+    stamp.host = stamp.host + by;
+    stamp.output = stamp.output + by;
+    return stamp;
+}
+
+}  // namespace
+
+CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
+                               clock::Translator& translator, EventJournal& events)
+    : configuration_(configuration),
+      index_(index),
+      translator_(translator),
+      events_(events),
+      frames_(configuration),
+      evidence_(translator),
+      witness_(ExposureHistory(configuration), records_to_confirm),
+      completion_(configuration),
+      check_(configuration),
+      answers_(period_of(configuration)),
+      chunk_exposures_(configuration.slots),
+      triggers_(configuration),
+      limits_(limits_of(configuration)),
+      pairing_(limits_, *this) {}
+
+/// What pairing is told goes through here, so that the recording is complete.
+void CameraPipeline::tell(const pairing::Evidence& evidence) {
+    evidence_.record(evidence);
+    pairing::apply(pairing_, evidence);
+}
+
+void CameraPipeline::begin_anew() {
+    tell(pairing::Reset{});
+    middles_.clear();  // of numbers that may come again
+}
+
+/// Its clock does not count nanoseconds: arrivals alone say what exposures the frames are of.
+void CameraPipeline::pair_without_clock() {
+    limits_.camera_clock = false;
+    event_lengths_ = {};  // by the same clock
+    if (!triggered()) return;
+    begin_anew();
+    pairing_.set_limits(limits_);
+    tell(limits_);
+    log_later(LogLevel::warning,
+              fmt::format("its clock runs {:.4g} times as fast as it says: frames are "
+                          "paired without it",
+                          answers_.report().clock_rate));
+}
+
+void CameraPipeline::count_refusal(EventReason reason) {
+    const auto number = static_cast<std::size_t>(reason);
+    if (number < report_.refused.size()) ++report_.refused[number];
+}
+
+Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t payload_size,
+                                   bool has_clock, pairing::Instant stamp_instant) {
+    // Rings are made, and end, outside the lock that all threads wait for: that takes long. Only
+    // the camera's thread does so, and what the ring before still waits for is published first.
+    if (triggered() && !evidence_.recording()) {
+        auto ring = EvidenceRecorder::make_ring(place, configuration_.name);
+        if (!ring) return Unexpected(ring.error());
+        const std::lock_guard lock(mutex_);
+        evidence_.use(std::move(*ring));
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        witness_.forget();
+        begin_anew();
+    }
+    auto ring = frames_.make_ring(place, payload_size);
+    if (!ring) return Unexpected(ring.error());
+    std::optional<ring::Writer> before;
+    const std::lock_guard lock(mutex_);
+    if (*ring) before = frames_.use(std::move(**ring));
+    limits_.camera_clock = configuration_.camera_clock && has_clock;
+    limits_.stamped = stamp_instant;
+    answers_.begin_anew();
+    pairing_.set_limits(limits_);
+    tell(limits_);
+    report_.last_proof = host_now();
+    return {};
+}
+
+std::optional<std::uint32_t> CameraPipeline::acquire() {
+    const std::lock_guard lock(mutex_);
+    return frames_.acquire();
+}
+
+std::byte* CameraPipeline::slot_data(std::uint32_t slot) {
+    const std::lock_guard lock(mutex_);
+    return frames_.slot_data(slot);
+}
+
+void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id) {
+    const std::lock_guard lock(mutex_);
+    frames_.abandon(slot);
+    if (reason == EventReason::none) return;
+    ++report_.incomplete;
+    count_refusal(reason);
+    report_.last_sign = host_now();
+    triggers_.answered();
+    if (triggered()) tell(pairing::Shortfall{block_id, reason});
+    journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
+}
+
+void CameraPipeline::add(const pairing::Arrival& arrival) {
+    const std::lock_guard lock(mutex_);
+    ++report_.received;
+    report_.last_frame = report_.last_sign = arrival.arrived;
+    triggers_.answered();
+    answers_.arrived(arrival);
+    if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
+    pairing::Arrival told = completed(arrival);
+    if (triggered()) {
+        chunk_exposures_[arrival.slot] = arrival.exposure;
+        told.exposure = check_.for_pairing(arrival.exposure);
+        return tell(told);
+    }
+    ++report_.published;
+    frames_.publish_arrived(told, translator_.translate(arrival.arrived, {}), false);
+}
+
+/// With what the camera's registers say where the frame does not.
+pairing::Arrival CameraPipeline::completed(pairing::Arrival arrival) const {
+    if (std::isnan(arrival.sensor.gain)) arrival.sensor.gain = sensor_.gain;
+    if (std::isnan(arrival.sensor.temperature_c))
+        arrival.sensor.temperature_c = sensor_.temperature_c;
+    return arrival;
+}
+
+void CameraPipeline::set_sensor_state(const SensorState& state) {
+    const std::lock_guard lock(mutex_);
+    sensor_ = state;
+}
+
+std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, HostTime received) {
+    const std::lock_guard lock(mutex_);
+    report_.last_record = received;
+    if (const auto doubted = doubt(record, received)) {
+        note(record, *doubted);
+        return std::nullopt;
+    }
+    ++report_.triggers;
+    triggers_.recorded(record.trigger, received);
+    report_.measured = measured(record);
+    answers_.recorded(record);
+    if (!report_.measured) ++report_.unmeasured;
+    const bool started = record.start_ns != wire::no_time;
+    report_.start_delay = {started ? record.start_ns - record.trigger_ns : 0};
+    pairing::Exposure exposure = completion_.complete(record);
+    const auto stamp = translator_.translate(middle(exposure.start, exposure.end));
+    // A number that pairing holds already is a repeat: the record that came first counts.
+    if (!stamp || !middles_.try_emplace(exposure.trigger, *stamp).second) {
+        announce_unpaired(exposure, stamp ? EventReason::mismatch : EventReason::no_clock);
+        return std::nullopt;
+    }
+    ExposureCompletion::place_on_host(exposure, record, stamp->host);
+    exposure.recorded = received;
+    report_.record_delay = host_now() - exposure.end_on_host;
+    tell(exposure);
+    return stamp;
+}
+
+std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTime received) {
+    if (const auto doubt = contradicts_itself(record, configuration_)) return doubt;
+    const clock::ClockContact contact = translator_.contact();
+    follow_clock(contact.life);
+    const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
+    const auto arrival = contradicts_arrival(newest, received, translator_);
+    const WitnessedExposure exposure{record, check_.told_at(received)};
+    const auto doubt = witness_.judge(exposure, contact.exchanges, arrival);
+    if (witness_.overturned()) begin_anew();  // which of them lied, nobody can tell
+    if (!doubt) translator_.clock_continues();
+    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+        return doubt;
+    witness_.adopt(exposure);
+    adopt_step(record, *doubt);
+    return std::nullopt;
+}
+
+/// What pairing knows of the board's time is void when the estimate of that time is.
+void CameraPipeline::follow_clock(std::uint32_t life) {
+    const auto before = std::exchange(clock_life_, life);
+    if (before && before != life) begin_anew();
+}
+
+void CameraPipeline::adopt_step(const wire::Exposure& record, const Doubt& doubt) {
+    begin_anew();
+    translator_.begin_epoch();
+    events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
+                 BoardTime{record.trigger_ns}, doubt.expected});
+}
+
+void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
+    ++report_.records_doubted;
+    events_.add({EventKind::message_doubted,
+                 doubt.reason,
+                 index_,
+                 configuration_.name,
+                 doubt.said,
+                 {},
+                 doubt.expected});
+    // Two accounts of one exposure: neither is believed.
+    if (witness_.believed().disputes_newest(record)) middles_.erase(record.trigger);
+}
+
+void CameraPipeline::triggers_skipped(std::uint64_t count) {
+    const std::lock_guard lock(mutex_);
+    witness_.believed().triggers_skipped(count);
+}
+
+void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
+    const auto stamp = middles_.find(exposure.trigger);
+    const ExposureVerdict verdict =
+        check_.judge(arrival, account_of(arrival), exposure, report_.start_delay);
+    note_chunk_lag();
+    const pairing::Exposure shown = corrected(exposure, verdict);
+    const Duration shift = middle(shown.start, shown.end) - middle(exposure.start, exposure.end);
+    if (stamp == middles_.end()) {
+        frame_unpaired(arrival, EventReason::mismatch, nullptr);
+        announce_unpaired(exposure, EventReason::mismatch);
+    } else if (verdict.contradicted) {
+        frame_unpaired(arrival, EventReason::wrong_exposure, &exposure);
+        announce_unpaired(exposure, EventReason::wrong_exposure);
+    } else if (!frames_.publish_proved(arrival, shown, moved(stamp->second, shift))) {
+        if (frames_.stuck()) translator_.begin_epoch();
+        frame_unpaired(arrival, EventReason::went_back, nullptr);
+        announce_unpaired(exposure, EventReason::went_back);
+    } else {
+        report_.last_proof = arrival.arrived;
+        ++report_.published;
+    }
+    // The newest used record may still be the guess for a suspect frame.
+    middles_.erase(std::exchange(last_used_, exposure.trigger));
+}
+
+FrameAccount CameraPipeline::account_of(const pairing::Arrival& arrival) const {
+    return {chunk_exposures_[arrival.slot], event_lengths_.length(arrival.block_id)};
+}
+
+void CameraPipeline::add(const CameraEvent& event) {
+    const std::lock_guard lock(mutex_);
+    const bool times_count = answers_.report().clock_rate == 1;
+    switch (event.kind) {
+        case CameraEventKind::exposure_start:
+            if (!times_count) return;
+            return event_lengths_.started(event.block_id, event.at);
+        case CameraEventKind::exposure_end:
+            if (!times_count) return;
+            return event_lengths_.ended(event.block_id, event.at);
+        case CameraEventKind::trigger_missed: return note_missed_trigger();
+        case CameraEventKind::ptp_lost: return note_ptp(true);
+        case CameraEventKind::ptp_locked: return note_ptp(false);
+    }
+}
+
+void CameraPipeline::note_missed_trigger() {
+    ++report_.triggers_missed;
+    if (std::exchange(missed_said_, true)) return;
+    log_later(LogLevel::warning,
+              "the camera reports that it missed a trigger: exposure and readout may be "
+              "longer than the period");
+}
+
+void CameraPipeline::note_ptp(bool lost) {
+    if (std::exchange(report_.ptp_lost, lost) == lost) return;
+    if (lost)
+        log_later(LogLevel::warning, "the camera reports that its clock lost PTP");
+    else
+        log_later(LogLevel::info, "the camera reports that its clock follows PTP again");
+}
+
+void CameraPipeline::log_later(LogLevel level, std::string text) {
+    unsaid_.push_back({level, std::move(text)});
+}
+
+void CameraPipeline::note_chunk_lag() {
+    const ExposureSource before = std::exchange(report_.exposure_source, check_.source());
+    if (before != ExposureSource::chunk || check_.source() != ExposureSource::chunk_before) return;
+    log_later(LogLevel::warning,
+              "the exposure time in a frame's data is that of the frame before: it is "
+              "used as such, and sigma is larger while the exposure changes");
+}
+
+void CameraPipeline::frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
+                                    const pairing::Exposure* guess) {
+    ++report_.frames_without_trigger;
+    count_refusal(reason);
+    journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(arrival.block_id));
+    if (configuration_.on_unproved == OnUnproved::withhold || reason == EventReason::out_of_order)
+        return frames_.abandon(arrival.slot);
+    publish_suspect(arrival, guess);
+}
+
+/// As well stamped as can be guessed: by the exposure that it may be of, else by its arrival.
+void CameraPipeline::publish_suspect(const pairing::Arrival& arrival,
+                                     const pairing::Exposure* guess) {
+    ++report_.suspect;
+    ++report_.published;
+    const auto middle = guess != nullptr ? middles_.find(guess->trigger) : middles_.end();
+    if (middle != middles_.end()) return frames_.publish_guessed(arrival, *guess, middle->second);
+    frames_.publish_arrived(arrival, translator_.translate(arrival.arrived, {}), true);
+}
+
+void CameraPipeline::exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) {
+    middles_.erase(exposure.trigger);
+    announce_unpaired(exposure, reason);
+}
+
+void CameraPipeline::announce_unpaired(const pairing::Exposure& exposure, EventReason reason) {
+    ++report_.triggers_without_frame;
+    journal(EventKind::trigger_without_frame, reason, static_cast<std::int64_t>(exposure.trigger),
+            exposure.start);
+}
+
+void CameraPipeline::locked(const pairing::Exposure& first) {
+    ++report_.locks;
+    log_later(LogLevel::info,
+              fmt::format("paired: frames are verified from trigger {} on", first.trigger));
+    journal(EventKind::pairing_locked, EventReason::none, static_cast<std::int64_t>(first.trigger),
+            first.start);
+}
+
+void CameraPipeline::slipped(const pairing::Arrival& at) {
+    ++report_.slips;
+    log_later(
+        LogLevel::warning,
+        fmt::format("pairing slipped at block {}: frames are withheld until it is proved again",
+                    at.block_id));
+    journal(EventKind::pairing_slipped, EventReason::mismatch,
+            static_cast<std::int64_t>(at.block_id));
+}
+
+void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t value,
+                             std::optional<BoardTime> at) {
+    events_.add({kind, reason, index_, configuration_.name, value, at});
+}
+
+void CameraPipeline::reset() {
+    const std::lock_guard lock(mutex_);
+    witness_.forget();
+    begin_anew();
+    triggers_.answered();
+}
+
+std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
+    std::vector<Line> lines;
+    const auto wanted = [&] {
+        const std::lock_guard lock(mutex_);
+        lines.swap(unsaid_);
+        return advance_locked(now);
+    }();
+    for (const auto& [level, text] : lines) log(level, configuration_.name, "{}", text);
+    return wanted;
+}
+
+std::optional<pairing::Start> CameraPipeline::advance_locked(HostTime now) {
+    frames_.heartbeat(now);
+    if (!triggered()) return std::nullopt;
+    evidence_.heartbeat(now);
+    if (pairing_.due(now)) tell(pairing::Advance{now});
+    if (triggers_.overdue(now)) return pairing_.first_start();
+    return pairing_.wanted_start(now);
+}
+
+pairing::Start CameraPipeline::first_start() {
+    const std::lock_guard lock(mutex_);
+    return pairing_.first_start();
+}
+
+void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
+    const std::lock_guard lock(mutex_);
+    witness_.believed().forget_grid();
+    tell(pairing::StartRequest{start, now});
+    triggers_.asked(now);
+}
+
+void CameraPipeline::starved(std::uint64_t frames) {
+    const std::lock_guard lock(mutex_);
+    report_.no_buffer += frames;
+    for (std::uint64_t i = 0; i < frames && triggered(); ++i)
+        tell(pairing::Shortfall{0, EventReason::no_buffer});
+}
+
+void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
+    const std::lock_guard lock(mutex_);
+    check_.set_camera_exposure(exposure, since);
+    report_.told_exposure = exposure;
+}
+
+void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
+    const std::lock_guard lock(mutex_);
+    check_.read_exposure(exposure, at, report_.start_delay);
+}
+
+bool CameraPipeline::wants_exposure_readings() {
+    const std::lock_guard lock(mutex_);
+    return triggered() && check_.wants_readings();
+}
+
+void CameraPipeline::set_line_delays(const LineDelays& lines) {
+    const std::lock_guard lock(mutex_);
+    event_lengths_ = {};
+    missed_said_ = false;
+    report_.ptp_lost = false;
+    completion_.set_line_delays(lines);
+    check_.set_line_delays(lines);
+}
+
+std::uint64_t CameraPipeline::newest_trigger() {
+    const std::lock_guard lock(mutex_);
+    return triggers_.newest();
+}
+
+std::uint64_t CameraPipeline::unanswered_triggers() {
+    const std::lock_guard lock(mutex_);
+    return triggers_.unanswered();
+}
+
+PipelineReport CameraPipeline::report() {
+    const std::lock_guard lock(mutex_);
+    report_.pairing = pairing_.state();
+    report_.stamp_instant = pairing_.stamped();
+    report_.exposure = check_.measured();
+    report_.camera_exposure = check_.told();
+    report_.exposure_contradicted = check_.contradicted();
+    report_.lines = completion_.line_delays();
+    report_.edges = check_.edges();
+    report_.answers = answers_.report();
+    return report_;
+}
+
+std::uint64_t CameraPipeline::items() {
+    const std::lock_guard lock(mutex_);
+    return frames_.items();
+}
+
+std::uint64_t CameraPipeline::evidence_items() {
+    const std::lock_guard lock(mutex_);
+    return evidence_.items();
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// From arrivals and exposures of one camera to stamped frames: pairing, told by both sides.
+#pragma once
+
+#include <array>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera_event.hpp"
+#include "settings/configuration.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/pairing/recording.hpp"
+#include "base/log.hpp"
+#include "answer_watch.hpp"
+#include "publish/event_journal.hpp"
+#include "event_lengths.hpp"
+#include "publish/evidence_recorder.hpp"
+#include "plausibility/exposure_check.hpp"
+#include "publish/exposure_completion.hpp"
+#include "plausibility/exposure_witness.hpp"
+#include "publish/frame_publisher.hpp"
+#include "trigger_watch.hpp"
+
+namespace versavis::daemon {
+
+/// Reasons are counted by their number; those from here on are not.
+constexpr std::size_t counted_reasons = 32;
+
+struct PipelineReport {
+    pairing::State pairing = pairing::State::searching;
+    std::uint64_t received = 0;    ///< complete frames
+    std::uint64_t incomplete = 0;  ///< frames that lost packets on the way
+    std::uint64_t no_buffer = 0;   ///< frames that found no slot to go to
+    std::uint64_t published = 0;
+    std::uint64_t frames_without_trigger = 0;
+    std::uint64_t triggers = 0;
+    std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
+    std::uint64_t triggers_without_frame = 0;
+    std::uint64_t triggers_missed = 0;  ///< by the camera's own events
+    bool ptp_lost = false;              ///< the same
+    /// Triggers whose exposure was not measured although its line is wired.
+    std::uint64_t unmeasured = 0;
+    bool measured = true;       ///< the newest one was
+    std::uint64_t suspect = 0;  ///< published although not proved
+    std::uint64_t locks = 0;
+    std::uint64_t slips = 0;
+    pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
+    std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
+    Duration record_delay;   ///< end of the newest exposure to the arrival of its record
+    Duration start_delay;    ///< trigger to the start that its record has; 0: it has none
+    Duration told_exposure;  ///< as the camera was told, or tells; 0: it varies
+    HostTime last_record;    ///< the board's record of an exposure arrived, doubted or not
+    HostTime last_sign;      ///< a frame arrived, whole or not
+    HostTime last_frame;
+    HostTime last_proof;       ///< a frame was proved, or the camera was begun anew
+    Duration exposure;         ///< measured, of the newest frame; 0: unknown
+    Duration camera_exposure;  ///< by the camera's account; 0: unknown
+    ExposureSource exposure_source = ExposureSource::none;  ///< of that account
+    bool exposure_contradicted = false;                     ///< the two differ
+    LineDelays lines;
+    EdgeReport edges;
+    AnswerReport answers;
+};
+
+/// Thread-safe. Whoever completes a pair publishes it.
+class CameraPipeline final : private pairing::Outcome {
+ public:
+    CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
+                   clock::Translator& translator, EventJournal& events);
+
+    /// Makes the rings, or one with larger slots: called by the camera once it knows its payload.
+    /// Slots are void then. `has_clock`: its stamps are its own.
+    /// `stamp_instant`: what they are of; unknown: it is found out.
+    Expected<> prepare(const ring::Place& place, std::uint64_t payload_size, bool has_clock,
+                       pairing::Instant stamp_instant = pairing::Instant::unknown);
+
+    std::optional<std::uint32_t> acquire();
+    std::byte* slot_data(std::uint32_t slot);
+    void abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id);
+
+    /// Frames that found no slot to go to.
+    void starved(std::uint64_t frames);
+
+    /// What the camera says that it exposes from now on, about; 0: it changes by itself.
+    void set_camera_exposure(Duration exposure, HostTime since);
+
+    /// What the camera's register says that it exposes; to be read while wanted.
+    void read_exposure(Duration exposure, HostTime at);
+    bool wants_exposure_readings();
+
+    /// Of frames from now on that do not carry it themselves.
+    void set_sensor_state(const SensorState& state);
+
+    /// Before frames of these lines come.
+    void set_line_delays(const LineDelays& lines);
+
+    /// A complete frame in an acquired slot; the slot is the pipeline's from here on.
+    void add(const pairing::Arrival& arrival);
+
+    /// The stamp of the exposure's middle; none: board time cannot be translated yet, or the record
+    /// is doubted.
+    std::optional<clock::Stamp> add(const wire::Exposure& record, HostTime received);
+
+    /// By the camera's message channel.
+    void add(const CameraEvent& event);
+
+    /// The board sent no trigger for one grid point, and said so.
+    void triggers_skipped(std::uint64_t count);
+
+    /// Camera or board began a new life.
+    void reset();
+
+    /// Gives up what waited too long. A start: the board should be asked for it, because nothing
+    /// else can prove the pairing, or because no trigger came although it was asked to.
+    std::optional<pairing::Start> advance(HostTime now);
+    pairing::Start first_start();
+    void start_requested(pairing::Start start, HostTime now);
+
+    bool triggered() const { return configuration_.trigger == TriggerSource::board; }
+    std::uint8_t board_mask() const {
+        return static_cast<std::uint8_t>(1U << configuration_.output);
+    }
+
+    /// Number of the newest trigger that the board recorded.
+    std::uint64_t newest_trigger();
+
+    /// Triggers since the last frame.
+    std::uint64_t unanswered_triggers();
+    PipelineReport report();
+    std::uint64_t items();
+    std::uint64_t evidence_items();
+
+ private:
+    struct Line {
+        LogLevel level;
+        std::string text;
+    };
+
+    /// advance() logs it: nothing is written under the lock.
+    void log_later(LogLevel level, std::string text);
+    void paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) override;
+    void frame_unpaired(const pairing::Arrival& arrival, EventReason reason,
+                        const pairing::Exposure* guess) override;
+    void exposure_unpaired(const pairing::Exposure& exposure, EventReason reason) override;
+    void locked(const pairing::Exposure& first) override;
+    void slipped(const pairing::Arrival& at) override;
+
+    void tell(const pairing::Evidence& evidence);
+    void begin_anew();
+    void pair_without_clock();
+    std::optional<Doubt> doubt(const wire::Exposure& record, HostTime received);
+    void note(const wire::Exposure& record, const Doubt& doubt);
+    void adopt_step(const wire::Exposure& record, const Doubt& doubt);
+    void follow_clock(std::uint32_t life);
+    std::optional<pairing::Start> advance_locked(HostTime now);
+    pairing::Arrival completed(pairing::Arrival arrival) const;
+    void note_chunk_lag();
+    void note_missed_trigger();
+    void note_ptp(bool lost);
+    FrameAccount account_of(const pairing::Arrival& arrival) const;
+    void count_refusal(EventReason reason);
+    void announce_unpaired(const pairing::Exposure& exposure, EventReason reason);
+    void publish_suspect(const pairing::Arrival& arrival, const pairing::Exposure* guess);
+    void journal(EventKind kind, EventReason reason, std::int64_t value,
+                 std::optional<BoardTime> at = {});
+
+    CameraConfiguration configuration_;
+    std::uint32_t index_;
+    clock::Translator& translator_;
+    EventJournal& events_;
+
+    std::mutex mutex_;
+    FramePublisher frames_;
+    EvidenceRecorder evidence_;
+    ExposureWitness witness_;
+    std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
+    ExposureCompletion completion_;
+    ExposureCheck check_;
+    AnswerWatch answers_;
+    EventLengths event_lengths_;
+    SensorState sensor_;
+    bool missed_said_ = false;               ///< in the log, of this stream
+    std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
+    TriggerWatch triggers_;
+    pairing::Limits limits_;
+    pairing::Pairing pairing_;
+    /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,
+    /// translated once as it came.
+    std::map<std::uint64_t, clock::Stamp> middles_;
+    std::uint64_t last_used_ = 0;  ///< trigger
+    PipelineReport report_;
+    std::vector<Line> unsaid_;  ///< see log_later()
+};
+
+}  // namespace versavis::daemon

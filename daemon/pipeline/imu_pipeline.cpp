@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "imu_pipeline.hpp"
+
+#include "plausibility/arrival_check.hpp"
+#include "publish/total_sigma.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// A part keeps its rate within this part of the configured one. At half, parts that are an eighth
+/// slower are doubted at their first samples; at twice, the second sample may be half a period off.
+constexpr std::int64_t rate_parts = 4;
+
+/// Over lost samples a part's pace may wander by one part in so many. At half, the first sample
+/// after a second's gap may be off by 0.2 ms; at twice, parts that warm up are doubted after a gap.
+constexpr std::int64_t wander_parts = 10'000;
+
+/// Majority of samples that agree, after the clock or the board began anew, until one is published:
+/// the first have no neighbours. At half, a lie that lasts 20 samples from the first on passes; at
+/// twice, each beginning costs 32 samples more.
+constexpr int samples_to_confirm = 32;
+
+PulseHistory history(const ImuConfiguration& configuration) {
+    const Duration period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)};
+    return {period, period / rate_parts, wander_parts};
+}
+
+/// The board tries a failed part once a second: so many equal failures make one more line. At half,
+/// a log has 12 lines an hour of it; at twice, 3.
+constexpr std::uint64_t failures_per_line = 600;
+
+/// A failure that did not come for so long is a new one. At half, a part that fails twice a minute
+/// fills the log; at twice, one that fails every two minutes does not show there.
+constexpr Duration forgotten_after = seconds(60);
+
+}  // namespace
+
+ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
+                         clock::Translator& translator, EventJournal& events)
+    : model_(*configuration.model),
+      port_(configuration.port()),
+      accel_ready_(configuration.accel_ready),
+      filter_(configuration.filter_delay()),
+      ring_(std::move(ring)),
+      translator_(translator),
+      events_(events),
+      witness_(history(configuration), samples_to_confirm) {
+    report_.name = configuration.name;
+    report_.model = model_.name;
+    report_.filter = filter_;
+    report_.rate_hz = configuration.rate_hz;
+}
+
+void ImuPipeline::board_restarted() {
+    const std::lock_guard lock(mutex_);
+    begin_anew();
+}
+
+void ImuPipeline::begin_anew() {
+    last_number_.reset();
+    witness_.forget();
+}
+
+bool ImuPipeline::tell(const wire::Event& event, HostTime now) {
+    const std::lock_guard lock(mutex_);
+    ImuFailure& last = report_.failure;
+    report_.working = event.kind == wire::EventKind::imu_ready;
+    if (report_.working) return last.times <= 1;
+    const bool again = last.kind == event.kind && last.step == event.detail &&
+                       last.answer == event.value && now - last.last < forgotten_after;
+    last = {event.kind, event.detail, event.value, again ? last.times + 1 : 1, now};
+    return last.times % failures_per_line == 1;
+}
+
+bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
+    const std::lock_guard lock(mutex_);
+    if (const auto doubted = doubt(sample, received)) {
+        ++report_.doubted;
+        journal(EventKind::message_doubted, sample, *doubted);
+        return false;
+    }
+    const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay);
+    if (!stamp || !witness_.confirmed()) {
+        ++report_.no_clock;
+        return witness_.confirmed();
+    }
+    const std::uint64_t number = extended(sample.number);
+    if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
+    last_number_ = number;
+    publish(sample, number, *stamp);
+    return true;
+}
+
+/// 32 bits on the wire are extended by the number before.
+std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
+    if (!last_number_) return number;
+    const auto step = static_cast<std::int32_t>(number - static_cast<std::uint32_t>(*last_number_));
+    return *last_number_ + static_cast<std::uint64_t>(std::int64_t{step});
+}
+
+std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
+    // No line, no age.
+    if ((sample.flags & wire::imu_accel_stamped) != 0 && !accel_ready_)
+        return Doubt{EventReason::implausible_flags, sample.flags, 0};
+    const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
+    const clock::ClockContact contact = translator_.contact();
+    const BoardTime departed = pulse.at + Duration{sample.departure_ns};
+    const auto arrival = contradicts_arrival(departed, received, translator_);
+    const auto doubt = witness_.judge(pulse, contact.exchanges, arrival);
+    if (!doubt) translator_.clock_continues();
+    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+        return doubt;
+    // The part was set up anew, or the board lost count.
+    witness_.adopt(pulse);
+    last_number_.reset();
+    translator_.begin_epoch();
+    journal(EventKind::stream_stepped, sample, *doubt);
+    return std::nullopt;
+}
+
+void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt) {
+    JournalEntry entry{kind, doubt.reason, port_, report_.name, doubt.said, {}, doubt.expected};
+    if (kind == EventKind::stream_stepped) entry.board_time = BoardTime{sample.time_ns};
+    events_.add(entry);
+}
+
+void ImuPipeline::publish(const wire::ImuSample& sample, std::uint64_t number,
+                          const clock::Stamp& stamp) {
+    const auto guarded = guard_.guard(stamp, total_sigma_ns(stamp.sigma_ns, filter_.sigma));
+    if (!guarded) {
+        ++report_.doubted;
+        if (guard_.stuck()) translator_.begin_epoch();
+        return journal(EventKind::message_doubted, sample,
+                       {EventReason::went_back, sample.time_ns, 0});
+    }
+    ImuMetadata metadata = imu::to_si(model_, sample);
+    metadata.board_time = {sample.time_ns};
+    metadata.host_time = stamp.host;
+    metadata.number = number;
+    metadata.sigma_ns = guarded->sigma_ns;
+    metadata.filter_delay = filter_.delay;
+    metadata.epoch = stamp.epoch;
+    metadata.flags |= guarded->flags;
+    if ((metadata.flags & flag_sensor_error) != 0)
+        ++report_.faulty;
+    else
+        report_.last_sample = stamp.host;
+    if ((metadata.flags & flag_repeated) != 0) ++report_.repeated;
+    ring_.publish(guarded->time, pack(metadata));
+    ++report_.published;
+}
+
+void ImuPipeline::heartbeat(HostTime now) {
+    const std::lock_guard lock(mutex_);
+    ring_.heartbeat(now);
+}
+
+ImuReport ImuPipeline::report() {
+    const std::lock_guard lock(mutex_);
+    return report_;
+}
+
+}  // namespace versavis::daemon

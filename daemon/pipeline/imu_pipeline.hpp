@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Samples of one IMU: from raw words to SI units with a stamp, into the ring.
+#pragma once
+
+#include <mutex>
+#include <string>
+
+#include "settings/configuration.hpp"
+#include "engine/clock/translator.hpp"
+#include "engine/ring/writer.hpp"
+#include "publish/event_journal.hpp"
+#include "plausibility/pulse_history.hpp"
+#include "publish/stamp_guard.hpp"
+#include "plausibility/witness.hpp"
+
+namespace versavis::daemon {
+
+/// The last failure of a part that the board told of.
+struct ImuFailure {
+    wire::EventKind kind = wire::EventKind::imu_failed;
+    std::uint16_t step = 0;  ///< of its set-up, or imu_step_running
+    std::int64_t answer = 0;
+    std::uint64_t times = 0;  ///< in a row; 0: none
+    HostTime last;
+};
+
+/// The step of a failure after the set-up.
+constexpr std::uint16_t imu_step_running = 0xFFFF;
+
+struct ImuReport {
+    std::string name;
+    std::string model;
+    std::uint64_t published = 0;
+    std::uint64_t lost = 0;      ///< numbers that never arrived
+    std::uint64_t no_clock = 0;  ///< withheld: before the clock and its neighbours are known
+    std::uint64_t faulty = 0;    ///< published with a sensor error
+    std::uint64_t repeated = 0;  ///< published with the data of the sample before
+    std::uint64_t doubted = 0;   ///< withheld: witnesses contradict number, time or flags
+    HostTime last_sample;        ///< without an error
+    imu::FilterDelay filter;
+    double rate_hz = 0;  ///< configured
+    ImuFailure failure;
+    bool working = false;  ///< it was set up, and has not failed since
+};
+
+/// Thread-safe.
+class ImuPipeline {
+ public:
+    ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
+                clock::Translator& translator, EventJournal& events);
+
+    /// False: the sample is doubted, or not confirmed yet: nothing may be made of its time.
+    bool add(const wire::ImuSample& sample, HostTime received);
+    void board_restarted();
+
+    /// The part was set up, or failed. True: that is new, or is due to be told once more.
+    bool tell(const wire::Event& event, HostTime now);
+    void heartbeat(HostTime now);
+    ImuReport report();
+    /// IMU port of the board.
+    std::uint8_t port() const { return port_; }
+
+ private:
+    void begin_anew();
+    std::optional<Doubt> doubt(const wire::ImuSample& sample, HostTime received);
+    void journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt);
+    std::uint64_t extended(std::uint32_t number) const;
+    void publish(const wire::ImuSample& sample, std::uint64_t number, const clock::Stamp& stamp);
+
+    std::mutex mutex_;
+    const imu::ImuModel& model_;
+    std::uint8_t port_;
+    bool accel_ready_;
+    imu::FilterDelay filter_;
+    ring::Writer ring_;
+    clock::Translator& translator_;
+    EventJournal& events_;
+    Witness<PulseHistory> witness_;
+    StampGuard guard_;
+    std::optional<std::uint64_t> last_number_;
+    ImuReport report_;
+};
+
+}  // namespace versavis::daemon

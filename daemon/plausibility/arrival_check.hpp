@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Holds the board's time of a message against the host's time when it was here.
+#pragma once
+
+#include <optional>
+
+#include "engine/clock/translator.hpp"
+#include "doubt.hpp"
+
+namespace versavis::daemon {
+
+/// `at`: the newest instant that the message tells of. None also while the board's clock is
+/// unknown.
+std::optional<Doubt> contradicts_arrival(BoardTime at, HostTime received,
+                                         const clock::Translator& translator);
+
+}  // namespace versavis::daemon

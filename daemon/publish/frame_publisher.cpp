@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame_publisher.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "exposure_completion.hpp"
+#include "total_sigma.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// Least descriptors of a ring: a reader that sleeps still learns how many frames it lost. At half
+/// it would learn of 32; at twice each ring takes 8 KiB more.
+constexpr std::uint32_t descriptor_floor = 64;
+
+FrameMetadata describe(const pairing::Exposure& exposure) {
+    FrameMetadata metadata{};
+    metadata.trigger = exposure.trigger;
+    metadata.set_tick(exposure.tick);
+    metadata.board_time = middle(exposure.start, exposure.end);
+    if (exposure.kind == StampKind::measured_middle || exposure.length_by_camera)
+        metadata.exposure = exposure.end - exposure.start;
+    metadata.delay_ns = static_cast<std::int32_t>(exposure.delay.ns);
+    metadata.flags = static_cast<std::uint32_t>(exposure.kind) |
+                     (exposure.length_by_camera ? flag_camera_length : 0U);
+    return metadata;
+}
+
+}  // namespace
+
+FramePublisher::FramePublisher(const CameraConfiguration& configuration)
+    : name_(configuration.name), slots_(configuration.slots) {}
+
+Expected<std::optional<ring::Writer>> FramePublisher::make_ring(const ring::Place& place,
+                                                                std::uint64_t payload_size) const {
+    if (ring_ && ring_->slot_size() >= payload_size) return std::nullopt;
+    ring::Shape shape;
+    shape.name = name_;
+    shape.kind = ring::StreamKind::frames;
+    shape.slot_count = slots_;
+    shape.slot_size = payload_size;
+    shape.descriptor_count = std::bit_ceil(std::max(2 * slots_, descriptor_floor));
+    auto ring = ring::Writer::create(place, shape);
+    if (!ring) return Unexpected(ring.error());
+    return std::move(*ring);
+}
+
+bool FramePublisher::publish_proved(const pairing::Arrival& arrival,
+                                    const pairing::Exposure& exposure, const clock::Stamp& middle) {
+    FrameMetadata metadata = describe(exposure);
+    metadata.sigma_ns =
+        total_sigma_ns(middle.sigma_ns, kind_sigma(exposure, arrival.arrived - middle.host));
+    return publish(arrival, middle, metadata);
+}
+
+void FramePublisher::publish_guessed(const pairing::Arrival& arrival,
+                                     const pairing::Exposure& exposure,
+                                     const clock::Stamp& middle) {
+    FrameMetadata metadata = describe(exposure);
+    metadata.flags |= flag_suspect;
+    metadata.sigma_ns = sigma_unknown;
+    publish(arrival, middle, metadata);
+}
+
+void FramePublisher::publish_arrived(const pairing::Arrival& arrival, const clock::Stamp& arrived,
+                                     bool suspect) {
+    FrameMetadata metadata{};
+    metadata.flags = static_cast<std::uint32_t>(StampKind::arrival) | (suspect ? flag_suspect : 0U);
+    metadata.sigma_ns = sigma_unknown;
+    publish(arrival, arrived, metadata);
+}
+
+bool FramePublisher::publish(const pairing::Arrival& arrival, const clock::Stamp& stamp,
+                             FrameMetadata metadata) {
+    metadata.block_id = arrival.block_id;
+    metadata.host_time = stamp.host;
+    metadata.arrival = arrival.arrived;
+    metadata.camera_time = arrival.camera_time;
+    metadata.width = arrival.width;
+    metadata.height = arrival.height;
+    metadata.stride = arrival.stride;
+    metadata.pixel_format = arrival.pixel_format;
+    metadata.epoch = stamp.epoch;
+    const bool suspect = (metadata.flags & flag_suspect) != 0;
+    const auto guarded = guard_.guard(stamp, metadata.sigma_ns, suspect);
+    if (!guarded) return false;
+    metadata.flags |= guarded->flags;
+    metadata.sigma_ns = guarded->sigma_ns;
+    ring_->publish(arrival.slot, arrival.size, guarded->time, pack(metadata), pack(arrival.sensor));
+    return true;
+}
+
+void FramePublisher::heartbeat(HostTime now) {
+    if (ring_) ring_->heartbeat(now);
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,576 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "configuration_check.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <strings.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <cctype>
+#include <tuple>
+
+#include "camera_preset.hpp"
+#include "receive_mode.hpp"
+#include "engine/pairing/pairing.hpp"
+
+namespace versavis::daemon {
+
+namespace {
+
+/// A slow start sends one pulse a second: a frame must come before the next. At half, slow cameras
+/// cannot start; at twice, a frame could be of either pulse.
+constexpr double longest_arrival_without_clock_ms = 900;
+
+/// A reading on the board's grid is set up half a millisecond ahead. At half, slow rates are
+/// refused; at twice, readings would overlap.
+constexpr double fastest_on_grid_hz = 1000;
+
+/// Slowest pulses of sync and test. At half, a cycle takes longer than any check of a cable; at
+/// twice, rates that boards have are refused.
+constexpr double slowest_pulses_hz = 0.1;
+
+class Findings {
+ public:
+    explicit Findings(TomlProblems& problems) : problems_(problems) {}
+
+    void add(const TomlEntry& entry, const std::string& key, const std::string& what,
+             const std::string& cure, const TomlRange& range = {}) {
+        TomlProblem found = entry.problem(key, what, cure);
+        found.range = range;
+        const auto same_place = [&](const TomlProblem& known) {
+            return known.place.line == found.place.line &&
+                   known.place.column == found.place.column && known.key == found.key;
+        };
+        if (std::none_of(problems_.begin(), problems_.end(), same_place))
+            problems_.push_back(std::move(found));
+    }
+
+    /// Refuses a value above what another key leaves.
+    void limit(const TomlEntry& entry, const std::string& key, double value, double maximum,
+               const std::string& reason, const std::string& cure) {
+        if (value > maximum)
+            add(entry, key,
+                fmt::format("'{}' is {}, and must be at most {} ({})", key, quantity(key, value),
+                            quantity(key, maximum), reason),
+                cure, TomlRange{std::nullopt, maximum});
+    }
+
+ private:
+    TomlProblems& problems_;
+};
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// The entry in words, with its line.
+std::string at_line(const TomlEntry& entry) {
+    return fmt::format("{} in line {}", entry.title, entry.place.line);
+}
+
+/// Each that agrees with one before it: told with the first of them.
+template <class Entry, class Same, class Tell>
+void find_repeated(const std::vector<Entry>& entries, Same same, Tell tell) {
+    for (auto second = entries.begin(); second != entries.end(); ++second) {
+        const auto first =
+            std::find_if(entries.begin(), second, [&](const Entry& e) { return same(e, *second); });
+        if (first != second) tell(*first, *second);
+    }
+}
+
+/// Names become names of files.
+bool valid_name(const std::string& name) {
+    const auto allowed = [](unsigned char c) {
+        return std::isalnum(c) != 0 || c == '_' || c == '-';
+    };
+    return !name.empty() && name.size() < 32 && std::all_of(name.begin(), name.end(), allowed);
+}
+
+void check_instance(const Configuration& configuration, Findings& findings) {
+    if (!valid_name(configuration.instance))
+        findings.add(configuration.entry, "instance",
+                     fmt::format("'{}' is not a valid name", clipped(configuration.instance)),
+                     "use up to 31 letters, digits, '_' and '-'");
+}
+
+void check_that_it_serves(const Configuration& configuration, Findings& findings) {
+    const auto& keys = configuration.entry;
+    if (!keys.has("camera") && !keys.has("imu"))
+        findings.add(configuration.entry, "", "there is nothing to serve",
+                     "write a table [[camera]] with 'name' and 'device', or [[imu]] with 'model'");
+}
+
+void check_link(const Configuration& configuration, Findings& findings) {
+    const BoardConfiguration& board = configuration.board;
+    const std::string prefix = "unix:";
+    const bool is_unix = board.link.rfind(prefix, 0) == 0;
+    const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1;
+    if (board.link != "usb" && (!is_unix || board.link == prefix))
+        findings.add(board.entry, "link",
+                     fmt::format("'{}' is not a valid link", clipped(board.link)),
+                     "use \"usb\" or \"unix:/path/of/socket\"");
+    else if (is_unix && board.link.size() - prefix.size() > longest)
+        findings.add(board.entry, "link",
+                     fmt::format("the path of a socket has {} characters at most", longest),
+                     "use a shorter one");
+}
+
+void check_pps(const Configuration& configuration, Findings& findings) {
+    using clock::PpsLabels;
+    const ClockConfiguration& clock = configuration.clock;
+    if (clock.pps == PpsLabels::off) return;
+    if (clock.output == clock::OutputClockKind::monotonic_raw)
+        findings.add(clock.entry, "pps", "PPS cannot label CLOCK_MONOTONIC_RAW",
+                     "choose output = \"realtime\" or \"tai\", or pps = \"off\"");
+    if (!contains(configuration.ports.inputs, "pps"))
+        findings.add(clock.entry, "pps", "'pps' needs the PPS input, which is not enabled",
+                     "add \"pps\" to 'inputs' of [ports]");
+    if (clock.pps == PpsLabels::nmea && !configuration.ports.nmea)
+        findings.add(clock.entry, "pps", "pps = \"nmea\" needs a receiver at the board's UART",
+                     "set nmea = true in [ports], or pps = \"host\"");
+}
+
+struct NamedEntry {
+    const TomlEntry& entry;
+    const std::string& name;
+};
+
+void check_names(const Configuration& configuration, Findings& findings) {
+    std::vector<NamedEntry> all;
+    for (const auto& camera : configuration.cameras) all.push_back({camera.entry, camera.name});
+    for (const auto& imu : configuration.imus) all.push_back({imu.entry, imu.name});
+    const std::vector<std::string> taken{"clock", "events", "status"};
+    for (const auto& [entry, name] : all) {
+        const std::size_t stem = name.size() - std::min(name.size(), evidence_suffix.size());
+        if (name.empty())
+            findings.add(entry, "name", "a 'name' is needed", "give one, such as \"cam0\"");
+        else if (!valid_name(name))
+            findings.add(entry, "name", fmt::format("'{}' is not a valid name", clipped(name)),
+                         "use up to 31 letters, digits, '_' and '-'");
+        else if (contains(taken, name) || name.substr(stem) == evidence_suffix)
+            findings.add(entry, "name",
+                         fmt::format("the name '{}' is taken by a stream of the service", name),
+                         "choose another");
+    }
+    find_repeated(
+        all, [](const NamedEntry& a, const NamedEntry& b) { return a.name == b.name; },
+        [&](const NamedEntry& first, const NamedEntry& second) {
+            findings.add(
+                second.entry, "name",
+                fmt::format("the name '{}' is taken by {}", second.name, at_line(first.entry)),
+                "choose another");
+        });
+}
+
+/// Digits and dots in three groups or more are meant as an IP address.
+bool is_broken_address(const std::string& device) {
+    const bool numeric = device.find_first_not_of("0123456789.") == std::string::npos;
+    in_addr address{};
+    return numeric && std::count(device.begin(), device.end(), '.') >= 2 &&
+           ::inet_pton(AF_INET, device.c_str(), &address) != 1;
+}
+
+void check_devices(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        if (camera.device.empty())
+            findings.add(camera.entry, "device", "a camera needs a 'device'",
+                         "give its IP address, serial number or name; arv-tool-0.8 lists them");
+        if (is_broken_address(camera.device))
+            findings.add(camera.entry, "device",
+                         fmt::format("'{}' is not an IP address", clipped(camera.device)),
+                         "an IP address is four numbers from 0 to 255, such as 192.168.1.20");
+    }
+    find_repeated(
+        configuration.cameras,
+        [](const CameraConfiguration& a, const CameraConfiguration& b) {
+            return !a.device.empty() && ::strcasecmp(a.device.c_str(), b.device.c_str()) == 0;
+        },
+        [&](const CameraConfiguration& first, const CameraConfiguration& second) {
+            findings.add(second.entry, "device",
+                         fmt::format("'{}' is the device of {}", clipped(second.device),
+                                     at_line(first.entry)),
+                         "one camera has one table: give another device, or remove the table");
+        });
+}
+
+/// The lateness of a packet socket varies.
+void check_receive(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.receive == ReceiveMode::packet && !packet_socket_suits(camera))
+            findings.add(camera.entry, "receive",
+                         fmt::format("\"packet\" delivers frames up to {} ms late, too much for a "
+                                     "period of {:g} ms",
+                                     packet_socket_lateness.ns / 1'000'000,
+                                     static_cast<double>(period_of(camera).ns) * 1e-6),
+                         "use \"auto\" or \"socket\"");
+}
+
+void check_outputs(const Configuration& configuration, Findings& findings) {
+    const auto triggered = [](const CameraConfiguration& camera) {
+        return camera.trigger == TriggerSource::board;
+    };
+    std::vector<unsigned> free;
+    for (unsigned output = 0; output < wire::camera_count; ++output)
+        if (std::none_of(configuration.cameras.begin(), configuration.cameras.end(),
+                         [&](const auto& c) { return triggered(c) && c.output == output; }))
+            free.push_back(output);
+    find_repeated(
+        configuration.cameras,
+        [&](const CameraConfiguration& a, const CameraConfiguration& b) {
+            return triggered(a) && triggered(b) && a.output == b.output;
+        },
+        [&](const CameraConfiguration& first, const CameraConfiguration& second) {
+            findings.add(
+                second.entry, "output",
+                fmt::format("output {} is taken by {}", second.output, at_line(first.entry)),
+                free.empty() ? "the board triggers four cameras at most"
+                             : fmt::format("free: {}", fmt::join(free, ", ")));
+        });
+}
+
+void check_history(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (camera.entry.has("slots") && camera.entry.has("history_s"))
+            findings.add(camera.entry, "history_s",
+                         "'slots' and 'history_s' both say how many frames the ring holds",
+                         "keep one of them");
+}
+
+bool can_be_master(const CameraConfiguration& camera) {
+    return camera.trigger == TriggerSource::board && camera.master.empty() &&
+           camera.strobe != Strobe::none;
+}
+
+/// Why `slave` cannot have its master; empty: it can.
+std::string wrong_with_master(const Configuration& configuration,
+                              const CameraConfiguration& slave) {
+    const auto& cameras = configuration.cameras;
+    const auto master = std::find_if(cameras.begin(), cameras.end(),
+                                     [&](const auto& c) { return c.name == slave.master; });
+    if (master == cameras.end()) return "there is no camera of that name";
+    if (master->name == slave.name) return "it is this camera itself";
+    if (master->trigger != TriggerSource::board) return "the board does not trigger it";
+    if (!master->master.empty()) return "it has a master itself";
+    return master->strobe == Strobe::none ? "it has no exposure line" : "";
+}
+
+void check_master(const Configuration& configuration, const CameraConfiguration& slave,
+                  Findings& findings) {
+    if (slave.trigger == TriggerSource::free_run)
+        return findings.add(slave.entry, "master",
+                            "a camera with trigger = \"free\" has no 'master'",
+                            "remove one of the two");
+    for (const char* key : {"rate_hz", "phase_us", "max_exposure_us"})
+        if (slave.entry.has(key))
+            findings.add(slave.entry, key, fmt::format("a slave has the '{}' of its master", key),
+                         "remove the key, or 'master'");
+    const std::string wrong = wrong_with_master(configuration, slave);
+    if (wrong.empty()) return;
+    std::vector<std::string> possible;
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (can_be_master(camera) && camera.name != slave.name) possible.push_back(camera.name);
+    findings.add(slave.entry, "master",
+                 fmt::format("'{}' cannot be the master: {}", clipped(slave.master), wrong),
+                 possible.empty() ? "no other camera has an exposure line and no master: remove it"
+                                  : fmt::format("possible: {}", fmt::join(possible, ", ")));
+}
+
+void check_masters(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        if (!camera.master.empty()) check_master(configuration, camera, findings);
+}
+
+void check_camera_times(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const double period = 1e6 / camera.rate_hz;
+        const double before_next = period - 1e-3;
+        const std::string slower = camera.master.empty() ? "lower it, or 'rate_hz'"
+                                                         : "lower it, or 'rate_hz' of its master";
+        const auto limit = [&](const char* key, double value, double maximum, const char* reason,
+                               const std::string& cure) {
+            findings.limit(camera.entry, key, value, maximum, reason, cure);
+        };
+        limit("latest_arrival_ms", camera.latest_arrival_ms, longest_arrival_ms(camera),
+              camera.camera_clock ? "the service remembers no more exposures at this rate"
+                                  : "without 'camera_clock' the start sends one pulse a second",
+              camera.camera_clock ? slower : "lower it, or set camera_clock = true");
+        if (camera.trigger == TriggerSource::free_run) continue;
+        limit("phase_us", camera.phase_us, before_next, "less than the period", slower);
+        limit("latency_us", camera.latency_us, before_next, "less than the period", slower);
+        limit("gap_us", camera.gap_us, before_next, "less than the period", slower);
+        limit("pulse_us", camera.pulse_us, period / 2, "half the period", slower);
+        limit("exposure_us", camera.exposure_us, period - camera.latency_us - camera.gap_us,
+              "with 'latency_us' and 'gap_us' it must end before the next trigger", slower);
+        limit("exposure_us", camera.exposure_us, camera.max_exposure_us, "'max_exposure_us'",
+              "lower it, or raise 'max_exposure_us'");
+    }
+}
+
+/// What would last too short for the board to see.
+void check_glitch(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const auto seen = [&](const TomlEntry& entry, const char* key, double us) {
+            if (!entry.has(key)) return;
+            if (const auto hidden = hidden_exposure(camera, key, us))
+                findings.add(entry, key, hidden->what, hidden->cure,
+                             TomlRange{camera.glitch_us, std::nullopt});
+        };
+        seen(camera.entry, "exposure_us", camera.exposure_us);
+        seen(camera.entry, "max_exposure_us", camera.max_exposure_us);
+        if (camera.exposure_by_pulse && camera.master.empty())
+            seen(camera.entry, "pulse_us", camera.pulse_us);
+        if (!camera.auto_exposure.enabled) continue;
+        seen(camera.auto_exposure.entry, "min_us", camera.auto_exposure.min_us);
+        seen(camera.auto_exposure.entry, "max_us", camera.auto_exposure.max_us);
+    }
+}
+
+void check_auto_exposure(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const AutoExposureConfiguration& control = camera.auto_exposure;
+        if (!control.enabled) continue;
+        findings.limit(control.entry, "max_us", control.max_us, camera.max_exposure_us,
+                       "'max_exposure_us' of the camera", "lower it, or raise 'max_exposure_us'");
+        findings.limit(control.entry, "min_us", control.min_us, control.max_us, "'max_us'",
+                       "lower it, or raise 'max_us'");
+        if (camera.exposure_by_pulse)
+            findings.add(camera.entry, "auto_exposure",
+                         "the length of the trigger sets the exposure: auto exposure cannot",
+                         "set exposure = \"timed\", or remove [camera.auto_exposure]");
+    }
+}
+
+/// What a preset can do is known without the camera, if it is named.
+void check_preset(const CameraConfiguration& camera, const std::vector<CameraPreset>& presets,
+                  Findings& findings) {
+    if (camera.preset == "auto") return;
+    std::vector<std::string> names{"auto"};
+    for (const CameraPreset& preset : presets) names.push_back(preset.name);
+    const auto preset = std::find_if(presets.begin(), presets.end(),
+                                     [&](const auto& p) { return p.name == camera.preset; });
+    if (preset == presets.end())
+        return findings.add(camera.entry, "preset",
+                            fmt::format("there is no preset '{}'", clipped(camera.preset)),
+                            fmt::format("use one of: {}", fmt::join(names, ", ")));
+    const std::tuple<const char*, const char*, bool> asked[]{
+        {"chunks", "chunks", camera.chunks.value_or(false)},
+        {"ptp", "ptp", camera.ptp},
+        {"exposure", "pulse_width", camera.exposure_by_pulse}};
+    for (const auto& [key, group, wanted] : asked)
+        if (wanted && preset->groups.at(group).empty())
+            findings.add(camera.entry, key,
+                         fmt::format("cameras of preset '{}' have no '{}'", preset->name, group),
+                         "remove the key, or set the features by name in [camera.features]");
+}
+
+void check_presets(const Configuration& configuration, Findings& findings) {
+    if (configuration.cameras.empty()) return;
+    const auto presets = load_presets(preset_directory(configuration));
+    if (!presets) {
+        const Error& error = presets.error();
+        return findings.add(configuration.entry, "preset_directory",
+                            error.where + ": " + error.what, error.cure);
+    }
+    for (const CameraConfiguration& camera : configuration.cameras)
+        check_preset(camera, *presets, findings);
+}
+
+/// The bus of a part, and its lines.
+void check_imu_wiring(const ImuConfiguration& imu, Findings& findings) {
+    const imu::ImuModel& model = *imu.model;
+    const bool serial = imu.port() == 1;
+    const bool has_i2c = model.fastest_i2c_hz > 0;
+    if (imu.entry.has("bus") && serial)
+        findings.add(imu.entry, "bus", fmt::format("the {} is on the UART", model.name),
+                     "remove the key");
+    else if (imu.bus == ImuBus::i2c && !has_i2c)
+        findings.add(imu.entry, "bus", fmt::format("the {} has no I2C", model.name),
+                     "set bus = \"spi\"; of all parts only the icm42688p can be on I2C");
+    else if (imu.bus == ImuBus::i2c && !imu.data_ready)
+        findings.add(imu.entry, "bus",
+                     "a reading takes so long on I2C that the data-ready line must begin it",
+                     "wire that line and set data_ready = true, or put the part on the SPI");
+    if (imu.entry.has("i2c_address") && imu.bus != ImuBus::i2c)
+        findings.add(imu.entry, "i2c_address", "'i2c_address' is of a part on I2C",
+                     has_i2c ? "set bus = \"i2c\", or remove the key" : "remove the key");
+    if (imu.i2c_address != first_i2c_address && imu.i2c_address != second_i2c_address)
+        findings.add(imu.entry, "i2c_address",
+                     fmt::format("'i2c_address' is 0x{:02X}, and must be 0x{:02X} or 0x{:02X}",
+                                 imu.i2c_address, first_i2c_address, second_i2c_address),
+                     "see which of them its address pin chooses");
+    if (!imu.accel_ready) return;
+    if (!model.accel_ready)
+        findings.add(imu.entry, "accel_ready",
+                     fmt::format("the {} has no data-ready line of its accelerometer", model.name),
+                     "remove the key; of all parts only the bmi088 has one");
+    else if (!imu.data_ready)
+        findings.add(imu.entry, "accel_ready",
+                     "'accel_ready' needs the data-ready line of the gyro, which paces the samples",
+                     "wire that line and set data_ready = true, or remove the key");
+}
+
+void check_imus(const Configuration& configuration, Findings& findings) {
+    for (const ImuConfiguration& imu : configuration.imus) {
+        const imu::ImuModel& model = *imu.model;
+        check_imu_wiring(imu, findings);
+        if (imu.bus == ImuBus::i2c && model.fastest_i2c_hz > 0)
+            findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_i2c_hz,
+                           fmt::format("the fastest of the {} on I2C", model.name),
+                           "lower it, or put the part on the SPI");
+        findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_hz,
+                       fmt::format("the fastest of the {}", model.name), "lower it");
+        if (!imu.data_ready)
+            findings.limit(imu.entry, "rate_hz", imu.rate_hz, fastest_on_grid_hz,
+                           "faster only with the data-ready line", "lower it, or wire that line");
+        findings.limit(imu.entry, "filter", imu.filter, model.strongest_filter,
+                       fmt::format("the strongest of the {}", model.name), "lower it");
+    }
+    find_repeated(
+        configuration.imus,
+        [](const ImuConfiguration& a, const ImuConfiguration& b) { return a.port() == b.port(); },
+        [&](const ImuConfiguration& first, const ImuConfiguration& second) {
+            findings.add(
+                second.entry, "model",
+                fmt::format("the board has one port for IMUs on {}, taken by {}",
+                            second.port() == 0 ? "SPI or I2C" : "the UART", at_line(first.entry)),
+                "a vn100 is on the UART, all others on SPI or I2C; remove one of the "
+                "tables");
+        });
+}
+
+void check_illumination(const Configuration& configuration, Findings& findings) {
+    for (const std::string& name : configuration.illumination.cameras)
+        if (find_triggered_camera(configuration, name) == nullptr)
+            findings.add(configuration.illumination.entry, "cameras",
+                         fmt::format("'{}' is not a camera that the board triggers", clipped(name)),
+                         "use the 'name' of a table [[camera]]");
+}
+
+void check_inputs(const Configuration& configuration, Findings& findings) {
+    const PortConfiguration& ports = configuration.ports;
+    for (const auto& [key, names] :
+         {std::pair("inputs", &ports.inputs), {"falling", &ports.falling}})
+        for (const std::string& name : *names)
+            if (!contains(pulse_input_names, name))
+                findings.add(ports.entry, key, fmt::format("'{}' is not an input", clipped(name)),
+                             fmt::format("use some of: {}", fmt::join(pulse_input_names, ", ")));
+    for (const std::string& name : ports.falling)
+        if (!contains(ports.inputs, name))
+            findings.add(ports.entry, "falling",
+                         fmt::format("'{}' is not enabled: its edges are no events", clipped(name)),
+                         "add it to 'inputs', or remove it");
+}
+
+void check_uart_and_imu_output(const Configuration& configuration, Findings& findings) {
+    const PortConfiguration& ports = configuration.ports;
+    if (ports.nmea && !contains(ports.inputs, "pps"))
+        findings.add(ports.entry, "nmea",
+                     "'nmea' names the pulses of the PPS input, which is not enabled",
+                     "add \"pps\" to 'inputs'");
+    if (ports.nmea && find_imu_at(configuration, 1) != nullptr)
+        findings.add(ports.entry, "nmea", "'nmea' needs the UART, which the vn100 has",
+                     "remove one of them");
+    if (ports.imu_output && find_imu_at(configuration, 0) == nullptr)
+        findings.add(ports.entry, "imu_output", "'imu_output' needs an IMU on SPI or I2C",
+                     "add a table [[imu]] of any model but vn100, or remove the key");
+}
+
+/// Outputs that nothing else uses, as `test_output` names them.
+std::vector<std::string> free_test_outputs(const Configuration& configuration) {
+    std::vector<std::string> free{"test"};
+    if (configuration.ports.sync_rate_hz == 0) free.emplace_back("sync");
+    for (unsigned output = 0; output < wire::camera_count; ++output)
+        if (find_camera_at(configuration, output) == nullptr)
+            free.push_back(fmt::format("trigger{}", output));
+    return free;
+}
+
+/// Pulses of a rate of their own.
+void check_test_rate(const Configuration& configuration, Findings& findings) {
+    const PortConfiguration& ports = configuration.ports;
+    if (ports.test_rate_hz == 0 && ports.test_output != wire::test_at_test)
+        findings.add(
+            ports.entry, "test_output",
+            "'test_output' is where the pulses of 'test_rate_hz' leave, and there are none",
+            "set 'test_rate_hz', or remove the key");
+    if (ports.test_rate_hz == 0) return;
+    if (ports.test_rate_hz < slowest_pulses_hz)
+        findings.add(ports.entry, "test_rate_hz",
+                     "'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz", "raise it",
+                     TomlRange{slowest_pulses_hz, fastest_test_hz});
+    if (!ports.test.empty())
+        findings.add(ports.entry, "test_rate_hz",
+                     fmt::format("the test pulses show '{}' already ('test')", clipped(ports.test)),
+                     "remove one of the two keys");
+    if (ports.test_output == wire::test_at_sync && ports.sync_rate_hz != 0)
+        findings.add(ports.entry, "test_output", "the sync output has the pulses of 'sync_rate_hz'",
+                     "set sync_rate_hz = 0, or choose another output");
+    if (ports.test_output < wire::test_at_camera0 || ports.test_output >= wire::test_at_sync)
+        return;
+    const unsigned output = ports.test_output - unsigned{wire::test_at_camera0};
+    if (const CameraConfiguration* camera = find_camera_at(configuration, output))
+        findings.add(ports.entry, "test_output",
+                     fmt::format("output {} triggers {}", output, at_line(camera->entry)),
+                     fmt::format("free: {}", fmt::join(free_test_outputs(configuration), ", ")));
+}
+
+void check_pulse_outputs(const Configuration& configuration, Findings& findings) {
+    const PortConfiguration& ports = configuration.ports;
+    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < slowest_pulses_hz)
+        findings.add(ports.entry, "sync_rate_hz",
+                     "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz", "raise it",
+                     TomlRange{slowest_pulses_hz, fastest_sync_hz});
+    const ImuConfiguration* uart = find_imu_at(configuration, 1);
+    if (!test_source(configuration))
+        findings.add(
+            ports.entry, "test",
+            fmt::format("'{}' is neither a triggered camera nor an IMU", clipped(ports.test)),
+            "use the 'name' of a table [[camera]] or [[imu]], or \"\" for none");
+    else if (uart != nullptr && uart->name == ports.test && !uart->data_ready)
+        findings.add(ports.entry, "test", "the ticks of a vn100 are known by its data-ready line",
+                     "wire that line and set data_ready = true, or test something else");
+    if (const double rate = test_pulse_rate_hz(configuration); rate != 0)
+        findings.limit(ports.entry, "pulse_us", ports.pulse_us, 1e6 / rate / 2,
+                       ports.test.empty()
+                           ? std::string("half the period of 'test_rate_hz'")
+                           : fmt::format("half the period of '{}', which 'test' shows", ports.test),
+                       "lower it");
+}
+
+constexpr void (*rules[])(const Configuration&, Findings&){
+    check_that_it_serves, check_instance,      check_link,          check_pps,
+    check_names,          check_devices,       check_outputs,       check_masters,
+    check_camera_times,   check_glitch,        check_auto_exposure, check_presets,
+    check_imus,           check_illumination,  check_inputs,        check_uart_and_imu_output,
+    check_test_rate,      check_pulse_outputs, check_history,       check_receive};
+
+}  // namespace
+
+std::optional<HiddenExposure> hidden_exposure(const CameraConfiguration& camera,
+                                              std::string_view key, double us) {
+    const bool watched = camera.trigger == TriggerSource::board && camera.strobe != Strobe::none;
+    if (!watched || us >= camera.glitch_us) return std::nullopt;
+    return HiddenExposure{
+        fmt::format("'{}' is {:.10g} us, and must be at least {:.10g} us ('glitch_us'): the board "
+                    "takes what is shorter on the exposure line for a disturbance",
+                    key, us, camera.glitch_us),
+        "lower 'glitch_us', or expose for longer"};
+}
+
+double longest_arrival_ms(const CameraConfiguration& camera) {
+    const double kept =
+        static_cast<double>(pairing::longest_latest_arrival(period_of(camera)).ns) * 1e-6;
+    return camera.camera_clock ? kept : std::min(kept, longest_arrival_without_clock_ms);
+}
+
+void add_problems(const Configuration& configuration, TomlProblems& problems) {
+    Findings findings(problems);
+    for (const auto rule : rules) rule(configuration, findings);
+    std::stable_sort(problems.begin(), problems.end(), [](const auto& a, const auto& b) {
+        return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+    });
+}
+
+}  // namespace versavis::daemon

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "receive_mode.hpp"
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace versavis::daemon {
+
+bool packet_socket_suits(const CameraConfiguration& camera) {
+    return period_of(camera) >= packet_socket_lateness * latenesses_in_period;
+}
+
+Duration receive_lateness(const CameraConfiguration& camera) {
+    const bool perhaps_packet =
+        camera.receive == ReceiveMode::packet ||
+        (camera.receive == ReceiveMode::automatic && packet_socket_suits(camera));
+    return perhaps_packet ? packet_socket_lateness : Duration{};
+}
+
+bool packet_socket_allowed() {
+    const int socket = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);  // receives nothing
+    if (socket < 0) return false;
+    ::close(socket);
+    return true;
+}
+
+Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed,
+                                          bool plain_images) {
+    if (camera.receive == ReceiveMode::packet && !allowed)
+        return failure("receive", "\"packet\" needs CAP_NET_RAW, which the service lacks",
+                       "grant it, as the systemd unit does, or set receive = \"auto\"");
+    const bool packet =
+        plain_images &&
+        (camera.receive == ReceiveMode::packet ||
+         (camera.receive == ReceiveMode::automatic && allowed && packet_socket_suits(camera)));
+    return packet ? ReceiveMode::packet : ReceiveMode::socket;
+}
+
+const char* to_string(ReceiveMode mode) {
+    switch (mode) {
+        case ReceiveMode::automatic: return "";
+        case ReceiveMode::socket: return "socket";
+        case ReceiveMode::packet: return "packet";
+    }
+    return "";
+}
+
+}  // namespace versavis::daemon
