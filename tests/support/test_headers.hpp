@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>

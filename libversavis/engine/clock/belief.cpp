@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/clock/belief.hpp"
+#include "engine/clock/belief_matrix.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,15 +45,14 @@ Belief Belief::after_exchange(double round_trip_ns) {
     belief.mean[3] = start_delay_of_round_trip * round_trip_ns;
     const double delay_sigma = belief.mean[3];
     const double offset_sigma = start_sigma_of_round_trip * round_trip_ns;
-    belief.covariance.diagonal() << offset_sigma * offset_sigma,
-        start_skew_sigma * start_skew_sigma, drift_walk * drift_walk * drift_memory_s / 2,
-        delay_sigma * delay_sigma;
+    matrix(belief).diagonal() << offset_sigma * offset_sigma, start_skew_sigma * start_skew_sigma,
+        drift_walk * drift_walk * drift_memory_s / 2, delay_sigma * delay_sigma;
     return belief;
 }
 
-Belief::Matrix transition(Duration span) {
+BeliefMatrix transition(Duration span) {
     const double seconds = to_seconds(span);
-    Belief::Matrix result = Belief::Matrix::Identity();
+    BeliefMatrix result = BeliefMatrix::Identity();
     result(0, 1) = seconds;
     result(0, 2) = 0.5 * seconds * seconds;
     result(1, 2) = seconds;
@@ -61,12 +60,12 @@ Belief::Matrix transition(Duration span) {
     return result;
 }
 
-Belief::Matrix process_noise(Duration span) {
+BeliefMatrix process_noise(Duration span) {
     const double t = std::abs(to_seconds(span));
     const double t2 = t * t;
     const double skew = skew_walk * skew_walk;
     const double drift = drift_walk * drift_walk;
-    Belief::Matrix noise = Belief::Matrix::Zero();
+    BeliefMatrix noise = BeliefMatrix::Zero();
     noise(0, 0) = skew * t2 * t / 3 + drift * t2 * t2 * t / 20;
     noise(0, 1) = noise(1, 0) = skew * t2 / 2 + drift * t2 * t2 / 8;
     noise(0, 2) = noise(2, 0) = drift * t2 * t / 6;
@@ -78,8 +77,11 @@ Belief::Matrix process_noise(Duration span) {
 }
 
 Belief Belief::after(Duration span) const {
-    const Matrix change = transition(span);
-    return {change * mean, change * covariance * change.transpose() + process_noise(span)};
+    const BeliefMatrix change = transition(span);
+    Belief later;
+    vector(later) = change * vector(*this);
+    matrix(later) = change * matrix(*this) * change.transpose() + process_noise(span);
+    return later;
 }
 
 double Belief::offset_after(Duration span) const {
@@ -87,7 +89,7 @@ double Belief::offset_after(Duration span) const {
     return mean[0] + seconds * (mean[1] + 0.5 * seconds * mean[2]);
 }
 
-Belief::Vector Belief::level_by_component(double sign, Duration span) {
+BeliefVector level_by_component(double sign, Duration span) {
     const double seconds = to_seconds(span);
     return {sign, sign * seconds, sign * 0.5 * seconds * seconds, 1};
 }
@@ -95,7 +97,7 @@ Belief::Vector Belief::level_by_component(double sign, Duration span) {
 double Belief::offset_variance_after(Duration span) const {
     const double seconds = to_seconds(span);
     const double half_square = 0.5 * seconds * seconds;
-    const Matrix& c = covariance;
+    const auto c = matrix(*this);
     const double t = std::abs(seconds);
     const double aged =
         skew_walk * skew_walk * t * t * t / 3 + drift_walk * drift_walk * t * t * t * t * t / 20;

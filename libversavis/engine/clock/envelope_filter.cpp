@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/clock/belief_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -192,7 +193,7 @@ void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     belief_ = Belief::after_exchange(static_cast<double>(round_trip.ns));
     if (reset_) {
         belief_.mean[1] = kept_skew;
-        belief_.covariance(1, 1) = square(kept_skew_sigma);
+        matrix(belief_)(1, 1) = square(kept_skew_sigma);
     }
     begun_ = true;
     confirmed_ = false;
@@ -288,9 +289,9 @@ void EnvelopeFilter::follow_fall(const Passage& up, const Passage& down) {
 }
 
 void EnvelopeFilter::shift_level(double by_ns) {
-    if (square(by_ns) < square(shift_deviations) * belief_.covariance(3, 3)) return;
+    if (square(by_ns) < square(shift_deviations) * matrix(belief_)(3, 3)) return;
     belief_.mean[3] += by_ns;
-    belief_.covariance(3, 3) += square(by_ns);
+    matrix(belief_)(3, 3) += square(by_ns);
 }
 
 void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
@@ -307,11 +308,11 @@ void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
 /// Moments of the belief given this delay.
 void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
     const Duration since = passage.at - reference_;
-    const Belief::Vector direction = Belief::level_by_component(edge.sign(), since);
+    const BeliefVector direction = level_by_component(edge.sign(), since);
     const double blur = edge_blur(edge.scale_ns());
-    const double excess = edge.sign() * relative_ns(passage) - direction.dot(belief_.mean);
+    const double excess = edge.sign() * relative_ns(passage) - direction.dot(vector(belief_));
     const auto deviation = [&] {
-        return std::sqrt(direction.dot(belief_.covariance * direction) + square(blur));
+        return std::sqrt(direction.dot(matrix(belief_) * direction) + square(blur));
     };
     recent_surprises_ *= surprise_memory;
     if (excess < -surprising * deviation()) {
@@ -319,26 +320,26 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
         if (++recent_surprises_ > surprises_of_skew) {
             // One may be anything; several in a row say that a clock runs at another pace than it
             // did.
-            belief_.covariance(1, 1) += square(excess / surprise_span_s);
+            matrix(belief_)(1, 1) += square(excess / surprise_span_s);
             recent_surprises_ = 0;
         }
-        belief_.covariance *= std::min(square(excess / (surprising * deviation())), most_inflation);
+        matrix(belief_) *= std::min(square(excess / (surprising * deviation())), most_inflation);
         // Without an end to them no component may grow beyond all that a first exchange leaves
         // open.
-        if (belief_.covariance(1, 1) > square(largest_skew))
+        if (matrix(belief_)(1, 1) > square(largest_skew))
             belief_.covariance =
                 Belief::after_exchange(static_cast<double>(last_round_trip_.ns)).covariance;
     }
     const Influence influence =
         influence_of(excess, std::max(deviation(), -excess / surprising), edge.scale_ns());
-    const Belief::Vector gain = belief_.covariance * direction;
-    belief_.mean += gain * influence.score;
-    belief_.covariance -= influence.curvature * gain * gain.transpose();
+    const BeliefVector gain = matrix(belief_) * direction;
+    vector(belief_) += gain * influence.score;
+    matrix(belief_) -= influence.curvature * gain * gain.transpose();
     // No delay is negative; left alone, both edges could slide below what they bound.
     if (belief_.mean[3] < 0)
-        belief_.mean -= belief_.covariance.col(3) * (belief_.mean[3] / belief_.covariance(3, 3));
+        vector(belief_) -= matrix(belief_).col(3) * (belief_.mean[3] / matrix(belief_)(3, 3));
     // What rounding makes unequal is never measured away, but surprises would inflate it.
-    belief_.covariance = (0.5 * (belief_.covariance + belief_.covariance.transpose())).eval();
+    matrix(belief_) = (0.5 * (matrix(belief_) + matrix(belief_).transpose())).eval();
 }
 
 void EnvelopeFilter::remember_round_trip(BoardTime now, Duration round_trip) {
@@ -354,7 +355,7 @@ Duration EnvelopeFilter::smallest_round_trip() const {
     return std::min(smallest_in_window_, smallest_before_);
 }
 
-double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(belief_.covariance(1, 1)) * 1e-3; }
+double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(matrix(belief_)(1, 1)) * 1e-3; }
 
 Duration EnvelopeFilter::presumed_asymmetry() const {
     if (asymmetry_) return {};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/clock/belief_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -44,8 +45,8 @@ void PpsMap::begin(BoardTime at, OutputTime second) {
     reference_ = at;
     base_ = {second.ns - at.ns};
     belief_ = Belief::after_exchange(0);
-    belief_.covariance(0, 0) = pulse_sigma_ns * pulse_sigma_ns;
-    belief_.covariance(1, 1) = crystal_sigma * crystal_sigma;
+    matrix(belief_)(0, 0) = pulse_sigma_ns * pulse_sigma_ns;
+    matrix(belief_)(1, 1) = crystal_sigma * crystal_sigma;
     in_row_ = 1;
     misfits_in_row_ = 0;
     last_residual_ = {};
@@ -62,7 +63,7 @@ void PpsMap::add(BoardTime at, OutputTime second) {
         return begin(at, second);
     const Belief now = belief_.after(at - reference_);
     const double residual = static_cast<double>(second.ns - at.ns - base_.ns) - now.mean[0];
-    const double variance = now.covariance(0, 0) + pulse_sigma_ns * pulse_sigma_ns;
+    const double variance = matrix(now)(0, 0) + pulse_sigma_ns * pulse_sigma_ns;
     last_residual_ = rounded(residual);
     if (!agrees(residual, variance)) {
         ++rejected_;
@@ -72,9 +73,9 @@ void PpsMap::add(BoardTime at, OutputTime second) {
     misfits_in_row_ = 0;
     ++in_row_;
     reference_ = at;
-    const Belief::Vector gain = now.covariance.col(0) / variance;
-    belief_.mean = now.mean + gain * residual;
-    belief_.covariance = now.covariance - gain * now.covariance.row(0);
+    const BeliefVector gain = matrix(now).col(0) / variance;
+    vector(belief_) = vector(now) + gain * residual;
+    matrix(belief_) = matrix(now) - gain * matrix(now).row(0);
 }
 
 bool PpsMap::healthy(BoardTime now) const {

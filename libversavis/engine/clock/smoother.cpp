@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/clock/belief_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -41,8 +42,8 @@ constexpr Duration longest_silence = seconds(3);
 
 double square(double x) { return x * x; }
 
-Belief::Vector level_now(Direction direction) {
-    return Belief::level_by_component(static_cast<double>(direction), {});
+BeliefVector level_now(Direction direction) {
+    return level_by_component(static_cast<double>(direction), {});
 }
 
 }  // namespace
@@ -113,14 +114,14 @@ void Smoother::pass_forth(Segment& segment, bool first) {
     for (Knot& knot : segment.knots) {
         belief = belief.after(knot.site.passage.at - at);
         at = knot.site.passage.at;
-        const Belief::Vector direction = level_now(knot.site.direction);
-        const Belief::Vector gain = belief.covariance * direction;
+        const BeliefVector direction = level_now(knot.site.direction);
+        const BeliefVector gain = matrix(belief) * direction;
         const double variance = direction.dot(gain);
-        const double mean = direction.dot(belief.mean);
+        const double mean = direction.dot(vector(belief));
         if (first) judge(knot, level_ns(segment, knot), mean, variance, 1);
         const double scale = 1 / (1 + knot.precision * variance);
-        belief.mean += gain * scale * (knot.precision_mean - knot.precision * mean);
-        belief.covariance -= knot.precision * scale * gain * gain.transpose();
+        vector(belief) += gain * scale * (knot.precision_mean - knot.precision * mean);
+        matrix(belief) -= knot.precision * scale * gain * gain.transpose();
         knot.filtered = belief;
     }
 }
@@ -132,13 +133,13 @@ void Smoother::pass_back(Segment& segment) {
         const Belief& filtered = knots[i].filtered;
         const Duration span = knots[i + 1].site.passage.at - knots[i].site.passage.at;
         const Belief predicted = filtered.after(span);
-        const Belief::Matrix back =
-            predicted.covariance.ldlt().solve(transition(span) * filtered.covariance).transpose();
+        const BeliefMatrix back =
+            matrix(predicted).ldlt().solve(transition(span) * matrix(filtered)).transpose();
         const Belief& later = knots[i + 1].smoothed;
-        knots[i].smoothed.mean = filtered.mean + back * (later.mean - predicted.mean);
-        knots[i].smoothed.covariance =
-            filtered.covariance +
-            back * (later.covariance - predicted.covariance) * back.transpose();
+        Belief& smoothed = knots[i].smoothed;
+        vector(smoothed) = vector(filtered) + back * (vector(later) - vector(predicted));
+        matrix(smoothed) =
+            matrix(filtered) + back * (matrix(later) - matrix(predicted)) * back.transpose();
     }
 }
 
@@ -196,12 +197,12 @@ void Smoother::rescale(Segment& segment, Direction direction) {
 /// Each message anew, against what all others say.
 void Smoother::weigh(Segment& segment) {
     for (Knot& knot : segment.knots) {
-        const Belief::Vector direction = level_now(knot.site.direction);
-        const double precision = 1 / direction.dot(knot.smoothed.covariance * direction);
+        const BeliefVector direction = level_now(knot.site.direction);
+        const double precision = 1 / direction.dot(matrix(knot.smoothed) * direction);
         const double others = precision - knot.precision;
         if (others <= least_of_others * precision) continue;  // all that is known comes from it
         const double mean =
-            (precision * direction.dot(knot.smoothed.mean) - knot.precision_mean) / others;
+            (precision * direction.dot(vector(knot.smoothed)) - knot.precision_mean) / others;
         judge(knot, level_ns(segment, knot), mean, 1 / others, damping);
     }
 }
