@@ -6,6 +6,7 @@
 //   const machine = new Machine({ flash });   // bytes of an .elf, a .uf2, or of the flash itself
 //   machine.watch([0, 1, 25]);                // GPIO whose changes go to machine.log
 //   machine.set_input(2, 1, at_cycle);        // level 0, 1 or undefined (nothing drives it)
+//   machine.set_path(2, { rise_ns: 5 });      // what lies before a pin: see pin_path.mjs
 //   const why = machine.run_until(cycle);     // 'time', or what stopped it: see below
 //   machine.usb.write(bytes, at_cycle);       // see usb_host.mjs
 //
@@ -262,7 +263,12 @@ export class Machine {
 
     set_input(gpio, level, at = this.now) {
         const { clock, pins } = this;
-        clock.input_at(Math.max(at, clock.now), () => pins.set_external(gpio, level));
+        const from = Math.max(at, clock.now);
+        clock.input_at(Math.floor(from), () => pins.set_external(gpio, level, from));
+    }
+
+    set_path(gpio, properties) {
+        return this.pins.set_path(gpio, properties);
     }
 
     at(cycle, action) {

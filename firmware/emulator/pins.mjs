@@ -3,6 +3,7 @@
 // with a bit per GPIO. An output changes at the end of the cycle in which its driver acts.
 import { fault, hex } from './fault.mjs';
 import { irq } from './interrupts.mjs';
+import { PinPath } from './pin_path.mjs';
 
 export const pin_count = 30;
 const all_pins = 2 ** pin_count - 1;
@@ -26,9 +27,7 @@ export const pin_function = { spi: 1, uart: 2, i2c: 3, pwm: 4, sio: 5, pio0: 6, 
 const history_size = 16;
 
 // GPIO29 of a Pico measures its supply: a divider with a capacitor.
-const pico_loads = [[29, 12_500]];
-
-const due = 'due'; // a loaded pin whose level lasted long enough
+const capacitor = { gpio: 29, shortest_ns: 100_000 };
 
 /// Words that say which pins a two-bit override changes, and how.
 class Override {
@@ -64,14 +63,15 @@ export class Pins {
         this.out = 0; // as driven, before the pads
         this.driven = 0;
         this.pad = 0; // the levels at the pins
-        this.loads = new Map(pico_loads); // cycles that a level must last to be seen, by GPIO
-        this.changing = new Map(); // events of loaded pins whose level is about to change
+        this.paths = new Map(); // by GPIO; the others are ideal
         this.times = new Float64Array(history_size);
         this.words = new Uint32Array(history_size); // inputs before each of `times`
         this.newest = 0;
         this.inputs = 0;
         this.reset_pads();
         this.reset_io();
+        const { gpio, ...load } = capacitor;
+        this.set_path(gpio, load);
     }
 
     reset_pads() {
@@ -147,49 +147,42 @@ export class Pins {
         const wanted =
             ((out & driven) | (~driven & ((this.external & this.externally_driven) | floating))) &
             all_pins;
-        const pad = this.behind_loads(wanted);
+        const pad = this.behind_paths(wanted, time);
         const changed = (pad ^ this.pad) | (driven ^ this.driven);
         this.out = out;
         this.driven = driven;
         this.pad = pad;
-        if (changed & this.watched) this.note();
+        if (changed & this.watched) this.note(time - 1);
         if (changed !== 0) for (const listener of this.pad_listeners) listener();
         const inputs = this.in_override.apply(pad & this.input_enable) & all_pins;
         if (inputs !== this.inputs) this.set_inputs(inputs, time);
     }
 
-    /// What is joined to a pin: levels shorter than this do not pass, others come so much later.
-    set_load(gpio, cycles) {
-        this.loads.set(gpio, cycles);
+    /// What lies between the GPIO and whoever drives it (pin_path.mjs); without `properties`,
+    /// nothing. Returns the path.
+    set_path(gpio, properties) {
+        this.paths.get(gpio)?.cut();
+        this.paths.delete(gpio);
+        if (properties !== undefined) {
+            const level = (this.pad >>> gpio) & 1;
+            const moved = () => this.set_levels(this.out, this.driven, this.clock.now);
+            this.paths.set(gpio, new PinPath(this.clock, properties, level, moved));
+        }
+        this.set_levels(this.out, this.driven, this.clock.now);
+        return this.paths.get(gpio);
     }
 
-    behind_loads(wanted) {
+    behind_paths(wanted, time) {
         let pad = wanted;
-        for (const [gpio, cycles] of this.loads) {
+        for (const [gpio, path] of this.paths) {
             const bit = 1 << gpio;
-            const event = this.changing.get(gpio);
-            if (((wanted ^ this.pad) & bit) === 0) {
-                if (event !== undefined) this.clock.cancel(event);
-                this.changing.delete(gpio);
-            } else if (event !== due) {
-                pad ^= bit;
-                if (event === undefined) this.change_in(gpio, cycles);
-            }
+            path.drive((wanted >>> gpio) & 1, time);
+            pad = path.level ? pad | bit : pad & ~bit;
         }
         return pad;
     }
 
-    change_in(gpio, cycles) {
-        const event = this.clock.at(this.clock.now + 1 + cycles, () => {
-            this.changing.set(gpio, due);
-            this.set_levels(this.out, this.driven, this.clock.now);
-            this.changing.delete(gpio);
-        });
-        this.changing.set(gpio, event);
-    }
-
-    note() {
-        const cycle = this.clock.now;
+    note(cycle) {
         const entry = { cycle, levels: this.pad >>> 0, driven: this.driven >>> 0 };
         const last = this.log[this.log.length - 1];
         if (last !== undefined && last.cycle === cycle) this.log[this.log.length - 1] = entry;
@@ -237,13 +230,14 @@ export class Pins {
         return true;
     }
 
-    /// A level from outside; undefined: nothing drives the pin.
-    set_external(gpio, level) {
+    /// A level from outside; undefined: nothing drives the pin. `at` may lie within this cycle.
+    set_external(gpio, level, at = this.clock.now) {
+        if (!Number.isInteger(at) && !this.paths.has(gpio)) this.set_path(gpio, {});
         const bit = 1 << gpio;
         this.externally_driven =
             level === undefined ? this.externally_driven & ~bit : this.externally_driven | bit;
         this.external = level ? this.external | bit : this.external & ~bit;
-        this.set_levels(this.out, this.driven, this.clock.now);
+        this.set_levels(this.out, this.driven, at);
     }
 
     // Interrupts of the GPIO.

@@ -2,24 +2,11 @@
 // The real firmware on the emulated chip does what its ports promise, to the cycle.
 //
 // usage: firmware.mjs IMAGE.uf2 IMAGE.elf [NAME...]     NAME: part of a test's name
-import { Icm42688p } from './icm42688p.mjs';
 import { readFileSync } from 'node:fs';
+import { Icm42688p } from './icm42688p.mjs';
 import { Image } from './image.mjs';
-import { Rig, busy_rig, cycle_ns, pin, quick_usb } from './rig.mjs';
-
-const [image, symbols, ...names] = process.argv.slice(2);
-
-function check(condition, what) {
-    if (!condition) throw new Error(what);
-}
-/// Extremes of what the test measured, by what it was.
-let measured = {};
-
-function check_within(value, least, most, what) {
-    const [lowest, highest] = measured[what] ?? [value, value];
-    measured[what] = [Math.min(lowest, value), Math.max(highest, value)];
-    check(value >= least && value <= most, `${what}: ${value}, not from ${least} to ${most}`);
-}
+import { Rig, busy_rig, cycle_ns, pin, quick_usb, zero_of } from './rig.mjs';
+import { check, check_within, image, run, symbols } from './suite.mjs';
 
 /// The board does nothing any more, as if its code had a loop without an end.
 function hang(machine) {
@@ -57,12 +44,6 @@ function count_pulses(rig, ms) {
     rig.on_pin(pin.test, (cycle, level) => (pulses += level ? 1 : 0));
     rig.run_ms(ms);
     return pulses;
-}
-
-/// The cycle at which the board's time is 0, by its first exposure record.
-function zero_of(rig, camera, output = 0) {
-    const first = rig.host.all('exposure').find((record) => record.camera === output);
-    return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
 }
 
 /// How many microseconds each interrupt of priority 0 takes, from here on.
@@ -711,27 +692,6 @@ const tests = {
         }
     },
 
-    'without a free pin for the loop no exposure is measured, and all are with one': () => {
-        const measured = (load) => {
-            const rig = new Rig(image, quick_usb);
-            if (load > 0) rig.machine.pins.set_load(pin.loop, load);
-            const camera = rig.add_camera(0);
-            rig.connect();
-            rig.configure({ cameras: [{ latency: 8000 }] });
-            rig.host.start();
-            rig.run_ms(1200);
-            const records = rig.host.all('exposure');
-            check(records.length >= camera.triggers.length - 2, `${records.length} records`);
-            const { edges_lost: lost, stamp_test: test } = rig.host.last('health');
-            check(load === 0 || lost > 0, 'nothing is lost');
-            check(test === (load === 0 ? 2 : 1), `the test of stamps says ${test}`);
-            return records.filter(({ flags }) => (flags & 1) !== 0).length / records.length;
-        };
-        check(measured(0) === 1, 'not all are measured');
-        check(measured(20) === 0, 'some are measured with a load of 160 ns');
-        check(measured(12_500) === 0, 'some are measured with a load of 100 us');
-    },
-
     'a line that never rests is ignored, and harms nothing else': () => {
         const rig = new Rig(image, quick_usb);
         const camera = rig.add_camera(0);
@@ -887,19 +847,4 @@ const tests = {
     },
 };
 
-let failed = 0;
-for (const [name, test] of Object.entries(tests)) {
-    if (names.length > 0 && !names.some((part) => name.includes(part))) continue;
-    measured = {};
-    try {
-        test();
-        const figures = Object.entries(measured).map(([what, [lowest, highest]]) =>
-            `    ${what}: ${lowest.toFixed(1)} to ${highest.toFixed(1)}\n`,
-        );
-        process.stdout.write(`ok: ${name}\n${figures.join('')}`);
-    } catch (error) {
-        ++failed;
-        process.stdout.write(`FAILED: ${name}: ${error.stack}\n`);
-    }
-}
-process.exitCode = failed === 0 ? 0 : 1;
+run(tests);

@@ -15,6 +15,12 @@ export const pin = { exposure: 14, loop: 18, trigger: 19, sync: 26, test: 27, li
 /// A host that waits for nothing.
 export const quick_usb = { usb_times: { debounce_ms: 1, reset_ms: 1, recovery_ms: 1 } };
 
+/// The cycle at which the board's time is 0, by its first exposure record.
+export function zero_of(rig, camera, output = 0) {
+    const first = rig.host.all('exposure').find((record) => record.camera === output);
+    return camera.triggers[first.trigger - 1] - first.triggered / cycle_ns;
+}
+
 export class Rig {
     /// On `machine`, or a new one that starts from the image.
     constructor(image, options = {}, machine = undefined) {
