@@ -24,7 +24,7 @@ const ideal = {
     bounces: 0, // after an edge, at most so many times back and forth...
     bounce_ns: 1000, // ... within that time
     clamp: undefined, // the level of the pin, whoever drives it
-    jitter_ns: 0, // so near to the clock's edge, chance says whether that one or the next sees it
+    jitter_ns: 0, // half of it from the clock's edge, chance says which one takes a level in
     seed: 1,
 };
 
@@ -69,16 +69,18 @@ export class PinPath {
         const before = coming.at(-1);
         const is_short = (from - before?.from) * cycle_ns < this.shortest_ns;
         if (is_short || at <= before?.at) return this.drop_last();
-        const cycle = Math.max(this.taken_in(at), before?.cycle ?? 0);
+        const cycle = Math.max(this.taken_in(at, from), before?.cycle ?? 0);
         const event = this.clock.input_at(cycle, () => this.arrive());
         coming.push({ level, from, at, cycle, event });
     }
 
-    /// The cycle whose begin takes in what came at `at`.
-    taken_in(at) {
+    /// The cycle whose end takes in what came at `at`, like the level that an output has since the
+    /// begin of that cycle.
+    taken_in(at, from) {
         const nearest = Math.round(at);
         const is_near = Math.abs(at - nearest) * cycle_ns < this.jitter_ns / 2;
-        return is_near ? nearest + Math.floor(this.random() * 2) : Math.ceil(at);
+        if (!is_near) return Math.floor(at);
+        return Math.max(nearest - Math.floor(this.random() * 2), Math.floor(from));
     }
 
     arrive() {

@@ -4,13 +4,12 @@
 const registers = { device_config: 0x11, status: 0x2d, who_am_i: 0x75, data: 0x1d };
 const identity = 0x47;
 const i2c_address = 0x68;
-const pulse_cycles = 12_500;
 
 export class Icm42688p {
-    /// Data is ready every `period` cycles at the GPIO `ready`. On SPI the GPIO `select` selects it;
-    /// without one, it is on I2C.
-    constructor(machine, { select, ready, period }) {
-        Object.assign(this, { machine, ready, period });
+    /// Data is ready every `period` cycles, which the GPIO `ready` shows for `pulse` cycles. On SPI
+    /// the GPIO `select` selects it; without one, it is on I2C.
+    constructor(machine, { select, ready, period, pulse = 12_500 }) {
+        Object.assign(this, { machine, ready, period, pulse });
         this.bytes = new Uint8Array(128);
         this.bytes[registers.who_am_i] = identity;
         this.position = 0;
@@ -27,7 +26,7 @@ export class Icm42688p {
         for (let cycle = from; cycle < to; cycle += this.period) {
             this.edges.push(cycle);
             this.machine.set_input(this.ready, 1, cycle);
-            this.machine.set_input(this.ready, 0, cycle + pulse_cycles);
+            this.machine.set_input(this.ready, 0, cycle + this.pulse);
         }
     }
 

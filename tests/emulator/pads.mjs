@@ -47,3 +47,456 @@ function rig_behind(path_of, { camera = {}, cameras, ports = { inputs: 0b1111 } 
     rig.host.start();
     return rig;
 }
+
+/// Errors of stamps, in buckets of 8 ns.
+class Histogram {
+    constructor() {
+        this.buckets = new Map();
+        this.count = 0;
+        this.worst = 0;
+    }
+
+    add(error) {
+        const bucket = Math.floor(error / 8);
+        this.buckets.set(bucket, (this.buckets.get(bucket) ?? 0) + 1);
+        this.worst = Math.max(this.worst, Math.abs(error));
+        ++this.count;
+    }
+
+    print() {
+        const sorted = [...this.buckets].sort(([a], [b]) => a - b);
+        const lines = sorted.map(
+            ([bucket, count]) => `    ${8 * bucket} to ${8 * bucket + 8} ns: ${count}\n`,
+        );
+        process.stdout.write(`    ${this.count} edges, at most ${this.worst} ns off\n`);
+        process.stdout.write(lines.join(''));
+    }
+}
+
+/// What came through, as [{first, edges}...] of changes for good: the instants at which its level
+/// may have been seen first.
+function settled_changes(path, bounce_ns) {
+    const changes = [];
+    path.edges.forEach(({ at, level }, i) => {
+        const { edges } = path;
+        const is_new = i === 0 || (at - edges[i - 1].at) * cycle_ns > bounce_ns;
+        if (is_new) changes.push({ level, instants: [], is_seen: false });
+        const change = changes.at(-1);
+        if (change.level !== level || change.is_seen) return;
+        change.instants.push(at);
+        const until = edges[i + 1]?.at ?? Infinity;
+        change.is_seen = (until - at) * cycle_ns >= surely_seen_ns;
+    });
+    return changes;
+}
+
+const nearest = (errors) =>
+    errors.reduce((best, error) => (Math.abs(error) < Math.abs(best) ? error : best), Infinity);
+
+/// Whether a path let something through from this instant on.
+const came_through = (path, from) =>
+    path.edges.some(({ at, level }) => level === 1 && at >= from && at < from + cycles_per_us);
+
+/// Holds each exposure of `camera` against its line, of which pulses may be lost.
+function check_exposures(rig, output, zero) {
+    const camera = rig.cameras[output];
+    const line = rig.lines[output];
+    const records = rig.host.all('exposure').filter((record) => record.camera === output);
+    let lost = 0;
+    for (const record of records) {
+        const { trigger } = record;
+        const of_line = (instant, level) => line.edges
+            .filter((edge) => edge.level === level)
+            .map(({ at }) => at)
+            .find((at) => at >= instant && at < instant + cycles_per_us);
+        check(record.triggered === (camera.triggers[trigger - 1] - zero) * cycle_ns, 'trigger');
+        const start = of_line(camera.starts[trigger - 1], 1);
+        const end = of_line(camera.ends[trigger - 1], 0);
+        if (start === undefined) {
+            ++lost;
+            check(has_no_start(record), `camera ${output}, trigger ${trigger}: a start is made up`);
+            continue;
+        }
+        check(is_measured(record), `camera ${output}, trigger ${trigger}: flags ${record.flags}`);
+        check_within(record.start - (start - zero) * cycle_ns, -48, 48, 'start');
+        check_within(record.end - (end - zero) * cycle_ns, -48, 48, 'end');
+    }
+    check(records.length >= camera.triggers.length - 2, `${records.length} records`);
+    return lost;
+}
+
+/// Each measured exposure is one that came through, when triggers or levels were held meanwhile:
+/// most are measured, and some are not.
+function check_by_time(rig, output, zero) {
+    const { starts, ends } = rig.cameras[output];
+    const records = rig.host.all('exposure').filter(({ camera }) => camera === output);
+    const measured = records.filter(is_measured);
+    check(measured.length >= 30, `${measured.length} of camera ${output} are measured`);
+    check(records.length - measured.length >= 10, 'all are measured');
+    for (const { start, end } of measured) {
+        const error = nearest(starts.map((cycle) => start - (cycle - zero) * cycle_ns));
+        const index = starts.findIndex((cycle) => start - (cycle - zero) * cycle_ns === error);
+        // What the path takes is part of it.
+        check_within(error, -48, 56, 'start, with its pad');
+        check_within(end - (ends[index] - zero) * cycle_ns, -48, 56, 'end, with its pad');
+    }
+}
+
+/// Ways in which a pin is not free, or does not work.
+const bad_loops = {
+    'a load of 160 ns': { shortest_ns: 160 },
+    'a load of 100 us': { shortest_ns: 100_000 },
+    'no pulse that comes back': { loses: 1 },
+    'a low level': { clamp: 0 },
+    'a high level': { clamp: 1 },
+    'a rise that is late': { rise_ns: 100 },
+    'a fall that is late': { fall_ns: 100 },
+};
+
+function check_loop(rig, wanted, what) {
+    const { stamp_test: test } = rig.host.last('health');
+    check(test === wanted, `the test of stamps says ${test} with ${what}`);
+}
+
+/// With a loop as it should be, all is measured again.
+function check_free_loop(rig, camera) {
+    rig.machine.set_path(pin.loop);
+    rig.run_ms(1200); // for the eighth edge, and for what was exposed meanwhile
+    const zero = zero_of(rig, camera);
+    const { length } = rig.host.messages;
+    rig.run_ms(1200);
+    const { messages } = rig.host;
+    const records = messages.slice(length).filter(({ kind }) => kind === 'exposure');
+    check(records.length > 50, `${records.length} records`);
+    for (const { trigger, start, end, flags } of records) {
+        check((flags & 1) !== 0, `flags ${flags} after the loop works`);
+        check_within(start - (camera.starts[trigger - 1] - zero) * cycle_ns, -48, 48, 'start');
+        check_within(end - (camera.ends[trigger - 1] - zero) * cycle_ns, -48, 48, 'end');
+    }
+    check_loop(rig, 2, 'a free pin');
+}
+
+function send_pulses(rig, count, period, width) {
+    const from = rig.machine.now + cycles_per_ms;
+    const random = random_numbers(9);
+    for (const input of rig.inputs)
+        for (let k = 0; k < count; ++k) {
+            const edge = from + k * period + random() * 1000;
+            input.edges.push(edge);
+            rig.machine.set_input(input.gpio, 1, edge);
+            rig.machine.set_input(input.gpio, 0, edge + width + random());
+        }
+    rig.run_ms((count * period) / cycles_per_ms + 20);
+}
+
+const events_of = (rig, { event, source }) =>
+    rig.host.all('event').filter((told) => told.event === event && told.source === source);
+
+const check_nothing_lost = (rig) => {
+    const { edges_lost, stamp_test } = rig.host.last('health');
+    check(edges_lost === 0 && stamp_test === 2, `${edges_lost} edges lost, test ${stamp_test}`);
+    check(!rig.host.has_event(4), 'edges were lost');
+    check(rig.host.bad === 0 && rig.host.gaps === 0, 'packets were lost');
+};
+
+/// Four cameras and four inputs whose edges have any phase, in groups whose edges are up to 1 us
+/// apart, down to none. Both edges of exposures are stamped, the rising ones of pulses.
+class AnyPhase {
+    constructor() {
+        this.random = random_numbers(1);
+        this.histogram = new Histogram();
+        const exposure = () => 2500 + this.near();
+        const latency_of = () => 1000 + this.near();
+        this.rig = rig_behind(bad_pad, {
+            camera: { exposure, latency_of },
+            cameras: all_outputs.map(() => ({ latency: 8000, rate_uhz: 500_000_000, pulse: 10_000,
+                exposure: 20_000, max_exposure: 500_000 })),
+        });
+        this.ticks = 0;
+        this.rig.on_pin(pin.trigger, (cycle, level) => level && this.tick(cycle));
+    }
+
+    /// Cycles, as often within each tenth of the one before.
+    near() {
+        return 125 * 10 ** (-4 * this.random());
+    }
+
+    tick(cycle) {
+        const alone = 10_000 + 40_000 * this.random();
+        for (const [index, from] of [1000, alone, 2 * alone].entries())
+            for (const { gpio } of this.rig.inputs) {
+                const is_slow = gpio === pin.pps || gpio === pin.sync_input;
+                if (is_slow && index !== this.ticks % 2) continue; // not within 1 ms
+                const edge = cycle + from + this.near();
+                this.rig.machine.set_input(gpio, 1, edge);
+                this.rig.machine.set_input(gpio, 0, edge + surely_seen_ns / cycle_ns + this.near());
+            }
+        ++this.ticks;
+    }
+
+    /// What has come since the last call.
+    judge() {
+        const { host, cameras } = this.rig;
+        this.zero ??= zero_of(this.rig, cameras[0]);
+        for (const message of host.messages) {
+            if (message.kind === 'exposure') this.judge_exposure(message);
+            if (message.kind === 'event') this.judge_event(message);
+        }
+        host.messages = host.messages.filter(({ kind }) => kind === 'health').slice(-1);
+    }
+
+    judge_exposure(record) {
+        const { edges } = this.rig.lines[record.camera];
+        check(is_measured(record), `flags ${record.flags}`);
+        this.judge_stamp(record.start, edges[2 * record.trigger - 2], 'start');
+        this.judge_stamp(record.end, edges[2 * record.trigger - 1], 'end');
+    }
+
+    judge_event(told) {
+        const input = this.rig.inputs.find(
+            ({ event, source }) => event === told.event && source === told.source,
+        );
+        check(input !== undefined || told.event === 15, `event ${told.event}`); // no sync signal
+        if (input !== undefined)
+            this.judge_stamp(told.time, input.path.edges[2 * told.value - 2], `event ${told.event}`);
+    }
+
+    judge_stamp(stamp, { at }, what) {
+        const error = stamp - (at - this.zero) * cycle_ns;
+        this.histogram.add(error);
+        check_within(error, -48, 48, what);
+    }
+}
+
+const tests = {
+    'edges of any phase, however near to each other, are stamped within 48 ns': () => {
+        const wanted = Number(process.env.VERSAVIS_EDGES ?? 20_000);
+        const any = new AnyPhase();
+        while (any.histogram.count < wanted) {
+            any.rig.run_ms(50);
+            any.judge();
+        }
+        any.rig.run_until('health', () => any.rig.host.last('health') !== undefined, 1100);
+        check_nothing_lost(any.rig);
+        any.histogram.print();
+    },
+
+    'exposures and pulses that bounce have the time of their first edge': () => {
+        const bounce_ns = 3000;
+        const path_of = (seed) => ({ ...bad_pad(seed), bounces: 4, bounce_ns });
+        const rig = rig_behind(path_of, {
+            cameras: all_outputs.map(() => ({ latency: 8000, rate_uhz: 100_000_000 })),
+        });
+        send_pulses(rig, 100, 1_250_000, 250_000);
+        rig.run_ms(1000);
+        const zero = zero_of(rig, rig.cameras[0]);
+        const error_of = (stamp, change) =>
+            nearest(change.instants.map((at) => stamp - (at - zero) * cycle_ns));
+        const records = rig.host.all('exposure');
+        check(records.length >= 4 * 150, `${records.length} records`);
+        const changes = rig.lines.map((line) => settled_changes(line, bounce_ns));
+        check(rig.lines[0].edges.length > 1.5 * changes[0].length, 'nothing bounces');
+        for (const record of records) {
+            const of_line = changes[record.camera];
+            check(is_measured(record), `flags ${record.flags}`);
+            check_within(error_of(record.start, of_line[2 * record.trigger - 2]), -48, 48, 'start');
+            check_within(error_of(record.end, of_line[2 * record.trigger - 1]), -48, 48, 'end');
+        }
+        for (const input of rig.inputs) {
+            const told = events_of(rig, input);
+            check(told.length >= input.edges.length, `${told.length} events ${input.event}`);
+            // A pulse of an auxiliary input that bounces at its end is two.
+            const rises = input.path.edges.filter(({ level }) => level === 1);
+            for (const { time } of told) {
+                const errors = rises.map(({ at }) => time - (at - zero) * cycle_ns);
+                check_within(nearest(errors), -48, 48, `event ${input.event}`);
+            }
+        }
+        check_nothing_lost(rig);
+    },
+
+    'a data-ready line that bounces stamps samples by its first edges': () => {
+        const bounce_ns = 2000;
+        const rig = rig_behind(bad_pad);
+        const period = 152_671.3;
+        const ready = rig.machine.set_path(pin.imu_ready, {
+            ...bad_pad(7),
+            bounces: 4,
+            bounce_ns,
+        });
+        const imu = new Icm42688p(rig.machine, {
+            select: pin.spi_select,
+            ready: pin.imu_ready,
+            period,
+            pulse: 2500, // what comes after 100 us is no echo
+        });
+        rig.host.stop();
+        rig.run_ms(20);
+        rig.configure({
+            cameras: [{ latency: 8000 }],
+            imus: [{ kind: 6, options: 1, rate_mhz: 1_000_000 }],
+        });
+        rig.run_until('set up the IMU', () => rig.host.has_event(10));
+        rig.host.messages = [];
+        rig.cameras[0].triggers.length = 0;
+        rig.host.start();
+        const from = rig.machine.now + cycles_per_ms;
+        imu.run(from, from + 400 * period);
+        rig.run_ms(400 * 1.2214 + 5);
+        const zero = zero_of(rig, rig.cameras[0]);
+        const changes = settled_changes(ready, bounce_ns).filter(({ level }) => level === 1);
+        const samples = rig.host.all('imu');
+        check(changes.length >= 400, `${changes.length} edges`);
+        check(ready.edges.length > 3 * changes.length, 'nothing bounces');
+        // A reading may begin with a level that is too short to be stamped, and is of no use then.
+        check_within(changes.length - samples.length, 0, 5, 'edges without a sample');
+        let next = samples[0].number;
+        for (const { number, flags, time } of samples) {
+            check(flags === (number === next ? 8 : 12), `sample ${number}: flags ${flags}`);
+            next = number + 1;
+            const errors = changes[number].instants.map((at) => time - (at - zero) * cycle_ns);
+            check_within(nearest(errors), -48, 48, 'sample');
+        }
+    },
+
+    'of pulses that a line loses, none takes the stamps of another': () => {
+        const rig = rig_behind((seed) => ({ ...bad_pad(seed), loses: 0.2 }), {
+            camera: { exposure: () => 60_000 },
+            cameras: all_outputs.map(() => ({ latency: 8000, rate_uhz: 200_000_000 })),
+        });
+        send_pulses(rig, 200, 625_000, 12_500);
+        rig.run_ms(500);
+        const zero = zero_of(rig, rig.cameras[0]);
+        for (const output of all_outputs) {
+            const lost = check_exposures(rig, output, zero);
+            check(lost > 30, `${lost} were lost`);
+        }
+        for (const input of rig.inputs) {
+            const passed = input.path.edges.filter(({ level }) => level === 1);
+            const told = events_of(rig, input);
+            check(passed.length < 180, `${passed.length} passed`);
+            check(told.length === passed.length, `${told.length} events of ${passed.length}`);
+            told.forEach(({ time, value }) => {
+                const { at } = passed[value - 1];
+                check_within(time - (at - zero) * cycle_ns, -48, 48, `event ${input.event}`);
+            });
+        }
+        check_nothing_lost(rig);
+    },
+
+    'without a free pin for the loop no exposure is measured, and all are with one': () => {
+        for (const [what, path] of Object.entries(bad_loops)) {
+            const rig = new Rig(image, quick_usb);
+            const camera = rig.add_camera(0);
+            rig.machine.set_path(pin.loop, path);
+            rig.connect();
+            rig.configure({ cameras: [{ latency: 8000 }] });
+            rig.host.start();
+            rig.run_ms(1200);
+            const records = rig.host.all('exposure');
+            check(records.length >= camera.triggers.length - 2, `${records.length} records`);
+            check(!records.some(is_measured), `some are measured with a loop that has ${what}`);
+            check_loop(rig, 1, what);
+            check(rig.host.last('health').edges_lost > 0, 'nothing is lost');
+            check_free_loop(rig, camera);
+        }
+    },
+
+    'a loop that fails for a while ends what is measured until it works again': () => {
+        for (const [what, path] of Object.entries(bad_loops)) {
+            const rig = new Rig(image, quick_usb);
+            const camera = rig.add_camera(0);
+            rig.connect();
+            rig.configure({ cameras: [{ latency: 8000 }] });
+            rig.host.start();
+            rig.run_ms(2500);
+            check(rig.host.all('exposure').every(is_measured), 'not all are measured');
+            rig.machine.set_path(pin.loop, path);
+            rig.run_ms(2200); // by then it has risen and fallen
+            const { length } = rig.host.messages;
+            rig.run_ms(1200);
+            const { messages } = rig.host;
+            const records = messages.slice(length).filter(({ kind }) => kind === 'exposure');
+            check(records.length > 50, `${records.length} records`);
+            check(!records.some(is_measured), `some are measured with a loop that has ${what}`);
+            check_loop(rig, 1, what);
+            check_free_loop(rig, camera);
+        }
+    },
+
+    'what the loop loses shifts no later stamp': () => {
+        const rig = new Rig(image, quick_usb);
+        const camera = rig.add_camera(0);
+        rig.connect();
+        rig.configure({ cameras: [{ latency: 8000 }] });
+        rig.host.start();
+        rig.run_ms(2500);
+        rig.machine.set_path(pin.loop, { loses: 1 });
+        rig.run_ms(2200);
+        check_free_loop(rig, camera);
+    },
+
+    'a storm of edges shifts no later stamp': () => {
+        const rig = rig_behind(bad_pad, { camera: { exposure: () => 100_000 } });
+        rig.run_ms(100);
+        for (let storm = 0; storm < 3; ++storm) {
+            const from = rig.machine.now + 1000;
+            for (let i = 0; i < 2000; ++i)
+                for (const [k, { gpio }] of rig.inputs.entries())
+                    rig.machine.set_input(gpio, 1 - (i % 2), from + 80 * i + 20 * k);
+            rig.run_ms(1300); // they are ignored for a second
+            const { edges_lost: lost } = rig.host.last('health');
+            check(lost > 500 * (storm + 1), `${lost} edges lost`);
+        }
+        const zero = zero_of(rig, rig.cameras[0]);
+        for (const output of all_outputs) {
+            const records = rig.host.all('exposure').filter(({ camera }) => camera === output);
+            const { starts, ends, triggers } = rig.cameras[output];
+            const measured = records.filter(is_measured);
+            check(measured.length >= triggers.length - 10, `${measured.length} are measured`);
+            for (const { trigger, start, end } of measured) {
+                check_within(start - (starts[trigger - 1] - zero) * cycle_ns, -48, 56, 'start');
+                check_within(end - (ends[trigger - 1] - zero) * cycle_ns, -48, 56, 'end');
+            }
+        }
+    },
+
+    'a trigger that does not leave gives no exposure, and no other is wrong': () => {
+        for (const clamp of [0, 1]) {
+            const rig = rig_behind(bad_pad);
+            rig.run_ms(200);
+            const clamped = rig.machine.set_path(pin.trigger + 2, { clamp });
+            rig.run_ms(500);
+            check(clamped.edges.length === 0, 'it is not clamped');
+            const before = rig.cameras[2].triggers.length;
+            rig.run_ms(500);
+            check(rig.cameras[2].triggers.length === before, 'it is not clamped');
+            rig.machine.set_path(pin.trigger + 2);
+            rig.run_ms(500);
+            const zero = zero_of(rig, rig.cameras[0]);
+            for (const output of [0, 1, 3]) check_exposures(rig, output, zero);
+            check_by_time(rig, 2, zero);
+            check_nothing_lost(rig);
+        }
+    },
+
+    'an exposure line that is held gives no exposure, and no other is wrong': () => {
+        for (const clamp of [0, 1]) {
+            const rig = rig_behind(bad_pad);
+            rig.run_ms(203);
+            const before = rig.lines[1].edges.length;
+            rig.machine.set_path(pin.exposure + 1, { clamp });
+            rig.run_ms(500);
+            const edges = rig.lines[1].edges.slice(0, before);
+            rig.lines[1] = rig.machine.set_path(pin.exposure + 1, bad_pad(1));
+            rig.lines[1].edges.unshift(...edges);
+            rig.run_ms(500);
+            const zero = zero_of(rig, rig.cameras[0]);
+            for (const output of [0, 2, 3]) check_exposures(rig, output, zero);
+            check_by_time(rig, 1, zero);
+            check_nothing_lost(rig);
+        }
+    },
+};
+
+run(tests);

@@ -48,13 +48,17 @@ export class Rig {
         this.listeners.push({ gpio, call });
     }
 
-    /// A camera at this output; returns what happened: cycles of triggers and exposures.
-    add_camera(output, { latency = 1000, exposure = () => 375_000 } = {}) {
+    /// A camera at this output; returns what happened: cycles of triggers and exposures. Its times
+    /// may lie between two cycles; those of each exposure follow from the exposures before.
+    add_camera(
+        output,
+        { latency = 1000, latency_of = () => latency, exposure = () => 375_000 } = {},
+    ) {
         const camera = { triggers: [], starts: [], ends: [] };
         this.machine.set_input(pin.exposure + output, 0, 0);
         this.on_pin(pin.trigger + output, (cycle, level) => {
             if (!level) return;
-            const start = cycle + latency;
+            const start = cycle + latency_of(camera.triggers.length);
             const end = start + exposure(camera.triggers.length);
             camera.triggers.push(cycle);
             camera.starts.push(start);
