@@ -10,11 +10,13 @@ import { fileURLToPath } from 'node:url';
 import { check, finish } from './check.mjs';
 
 const [faults, folder] = process.argv.slice(2);
-const firmware = join(dirname(fileURLToPath(import.meta.url)), 'firmware.mjs');
+const here = dirname(fileURLToPath(import.meta.url));
+const programs = ['firmware.mjs', 'pads.mjs'].map((name) => join(here, name));
 
 /// Whether the test fails on this image, and how.
 function failure_of(image, test) {
-    const { stdout } = spawnSync('node', [firmware, `${image}.uf2`, `${image}.elf`, test], {
+    const program = programs.find((path) => readFileSync(path, 'utf8').includes(`'${test}`));
+    const { stdout } = spawnSync('node', [program, `${image}.uf2`, `${image}.elf`, test], {
         encoding: 'utf8',
     });
     const lines = stdout.split('\n');
