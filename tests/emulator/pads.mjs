@@ -190,6 +190,7 @@ const events_of = (rig, { event, source }) =>
     rig.host.all('event').filter((told) => told.event === event && told.source === source);
 
 const check_nothing_lost = (rig) => {
+    rig.run_until('health', () => rig.host.last('health') !== undefined, 1100);
     const { edges_lost, stamp_test } = rig.host.last('health');
     check(edges_lost === 0 && stamp_test === 2, `${edges_lost} edges lost, test ${stamp_test}`);
     check(!rig.host.has_event(4), 'edges were lost');
@@ -376,7 +377,6 @@ const tests = {
             any.rig.run_ms(50);
             any.judge();
         }
-        any.rig.run_until('health', () => any.rig.host.last('health') !== undefined, 1100);
         check_nothing_lost(any.rig);
         any.histogram.print();
     },
