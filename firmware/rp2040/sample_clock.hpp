@@ -37,8 +37,9 @@ class SampleClock {
 
  private:
     static constexpr std::uint32_t cycle_ns = 8;
-    /// From a level at a pin until the watcher can sample it.
-    static constexpr std::uint32_t synchroniser_cycles = 2;
+    /// A sample shows the level that the first flip-flop of the synchroniser took in so long before
+    /// the cycle of the sample began; the second one had it when that cycle began.
+    static constexpr std::uint32_t synchroniser_cycles = 1;
     static constexpr std::uint32_t count_ns = watcher::sample_cycles * cycle_ns;
     static constexpr std::uint32_t change_ns = watcher::change_cycles * cycle_ns;
     static constexpr std::uint32_t most_counts = 1U << watcher::count_bits;

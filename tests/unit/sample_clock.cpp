@@ -19,12 +19,13 @@ struct Word {
     double edge_ns;  ///< true time of the change that it shows
 };
 
-/// Samples one line every six cycles, three later after a change; levels take two cycles to it.
+/// Samples one line every six cycles, three later after a change; the synchroniser's first
+/// flip-flop has taken a level in one cycle before.
 class Watcher {
  public:
     /// The word of the change at this time, which is after the word before and its next sample.
     Word change(double at_ns) {
-        const double seen = at_ns / 8 + 2;
+        const double seen = at_ns / 8 + 1;
         const double samples = std::max(0.0, std::ceil((seen - sample_) / 6));
         sample_ += samples * 6;
         counts_ += static_cast<std::uint64_t>(samples);
@@ -34,7 +35,7 @@ class Watcher {
         return word;
     }
     /// A change after this one is seen by another sample.
-    double last_sample_ns() const { return (sample_ - 9 - 2) * 8; }
+    double last_sample_ns() const { return (sample_ - 9 - 1) * 8; }
 
  private:
     double sample_ = 2;
