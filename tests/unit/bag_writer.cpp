@@ -43,15 +43,3 @@ TEST_CASE("metadata_csv: rows have as many fields as there are columns") {
     }
     CHECK(csv_columns(ring::StreamKind::status).empty());
 }
-
-TEST_CASE("metadata_csv: gain and temperature are empty where they are not known") {
-    const std::string stream = "a";
-    const auto ends_with = [&](std::uint64_t attributes, const std::string& end) {
-        const RecordedItem item{
-            stream, ring::StreamKind::frames, 1, 2, {3}, {}, {}, 0, attributes, {}, {}};
-        return csv_row(item).ends_with(end);
-    };
-    CHECK(csv_columns(ring::StreamKind::frames).ends_with(",gain,temperature_c"));
-    CHECK(ends_with(pack(SensorState{6.5F, 41}), ",6.5,41"));
-    CHECK(ends_with(pack(SensorState{}), ",,"));
-}

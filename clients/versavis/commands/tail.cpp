@@ -4,14 +4,14 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "base/shallow_json.hpp"
 #include "clock/clock_json.hpp"
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "pairing/evidence_json.hpp"
-#include "base/shallow_json.hpp"
+#include "recording/item_fields.hpp"
 #include "status/status_document.hpp"
 #include "versavis/stream.hpp"
 
@@ -27,70 +27,21 @@ json describe(const ring::Item& item) {
     return line;
 }
 
-/// JSON numbers have no NaN: what is not known, or a part does not measure, is null.
-json vector(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
+json describe(ring::StreamKind kind, const ring::Item& item) {
+    json line = describe(item);
+    add_fields(line, kind, item.metadata, item.payload.attributes());
+    return line;
+}
 
 json describe(const Frame& item) {
-    json line = describe(static_cast<const ring::Item&>(item));
-    const FrameMetadata& d = item.data;
-    const SensorState sensor = item.sensor();
-    line.update({{"kind", to_string(d.stamp_kind())},
-                 {"sigma_ns", d.sigma_ns == sigma_unknown ? json(nullptr) : json(d.sigma_ns)},
-                 {"trigger", d.trigger},
-                 {"block_id", d.block_id},
-                 {"exposure_ns", d.exposure.ns},
-                 {"board_time_ns", d.board_time.ns},
-                 {"host_time_ns", d.host_time.ns},
-                 {"arrival_ns", d.arrival.ns},
-                 {"camera_time_ns", d.camera_time.ns},
-                 {"delay_ns", d.delay_ns},
-                 {"gain", sensor.gain},
-                 {"temperature_c", sensor.temperature_c},
-                 {"tick", d.tick()},
-                 {"width", d.width},
-                 {"height", d.height},
-                 {"pixel_format", d.pixel_format},
-                 {"format", pixel_format_name(d.pixel_format)},
-                 {"epoch", d.epoch},
-                 {"flags", d.flags},
-                 {"bytes", item.payload.size()}});
+    json line = describe(ring::StreamKind::frames, item);
+    line["bytes"] = item.payload.size();
     return line;
 }
 
-json describe(const ImuSample& item) {
-    json line = describe(static_cast<const ring::Item&>(item));
-    const ImuMetadata& d = item.data;
-    line.update(
-        {{"sample", d.number},
-         {"sigma_ns", d.sigma_ns},
-         {"filter_delay_ns", d.filter_delay.ns},
-         {"accel_age_ns", (d.flags & flag_accel_age) != 0 ? json(d.accel_age_ns) : json(nullptr)},
-         {"gyro_rad_s", vector(d.gyro)},
-         {"accel_m_s2", vector(d.accel)},
-         {"magnetic_t", vector(d.magnetic)},
-         {"temperature_c", d.temperature},
-         {"pressure_pa", d.pressure},
-         {"board_time_ns", d.board_time.ns},
-         {"host_time_ns", d.host_time.ns},
-         {"epoch", d.epoch},
-         {"flags", d.flags}});
-    return line;
-}
+json describe(const ImuSample& item) { return describe(ring::StreamKind::imu, item); }
 
-json describe(const Event& item) {
-    json line = describe(static_cast<const ring::Item&>(item));
-    const EventMetadata& d = item.data;
-    line.update(
-        {{"event", to_string(d.kind)},
-         {"source", std::string(d.source_name, ::strnlen(d.source_name, sizeof d.source_name))},
-         {"reason", to_string(d.reason)},
-         {"value", d.value},
-         {"count", d.count},
-         {"board_time_ns", d.board_time.ns},
-         {"host_time_ns", d.host_time.ns},
-         {"epoch", d.epoch}});
-    return line;
-}
+json describe(const Event& item) { return describe(ring::StreamKind::events, item); }
 
 json describe(const pairing::EvidenceItem& item) {
     json line = describe(static_cast<const ring::Item&>(item));

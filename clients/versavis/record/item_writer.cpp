@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "recording/item_fields.hpp"
 #include "recording/mcap_record.hpp"
 
 namespace versavis::client {
@@ -22,54 +23,10 @@ constexpr std::int64_t status_period_ns = 900'000'000;
 
 constexpr const char* any_object = R"({"type":"object"})";
 
-/// Null where 0 says that there is none.
-Json known(std::int64_t value) { return value == 0 ? Json() : Json(value); }
-
-Json sigma(std::uint32_t sigma_ns) { return sigma_ns == sigma_unknown ? Json() : Json(sigma_ns); }
-
-Json stamp_json(const ring::Item& item) {
-    const auto frame = unpack<FrameMetadata>(item.metadata);
-    const SensorState sensor = unpack_sensor_state(item.payload.attributes());
-    const auto is = [&](std::uint32_t flag) { return (frame.flags & flag) != 0; };
-    return {{"time_ns", item.time.ns},
-            {"sigma_ns", sigma(frame.sigma_ns)},
-            {"kind", to_string(frame.stamp_kind())},
-            {"suspect", is(flag_suspect)},
-            {"holdover", is(flag_holdover)},
-            {"clamped", is(flag_clamped)},
-            {"sensor_error", is(flag_sensor_error)},
-            {"trigger", frame.trigger},
-            {"tick", frame.tick()},
-            {"block_id", frame.block_id},
-            {"board_time_ns", frame.board_time.ns},
-            {"host_time_ns", frame.host_time.ns},
-            {"arrival_ns", frame.arrival.ns},
-            {"camera_time_ns", known(frame.camera_time.ns)},
-            {"exposure_ns", known(frame.exposure.ns)},
-            {"delay_ns", frame.delay_ns},
-            {"gain", sensor.gain},
-            {"temperature_c", sensor.temperature_c},
-            {"epoch", frame.epoch},
-            {"life", fmt::format("{:016x}", item.life)}};
-}
-
-Json event_json(const ring::Item& item) {
-    const auto event = unpack<EventMetadata>(item.metadata);
-    const std::string name(event.source_name,
-                           ::strnlen(event.source_name, sizeof event.source_name));
-    return {{"time_ns", item.time.ns},
-            {"kind", to_string(event.kind)},
-            {"reason", to_string(event.reason)},
-            {"source", event.source},
-            {"source_name", name},
-            {"value", event.value},
-            {"expected", event.expected},
-            {"count", event.count},
-            {"board_time_ns", known(event.board_time.ns)},
-            {"host_time_ns", event.host_time.ns},
-            {"sigma_ns", sigma(event.sigma_ns)},
-            {"suspect", (event.flags & flag_suspect) != 0},
-            {"epoch", event.epoch}};
+Json item_json(ring::StreamKind kind, const ring::Item& item) {
+    Json json{{"time_ns", item.time.ns}, {"life", fmt::format("{:016x}", item.life)}};
+    add_fields(json, kind, item.metadata, item.payload.attributes());
+    return json;
 }
 
 /// A name in it may be no UTF-8: it must not end the recording.
@@ -190,7 +147,7 @@ void ItemWriter::write_frame_notes(Channels& channels, const std::string& stream
     const auto frame = unpack<FrameMetadata>(item.metadata);
     file_.write({json_channel(channels, "/versavis/" + stream + "/stamp", "Stamp"),
                  channels.sequence, item.time.ns},
-                dump(stamp_json(item)));
+                dump(item_json(ring::StreamKind::frames, item)));
     const auto lens = lenses_.find(stream);
     file_.write(
         {ros_channel(channels, "/" + stream + "/camera_info", "sensor_msgs/msg/CameraInfo"),
@@ -218,7 +175,7 @@ void ItemWriter::write_event(Channels& channels, const ring::Item& item) {
     const auto event = unpack<EventMetadata>(item.metadata);
     file_.write(
         {json_channel(channels, "/versavis/events", "Event"), channels.sequence, item.time.ns},
-        dump(event_json(item)));
+        dump(item_json(ring::StreamKind::events, item)));
     if (static_cast<std::uint32_t>(event.kind) != utc_label) return;
     const OutputTime utc{event.value * 1'000'000'000};
     file_.write({ros_channel(channels, "/utc", "sensor_msgs/msg/TimeReference"), channels.sequence,
