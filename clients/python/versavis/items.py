@@ -103,6 +103,19 @@ def number(part, name, doc):
     return property(lambda self: getattr(getattr(self._item.data, part), name), doc=doc)
 
 
+def unless_zero(part, name, doc):
+    """The same; None where 0 says that it is not known."""
+    return property(lambda self: getattr(getattr(self._item.data, part), name) or None, doc=doc)
+
+
+def unless_nan(part, name, doc):
+    def known(self):
+        value = getattr(getattr(self._item.data, part), name)
+        return None if math.isnan(value) else value
+
+    return property(known, doc=doc)
+
+
 def flags_of(part):
     return property(lambda self: Flags(getattr(self._item.data, part).flags), doc="See Flags.")
 
@@ -118,13 +131,15 @@ def sigma_of(part):
 class Frame(Item):
     """A frame of a camera."""
 
-    trigger = number("frame", "trigger", "Number of its pulse; 0: not triggered.")
+    trigger = unless_zero("frame", "trigger", "Number of its pulse; None: not triggered.")
     block_id = number("frame", "block_id", "The camera's own frame number.")
-    board_time = number("frame", "board_time", "Middle of the exposure, board's clock, ns.")
+    board_time = unless_zero("frame", "board_time",
+                             "Middle of the exposure, board's clock, ns; None: unknown.")
     host_time = number("frame", "host_time", "Middle of the exposure, CLOCK_MONOTONIC_RAW, ns.")
     arrival = number("frame", "arrival", "Host time when the frame was complete, ns.")
-    exposure = number("frame", "exposure", "Measured, in ns, or see Flags.CAMERA_LENGTH; 0: unknown.")
-    camera_time = number("frame", "camera_time", "As the camera stamped it, ns; 0: none.")
+    exposure = unless_zero("frame", "exposure",
+                           "Measured, in ns, or see Flags.CAMERA_LENGTH; None: unknown.")
+    camera_time = unless_zero("frame", "camera_time", "As the camera stamped it, ns; None: none.")
     sigma = sigma_of("frame")
     width = number("frame", "width", "Pixels of a row.")
     height = number("frame", "height", "Rows.")
@@ -235,17 +250,26 @@ class ImuSample(Item):
     board_time = number("imu", "board_time", "Of the sample, board's clock, ns.")
     host_time = number("imu", "host_time", "Of the motion, CLOCK_MONOTONIC_RAW, ns.")
     sample = number("imu", "number", "Samples since the board's boot.")
-    temperature = number("imu", "temperature", "Degree Celsius.")
-    pressure = number("imu", "pressure", "Pa; NaN: none.")
+    temperature = unless_nan("imu", "temperature", "Degree Celsius; None: unknown.")
+    pressure = unless_nan("imu", "pressure", "Pa; None: the part has none.")
     sigma = sigma_of("imu")
     epoch = number("imu", "epoch", "Stamps of two epochs do not compare.")
     flags = flags_of("imu")
     filter_delay = number("imu", "filter_delay", "Of the part's filter, ns, already taken off.")
-    accel_age = number("imu", "accel_age", "Of the acceleration, ns, with Flags.ACCEL_AGE.")
 
     gyro = property(lambda self: tuple(self._item.data.imu.gyro), doc="Angular rate, rad/s.")
     accel = property(lambda self: tuple(self._item.data.imu.accel), doc="Acceleration, m/s^2.")
-    magnetic = property(lambda self: tuple(self._item.data.imu.magnetic), doc="T; NaN: none.")
+
+    @property
+    def magnetic(self):
+        """In T; None: the part has none."""
+        field = tuple(self._item.data.imu.magnetic)
+        return None if math.isnan(field[0]) else field
+
+    @property
+    def accel_age(self):
+        """By how much the acceleration is older than the angular rate, ns; None: unknown."""
+        return self._item.data.imu.accel_age if self.flags & Flags.ACCEL_AGE else None
 
 
 class Event(Item):
@@ -255,7 +279,7 @@ class Event(Item):
     source = number("event", "source", "Number of the camera, the IMU port or the input.")
     flags = flags_of("event")
     value = number("event", "value", "What it means depends on the kind.")
-    board_time = number("event", "board_time", "In ns; 0: not an event of the board.")
+    board_time = unless_zero("event", "board_time", "In ns; None: not an event of the board.")
     host_time = number("event", "host_time", "CLOCK_MONOTONIC_RAW, ns.")
     sigma = sigma_of("event")
     epoch = number("event", "epoch", "Stamps of two epochs do not compare.")
