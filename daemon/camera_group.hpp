@@ -10,8 +10,8 @@
 
 #include "board/board_link.hpp"
 #include "camera/camera.hpp"
-#include "pipeline/camera_pipeline.hpp"
 #include "health/status.hpp"
+#include "pipeline/camera_pipeline.hpp"
 
 namespace versavis::daemon {
 

@@ -10,15 +10,15 @@
 #include <cerrno>
 #include <fstream>
 
-#include "camera/camera_probe.hpp"
-#include "camera/description_check.hpp"
-#include "check/camera_check.hpp"
-#include "settings/configuration.hpp"
-#include "settings/problem_report.hpp"
 #include "base/library_log.hpp"
 #include "base/log.hpp"
 #include "base/memory_lock.hpp"
+#include "camera/camera_probe.hpp"
+#include "camera/description_check.hpp"
+#include "check/camera_check.hpp"
 #include "service.hpp"
+#include "settings/configuration.hpp"
+#include "settings/problem_report.hpp"
 
 namespace {
 

@@ -4,13 +4,13 @@
 #include <bit>
 #include <cmath>
 
-#include "board/board_event.hpp"
-#include "settings/line_delays.hpp"
-#include "settings/board_configuration.hpp"
-#include "settings/board_parts.hpp"
 #include "base/log.hpp"
 #include "base/state_directory.hpp"
+#include "board/board_event.hpp"
 #include "health/diagnosis.hpp"
+#include "settings/board_configuration.hpp"
+#include "settings/board_parts.hpp"
+#include "settings/line_delays.hpp"
 #include "versavis/ring_path.hpp"
 
 namespace versavis::daemon {

@@ -11,14 +11,14 @@
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
 #include "camera_group.hpp"
-#include "settings/configuration.hpp"
 #include "engine/ring/directory.hpp"
-#include "publish/clock_recorder.hpp"
-#include "publish/event_journal.hpp"
-#include "plausibility/event_witness.hpp"
-#include "pipeline/imu_pipeline.hpp"
 #include "health/output_step_watch.hpp"
 #include "health/status_publisher.hpp"
+#include "pipeline/imu_pipeline.hpp"
+#include "plausibility/event_witness.hpp"
+#include "publish/clock_recorder.hpp"
+#include "publish/event_journal.hpp"
+#include "settings/configuration.hpp"
 
 namespace versavis::daemon {
 

@@ -17,8 +17,8 @@
 #include <random>
 #include <system_error>
 
-#include "engine/clock/output_clock.hpp"
 #include "../../firmware/native/native_board.hpp"
+#include "engine/clock/output_clock.hpp"
 
 namespace versavis::rig {
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "../../firmware/native/virtual_board.hpp"
 #include "adis_device.hpp"
 #include "board.hpp"
 #include "camera_view.hpp"
@@ -20,7 +21,6 @@
 #include "ground_truth.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
-#include "../../firmware/native/virtual_board.hpp"
 
 namespace versavis::rig {
 

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "versavis/error.hpp"
 #include "../../firmware/native/virtual_board.hpp"
+#include "versavis/error.hpp"
 
 namespace versavis::rig {
 

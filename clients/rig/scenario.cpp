@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scenario.hpp"
 
-#include "engine/toml/table_reader.hpp"
 #include "base/hal.hpp"
+#include "engine/toml/table_reader.hpp"
 
 namespace versavis::rig {
 

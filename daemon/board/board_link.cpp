@@ -6,10 +6,10 @@
 #include <cstring>
 #include <random>
 
+#include "base/thread_name.hpp"
+#include "engine/board/firmware_file.hpp"
 #include "settings/board_configuration.hpp"
 #include "settings/board_parts.hpp"
-#include "engine/board/firmware_file.hpp"
-#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

@@ -15,15 +15,15 @@
 #include <variant>
 #include <vector>
 
+#include "base/wake_up.hpp"
 #include "board/board_counters.hpp"
 #include "board/byte_stream.hpp"
 #include "board/clock_exchange.hpp"
-#include "plausibility/packet_check.hpp"
 #include "board/stamping_reader.hpp"
-#include "base/wake_up.hpp"
-#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/pairing.hpp"
+#include "plausibility/packet_check.hpp"
+#include "settings/configuration.hpp"
 #include "wire/packet.hpp"
 
 namespace versavis::daemon {

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "engine/clock/translator.hpp"
-#include "publish/clock_recorder.hpp"
 #include "plausibility/doubt.hpp"
+#include "publish/clock_recorder.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::daemon {

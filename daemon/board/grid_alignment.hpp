@@ -6,8 +6,8 @@
 #include <mutex>
 #include <optional>
 
-#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
+#include "settings/configuration.hpp"
 
 namespace versavis::daemon {
 

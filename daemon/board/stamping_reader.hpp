@@ -10,8 +10,8 @@
 #include <span>
 #include <thread>
 
-#include "board/byte_stream.hpp"
 #include "base/wake_up.hpp"
+#include "board/byte_stream.hpp"
 
 namespace versavis::daemon {
 

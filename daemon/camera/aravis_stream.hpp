@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "camera/frame_source.hpp"
 #include "base/patient_work.hpp"
+#include "camera/frame_source.hpp"
 #include "engine/pairing/block_id.hpp"
 
 namespace versavis::daemon {

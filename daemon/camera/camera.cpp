@@ -7,13 +7,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/thread_name.hpp"
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
 #include "camera/image_receiver.hpp"
 #include "settings/receive_mode.hpp"
-#include "base/thread_name.hpp"
 
 namespace versavis::daemon {
 

@@ -13,19 +13,19 @@
 #include <thread>
 #include <vector>
 
+#include "base/patient_work.hpp"
 #include "camera/auto_exposure.hpp"
 #include "camera/bandwidth_plan.hpp"
-#include "settings/camera_preset.hpp"
 #include "camera/camera_state.hpp"
 #include "camera/description_vetting.hpp"
 #include "camera/device_claims.hpp"
 #include "camera/gvcp.hpp"
-#include "base/patient_work.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/retry.hpp"
 #include "camera/sensor_features.hpp"
-#include "settings/configuration.hpp"
 #include "pipeline/camera_pipeline.hpp"
+#include "settings/camera_preset.hpp"
+#include "settings/configuration.hpp"
 
 struct _ArvCamera;  // NOLINT(bugprone-reserved-identifier): Aravis names it so
 using ArvCamera = _ArvCamera;

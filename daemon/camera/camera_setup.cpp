@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "camera/u3v_client.hpp"
 #include "base/log.hpp"
+#include "camera/u3v_client.hpp"
 
 namespace versavis::daemon {
 

@@ -3,11 +3,11 @@
 #pragma once
 
 #include "camera/aravis_node_map.hpp"
-#include "settings/camera_preset.hpp"
-#include "settings/line_delays.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/sensor_features.hpp"
+#include "settings/camera_preset.hpp"
 #include "settings/configuration.hpp"
+#include "settings/line_delays.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {

@@ -7,11 +7,11 @@
 #include <memory>
 #include <thread>
 
+#include "base/patient_work.hpp"
 #include "camera/frame_assembler.hpp"
 #include "camera/frame_source.hpp"
 #include "camera/gvcp.hpp"
 #include "camera/packet_ring.hpp"
-#include "base/patient_work.hpp"
 #include "engine/pairing/block_id.hpp"
 
 namespace versavis::daemon {

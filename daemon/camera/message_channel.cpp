@@ -9,8 +9,8 @@
 
 #include <algorithm>
 
-#include "camera/gvcp.hpp"
 #include "base/thread_name.hpp"
+#include "camera/gvcp.hpp"
 
 namespace versavis::daemon {
 

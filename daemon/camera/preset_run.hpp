@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "settings/camera_preset.hpp"
 #include "camera/node_map.hpp"
+#include "settings/camera_preset.hpp"
 
 namespace versavis::daemon {
 

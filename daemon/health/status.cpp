@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "settings/receive_mode.hpp"
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_version.hpp"
+#include "settings/receive_mode.hpp"
 
 namespace versavis::daemon {
 

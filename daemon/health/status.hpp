@@ -8,10 +8,10 @@
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
 #include "camera/camera.hpp"
-#include "engine/clock/translator.hpp"
-#include "pipeline/camera_pipeline.hpp"
 #include "delivery.hpp"
 #include "diagnosis.hpp"
+#include "engine/clock/translator.hpp"
+#include "pipeline/camera_pipeline.hpp"
 #include "pipeline/imu_pipeline.hpp"
 
 namespace versavis::daemon {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "settings/receive_mode.hpp"
 #include "engine/rounding.hpp"
 #include "plausibility/arrival_check.hpp"
+#include "settings/receive_mode.hpp"
 
 namespace versavis::daemon {
 

@@ -9,19 +9,19 @@
 #include <string>
 #include <vector>
 
+#include "answer_watch.hpp"
+#include "base/log.hpp"
 #include "camera_event.hpp"
-#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/recording.hpp"
-#include "base/log.hpp"
-#include "answer_watch.hpp"
-#include "publish/event_journal.hpp"
 #include "event_lengths.hpp"
-#include "publish/evidence_recorder.hpp"
 #include "plausibility/exposure_check.hpp"
-#include "publish/exposure_completion.hpp"
 #include "plausibility/exposure_witness.hpp"
+#include "publish/event_journal.hpp"
+#include "publish/evidence_recorder.hpp"
+#include "publish/exposure_completion.hpp"
 #include "publish/frame_publisher.hpp"
+#include "settings/configuration.hpp"
 #include "trigger_watch.hpp"
 
 namespace versavis::daemon {

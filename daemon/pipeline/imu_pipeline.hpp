@@ -5,13 +5,13 @@
 #include <mutex>
 #include <string>
 
-#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
-#include "publish/event_journal.hpp"
 #include "plausibility/pulse_history.hpp"
-#include "publish/stamp_guard.hpp"
 #include "plausibility/witness.hpp"
+#include "publish/event_journal.hpp"
+#include "publish/stamp_guard.hpp"
+#include "settings/configuration.hpp"
 
 namespace versavis::daemon {
 

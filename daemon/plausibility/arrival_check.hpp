@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "engine/clock/translator.hpp"
 #include "doubt.hpp"
+#include "engine/clock/translator.hpp"
 
 namespace versavis::daemon {
 

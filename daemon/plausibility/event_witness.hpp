@@ -4,11 +4,11 @@
 
 #include <optional>
 
-#include "engine/clock/translator.hpp"
 #include "doubt.hpp"
+#include "engine/clock/translator.hpp"
 #include "pulse_history.hpp"
-#include "witness.hpp"
 #include "wire/messages.hpp"
+#include "witness.hpp"
 
 namespace versavis::daemon {
 

@@ -2,10 +2,10 @@
 // Holds the exposure that was measured against the one that the camera reports.
 #pragma once
 
-#include "settings/configuration.hpp"
-#include "engine/pairing/evidence.hpp"
 #include "edge_difference.hpp"
+#include "engine/pairing/evidence.hpp"
 #include "reported_exposure.hpp"
+#include "settings/configuration.hpp"
 
 namespace versavis::daemon {
 

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <optional>
 
-#include "settings/configuration.hpp"
 #include "doubt.hpp"
+#include "settings/configuration.hpp"
 #include "steady_value.hpp"
-#include "witness.hpp"
 #include "wire/messages.hpp"
+#include "witness.hpp"
 
 namespace versavis::daemon {
 

@@ -3,9 +3,9 @@
 // from configuration and history.
 #pragma once
 
-#include "settings/line_delays.hpp"
-#include "settings/configuration.hpp"
 #include "engine/pairing/evidence.hpp"
+#include "settings/configuration.hpp"
+#include "settings/line_delays.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::daemon {

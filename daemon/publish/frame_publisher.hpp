@@ -6,10 +6,10 @@
 #include <optional>
 #include <utility>
 
-#include "settings/configuration.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "engine/ring/writer.hpp"
+#include "settings/configuration.hpp"
 #include "stamp_guard.hpp"
 
 namespace versavis::daemon {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "board_parts.hpp"
+#include "wire/limits.hpp"
 
 namespace versavis::daemon {
 
@@ -19,17 +20,9 @@ constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
 /// The same with its rate in milli-hertz.
 constexpr std::int64_t millihertz_ns = 1'000'000'000'000;
 
-/// Longest latency of a camera that boards take. At half, slow cameras would be told too short a
-/// latency; at twice, boards would refuse it.
-constexpr std::int64_t longest_latency_ns = 100'000'000;
-
 /// Longest that 32 bits of nanoseconds hold. At half, phases of slow cameras do not fit; twice does
 /// not fit.
 constexpr std::int64_t longest_ns = 4'000'000'000;
-
-/// Shortest time that the light is on beside its lead, as boards have it. At half, rounding could
-/// make a configuration that they refuse; at twice, short lights are longer than asked for.
-constexpr std::uint32_t shortest_light_ns = 10'000;
 
 std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
     unsigned mask = 0;
@@ -64,7 +57,7 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
     out.phase_ns = short_ns(camera.phase_us, period_ns - 1);
     out.pulse_ns = short_ns(camera.pulse_us, period_ns / 2);
     out.latency_ns = short_ns(camera.latency_us + camera.board_output_ns * 1e-3,
-                              std::min(period_ns - 1, longest_latency_ns));
+                              std::min(period_ns - 1, wire::limits::longest_latency_ns));
     out.gap_ns = short_ns(camera.gap_us, period_ns - 1);
     out.glitch =
         static_cast<std::uint8_t>(std::llround(camera.glitch_us * 1e3 / wire::glitch_unit_ns));
@@ -221,8 +214,9 @@ wire::Configuration board_configuration(const Configuration& configuration) {
             static_cast<std::uint8_t>(1U << find_triggered_camera(configuration, name)->output);
     if (configuration.illumination.inverted) out.illumination.flags |= wire::illumination_inverted;
     out.illumination.lead_ns = short_ns(configuration.illumination.lead_us);
-    out.illumination.max_on_ns = std::max(short_ns(configuration.illumination.max_on_us),
-                                          out.illumination.lead_ns + shortest_light_ns);
+    out.illumination.max_on_ns =
+        std::max(short_ns(configuration.illumination.max_on_us),
+                 out.illumination.lead_ns + wire::limits::shortest_light_ns);
     out.illumination.duty_ppm =
         static_cast<std::uint32_t>(std::llround(configuration.illumination.duty_percent * 1e4));
     out.ports.inputs = pulse_inputs(configuration.ports.inputs);

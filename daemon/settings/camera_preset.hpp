@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How a family of cameras is set up, read from data files (daemon/settings/presets/): one for cameras
-// that keep to the standard, and for each maker what differs.
+// How a family of cameras is set up, read from data files (daemon/settings/presets/): one for
+// cameras that keep to the standard, and for each maker what differs.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "line_delays.hpp"
 #include "engine/pairing/evidence.hpp"
+#include "line_delays.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::daemon {

@@ -10,14 +10,15 @@
 
 #include "configuration_check.hpp"
 #include "engine/toml/table_reader.hpp"
+#include "wire/limits.hpp"
 
 namespace versavis::daemon {
 
 namespace {
 
-/// Longest exposure that a camera may be set to: 10 s. At half, long exposures are refused; at
-/// twice, nothing that anybody does is allowed in addition.
-constexpr double longest_us = 1e7;
+namespace limits = wire::limits;
+constexpr double ns_per_us = 1e3;
+constexpr double longest_us = limits::longest_exposure_ns / ns_per_us;
 
 /// What 32 bits of nanoseconds on the wire hold. Less would refuse what works; more does not fit.
 constexpr double longest_shift_us = 4e6;
@@ -136,13 +137,16 @@ void read_trigger(TableReader& reader, CameraConfiguration& camera) {
         {{"board", TriggerSource::board}, {"free", TriggerSource::free_run}});
     reader.read("output", camera.output, 0, wire::camera_count - 1);
     reader.read("master", camera.master);
-    reader.read("rate_hz", camera.rate_hz, 0.1, 1000);
+    reader.read("rate_hz", camera.rate_hz, limits::slowest_camera_uhz / 1e6,
+                limits::fastest_camera_uhz / 1e6);
     reader.read("phase_us", camera.phase_us, 0, longest_shift_us);
     reader.read("exposure_us", camera.exposure_us, 0, longest_us);
-    reader.read("max_exposure_us", camera.max_exposure_us, 1, longest_us);
-    reader.read("latency_us", camera.latency_us, 0, 1e5);
+    reader.read("max_exposure_us", camera.max_exposure_us,
+                limits::shortest_max_exposure_ns / ns_per_us, longest_us);
+    reader.read("latency_us", camera.latency_us, 0, limits::longest_latency_ns / ns_per_us);
     reader.read("gap_us", camera.gap_us, 0, longest_shift_us);
-    reader.read("pulse_us", camera.pulse_us, 1, 1e4);
+    reader.read("pulse_us", camera.pulse_us, limits::shortest_pulse_ns / ns_per_us,
+                limits::longest_pulse_ns / ns_per_us);
     reader.read("trigger_inverted", camera.trigger_inverted);
     reader.choose<Strobe>("strobe", camera.strobe,
                           {{"active_high", Strobe::active_high},
@@ -235,8 +239,9 @@ ImuConfiguration read_imu(TableReader& reader) {
 
 void read_illumination(TableReader& reader, IlluminationConfiguration& light) {
     reader.read("cameras", light.cameras);
-    reader.read("lead_us", light.lead_us, 0, 1000);
-    reader.read("max_on_us", light.max_on_us, 10 + light.lead_us, 1e6);
+    reader.read("lead_us", light.lead_us, 0, limits::longest_lead_ns / ns_per_us);
+    reader.read("max_on_us", light.max_on_us, limits::shortest_light_ns / ns_per_us + light.lead_us,
+                limits::longest_light_ns / ns_per_us);
     reader.read("duty_percent", light.duty_percent, 0.0001, 100);
     reader.read("inverted", light.inverted);
 }
@@ -246,12 +251,13 @@ void read_ports(TableReader& reader, PortConfiguration& ports) {
     reader.read("falling", ports.falling);
     reader.read("imu_output", ports.imu_output);
     reader.read("nmea", ports.nmea);
-    reader.read("nmea_baud", ports.nmea_baud, 1200, 921600);
+    reader.read("nmea_baud", ports.nmea_baud, limits::slowest_nmea_baud, limits::fastest_nmea_baud);
     reader.read("test", ports.test);
     reader.read("test_rate_hz", ports.test_rate_hz, 0, fastest_test_hz);
     reader.choose<std::uint8_t>("test_output", ports.test_output, test_outputs);
     reader.read("sync_rate_hz", ports.sync_rate_hz, 0, fastest_sync_hz);
-    reader.read("pulse_us", ports.pulse_us, 1, 1e4);
+    reader.read("pulse_us", ports.pulse_us, limits::shortest_pulse_ns / ns_per_us,
+                limits::longest_pulse_ns / ns_per_us);
 }
 
 /// What follows from other keys where a key is not there.

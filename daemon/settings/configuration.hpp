@@ -8,14 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include "base/log.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "engine/clock/pps_reference.hpp"
 #include "engine/imu/imu_model.hpp"
 #include "engine/pairing/evidence.hpp"
 #include "engine/toml/problem.hpp"
-#include "base/log.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
+#include "wire/limits.hpp"
 #include "wire/messages.hpp"
 #include "wire/usb_identity.hpp"
 
@@ -163,10 +164,8 @@ inline const std::vector<std::pair<std::string, std::uint8_t>> test_outputs{
     {"trigger2", wire::test_at_camera0 + 2},
     {"trigger3", wire::test_at_camera0 + 3}};
 
-/// Fastest pulses at the sync output and of the test. Half would refuse what boards do; twice is
-/// more than they do.
-constexpr double fastest_sync_hz = 10;
-constexpr double fastest_test_hz = 10'000;
+constexpr double fastest_sync_hz = wire::limits::fastest_sync_uhz / 1e6;
+constexpr double fastest_test_hz = wire::limits::fastest_test_millihertz / 1e3;
 
 struct PortConfiguration {
     TomlEntry entry;

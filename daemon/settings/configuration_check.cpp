@@ -12,8 +12,8 @@
 #include <tuple>
 
 #include "camera_preset.hpp"
-#include "receive_mode.hpp"
 #include "engine/pairing/pairing.hpp"
+#include "receive_mode.hpp"
 
 namespace versavis::daemon {
 
@@ -23,13 +23,9 @@ namespace {
 /// cannot start; at twice, a frame could be of either pulse.
 constexpr double longest_arrival_without_clock_ms = 900;
 
-/// A reading on the board's grid is set up half a millisecond ahead. At half, slow rates are
-/// refused; at twice, readings would overlap.
-constexpr double fastest_on_grid_hz = 1000;
-
-/// Slowest pulses of sync and test. At half, a cycle takes longer than any check of a cable; at
-/// twice, rates that boards have are refused.
-constexpr double slowest_pulses_hz = 0.1;
+constexpr double fastest_on_grid_hz = wire::limits::fastest_imu_without_data_ready_millihertz / 1e3;
+constexpr double slowest_test_hz = wire::limits::slowest_test_millihertz / 1e3;
+constexpr double slowest_sync_hz = wire::limits::slowest_sync_uhz / 1e6;
 
 class Findings {
  public:
@@ -496,10 +492,10 @@ void check_test_rate(const Configuration& configuration, Findings& findings) {
             "'test_output' is where the pulses of 'test_rate_hz' leave, and there are none",
             "set 'test_rate_hz', or remove the key");
     if (ports.test_rate_hz == 0) return;
-    if (ports.test_rate_hz < slowest_pulses_hz)
+    if (ports.test_rate_hz < slowest_test_hz)
         findings.add(ports.entry, "test_rate_hz",
                      "'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz", "raise it",
-                     TomlRange{slowest_pulses_hz, fastest_test_hz});
+                     TomlRange{slowest_test_hz, fastest_test_hz});
     if (!ports.test.empty())
         findings.add(ports.entry, "test_rate_hz",
                      fmt::format("the test pulses show '{}' already ('test')", clipped(ports.test)),
@@ -518,10 +514,10 @@ void check_test_rate(const Configuration& configuration, Findings& findings) {
 
 void check_pulse_outputs(const Configuration& configuration, Findings& findings) {
     const PortConfiguration& ports = configuration.ports;
-    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < slowest_pulses_hz)
+    if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < slowest_sync_hz)
         findings.add(ports.entry, "sync_rate_hz",
                      "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz", "raise it",
-                     TomlRange{slowest_pulses_hz, fastest_sync_hz});
+                     TomlRange{slowest_sync_hz, fastest_sync_hz});
     const ImuConfiguration* uart = find_imu_at(configuration, 1);
     if (!test_source(configuration))
         findings.add(

@@ -3,10 +3,10 @@
 // the HAL.
 #pragma once
 
+#include "base/hal.hpp"
 #include "camera_channel.hpp"
 #include "configuration_check.hpp"
 #include "edge_order.hpp"
-#include "base/hal.hpp"
 #include "illumination.hpp"
 #include "imu/spi_imu.hpp"
 #include "imu/vn100.hpp"

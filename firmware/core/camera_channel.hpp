@@ -4,9 +4,9 @@
 #pragma once
 
 #include "announcements.hpp"
+#include "base/grid.hpp"
 #include "exposure_tracker.hpp"
 #include "glitch_filter.hpp"
-#include "base/grid.hpp"
 #include "grid_clock.hpp"
 #include "output_queue.hpp"
 

@@ -3,18 +3,18 @@
 
 #include "imu/imu_part.hpp"
 #include "imu/vn100.hpp"
+#include "wire/limits.hpp"
 
 namespace versavis::firmware {
 
 namespace {
 
+namespace limits = wire::limits;
 using Field = wire::ConfigurationField;
 using Part = wire::ConfigurationPart;
 
 constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
 constexpr std::int64_t mhz_ns = 1'000'000'000'000;
-constexpr std::int64_t longest_exposure = 10'000'000'000;
-constexpr std::int64_t longest_pulse = 10'000'000;
 
 std::int64_t min(std::int64_t a, std::int64_t b) { return a < b ? a : b; }
 
@@ -93,13 +93,17 @@ void check_camera(const wire::Configuration& configuration, std::size_t index, C
     const wire::CameraConfiguration& camera = configuration.cameras[index];
     checker.need(true, bit_of(wire::present_camera0) + static_cast<unsigned>(index));
     const std::int64_t period = camera.rate_uhz == 0 ? INT64_MAX : uhz_ns / camera.rate_uhz;
-    checker.small(Field::rate, camera.rate_uhz, 100'000, 1'000'000'000);
+    checker.small(Field::rate, camera.rate_uhz, limits::slowest_camera_uhz,
+                  limits::fastest_camera_uhz);
     checker.range(Field::phase, camera.phase_ns, 0, period - 1);
-    checker.range(Field::pulse, camera.pulse_ns, 1'000, min(period / 2, longest_pulse));
-    checker.range(Field::latency, camera.latency_ns, 0, min(period - 1, 100'000'000));
+    checker.range(Field::pulse, camera.pulse_ns, limits::shortest_pulse_ns,
+                  min(period / 2, limits::longest_pulse_ns));
+    checker.range(Field::latency, camera.latency_ns, 0,
+                  min(period - 1, limits::longest_latency_ns));
     checker.range(Field::gap, camera.gap_ns, 0, period - 1);
-    checker.range(Field::exposure, camera.exposure_ns, 0, longest_exposure);
-    checker.range(Field::max_exposure, camera.max_exposure_ns, 1'000, longest_exposure);
+    checker.range(Field::exposure, camera.exposure_ns, 0, limits::longest_exposure_ns);
+    checker.range(Field::max_exposure, camera.max_exposure_ns, limits::shortest_max_exposure_ns,
+                  limits::longest_exposure_ns);
     check_master(configuration, index, checker);
 }
 
@@ -109,7 +113,7 @@ void check_uart_imu(const wire::ImuConfiguration& imu, Checker checker) {
     checker.need(true, bit_of(wire::present_uart));
     checker.need(data_ready, bit_of(wire::present_ready0) + 1);
     checker.range(Field::imu_kind, static_cast<std::int64_t>(imu.kind), only, only);
-    checker.range(Field::imu_rate, imu.rate_millihertz, 1'000,
+    checker.range(Field::imu_rate, imu.rate_millihertz, limits::slowest_imu_millihertz,
                   min(vn100::fastest_millihertz, checker.facts().fastest_imu_millihertz));
     checker.small(Field::imu_filter, imu.filter, 0, 0);
     checker.small(Field::imu_options, imu.options, 0, wire::imu_data_ready);
@@ -143,8 +147,9 @@ void check_spi_imu(const wire::ImuConfiguration& imu, Checker checker) {
     const std::int64_t fastest =
         min(i2c ? part->fastest_i2c_millihertz() : part->fastest_millihertz(),
             checker.facts().fastest_imu_millihertz);
-    checker.range(Field::imu_rate, imu.rate_millihertz, 1'000,
-                  data_ready ? fastest : min(fastest, 1'000'000));
+    checker.range(
+        Field::imu_rate, imu.rate_millihertz, limits::slowest_imu_millihertz,
+        data_ready ? fastest : min(fastest, limits::fastest_imu_without_data_ready_millihertz));
     checker.small(Field::imu_filter, imu.filter, 0, part->strongest_filter());
 }
 
@@ -152,16 +157,18 @@ void check_illumination(const wire::IlluminationConfiguration& light, Checker ch
     if (light.cameras == 0) return;
     checker.need(true, bit_of(wire::present_light));
     checker.small(Field::cameras, light.cameras, 1, (1 << wire::camera_count) - 1);
-    checker.small(Field::lead, light.lead_ns, 0, 1'000'000);
-    checker.range(Field::max_on, light.max_on_ns, 10'000 + std::int64_t{light.lead_ns},
-                  1'000'000'000);
+    checker.small(Field::lead, light.lead_ns, 0, limits::longest_lead_ns);
+    checker.range(Field::max_on, light.max_on_ns,
+                  limits::shortest_light_ns + std::int64_t{light.lead_ns},
+                  limits::longest_light_ns);
     checker.small(Field::duty, light.duty_ppm, 1, 1'000'000);
 }
 
 /// Where pulses at a rate of their own leave, and how fast.
 void check_test_rate(const wire::Configuration& configuration, Checker& checker) {
     const wire::PortConfiguration& ports = configuration.ports;
-    checker.small(Field::test_rate, ports.test_rate_millihertz, 100, 10'000'000);
+    checker.small(Field::test_rate, ports.test_rate_millihertz, limits::slowest_test_millihertz,
+                  limits::fastest_test_millihertz);
     checker.small(Field::test_output, ports.test_output, 0, wire::test_at_sync);
     if (ports.test_output == wire::test_at_test)
         return checker.need(true, bit_of(wire::present_test_output));
@@ -185,7 +192,7 @@ void check_test(const wire::Configuration& configuration, Checker& checker) {
         (uart_imu.options & wire::imu_data_ready) != 0;  // nothing else shows its ticks
     if (ports.test == wire::test_none) return;
     const int last = wire::test_imu0 + (uart_ticks ? 1 : 0);
-    std::int64_t period = longest_pulse * 2;
+    std::int64_t period = limits::longest_pulse_ns * 2;
     if (ports.test == wire::test_rate) {
         check_test_rate(configuration, checker);
         if (ports.test_rate_millihertz != 0) period = mhz_ns / ports.test_rate_millihertz;
@@ -200,7 +207,8 @@ void check_test(const wire::Configuration& configuration, Checker& checker) {
         const std::uint32_t rate = configuration.cameras[ports.test - wire::test_camera0].rate_uhz;
         if (rate != 0) period = uhz_ns / rate;
     }
-    checker.range(Field::pulse, ports.pulse_ns, 1'000, min(longest_pulse, period / 2));
+    checker.range(Field::pulse, ports.pulse_ns, limits::shortest_pulse_ns,
+                  min(limits::longest_pulse_ns, period / 2));
 }
 
 void check_ports(const wire::Configuration& configuration, Checker checker) {
@@ -211,8 +219,10 @@ void check_ports(const wire::Configuration& configuration, Checker checker) {
     check_test(configuration, checker);
     if (ports.sync_rate_uhz != 0) {
         checker.need(true, bit_of(wire::present_sync_output));
-        checker.small(Field::sync_rate, ports.sync_rate_uhz, 100'000, 10'000'000);
-        checker.range(Field::pulse, ports.pulse_ns, 1'000, longest_pulse);
+        checker.small(Field::sync_rate, ports.sync_rate_uhz, limits::slowest_sync_uhz,
+                      limits::fastest_sync_uhz);
+        checker.range(Field::pulse, ports.pulse_ns, limits::shortest_pulse_ns,
+                      limits::longest_pulse_ns);
     }
     if ((ports.options & wire::port_imu_output) != 0) {
         checker.need(true, bit_of(wire::present_imu_output));
@@ -223,7 +233,9 @@ void check_ports(const wire::Configuration& configuration, Checker checker) {
     checker.need(true, bit_of(wire::present_uart));
     if (configuration.imus[1].kind != wire::ImuKind::none)  // it occupies the UART
         checker.small(Field::port_options, ports.options, 0, wire::port_imu_output);
-    if (ports.nmea_baud != 0) checker.small(Field::nmea_baud, ports.nmea_baud, 1'200, 921'600);
+    if (ports.nmea_baud != 0)
+        checker.small(Field::nmea_baud, ports.nmea_baud, limits::slowest_nmea_baud,
+                      limits::fastest_nmea_baud);
 }
 
 }  // namespace

@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "board.hpp"
 #include "base/hal.hpp"
+#include "board.hpp"
 #include "port_model.hpp"
 #include "virtual_board.hpp"
 

@@ -2,8 +2,8 @@
 // Board time: microseconds of the timer since the state machines started.
 #pragma once
 
-#include "clocks.hpp"
 #include "base/hal.hpp"
+#include "clocks.hpp"
 #include "registers.hpp"
 
 namespace versavis::rp2040 {

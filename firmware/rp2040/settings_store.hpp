@@ -2,8 +2,8 @@
 // Settings in flash, in two places by turns: what was stored before remains until the new is whole.
 #pragma once
 
-#include "flash_chip.hpp"
 #include "base/hal.hpp"
+#include "flash_chip.hpp"
 
 namespace versavis::rp2040 {
 

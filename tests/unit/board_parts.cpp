@@ -10,9 +10,9 @@
 #include <set>
 
 #include "../support/temporary_directory.hpp"
-#include "settings/board_configuration.hpp"
 #include "configuration_check.hpp"
 #include "engine/board/board_words.hpp"
+#include "settings/board_configuration.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;

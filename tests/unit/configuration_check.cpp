@@ -8,10 +8,10 @@
 #include <random>
 
 #include "../support/temporary_directory.hpp"
-#include "settings/board_configuration.hpp"
 #include "configuration_check.hpp"
 #include "imu/imu_part.hpp"
 #include "imu/vn100.hpp"
+#include "settings/board_configuration.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;

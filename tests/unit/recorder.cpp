@@ -20,9 +20,9 @@
 
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
+#include "commands/record_command.hpp"
 #include "engine/ring/writer.hpp"
 #include "record/item_writer.hpp"
-#include "commands/record_command.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"

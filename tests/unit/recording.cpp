@@ -6,8 +6,8 @@
 #include <fstream>
 #include <map>
 
-#include "recording/recording_info.hpp"
 #include "base/shallow_json.hpp"
+#include "recording/recording_info.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 

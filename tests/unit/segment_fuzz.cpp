@@ -14,9 +14,9 @@
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
-#include "engine/ring/writer.hpp"
 #include "commands/list.hpp"
 #include "commands/tail.hpp"
+#include "engine/ring/writer.hpp"
 #include "versavis.h"
 #include "versavis/ring_reader.hpp"
 

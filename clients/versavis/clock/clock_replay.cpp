@@ -10,8 +10,8 @@
 #include <iterator>
 #include <numeric>
 
-#include "clock/clock_csv.hpp"
 #include "base/plausible_time.hpp"
+#include "clock/clock_csv.hpp"
 
 namespace versavis::client {
 

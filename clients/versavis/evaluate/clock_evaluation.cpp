@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clock/clock_plot.hpp"
 #include "base/plausible_time.hpp"
+#include "clock/clock_plot.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::client {

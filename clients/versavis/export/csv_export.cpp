@@ -7,13 +7,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/shallow_json.hpp"
 #include "clock/clock_json.hpp"
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "export/metadata_csv.hpp"
 #include "export/text_file.hpp"
 #include "pairing/evidence_json.hpp"
-#include "base/shallow_json.hpp"
 
 namespace versavis::client {
 

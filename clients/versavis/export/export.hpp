@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "export/bag_writer.hpp"
-#include "recording/kalibr_yaml.hpp"
 #include "export/selection.hpp"
+#include "recording/kalibr_yaml.hpp"
 
 namespace versavis::client {
 

@@ -8,11 +8,11 @@
 #include <cstring>
 #include <optional>
 
+#include "base/shallow_json.hpp"
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
 #include "recording/recording.hpp"
-#include "base/shallow_json.hpp"
 
 namespace versavis::client {
 

@@ -17,10 +17,10 @@
 #include <random>
 #include <utility>
 
-#include "recording/kalibr_yaml.hpp"
 #include "record/frame_packer.hpp"
 #include "record/item_writer.hpp"
 #include "record/write_back.hpp"
+#include "recording/kalibr_yaml.hpp"
 #include "status/status_document.hpp"
 #include "versavis/ring_path.hpp"
 #include "versavis/ring_reader.hpp"

@@ -9,11 +9,11 @@
 #include <optional>
 #include <set>
 
-#include "base/plausible_time.hpp"
 #include "base/byte_cursor.hpp"
+#include "base/plausible_time.hpp"
+#include "base/shallow_json.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
-#include "base/shallow_json.hpp"
 #include "versavis/ring_path.hpp"
 
 namespace versavis::client {

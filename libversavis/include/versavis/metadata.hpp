@@ -6,8 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include "versavis/export.hpp"
 #include "ring_layout.hpp"
+#include "versavis/export.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis {

@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "versavis/metadata.hpp"
-#include "versavis/pixel_format.hpp"
 #include "ring_path.hpp"
 #include "ring_reader.hpp"
+#include "versavis/metadata.hpp"
+#include "versavis/pixel_format.hpp"
 
 namespace versavis {
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <optional>
 
+#include "ring_reader.hpp"
 #include "versavis/error.hpp"
 #include "versavis/export.hpp"
-#include "ring_reader.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis {

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Limits of a configuration: the board refuses what is beyond them, and the host, whose file has
+// other units, refuses it before.
+#pragma once
+
+#include <cstdint>
+
+namespace versavis::wire::limits {
+
+inline constexpr std::uint32_t slowest_camera_uhz = 100'000;
+inline constexpr std::uint32_t fastest_camera_uhz = 1'000'000'000;
+inline constexpr std::int64_t shortest_pulse_ns = 1'000;
+inline constexpr std::int64_t longest_pulse_ns = 10'000'000;
+inline constexpr std::int64_t longest_latency_ns = 100'000'000;
+inline constexpr std::int64_t longest_exposure_ns = 10'000'000'000;
+inline constexpr std::int64_t shortest_max_exposure_ns = 1'000;
+
+inline constexpr std::uint32_t slowest_imu_millihertz = 1'000;
+/// A reading without the part's own signal is set up half a millisecond ahead.
+inline constexpr std::uint32_t fastest_imu_without_data_ready_millihertz = 1'000'000;
+
+inline constexpr std::uint32_t longest_lead_ns = 1'000'000;
+inline constexpr std::uint32_t shortest_light_ns = 10'000;  ///< beside its lead
+inline constexpr std::uint32_t longest_light_ns = 1'000'000'000;
+
+inline constexpr std::uint32_t slowest_test_millihertz = 100;
+inline constexpr std::uint32_t fastest_test_millihertz = 10'000'000;
+inline constexpr std::uint32_t slowest_sync_uhz = 100'000;
+inline constexpr std::uint32_t fastest_sync_uhz = 10'000'000;
+inline constexpr std::uint32_t slowest_nmea_baud = 1'200;
+inline constexpr std::uint32_t fastest_nmea_baud = 921'600;
+
+}  // namespace versavis::wire::limits
