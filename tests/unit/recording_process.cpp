@@ -110,7 +110,8 @@ class Minute {
             file.add("/cam0/image_raw", "cdr", number_, time, std::string(40, '\1'));
             item("cam0", StreamKind::frames, time, frame);
             file.add("/versavis/cam0/stamp", "json", number_, time,
-                     R"({"time_ns":)" + std::to_string(time.ns) + R"(,"suspect":true})");
+                     R"({"time_ns":)" + std::to_string(time.ns) + R"(,"suspect":true,"flags":)" +
+                         std::to_string(frame.flags) + "}");
         }
     }
 
@@ -192,6 +193,14 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
     const Minute minute;
     minute.file.write(old_file);
     REQUIRE(process_recording(old_file, new_file, on));
+    const auto recording = Recording::open(new_file);
+    REQUIRE(recording);
+    std::vector<std::uint32_t> flags;
+    REQUIRE(recording->for_each({"cam0"}, [&](const RecordedItem& item) {
+        flags.push_back(unpack<FrameMetadata>(item.metadata).flags);
+        return true;
+    }));
+    REQUIRE(flags.size() == 600);
     const auto reader = McapReader::open(new_file);
     REQUIRE(reader);
     std::map<std::uint16_t, std::string> topics;
@@ -220,6 +229,7 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
                 const auto stamp = nlohmann::json::parse(data);
                 CHECK(stamp["time_ns"] == message->log_time);
                 CHECK(stamp["suspect"] == false);
+                CHECK(stamp["flags"] == flags[index]);
                 if (index == 3) CHECK(stamp["trigger"] == 4);
             }
             return true;

@@ -12,6 +12,7 @@
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
+#include "recording/item_fields.hpp"
 #include "recording/recording.hpp"
 
 namespace versavis::client {
@@ -352,26 +353,26 @@ std::string Processing::changed_item(const std::string& name, const Change& chan
     return data;
 }
 
-/// Of the stamps as JSON.
+/// What each change sets of a stamp as JSON, and what a proved pair sets besides.
+constexpr const char* stamp_fields[] = {"host_time_ns", "sigma_ns",      "kind",
+                                        "suspect",      "holdover",      "clamped",
+                                        "sensor_error", "camera_length", "flags"};
+constexpr const char* pair_fields[] = {"trigger", "tick", "board_time_ns", "exposure_ns",
+                                       "delay_ns"};
+
+/// Of the stamps as JSON. What else a stamp says, in files of any version, stays.
 std::string Processing::changed_text(const std::string& name, const Change& change,
                                      const std::string& data) const {
     json stamp = parse_shallow_json(data);
     if (!stamp.is_object()) return data;
-    stamp["time_ns"] = change.after.ns;
-    stamp["host_time_ns"] = change.host.ns;
-    stamp["sigma_ns"] = change.sigma_ns == sigma_unknown ? json(nullptr) : json(change.sigma_ns);
-    stamp["holdover"] = (change.flags & flag_holdover) != 0;
-    stamp["clamped"] = (change.flags & flag_clamped) != 0;
-    stamp["suspect"] = (change.flags & flag_suspect) != 0;
-    if (change.proof == no_proof) return stamp.dump();
     FrameMetadata frame{};
     apply(name, change, frame);
-    stamp["kind"] = to_string(frame.stamp_kind());
-    stamp["trigger"] = frame.trigger;
-    stamp["tick"] = frame.tick();
-    stamp["board_time_ns"] = frame.board_time.ns;
-    stamp["exposure_ns"] = frame.exposure.ns == 0 ? json(nullptr) : json(frame.exposure.ns);
-    stamp["delay_ns"] = frame.delay_ns;
+    json changed;
+    add_fields(changed, ring::StreamKind::frames, pack(frame), ring::no_attributes);
+    stamp["time_ns"] = change.after.ns;
+    for (const char* field : stamp_fields) stamp[field] = changed.at(field);
+    if (change.proof != no_proof)
+        for (const char* field : pair_fields) stamp[field] = changed.at(field);
     return stamp.dump();
 }
 
