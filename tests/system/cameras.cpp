@@ -40,11 +40,13 @@ std::string fault(const std::string& camera, const std::string& kind, int at,
 using Pairs = std::set<std::pair<std::uint64_t, std::uint64_t>>;
 
 /// Triggers and block ids in lines of JSON, of those with this `decision` if it is not empty.
+/// Frames whose trigger is unknown are none.
 Pairs pairs(std::istream& lines, const std::string& decision) {
     Pairs found;
     for (std::string text; std::getline(lines, text);) {
         const auto line = nlohmann::json::parse(text, nullptr, false);
         if (line.is_discarded() || line.value("decision", "") != decision) continue;
+        if (line["trigger"].is_null()) continue;
         found.emplace(line["trigger"], line["block_id"]);
     }
     return found;
