@@ -16,6 +16,9 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 #include <thread>
 
 #include "../support/in_process.hpp"
@@ -26,6 +29,7 @@
 #include "recording/mcap_reader.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"
+#include "versavis/fields.hpp"
 #include "versavis/ring_path.hpp"
 
 using namespace versavis;
@@ -162,6 +166,30 @@ std::vector<std::uint64_t> from_to(std::uint64_t first, std::uint64_t end) {
     return numbers;
 }
 
+std::vector<nlohmann::json> json_messages(const std::string& path, const std::string& topic) {
+    const auto reader = McapReader::open(path);
+    REQUIRE(reader);
+    std::optional<std::uint16_t> channel;
+    for (const McapChannel& each : reader->channels())
+        if (each.topic == topic) channel = each.id;
+    std::vector<nlohmann::json> found;
+    McapBuffer buffer;
+    for (const McapChunk& chunk : reader->chunks()) {
+        const auto records = reader->load(chunk, buffer);
+        REQUIRE(records);
+        REQUIRE(reader->for_each(chunk, *records, [&](const McapRecord& record) {
+            if (record.opcode != McapOpcode::message) return true;
+            const auto message = parse_message(record.content);
+            REQUIRE(message);
+            const auto* const text = reinterpret_cast<const char*>(message->data.data());
+            if (message->channel == channel)
+                found.push_back(nlohmann::json::parse(text, text + message->data.size()));
+            return true;
+        }));
+    }
+    return found;
+}
+
 std::map<std::string, std::uint64_t> gaps_in(const std::string& path, const std::string& stream) {
     std::map<std::string, std::uint64_t> gaps;
     const auto all = Recording::open(path)->gaps();
@@ -196,6 +224,28 @@ TEST_CASE_METHOD(Instance, "recorder: each item is in the file as it was in the 
         return true;
     }));
     CHECK(samples == 20);
+}
+
+TEST_CASE_METHOD(Instance, "recorder: stamps and events have time, life, and all fields") {
+    const auto settings = this->settings();
+    record(settings, [&](int turn) {
+        publish();
+        events->publish(OutputTime{5}, pack(EventMetadata{}));
+        return turn < 2;
+    });
+    for (const auto& [topic, kind] : {std::pair{"/versavis/cam0/stamp", ring::StreamKind::frames},
+                                      std::pair{"/versavis/events", ring::StreamKind::events}}) {
+        std::set<std::string> expected{"time_ns", "life"};
+        for (const Field& field : fields_of(kind)) expected.insert(field.name);
+        const auto messages = json_messages(settings.output, topic);
+        INFO(topic);
+        CHECK_FALSE(messages.empty());
+        for (const auto& message : messages) {
+            std::set<std::string> names;
+            for (const auto& [field, value] : message.items()) names.insert(field);
+            CHECK(names == expected);
+        }
+    }
 }
 
 TEST_CASE_METHOD(Instance, "recorder: what is overwritten before it is written is told as lost") {
