@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the published evaluation on the virtual rig, and writes docs/evaluation.md and its pictures.
+"""Runs the published evaluation on the virtual rig, and writes docs/results.md and its pictures.
 
 Each measurement is what a user would do: start the rig's hardware and the service, record, and let
 `versavis evaluate` look at the recording. Debian's own Python runs this: it is the one that has
@@ -285,7 +285,7 @@ def options():
                         help="all figures, saved after each recording (default "
                              "build/evaluation.json, of parts build/evaluation-PART.json)")
     parser.add_argument("--report-only", type=pathlib.Path, metavar="FILE",
-                        help="measure nothing: write docs/evaluation.md and its diagram anew from "
+                        help="measure nothing: write docs/results.md and its diagram anew from "
                              "such a file; the picture of the LED board stays")
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build" / "bin",
                         help=argparse.SUPPRESS)
@@ -307,7 +307,7 @@ def measure(chosen):
     if chosen.whole and not found["failed"]:
         report.write(found, ROOT / "docs")
     elif chosen.whole:
-        print("evaluate: docs/evaluation.md is left as it is; --report-only writes it all the same",
+        print("evaluate: docs/results.md is left as it is; --report-only writes it all the same",
               file=sys.stderr)
     return found
 

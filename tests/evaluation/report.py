@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the evaluation found, as docs/evaluation.md, as pictures and in a few lines."""
+"""What the evaluation found, as docs/results.md, as pictures and in a few lines."""
 import math
 import statistics
 import textwrap
@@ -345,7 +345,7 @@ def text(found):
 
 
 def write(found, docs):
-    (docs / "evaluation.md").write_text(text(found))
+    (docs / "results.md").write_text(text(found))
     draw_imu(found, docs / "images" / "camera-imu.svg")
 
 

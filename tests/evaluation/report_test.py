@@ -196,7 +196,7 @@ class Writing(unittest.TestCase):
             before = copy.deepcopy(found)
             report.write(found, docs)
             self.assertEqual(found, before)
-            self.assertEqual((docs / "evaluation.md").read_text(), report.text(found))
+            self.assertEqual((docs / "results.md").read_text(), report.text(found))
             self.assertIn("<svg", (docs / "images" / "camera-imu.svg").read_text())
 
 

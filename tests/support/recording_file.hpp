@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Makes recordings for tests, byte by byte, as docs/contracts/recording.md has them.
+// Makes recordings for tests, byte by byte, as docs/contracts/recording-format.md has them.
 #pragma once
 
 #include <cstddef>

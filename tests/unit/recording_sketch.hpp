@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Writes small recordings for tests, as docs/contracts/recording.md says, cut off before a summary.
+// Writes small recordings for tests, as docs/contracts/recording-format.md says, cut off before a
+// summary.
 #pragma once
 
 #include <cstdint>

@@ -99,7 +99,7 @@ void FileCommands::add_export(CLI::App& app) {
     export_ = app.add_subcommand(
         "export",
         "Write a recording for others' tools: an EuRoC folder, a ROS 1 bag, or CSV "
-        "(docs/user/recordings-export.md)");
+        "(docs/user/export.md)");
     export_->add_option("file", export_settings_.recording, "Recording")->required();
     export_->add_option("directory", export_settings_.directory, "New or empty directory")
         ->required();

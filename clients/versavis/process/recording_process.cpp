@@ -312,7 +312,7 @@ class Processing {
     bool by_pps_ = false;
 };
 
-/// Where an item's parts lie (docs/contracts/recording.md).
+/// Where an item's parts lie (docs/contracts/recording-format.md).
 constexpr std::size_t item_time_at = 16;
 constexpr std::size_t item_metadata_at = 32;
 

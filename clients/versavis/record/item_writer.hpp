@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Items of rings as messages of a recording (docs/contracts/recording.md).
+// Items of rings as messages of a recording (docs/contracts/recording-format.md).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A recording, read back as the items that the rings held (docs/contracts/recording.md).
+// A recording, read back as the items that the rings held (docs/contracts/recording-format.md).
 #pragma once
 
 #include <cstddef>
