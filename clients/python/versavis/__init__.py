@@ -17,7 +17,7 @@ from .sets import FrameSet, Sets, sets
 from .streams import Stream, open, wait  # pylint: disable=redefined-builtin
 from .window import ImuSpan, ImuWindow, imu_dtype, imu_window
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Error", "Event", "Flags", "Frame", "FrameSet", "Gone", "ImuSample", "ImuSpan",
     "ImuWindow", "Item", "Lost", "Nothing", "Overtaken", "Pause", "Released", "Restarted", "Sets",
