@@ -32,7 +32,7 @@ constexpr Field frame_fields[] = {
      flag_camera_length},
     {"flags", offsetof(FrameMetadata, flags), Type::u32},
     {"trigger", offsetof(FrameMetadata, trigger), Type::u64, If::zero},
-    {"tick", offsetof(FrameMetadata, tick_low), Type::tick},
+    {"tick", offsetof(FrameMetadata, tick_low), Type::tick, If::without_trigger},
     {"block_id", offsetof(FrameMetadata, block_id), Type::u64},
     {"board_time_ns", offsetof(FrameMetadata, board_time), Type::i64, If::zero},
     {"host_time_ns", offsetof(FrameMetadata, host_time), Type::i64},
@@ -178,6 +178,9 @@ FieldValue value_of(const Field& field, const ring::Metadata& metadata, std::uin
     // Of all kinds of items that have values with a flag of their own, that is where flags are.
     if (field.unknown == If::without_flag &&
         (from.at<std::uint32_t>(offsetof(ImuMetadata, flags)) & field.flags) == 0)
+        return {};
+    if (field.unknown == If::without_trigger &&
+        from.at<std::uint64_t>(offsetof(FrameMetadata, trigger)) == 0)
         return {};
     switch (field.type) {
         case Type::u32: return number(word(), field.unknown);

@@ -49,6 +49,17 @@ function rig_behind(path_of, { camera = {}, cameras, ports = { inputs: 0b1111 } 
     return rig;
 }
 
+/// A board with one camera and `path` before its loop pin; without one it is ideal.
+function rig_with_loop(path) {
+    const rig = new Rig(image, quick_usb);
+    const camera = rig.add_camera(0);
+    rig.machine.set_path(pin.loop, path);
+    rig.connect();
+    rig.configure({ cameras: [{ latency: 8000 }] });
+    rig.host.start();
+    return { rig, camera };
+}
+
 /// Errors of stamps, in buckets of 8 ns.
 class Histogram {
     constructor() {
@@ -494,12 +505,7 @@ const tests = {
 
     'without a free pin for the loop no exposure is measured, and all are with one': () => {
         for (const [what, path] of Object.entries(bad_loops)) {
-            const rig = new Rig(image, quick_usb);
-            const camera = rig.add_camera(0);
-            rig.machine.set_path(pin.loop, path);
-            rig.connect();
-            rig.configure({ cameras: [{ latency: 8000 }] });
-            rig.host.start();
+            const { rig, camera } = rig_with_loop(path);
             rig.run_ms(1200);
             const records = rig.host.all('exposure');
             check(records.length >= camera.triggers.length - 2, `${records.length} records`);
@@ -512,11 +518,7 @@ const tests = {
 
     'a loop that fails for a while ends what is measured until it works again': () => {
         for (const [what, path] of Object.entries(bad_loops)) {
-            const rig = new Rig(image, quick_usb);
-            const camera = rig.add_camera(0);
-            rig.connect();
-            rig.configure({ cameras: [{ latency: 8000 }] });
-            rig.host.start();
+            const { rig, camera } = rig_with_loop();
             rig.run_ms(2500);
             check(rig.host.all('exposure').every(is_measured), 'not all are measured');
             rig.machine.set_path(pin.loop, path);
@@ -533,11 +535,7 @@ const tests = {
     },
 
     'what the loop loses shifts no later stamp': () => {
-        const rig = new Rig(image, quick_usb);
-        const camera = rig.add_camera(0);
-        rig.connect();
-        rig.configure({ cameras: [{ latency: 8000 }] });
-        rig.host.start();
+        const { rig, camera } = rig_with_loop();
         rig.run_ms(2500);
         rig.machine.set_path(pin.loop, { loses: 1 });
         rig.run_ms(2200);

@@ -153,7 +153,7 @@ TEST_CASE("cameras: one that takes every n-th trigger delivers each frame, and s
     const auto verdict = judge(stack, 4);
     CHECK(verdict.streams.at("cam0").rate_hz == Approx(10).margin(0.3));
     CHECK(verdict.streams.at("cam1").rate_hz == Approx(20.0 / 3).margin(0.3));
-    CHECK(verdict.streams.at("cam2").rate_hz == Approx(20).margin(3));
+    CHECK(verdict.streams.at("cam2").rate_hz == Approx(20).margin(0.5));
 }
 
 TEST_CASE("cameras: triggers ignored at random cost no frame, and are said in numbers") {
@@ -193,7 +193,7 @@ TEST_CASE("cameras: now and then two frames of one trigger: each proved one is d
     const rig::Verdict verdict = judge(stack, 6);
     // A surplus frame costs itself, and the one that shows that it is surplus.
     CHECK(verdict.streams.at("cam0").rate_hz > 10);
-    CHECK(verdict.streams.at("cam1").rate_hz == Approx(20).margin(3));
+    CHECK(verdict.streams.at("cam1").rate_hz == Approx(20).margin(0.5));
     CHECK(verdict.streams.at("cam1").lost <= 4);
     stack.wait_for_status([](const auto& s) {  // a single one is forgotten
         return s["cameras"][1]["frames_received"] > 200 && s["cameras"][1]["health"] == "ok";
@@ -231,7 +231,7 @@ TEST_CASE("cameras: a clock of another unit than it says is named, and frames co
     });
     CHECK(rate == Approx(8).epsilon(0.01));  // it is measured by arrivals
     CHECK(status["cameras"][0]["frames_published"] > 0);
-    CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(3));
+    CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(0.5));
 }
 
 TEST_CASE("cameras: block ids that begin again and again are named") {
@@ -287,7 +287,13 @@ TEST_CASE("cameras: one without a usable clock is started slowly and then paired
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status(healthy);
-    CHECK(judge(stack, 3).streams.at("cam0").rate_hz == Approx(20).margin(3));
+    const rig::Verdict verdict = judge(stack, 3);
+    const rig::StreamVerdict& stream = verdict.streams.at("cam0");
+    INFO(rig::to_table(verdict));
+    // Without its clock a frame that arrives late is not proved, and withheld: some may be.
+    const double missing = static_cast<double>(stream.lost) / static_cast<double>(stream.items);
+    CHECK(missing <= 0.06);
+    CHECK(stream.rate_hz * (1 + missing) == Approx(20).margin(0.5));
 }
 
 TEST_CASE("cameras: the service exposes by the brightness it sees, and the board knows before") {

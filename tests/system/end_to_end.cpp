@@ -100,7 +100,7 @@ TEST_CASE("end to end: the firmware as it is flashed stamps like the native boar
     const rig::Verdict verdict = judge(stack, 6);
     CHECK(verdict.ok);
     for (const auto& name : {"cam0", "cam1"})
-        CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(3));
+        CHECK(verdict.streams.at(name).rate_hz == Approx(20).margin(0.5));
     CHECK(verdict.streams.at("imu0").rate_hz == Approx(200).margin(5));
     const auto status = stack.wait_for_status(healthy);
     CHECK(status["board"]["lost_packets"] == 0);

@@ -74,7 +74,7 @@ void judge_all(Stack& stack) {
     for (unsigned i = 0; i < std::size(models); ++i) {
         const auto& stream = verdict.streams.at("cam" + std::to_string(i));
         CHECK(stream.wrong_pairs == 0);
-        CHECK(stream.rate_hz == Approx(20).margin(3));
+        CHECK(stream.rate_hz == Approx(20).margin(0.5));
     }
 }
 

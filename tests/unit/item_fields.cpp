@@ -129,6 +129,8 @@ Row row_of(const std::string& name, const std::string& meaning, const std::strin
     const auto says = [&](const char* value) {
         return meaning.find(std::string("; ") + value + ": ") != std::string::npos;
     };
+    if (meaning.find("unknown without trigger") != std::string::npos)
+        row.unknown = UnknownIf::without_trigger;
     if (says("0")) row.unknown = UnknownIf::zero;
     if (says("0xFFFFFFFF")) row.unknown = UnknownIf::ones;
     // Of a number with a fraction, whether the contract expects that or not.
@@ -202,13 +204,13 @@ TEST_CASE("item_fields: what is unknown is null, and empty in CSV") {
     frame.sigma_ns = sigma_unknown;
     frame.flags = 3 | flag_suspect;
     const json line = as_json(ring::StreamKind::frames, frame, pack(SensorState{}));
-    for (const char* name : {"sigma_ns", "trigger", "board_time_ns", "camera_time_ns",
+    for (const char* name : {"sigma_ns", "trigger", "tick", "board_time_ns", "camera_time_ns",
                              "exposure_ns", "gain", "temperature_c"})
         CHECK(line.at(name).is_null());
     CHECK(line.at("kind") == "arrival");
     CHECK(line.at("suspect") == true);
     CHECK(field_row(ring::StreamKind::frames, pack(frame), pack(SensorState{})) ==
-          ",0,,arrival,1,0,0,0,0,7,,0,0,,0,0,,,0,0,0,0,0,unknown,,");
+          ",0,,arrival,1,0,0,0,0,7,,,0,,0,0,,,0,0,0,0,0,unknown,,");
 }
 
 TEST_CASE("item_fields: an IMU sample says all that is known") {

@@ -25,8 +25,8 @@
 #include "../support/temporary_directory.hpp"
 #include "commands/record_command.hpp"
 #include "engine/ring/writer.hpp"
+#include "mcap_messages.hpp"
 #include "record/item_writer.hpp"
-#include "recording/mcap_reader.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"
 #include "versavis/fields.hpp"
@@ -167,26 +167,12 @@ std::vector<std::uint64_t> from_to(std::uint64_t first, std::uint64_t end) {
 }
 
 std::vector<nlohmann::json> json_messages(const std::string& path, const std::string& topic) {
-    const auto reader = McapReader::open(path);
-    REQUIRE(reader);
-    std::optional<std::uint16_t> channel;
-    for (const McapChannel& each : reader->channels())
-        if (each.topic == topic) channel = each.id;
     std::vector<nlohmann::json> found;
-    McapBuffer buffer;
-    for (const McapChunk& chunk : reader->chunks()) {
-        const auto records = reader->load(chunk, buffer);
-        REQUIRE(records);
-        REQUIRE(reader->for_each(chunk, *records, [&](const McapRecord& record) {
-            if (record.opcode != McapOpcode::message) return true;
-            const auto message = parse_message(record.content);
-            REQUIRE(message);
-            const auto* const text = reinterpret_cast<const char*>(message->data.data());
-            if (message->channel == channel)
-                found.push_back(nlohmann::json::parse(text, text + message->data.size()));
-            return true;
-        }));
-    }
+    test::for_each_message(path, [&](const std::string& its_topic, const auto& message) {
+        const auto* const text = reinterpret_cast<const char*>(message.data.data());
+        if (its_topic == topic)
+            found.push_back(nlohmann::json::parse(text, text + message.data.size()));
+    });
     return found;
 }
 
@@ -364,18 +350,9 @@ TEST_CASE_METHOD(Instance, "recorder: a gap before the first item stands where t
     });
     CHECK(report.streams.at("cam0").lost > 0);
     CHECK(gaps_in(settings.output, "cam0").at("lost") == report.streams.at("cam0").lost);
-    const auto file = McapReader::open(settings.output);
-    REQUIRE(file);
-    McapBuffer buffer;
-    for (const McapChunk& chunk : file->chunks()) {
-        const auto records = file->load(chunk, buffer);
-        REQUIRE(records);
-        CHECK(file->for_each(chunk, *records, [&](const McapRecord& record) {
-            if (record.opcode == McapOpcode::message)
-                CHECK(parse_message(record.content)->log_time >= 1'000'000'000);
-            return Expected<bool>(true);
-        }));
-    }
+    test::for_each_message(settings.output, [](const std::string&, const auto& message) {
+        CHECK(message.log_time >= 1'000'000'000);
+    });
 }
 
 TEST_CASE_METHOD(Instance,

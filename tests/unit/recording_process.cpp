@@ -12,7 +12,7 @@
 #include "../support/temporary_directory.hpp"
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
-#include "recording/mcap_reader.hpp"
+#include "mcap_messages.hpp"
 #include "recording/recording.hpp"
 #include "recording_sketch.hpp"
 
@@ -201,40 +201,26 @@ TEST_CASE("recording_process: images and texts have the stamp of their item") {
         return true;
     }));
     REQUIRE(flags.size() == 600);
-    const auto reader = McapReader::open(new_file);
-    REQUIRE(reader);
-    std::map<std::uint16_t, std::string> topics;
-    for (const McapChannel& channel : reader->channels()) topics[channel.id] = channel.topic;
-    McapBuffer buffer;
     std::map<std::string, int> seen;
-    for (const McapChunk& chunk : reader->chunks()) {
-        const auto records = reader->load(chunk, buffer);
-        REQUIRE(records);
-        REQUIRE(reader->for_each(chunk, *records, [&](const McapRecord& record) {
-            if (record.opcode != McapOpcode::message) return true;
-            const auto message = parse_message(record.content);
-            REQUIRE(message);
-            const std::string& topic = topics[message->channel];
-            const int index = seen[topic]++;
-            const std::string data(reinterpret_cast<const char*>(message->data.data()),
-                                   message->data.size());
-            if (topic == "/cam0/image_raw") {
-                std::int32_t s = 0;
-                std::uint32_t ns = 0;
-                std::memcpy(&s, data.data() + 4, 4);
-                std::memcpy(&ns, data.data() + 8, 4);
-                CHECK(std::uint64_t(s) * 1'000'000'000 + ns == message->log_time);
-                CHECK(data.substr(12) == std::string(28, '\1'));
-            } else if (topic == "/versavis/cam0/stamp") {
-                const auto stamp = nlohmann::json::parse(data);
-                CHECK(stamp["time_ns"] == message->log_time);
-                CHECK(stamp["suspect"] == false);
-                CHECK(stamp["flags"] == flags[index]);
-                if (index == 3) CHECK(stamp["trigger"] == 4);
-            }
-            return true;
-        }));
-    }
+    test::for_each_message(new_file, [&](const std::string& topic, const auto& message) {
+        const int index = seen[topic]++;
+        const std::string data(reinterpret_cast<const char*>(message.data.data()),
+                               message.data.size());
+        if (topic == "/cam0/image_raw") {
+            std::int32_t s = 0;
+            std::uint32_t ns = 0;
+            std::memcpy(&s, data.data() + 4, 4);
+            std::memcpy(&ns, data.data() + 8, 4);
+            CHECK(std::uint64_t(s) * 1'000'000'000 + ns == message.log_time);
+            CHECK(data.substr(12) == std::string(28, '\1'));
+        } else if (topic == "/versavis/cam0/stamp") {
+            const auto stamp = nlohmann::json::parse(data);
+            CHECK(stamp["time_ns"] == message.log_time);
+            CHECK(stamp["suspect"] == false);
+            CHECK(stamp["flags"] == flags[index]);
+            if (index == 3) CHECK(stamp["trigger"] == 4);
+        }
+    });
     CHECK(seen["/cam0/image_raw"] == 600);
     CHECK(seen["/versavis/clock/item"] == 660);
 }

@@ -151,9 +151,9 @@ class Frame(Item):
 
     @property
     def tick(self):
-        """The board's grid point, equal for cameras that exposed together."""
+        """The board's grid point, equal for cameras that exposed together; None: not triggered."""
         data = self._item.data.frame
-        return data.tick_high << 32 | data.tick_low
+        return data.tick_high << 32 | data.tick_low if data.trigger else None
 
     @property
     def format(self):

@@ -29,7 +29,7 @@ enum class FieldType : std::uint8_t {
 };
 
 /// When a value says nothing.
-enum class UnknownIf : std::uint8_t { never, zero, ones, nan, without_flag };
+enum class UnknownIf : std::uint8_t { never, zero, ones, nan, without_flag, without_trigger };
 
 struct Field {
     const char* name;      ///< ends with the unit of a time, an angular rate, ...
