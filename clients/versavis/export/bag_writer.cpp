@@ -92,7 +92,7 @@ Unexpected<Error> BagWriter::failed() const {
 
 Expected<> BagWriter::append(std::span<const std::byte> bytes) {
     while (!bytes.empty()) {
-        const ssize_t written = ::write(file_.number(), bytes.data(), bytes.size());
+        const ssize_t written = ::write(file_.get(), bytes.data(), bytes.size());
         if (written < 0 && errno == EINTR) continue;
         if (written < 0) return failed();
         bytes = bytes.subspan(static_cast<std::size_t>(written));
@@ -209,9 +209,8 @@ Expected<> BagWriter::finish() {
         if (auto written = append(record(Op::chunk_info, fields, list)); !written) return written;
     }
     const std::string head = bag_header(index, told, static_cast<std::uint32_t>(chunks_.size()));
-    if (::pwrite(file_.number(), head.data(), head.size(), 0) !=
-            static_cast<ssize_t>(head.size()) ||
-        ::fsync(file_.number()) != 0)
+    if (::pwrite(file_.get(), head.data(), head.size(), 0) != static_cast<ssize_t>(head.size()) ||
+        ::fsync(file_.get()) != 0)
         return failed();
     return {};
 }

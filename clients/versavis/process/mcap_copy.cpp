@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "base/byte_cursor.hpp"
-#include "base/file_descriptor.hpp"
+#include "posix/file_descriptor.hpp"
 #include "recording/mcap_summary.hpp"
 
 namespace versavis::client {
@@ -71,7 +71,7 @@ class Copy {
         if (!copied) return copied;
         if (auto added = add_attachment(); !added) return added;
         if (auto ended = append(mcap_end(summary_, at_)); !ended) return ended;
-        if (::fsync(to_.number()) != 0) return failed();
+        if (::fsync(to_.get()) != 0) return failed();
         return {};
     }
 
@@ -228,7 +228,7 @@ class Copy {
 
     Expected<> append(std::string_view text) {
         while (!text.empty()) {
-            const ssize_t written = ::write(to_.number(), text.data(), text.size());
+            const ssize_t written = ::write(to_.get(), text.data(), text.size());
             if (written < 0 && errno == EINTR) continue;
             if (written < 0) return failed();
             text.remove_prefix(static_cast<std::size_t>(written));

@@ -67,7 +67,7 @@ Expected<McapWriter> McapWriter::create(const std::string& path, const std::stri
         return failure(path, "cannot be created: " + reason(errno),
                        errno == EEXIST ? "name another file with -o; none is overwritten"
                                        : "does its directory exist, and may you write there?");
-    ::flock(file.number(), LOCK_EX | LOCK_NB);
+    ::flock(file.get(), LOCK_EX | LOCK_NB);
     McapWriter writer(path, std::move(file));
     writer.pending_ =
         mcap_magic + mcap_record(McapOpcode::header, mcap_text("ros2") + mcap_text(library));
@@ -127,7 +127,7 @@ void McapWriter::take_back() {
     last_time_ = mark_.last_time;
     // A crash after the next chunk must leave nothing behind it. Where that fails, what comes next
     // overwrites it all the same.
-    if (::ftruncate(file_.number(), static_cast<off_t>(offset_)) == 0) reserved_ = offset_;
+    if (::ftruncate(file_.get(), static_cast<off_t>(offset_)) == 0) reserved_ = offset_;
     auto& places = places_[mark_.channel];
     places.pop_back();
     if (places.empty()) places_.erase(mark_.channel);
@@ -238,10 +238,10 @@ Expected<> McapWriter::end_file() {
         pending_.clear();
         offset_ = end;
     }
-    if (::ftruncate(file_.number(), static_cast<off_t>(offset_)) != 0 && written)
+    if (::ftruncate(file_.get(), static_cast<off_t>(offset_)) != 0 && written)
         return unwritten(path_, errno);
     if (!written) return written;
-    if (::fsync(file_.number()) != 0) return unwritten(path_, errno);
+    if (::fsync(file_.get()) != 0) return unwritten(path_, errno);
     return {};
 }
 
@@ -251,8 +251,8 @@ Expected<> McapWriter::flush(std::span<const std::byte> body) {
     iovec parts[]{{pending_.data(), pending_.size()},
                   {const_cast<std::byte*>(body.data()), body.size()}};
     for (std::size_t first = parts[0].iov_len > 0 ? 0 : 1; first < 2 && parts[first].iov_len > 0;) {
-        const ssize_t written = ::pwritev(file_.number(), parts + first,
-                                          static_cast<int>(2 - first), static_cast<off_t>(offset_));
+        const ssize_t written = ::pwritev(file_.get(), parts + first, static_cast<int>(2 - first),
+                                          static_cast<off_t>(offset_));
         if (written < 0 && errno == EINTR) continue;
         if (written < 0) return unwritten(path_, errno);
         offset_ += static_cast<std::uint64_t>(written);
@@ -273,7 +273,7 @@ Expected<> McapWriter::flush(std::span<const std::byte> body) {
 
 Expected<> McapWriter::write_at(std::uint64_t offset, const std::string& bytes) const {
     const ssize_t written =
-        ::pwrite(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        ::pwrite(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (written == static_cast<ssize_t>(bytes.size())) return {};
     return unwritten(path_, written < 0 ? errno : ENOSPC);
 }
@@ -296,7 +296,7 @@ Expected<> McapWriter::reserve(std::uint64_t size) {
 /// Where the file system knows how: else the file lies in more pieces, and takes what there is.
 bool McapWriter::set_aside(std::uint64_t size) {
     const auto at = static_cast<off_t>(offset_);
-    if (::fallocate(file_.number(), FALLOC_FL_KEEP_SIZE, at, static_cast<off_t>(size)) != 0)
+    if (::fallocate(file_.get(), FALLOC_FL_KEEP_SIZE, at, static_cast<off_t>(size)) != 0)
         return false;
     reserved_ = offset_ + size;
     return true;

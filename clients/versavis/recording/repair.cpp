@@ -38,7 +38,7 @@ Expected<> write_at(const FileDescriptor& file, const std::string& path, std::ui
                     std::span<const std::byte> bytes) {
     while (!bytes.empty()) {
         const ssize_t written =
-            ::pwrite(file.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+            ::pwrite(file.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
         if (written < 0 && errno == EINTR) continue;
         if (written < 0) return unwritten(path);
         bytes = bytes.subspan(static_cast<std::size_t>(written));
@@ -202,7 +202,7 @@ Expected<> copy(const McapReader& from, std::uint64_t begin, std::uint64_t end,
         if (auto put = write_at(to, path, at - begin, part); !put) return put;
         at += part.size();
     }
-    if (::fsync(to.number()) != 0) return unwritten(path);
+    if (::fsync(to.get()) != 0) return unwritten(path);
     return {};
 }
 
@@ -222,7 +222,7 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
             path,
             std::string(in_place ? "cannot be written: " : "cannot be read: ") + reason(errno),
             in_place ? "repair it into a new file with -o" : "");
-    if (::flock(file.number(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
+    if (::flock(file.get(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
         return failure(path, "is being written by another process",
                        "stop the recorder, and see whether the file is whole then");
     return file;
@@ -235,11 +235,10 @@ Error with_cure(Error damage) {
 
 Expected<> append_end(const FileDescriptor& file, const std::string& path, const Stock& stock) {
     if (auto written = write_at(file, path, stock.kept(), stock.end()); !written) {
-        [[maybe_unused]] const int back =
-            ::ftruncate(file.number(), static_cast<off_t>(stock.kept()));
+        [[maybe_unused]] const int back = ::ftruncate(file.get(), static_cast<off_t>(stock.kept()));
         return written;
     }
-    if (::fsync(file.number()) != 0) return unwritten(path);
+    if (::fsync(file.get()) != 0) return unwritten(path);
     return {};
 }
 
@@ -254,7 +253,7 @@ Expected<> repair_in_place(const FileDescriptor& file, const McapReader& reader,
             return kept;
         }
     }
-    if (::ftruncate(file.number(), static_cast<off_t>(stock.kept())) != 0)
+    if (::ftruncate(file.get(), static_cast<off_t>(stock.kept())) != 0)
         return unwritten(reader.path());
     return append_end(file, reader.path(), stock);
 }
