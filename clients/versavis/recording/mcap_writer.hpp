@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "posix/file_descriptor.hpp"
+#include "posix/file.hpp"
 #include "recording/mcap_summary.hpp"
 #include "versavis/error.hpp"
 
