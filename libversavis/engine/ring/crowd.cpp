@@ -5,7 +5,7 @@
 #include <system_error>
 
 #include "client/futex.hpp"
-#include "client/quiet_thread.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::ring {
 
@@ -41,7 +41,7 @@ void Crowd::call(const std::atomic<std::uint32_t>& word) {
     tell();
     if (thread_.joinable()) return;
     try {
-        thread_ = quiet_thread([this, &word] { run(word); });
+        thread_ = start_thread("crowd", [this, &word] { run(word); });
     } catch (const std::system_error&) {
         futex_wake(word, INT_MAX);  // no thread to be had: slower, but all are woken
     }

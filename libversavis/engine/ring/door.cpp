@@ -13,7 +13,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "client/quiet_thread.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::ring {
 
@@ -71,7 +71,7 @@ Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path,
         return not_made(path);
     std::unique_ptr<Door> door(new Door(std::move(segment), std::move(socket)));
     try {
-        door->thread_ = quiet_thread([self = door.get()] { self->serve(); });
+        door->thread_ = start_thread("door", [self = door.get()] { self->serve(); });
     } catch (const std::system_error& error) {
         return failure(path.string(), fmt::format("gets no thread: {}", error.what()),
                        "raise the limit on tasks");
