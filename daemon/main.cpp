@@ -18,6 +18,7 @@
 #include "check/camera_check.hpp"
 #include "service.hpp"
 #include "settings/configuration.hpp"
+#include "settings/key_report.hpp"
 #include "settings/problem_report.hpp"
 
 namespace {
@@ -197,14 +198,21 @@ int main(int argc, char** argv) {
     CLI::Option* check_config =
         app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
     app.add_flag("--json", as_json, "As JSON");
+    bool list_keys = false;
+    CLI::Option* keys = app.add_flag("--keys", list_keys,
+                                     "Print each key of the file with its meaning, range and "
+                                     "default, and exit")
+                            ->excludes(check_config);
     bool check_cables = false;
     CLI::Option* check_wires = app.add_flag("--check-cameras", check_cables,
                                             "Prove the wiring of all cameras by pulses, and exit")
-                                   ->excludes(check_config);
+                                   ->excludes(check_config)
+                                   ->excludes(keys);
     ProbeOptions probe_options;
     app.add_option("--probe-camera", probe_options.device,
                    "Set up one camera (address, serial number or name), or 'all', and report")
         ->excludes(check_config)
+        ->excludes(keys)
         ->excludes(check_wires);
     app.add_option("--bundle", probe_options.bundle,
                    "Also write description, values and a draft of a preset to this file");
@@ -217,10 +225,14 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
-    if (as_json && !check_only && !check_cables && probe_options.device.empty())
-        return app.exit(CLI::RequiresError("--json",
-                                           "--check-config, --check-cameras or --probe-camera")),
+    if (as_json && !check_only && !list_keys && !check_cables && probe_options.device.empty())
+        return app.exit(CLI::RequiresError(
+                   "--json", "--check-config, --keys, --check-cameras or --probe-camera")),
                EX_USAGE;
+    if (list_keys) {
+        fmt::print("{}\n", as_json ? to_json(describe_keys()) : to_text(describe_keys()));
+        return EX_OK;
+    }
     if (check_cables) return check_wiring(path, as_json);
     if (!probe_options.device.empty()) {
         probe_options.json = as_json;

@@ -304,6 +304,16 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
     }
 }
 
+void check_line_delays(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const bool rising = camera.entry.has("strobe_rising_us");
+        if (rising != camera.entry.has("strobe_falling_us"))
+            findings.add(camera.entry, rising ? "strobe_rising_us" : "strobe_falling_us",
+                         "the delays of both edges of the exposure line are needed",
+                         "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
+    }
+}
+
 /// What would last too short for the board to see.
 void check_glitch(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras) {
@@ -535,12 +545,27 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
                        "lower it");
 }
 
-constexpr void (*rules[])(const Configuration&, Findings&){
-    check_that_it_serves, check_instance,      check_link,          check_pps,
-    check_names,          check_devices,       check_outputs,       check_masters,
-    check_camera_times,   check_glitch,        check_auto_exposure, check_presets,
-    check_imus,           check_illumination,  check_inputs,        check_uart_and_imu_output,
-    check_test_rate,      check_pulse_outputs, check_history,       check_receive};
+constexpr void (*rules[])(const Configuration&, Findings&){check_that_it_serves,
+                                                           check_instance,
+                                                           check_link,
+                                                           check_pps,
+                                                           check_names,
+                                                           check_devices,
+                                                           check_outputs,
+                                                           check_masters,
+                                                           check_camera_times,
+                                                           check_line_delays,
+                                                           check_glitch,
+                                                           check_auto_exposure,
+                                                           check_presets,
+                                                           check_imus,
+                                                           check_illumination,
+                                                           check_inputs,
+                                                           check_uart_and_imu_output,
+                                                           check_test_rate,
+                                                           check_pulse_outputs,
+                                                           check_history,
+                                                           check_receive};
 
 }  // namespace
 
