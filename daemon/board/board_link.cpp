@@ -399,7 +399,7 @@ void BoardLink::take(const wire::HelloVersion& other) {
     hello_.minor = other.minor;
 }
 
-void BoardLink::note(const std::optional<Doubt>& doubt) {
+void BoardLink::note(const std::optional<Implausibility>& doubt) {
     if (!doubt) return;
     {
         const std::lock_guard lock(report_mutex_);

@@ -40,7 +40,7 @@ class BoardListener {
     virtual void exposure(const wire::Exposure& record, HostTime received) = 0;
     /// False: the sample is doubted, and nothing may be made of its times.
     virtual bool imu_sample(const wire::ImuSample& sample, HostTime received) = 0;
-    virtual void exchange_doubted(const Doubt& doubt) = 0;
+    virtual void exchange_doubted(const Implausibility& doubt) = 0;
     virtual void board_event(const wire::Event& event, HostTime received) = 0;
 };
 
@@ -113,7 +113,7 @@ class BoardLink {
     void take_answer(const wire::Packet& packet);
     bool same_life(const wire::BoardHello& hello, std::uint32_t nonce, HostTime received) const;
     bool of_this_life(const wire::Header& header);
-    void note(const std::optional<Doubt>& doubt);
+    void note(const std::optional<Implausibility>& doubt);
     void count_impossible();
     template <class T, class Use>
     bool use(const wire::Packet& packet, Use&& use);

@@ -13,18 +13,15 @@ namespace versavis::daemon {
 namespace {
 
 /// Until a camera that is asked by its address is taken for absent: some answer after a third of a
-/// second. At half, one with a slow control channel may be missed; at twice, the state of one that
-/// is absent is known a second later.
+/// second.
 constexpr Duration address_patience = seconds(1);
 
 /// The same for one that is asked by broadcast, before USB is looked at, and after: cameras may
-/// wait a second with their answer. At half, slow ones are never found; at twice, the state is
-/// known a second later.
+/// wait a second with their answer.
 constexpr Duration first_broadcast_patience = milliseconds(100);
 constexpr Duration broadcast_patience = seconds(1);
 
-/// For one register. At half, a busy camera does not answer in time; at twice, a mute one is waited
-/// for longer.
+/// For one register.
 constexpr Duration answer_patience = milliseconds(500);
 
 constexpr std::chrono::milliseconds look_interval(20);
@@ -45,7 +42,7 @@ CameraProblem absent(const std::string& device) {
 }
 
 CameraResult<> check_claim(const std::string& camera, const std::string& device,
-                           const std::string& identity, DeviceClaims& claims) {
+                           const std::string& identity, DeviceLocks& claims) {
     const std::string holder = claims.claim(camera, identity);
     if (holder.empty()) return {};
     return problem(CameraState::misconfigured,

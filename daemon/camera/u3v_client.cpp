@@ -14,19 +14,16 @@ namespace versavis::daemon {
 
 namespace {
 
-/// For one answer. At half, a camera that is busy is given up; at twice, a mute one holds its
-/// thread up for longer.
+/// For one answer.
 constexpr Duration answer_patience = milliseconds(500);
 
-/// The same for a camera that says that its answer takes longer. At half, one that erases its flash
-/// is given up; at twice, one that never ends holds its thread up for longer.
+/// The same for a camera that says that its answer takes longer.
 constexpr Duration longest_patience = seconds(5);
 
 /// A question is put so often: what is left of an earlier program's may come first.
 constexpr unsigned most_tries = 3;
 
-/// Between looks at whether it is cancelled. At half, an idle wait wakes twice as often; at twice,
-/// a stop comes later.
+/// Between looks at whether it is cancelled.
 constexpr unsigned look_interval_ms = 20;
 
 /// Aravis divides what it reads by the room in a packet: a header, and the longest text of GenCP.

@@ -13,50 +13,41 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A start may take so long, and so many periods on top, before what is missing is a fault. At
-/// half, slow starts of cameras without a clock show as faults; at twice, a fault from the start on
-/// is named five seconds later.
+/// A start may take so long, and so many periods on top, before what is missing is a fault.
 constexpr Duration start_patience = seconds(4);
 constexpr int start_periods = 20;
 
-/// The board answers ten times a second. At half, a loaded host is taken for a silent board; at
-/// twice, a dead board is named half a second later.
+/// The board answers ten times a second.
 constexpr Duration board_silence = milliseconds(1000);
 
-/// Of the frames or triggers lately, what is more than chance. At half, a single one can be a
-/// cause; at twice, a cause of one in seven is missed.
+/// Of the frames or triggers lately, what is more than chance.
 constexpr double telling_share = 0.08;
 
 /// Of them all, but for what was on its way when it began.
 constexpr double nearly_all = 0.9;
 
-/// Records that take so long after the exposure come too late for pairing. At half, a slow link is
-/// blamed; at twice, a late one is not named.
+/// Records that take so long after the exposure come too late for pairing.
 constexpr Duration late_record = milliseconds(200);
 
 /// An exposure that leaves the camera less of its period than this share cannot keep the rate: it
-/// reads out, too. At half, such cameras are called slow; at twice, long exposures are blamed.
+/// reads out, too.
 constexpr double shortest_rest = 0.05;
 
-/// What two measures of one exposure may differ by: edges of slow lines. At half, opto-couplers are
-/// missed; at twice, a late start of the camera is called inverted.
+/// What two measures of one exposure may differ by: edges of slow lines.
 constexpr Duration edge_delay = microseconds(300);
 
-/// The largest packets that pass every network. Half: none sends such; twice: many do not pass.
+/// The largest packets that pass every network.
 constexpr std::uint32_t common_packet = 1500;
 
-/// Without a frame, whole or not, for so long and so many periods, a camera sends none. At half, a
-/// host that pauses makes one; at twice, another cause is named first.
+/// Without a frame, whole or not, for so long and so many periods, a camera sends none.
 constexpr Duration quiet_time = milliseconds(300);
 constexpr int quiet_periods = 5;
 
-/// A camera that restarts is back within so long, mostly. At half, its trigger cable is blamed
-/// meanwhile; at twice, a cable that broke is named six seconds later.
+/// A camera that restarts is back within so long, mostly.
 constexpr Duration restart_time = seconds(6);
 
 /// On top of the longest pause between two triggers, and of the link's delay, no record for so long
-/// is no trigger. At half, a start that is asked for again is one; at twice, a board that sends
-/// none is named a second later.
+/// is no trigger.
 constexpr Duration record_patience = milliseconds(1500);
 
 struct CameraView {
@@ -74,8 +65,8 @@ struct CameraView {
     }
     Duration period() const { return period_of(it.configuration); }
     Duration exposure() const {
-        const Duration told = it.pipeline.told_exposure;
-        return told.ns != 0 ? told : it.pipeline.exposure;
+        const Duration commanded = it.pipeline.commanded_exposure;
+        return commanded.ns != 0 ? commanded : it.pipeline.exposure;
     }
     /// Triggers of which frames are here, and records still on a slow link.
     std::uint64_t on_link() const {
@@ -165,7 +156,7 @@ bool exposes_too_long(const CameraView& camera) {
 /// The line rises where the exposure ends.
 bool strobe_inverted(const CameraView& camera) {
     const Duration latency = from_us(camera.it.configuration.latency_us);
-    const Duration exposure = camera.it.pipeline.told_exposure;
+    const Duration exposure = camera.it.pipeline.commanded_exposure;
     const Duration late = camera.it.pipeline.start_delay - latency - exposure;
     return camera.triggered() && camera.strobe() && exposure > edge_delay &&
            some(camera.it.recent.unmeasured + camera.refused(EventReason::wrong_exposure),
@@ -331,7 +322,7 @@ std::string unproved_hint(const CameraView& c) {
 
 /// Of exposures that the board does not see.
 std::string unseen_hint(const CameraView& c) {
-    const Duration exposure = c.it.pipeline.told_exposure;
+    const Duration exposure = c.it.pipeline.commanded_exposure;
     const double glitch_us = c.it.configuration.glitch_us;
     if (exposure.ns > 0 && exposure < from_us(glitch_us))
         return fmt::format(
@@ -486,7 +477,7 @@ constexpr Rule camera_rules[] = {
              "{}: the exposure line rises {} us after the trigger, where the exposure of {} us "
              "ends: its polarity is wrong; change 'strobe' to \"{}\"",
              c.it.pipeline.edges.line.empty() ? c.it.name : c.it.pipeline.edges.line,
-             c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.told_exposure.ns / 1000,
+             c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.commanded_exposure.ns / 1000,
              c.it.configuration.strobe == Strobe::active_high ? "active_low" : "active_high");
      }},
     {Fault::line_delays, line_leads,

@@ -7,16 +7,14 @@ namespace versavis::daemon {
 
 namespace {
 
-/// More packets in a row are not lost: a link carries some 20,000 in the longest silence before
-/// the board is greeted anew. At half, such a gap counts as an error; at twice, more wrong numbers
-/// pass for losses.
+/// More packets in a row are not lost: a link carries some 20,000 in the longest silence before the
+/// board is greeted anew.
 constexpr std::uint32_t largest_loss = 32768;
 
-/// No board runs for 36 years. At half, none does either; at twice, differences of three such
-/// times could overflow.
+/// No board runs for 36 years.
 constexpr std::int64_t latest_ns = std::int64_t{1} << 60U;
 
-/// The year 2200. At half, labels end in 2085; at twice, they do not fit int64 in nanoseconds.
+/// The year 2200.
 constexpr std::int64_t latest_label_s = 7'258'118'400;
 
 constexpr std::uint32_t camera_parts = (1U << wire::camera_count) - 1U;

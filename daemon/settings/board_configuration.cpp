@@ -21,8 +21,7 @@ constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
 /// The same with its rate in milli-hertz.
 constexpr std::int64_t millihertz_ns = 1'000'000'000'000;
 
-/// Longest that 32 bits of nanoseconds hold. At half, phases of slow cameras do not fit; twice does
-/// not fit.
+/// Longest that 32 bits of nanoseconds hold.
 constexpr std::int64_t longest_ns = 4'000'000'000;
 
 std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
@@ -123,8 +122,7 @@ std::string named(const Configuration& configuration, wire::ConfigurationField f
     return imu == nullptr ? "" : imu->name;
 }
 
-/// Most names that a field can hold. At half, some that are allowed are not told; at twice, nothing
-/// is gained.
+/// Most names that a field can hold.
 constexpr std::int64_t most_names = 16;
 
 std::string allowed(const Configuration& configuration, const wire::Refusal& refusal) {
@@ -144,14 +142,14 @@ std::string allowed(const Configuration& configuration, const wire::Refusal& ref
 /// The first of the options that the board does not take, by its key.
 std::string describe_options(const wire::Refusal& refusal, const TomlEntry& entry) {
     const std::int64_t refused = refusal.value & ~refusal.maximum;
-    const auto told = [&](const char* key, const char* value) {
+    const auto refused_by_key = [&](const char* key, const char* value) {
         return fmt::format("{} is {}: the board does not take that of this part, as it is wired",
                            entry.reference(key), value);
     };
-    if ((refused & wire::imu_accel_ready) != 0) return told("accel_ready", "true");
-    if ((refused & wire::imu_i2c) != 0) return told("bus", "\"i2c\"");
-    if ((refused & wire::imu_i2c_second) != 0) return told("i2c_address", "the second");
-    return told("data_ready", "true");
+    if ((refused & wire::imu_accel_ready) != 0) return refused_by_key("accel_ready", "true");
+    if ((refused & wire::imu_i2c) != 0) return refused_by_key("bus", "\"i2c\"");
+    if ((refused & wire::imu_i2c_second) != 0) return refused_by_key("i2c_address", "the second");
+    return refused_by_key("data_ready", "true");
 }
 
 }  // namespace

@@ -16,8 +16,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// How long complete frames wait behind one that lost packets. At half, fast cameras run out of
-/// buffers then; at twice, they take twice the memory for it.
+/// How long complete frames wait behind one that lost packets.
 constexpr double longest_wait_s = 0.12;
 
 /// Trigger pulses, where the period leaves room for them: half of what it may be.

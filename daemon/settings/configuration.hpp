@@ -22,7 +22,7 @@
 
 namespace versavis::daemon {
 
-/// The ring of what the pairing of a camera was told is named after the camera.
+/// The ring of all that the pairing of a camera gets is named after the camera.
 inline const std::string evidence_suffix = "-evidence";
 
 // Each table knows its place in the file, for what is found out after reading, and by the board.

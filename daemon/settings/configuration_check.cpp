@@ -19,8 +19,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A slow start sends one pulse a second: a frame must come before the next. At half, slow cameras
-/// cannot start; at twice, a frame could be of either pulse.
+/// A slow start sends one pulse a second: a frame must come before the next.
 constexpr double longest_arrival_without_clock_ms = 900;
 
 constexpr double fastest_on_grid_hz = wire::limits::fastest_imu_without_data_ready_millihertz / 1e3;
@@ -66,13 +65,13 @@ std::string at_line(const TomlEntry& entry) {
     return fmt::format("{} in line {}", entry.title, entry.place.line);
 }
 
-/// Each that agrees with one before it: told with the first of them.
-template <class Entry, class Same, class Tell>
-void find_repeated(const std::vector<Entry>& entries, Same same, Tell tell) {
+/// Reports each that agrees with one before it, with the first of them.
+template <class Entry, class Same, class Report>
+void find_repeated(const std::vector<Entry>& entries, Same same, Report report) {
     for (auto second = entries.begin(); second != entries.end(); ++second) {
         const auto first =
             std::find_if(entries.begin(), second, [&](const Entry& e) { return same(e, *second); });
-        if (first != second) tell(*first, *second);
+        if (first != second) report(*first, *second);
     }
 }
 

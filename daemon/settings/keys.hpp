@@ -37,8 +37,7 @@ struct BoardKey {
 };
 std::optional<BoardKey> find_key(wire::ConfigurationField field);
 
-/// Slots for frames that wait for proof, and for the newest ones that readers still want. At half,
-/// a start pattern cannot be proved; at twice, each camera takes eight frames more.
+/// Slots for frames that wait for proof, and for the newest ones that readers still want.
 constexpr unsigned spare_slots = 8;
 
 }  // namespace versavis::daemon

@@ -206,7 +206,7 @@ struct ClockAnswer {
     std::int64_t sent_ns;      ///< this answer, stamped as it was handed to the link
 };
 
-/// Follows the answer, from boards whose link can tell when it really left.
+/// Follows the answer, from boards whose link knows when it really left.
 struct ClockFollowUp {
     static constexpr Type type = Type::clock_follow_up;
     std::uint32_t id;  ///< of the request

@@ -33,7 +33,7 @@ struct Bench {
             camera.camera.packet_size = 9000;
             camera.pipeline.pairing = pairing::State::locked;
             camera.pipeline.last_sign = camera.pipeline.last_record = now;
-            camera.pipeline.told_exposure = camera.pipeline.exposure = milliseconds(3);
+            camera.pipeline.commanded_exposure = camera.pipeline.exposure = milliseconds(3);
             camera.recent.received = camera.recent.published = camera.recent.triggers = 20;
             camera.delivery = {true, true, false, now - seconds(59), 20};
         }
@@ -339,7 +339,7 @@ TEST_CASE("diagnosis: an exposure longer than the period, and a rate that the ca
     bench.cam().recent.received = bench.cam().recent.published = 10;
     bench.cam().recent.unmeasured = 10;
     check(bench.camera(), Fault::rate_too_high, "10.0 of 20 Hz");
-    bench.cam().pipeline.told_exposure = milliseconds(60);
+    bench.cam().pipeline.commanded_exposure = milliseconds(60);
     check(bench.camera(), Fault::exposure_too_long, "60000 us");
 }
 
@@ -437,7 +437,7 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     Bench strobe;
     strobe.cam().recent.unmeasured = 20;
     check(strobe.camera(), Fault::strobe_missing, "measured");
-    strobe.cam().pipeline.told_exposure = nanoseconds(4'900);
+    strobe.cam().pipeline.commanded_exposure = nanoseconds(4'900);
     check(strobe.camera(), Fault::strobe_missing,
           "exposures of 4.9 us for a disturbance of the line: lower 'glitch_us', which is 5 us");
     Bench network;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plausibility/exposure_witness.hpp"
+#include "plausibility/exposure_validator.hpp"
 
 #include <rapidcheck.h>
 #include <catch2/catch.hpp>
@@ -40,15 +40,15 @@ wire::Exposure displaced(wire::Exposure made, std::uint64_t trigger, Duration by
 struct Bench {
     bool believes(const wire::Exposure& made, Duration told = {}) {
         return !contradicts_itself(made, configuration) &&
-               !witness.judge(WitnessedExposure{made, told}, 0);
+               !witness.judge(ExposureObservation{made, told}, 0);
     }
     CameraConfiguration configuration = camera();
-    ExposureWitness witness{ExposureHistory(configuration)};
+    ExposureValidator witness{ExposureHistory(configuration)};
 };
 
 }  // namespace
 
-TEST_CASE("exposure_witness: exposures that vary move the triggers, and are believed") {
+TEST_CASE("exposure_validator: exposures that vary move the triggers, and are believed") {
     Bench bench;
     Duration expected = milliseconds(4);
     const std::vector<Duration> exposures{milliseconds(4),  milliseconds(4), milliseconds(30),
@@ -61,7 +61,7 @@ TEST_CASE("exposure_witness: exposures that vary move the triggers, and are beli
     }
 }
 
-TEST_CASE("exposure_witness: an exposure of which the camera says that it is fixed stays so") {
+TEST_CASE("exposure_validator: an exposure of which the camera says that it is fixed stays so") {
     Bench bench;
     const Duration fixed = milliseconds(4);
     for (std::uint64_t tick = 1; tick < 40; ++tick)
@@ -72,7 +72,7 @@ TEST_CASE("exposure_witness: an exposure of which the camera says that it is fix
     CHECK_FALSE(bench.believes(record(42, milliseconds(11), milliseconds(9)), milliseconds(9)));
 }
 
-TEST_CASE("exposure_witness: lost records, skipped triggers and late ones are no contradiction") {
+TEST_CASE("exposure_validator: lost records, skipped triggers and late ones are no contradiction") {
     Bench bench;
     const Duration fixed = milliseconds(4);
     for (std::uint64_t tick = 1; tick < 20; ++tick) bench.believes(record(tick, fixed, fixed));
@@ -94,7 +94,7 @@ TEST_CASE("exposure_witness: lost records, skipped triggers and late ones are no
     CHECK(bench.believes(next));
 }
 
-TEST_CASE("exposure_witness: flags tell which line there is") {
+TEST_CASE("exposure_validator: flags tell which line there is") {
     Bench bench;
     bench.configuration.strobe = GENERATE(Strobe::active_high, Strobe::none);
     bench.configuration.master = GENERATE("", "left");
@@ -113,7 +113,7 @@ TEST_CASE("exposure_witness: flags tell which line there is") {
     CHECK_FALSE(agrees(0));
 }
 
-TEST_CASE("exposure_witness: no field of a record overflows anything") {
+TEST_CASE("exposure_validator: no field of a record overflows anything") {
     Bench bench;
     for (std::uint64_t tick = 1; tick < 20; ++tick)
         bench.believes(record(tick, milliseconds(4), milliseconds(4)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "exposure_witness.hpp"
+#include "exposure_validator.hpp"
 
 #include <algorithm>
 
@@ -7,35 +7,25 @@ namespace versavis::daemon {
 
 namespace {
 
-/// What a board needs to notice that an exposure has lasted too long. At half, records of a board
-/// that was busy are doubted; at twice, such an end may be 4 ms late.
+/// What a board needs to notice that an exposure has lasted too long.
 constexpr Duration overlong_slack = milliseconds(2);
 
-/// The board waits for a start so long, or for a period. At half, the starts of fast cameras are
-/// doubted when they come late; at twice, such a lie may be 4 ms.
+/// The board waits for a start so long, or for a period.
 constexpr Duration shortest_patience = milliseconds(2);
 
-/// Exposures that differ by less are of equal length: triggers then say how fast the grid runs. At
-/// half, cameras whose exposures are noisy never tell; at twice, the grid seems to scatter by 20
-/// us.
+/// Exposures that differ by less are of equal length: triggers then say how fast the grid runs.
 constexpr Duration equal_exposures = microseconds(40);
 
 /// The grid runs at the board's pace within one part in so many: aligned, it follows another clock.
-/// At half, the second record of a life may be off by twice as much; at twice, grids that are
-/// aligned to a poor clock are doubted at first.
 constexpr std::int64_t first_pace_parts = 500;
 
-/// Over lost records the pace may wander by one part in so many. At half, the first record after a
-/// second's gap may be off by 0.2 ms; at twice, it is doubted when the board warms up.
+/// Over lost records the pace may wander by one part in so many.
 constexpr std::int64_t wander_parts = 10'000;
 
-/// A trigger that leaves late says so, and is sent no later than this. At half, triggers of a busy
-/// board are doubted; at twice, a lie may hide behind the flag for 4 ms.
+/// A trigger that leaves late says so, and is sent no later than this.
 constexpr Duration latest_trigger = milliseconds(2);
 
 /// How far the second latency, or the second exposure of equal length, may be off from the first.
-/// At half, cameras that start slowly lose frames then; at twice, it takes a second more until
-/// small lies are seen.
 constexpr Duration first_tolerance = milliseconds(1);
 
 /// 73 years: a grid point beyond it is a lie.
@@ -45,7 +35,7 @@ bool has_start(const wire::Exposure& record) { return record.start_ns != wire::n
 bool has_end(const wire::Exposure& record) { return record.end_ns != wire::no_time; }
 bool has(const wire::Exposure& record, unsigned flags) { return (record.flags & flags) != 0; }
 
-/// Flags and times must tell the same.
+/// Flags and times must agree.
 bool flags_agree(const wire::Exposure& record, const CameraConfiguration& configuration) {
     constexpr unsigned outcomes = wire::exposure_measured | wire::exposure_no_start |
                                   wire::exposure_no_end | wire::exposure_predicted;
@@ -64,19 +54,20 @@ bool flags_agree(const wire::Exposure& record, const CameraConfiguration& config
 
 }  // namespace
 
-std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
-                                        const CameraConfiguration& configuration) {
+std::optional<Implausibility> contradicts_itself(const wire::Exposure& record,
+                                                 const CameraConfiguration& configuration) {
     if (!flags_agree(record, configuration))
-        return Doubt{EventReason::implausible_flags, record.flags, 0};
+        return Implausibility{EventReason::implausible_flags, record.flags, 0};
     if (!has_start(record)) return std::nullopt;
     const Duration latest = from_us(configuration.latency_us) + period_of(configuration) +
                             shortest_patience + overlong_slack;
     if (record.start_ns < record.trigger_ns || record.start_ns - record.trigger_ns > latest.ns)
-        return Doubt{EventReason::implausible_time, record.start_ns, record.trigger_ns};
+        return Implausibility{EventReason::implausible_time, record.start_ns, record.trigger_ns};
     if (!has_end(record)) return std::nullopt;
     const Duration longest = from_us(configuration.max_exposure_us) + overlong_slack;
     if (record.end_ns < record.start_ns || record.end_ns - record.start_ns > longest.ns)
-        return Doubt{EventReason::implausible_length, record.end_ns, record.start_ns + longest.ns};
+        return Implausibility{EventReason::implausible_length, record.end_ns,
+                              record.start_ns + longest.ns};
     return std::nullopt;
 }
 
@@ -90,7 +81,7 @@ ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
     lengths_[length_count_++] = from_us(configuration.exposure_us);
 }
 
-std::optional<Doubt> ExposureHistory::doubt(const WitnessedExposure& exposure) const {
+std::optional<Implausibility> ExposureHistory::doubt(const ExposureObservation& exposure) const {
     const wire::Exposure& record = exposure.record;
     if (newest_)
         if (auto doubt = number_doubt(record)) return doubt;
@@ -102,7 +93,7 @@ std::optional<Doubt> ExposureHistory::doubt(const WitnessedExposure& exposure) c
 
 /// Each trigger has a grid point of its own, in order, and each grid point a trigger, but for those
 /// that the board leaves out.
-std::optional<Doubt> ExposureHistory::number_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> ExposureHistory::number_doubt(const wire::Exposure& record) const {
     const std::uint64_t ticks = record.tick - newest_->tick;
     const std::uint64_t triggers = record.trigger - newest_->trigger;
     const bool counted = record.trigger > newest_->trigger;
@@ -110,8 +101,9 @@ std::optional<Doubt> ExposureHistory::number_doubt(const wire::Exposure& record)
     if (counted && record.tick > newest_->tick && triggers <= ticks &&
         may_skip(record, ticks - triggers))
         return std::nullopt;
-    return Doubt{EventReason::implausible_number, static_cast<std::int64_t>(record.trigger),
-                 static_cast<std::int64_t>(newest_->trigger + 1)};
+    return Implausibility{EventReason::implausible_number,
+                          static_cast<std::int64_t>(record.trigger),
+                          static_cast<std::int64_t>(newest_->trigger + 1)};
 }
 
 bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t points) const {
@@ -119,11 +111,11 @@ bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t point
     return points <= skips_ || slave_ || has(record, sparse) || has(*newest_, sparse);
 }
 
-std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
     const Duration since{record.trigger_ns - punctual_->trigger_ns};
     const std::uint64_t ticks = record.tick - punctual_->tick;
-    const Doubt doubt{EventReason::implausible_time, record.trigger_ns,
-                      punctual_->trigger_ns + pace_.value().ns};
+    const Implausibility doubt{EventReason::implausible_time, record.trigger_ns,
+                               punctual_->trigger_ns + pace_.value().ns};
     // As real numbers: ticks may be a lie.
     const double expected_ns = static_cast<double>(ticks) * static_cast<double>(pace_.value().ns);
     if (expected_ns > furthest_ns) return doubt;
@@ -135,7 +127,7 @@ std::optional<Doubt> ExposureHistory::trigger_doubt(const wire::Exposure& record
     if (has(record, wire::exposure_late) || has(*punctual_, wire::exposure_late))
         tolerance = tolerance + latest_trigger;
     if (absolute(off) <= tolerance) return std::nullopt;
-    return Doubt{doubt.reason, doubt.said, (Duration{record.trigger_ns} - off).ns};
+    return Implausibility{doubt.reason, doubt.said, (Duration{record.trigger_ns} - off).ns};
 }
 
 /// By how much two triggers may lie closer or further apart, because other exposures were expected
@@ -153,23 +145,24 @@ Duration ExposureHistory::compensation(const wire::Exposure& record) const {
     return (high - low) / 2;
 }
 
-std::optional<Doubt> ExposureHistory::start_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> ExposureHistory::start_doubt(const wire::Exposure& record) const {
     if (!has_start(record)) return std::nullopt;
     if (latency_.fits({record.start_ns - record.trigger_ns})) return std::nullopt;
-    return Doubt{EventReason::implausible_time, record.start_ns,
-                 record.trigger_ns + latency_.value().ns};
+    return Implausibility{EventReason::implausible_time, record.start_ns,
+                          record.trigger_ns + latency_.value().ns};
 }
 
-std::optional<Doubt> ExposureHistory::end_doubt(const WitnessedExposure& exposure) const {
+std::optional<Implausibility> ExposureHistory::end_doubt(
+    const ExposureObservation& exposure) const {
     const wire::Exposure& record = exposure.record;
     if (!has_start(record) || !has_end(record)) return std::nullopt;
-    if (exposure.told.ns == 0 || exposure.told != told_) return std::nullopt;
+    if (exposure.commanded.ns == 0 || exposure.commanded != commanded_) return std::nullopt;
     if (length_.fits({record.end_ns - record.start_ns})) return std::nullopt;
-    return Doubt{EventReason::implausible_length, record.end_ns,
-                 record.start_ns + length_.value().ns};
+    return Implausibility{EventReason::implausible_length, record.end_ns,
+                          record.start_ns + length_.value().ns};
 }
 
-void ExposureHistory::learn(const WitnessedExposure& exposure) {
+void ExposureHistory::learn(const ExposureObservation& exposure) {
     const wire::Exposure& record = exposure.record;
     if (grid_known_ && !has(record, wire::exposure_late) && !has(*punctual_, wire::exposure_late) &&
         compensation(record) * 2 < equal_exposures) {
@@ -185,12 +178,12 @@ void ExposureHistory::learn(const WitnessedExposure& exposure) {
     if (!has_end(record)) return;
     const Duration length{record.end_ns - record.start_ns};
     lengths_[length_count_++ % remembered_lengths] = length;
-    if (exposure.told != told_) length_ = SteadyValue(first_tolerance);
-    told_ = exposure.told;
+    if (exposure.commanded != commanded_) length_ = RunningEstimate(first_tolerance);
+    commanded_ = exposure.commanded;
     length_.learn(length);
 }
 
-bool ExposureHistory::repeats(const WitnessedExposure& exposure) const {
+bool ExposureHistory::repeats(const ExposureObservation& exposure) const {
     return of_newest_trigger(exposure.record) && !disputes_newest(exposure.record);
 }
 

@@ -5,22 +5,22 @@
 #include <cstdint>
 #include <optional>
 
-#include "doubt.hpp"
+#include "implausibility.hpp"
+#include "majority_filter.hpp"
+#include "running_estimate.hpp"
 #include "settings/configuration.hpp"
-#include "steady_value.hpp"
 #include "wire/messages.hpp"
-#include "witness.hpp"
 
 namespace versavis::daemon {
 
 /// What no honest record of this camera says, whatever came before it.
-std::optional<Doubt> contradicts_itself(const wire::Exposure& record,
-                                        const CameraConfiguration& configuration);
+std::optional<Implausibility> contradicts_itself(const wire::Exposure& record,
+                                                 const CameraConfiguration& configuration);
 
 /// A record and the exposure that the camera keeps to at that time; 0: it varies, or is unknown.
-struct WitnessedExposure {
+struct ExposureObservation {
     const wire::Exposure& record;
-    Duration told;
+    Duration commanded;
 };
 
 /// The records that were believed. The board places each trigger half an expected exposure before
@@ -30,8 +30,8 @@ class ExposureHistory {
  public:
     explicit ExposureHistory(const CameraConfiguration& configuration);
 
-    std::optional<Doubt> doubt(const WitnessedExposure& exposure) const;
-    void learn(const WitnessedExposure& exposure);
+    std::optional<Implausibility> doubt(const ExposureObservation& exposure) const;
+    void learn(const ExposureObservation& exposure);
 
     /// All may have moved: the next record is held against latency and exposure alone.
     void rebase() {
@@ -45,10 +45,10 @@ class ExposureHistory {
     /// The board said that so many of the next grid points have no trigger.
     void triggers_skipped(std::uint64_t count) { skips_ += count; }
 
-    /// The newest one was of the same trigger, and told the same.
-    bool repeats(const WitnessedExposure& exposure) const;
+    /// The newest one was of the same trigger, and said the same.
+    bool repeats(const ExposureObservation& exposure) const;
 
-    /// It was of the same trigger, and told something else.
+    /// It was of the same trigger, and said something else.
     bool disputes_newest(const wire::Exposure& record) const;
 
  private:
@@ -56,16 +56,14 @@ class ExposureHistory {
         return newest_ && newest_->trigger == record.trigger;
     }
 
-    /// Exposures that the expected one of a trigger may be among. At half, a change of exposure
-    /// that takes effect late looks like a trigger off its grid; at twice, the allowance for it
-    /// lasts twice as long.
+    /// Exposures that the expected one of a trigger may be among.
     static constexpr std::size_t remembered_lengths = 8;
 
-    std::optional<Doubt> number_doubt(const wire::Exposure& record) const;
+    std::optional<Implausibility> number_doubt(const wire::Exposure& record) const;
     bool may_skip(const wire::Exposure& record, std::uint64_t points) const;
-    std::optional<Doubt> trigger_doubt(const wire::Exposure& record) const;
-    std::optional<Doubt> start_doubt(const wire::Exposure& record) const;
-    std::optional<Doubt> end_doubt(const WitnessedExposure& exposure) const;
+    std::optional<Implausibility> trigger_doubt(const wire::Exposure& record) const;
+    std::optional<Implausibility> start_doubt(const wire::Exposure& record) const;
+    std::optional<Implausibility> end_doubt(const ExposureObservation& exposure) const;
     Duration compensation(const wire::Exposure& record) const;
 
     Duration period_;
@@ -74,15 +72,15 @@ class ExposureHistory {
     std::size_t length_count_ = 0;
     std::optional<wire::Exposure> newest_;
     std::optional<wire::Exposure> punctual_;  ///< the newest whose trigger did not leave late
-    bool grid_known_ = false;  ///< the next tick can be told from the newest record's
-    std::uint64_t skips_ = 0;  ///< told since the newest record
-    Duration slew_;            ///< by which a period may differ from the one before
-    SteadyValue pace_;         ///< from one grid point to the next
-    SteadyValue latency_;
-    SteadyValue length_;
-    Duration told_;
+    bool grid_known_ = false;                 ///< the next tick follows from the newest record's
+    std::uint64_t skips_ = 0;                 ///< reported since the newest record
+    Duration slew_;                           ///< by which a period may differ from the one before
+    RunningEstimate pace_;                    ///< from one grid point to the next
+    RunningEstimate latency_;
+    RunningEstimate length_;
+    Duration commanded_;
 };
 
-using ExposureWitness = Witness<ExposureHistory>;
+using ExposureValidator = MajorityFilter<ExposureHistory>;
 
 }  // namespace versavis::daemon

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "health/output_step_watch.hpp"
+#include "health/clock_step_detector.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -8,10 +8,10 @@
 using namespace versavis;
 using namespace versavis::clock;
 
-TEST_CASE("output_step_watch: a step is told once, with the offset before and after") {
+TEST_CASE("clock_step_detector: a step is told once, with the offset before and after") {
     const auto clocks = std::make_shared<test::SimulatedClocks>();
     Translator translator{*OutputClock::create(OutputClockKind::realtime, false, clocks)};
-    daemon::OutputStepWatch watch;
+    daemon::ClockStepDetector watch;
     CHECK_FALSE(watch.see(translator.report()));
     const Duration before = translator.report().output_minus_host;
     clocks->pass(milliseconds(500));

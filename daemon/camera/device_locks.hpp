@@ -9,7 +9,7 @@
 namespace versavis::daemon {
 
 /// Thread-safe.
-class DeviceClaims {
+class DeviceLocks {
  public:
     /// The device is the camera's, and what it had before is free. Returns the name of the camera
     /// that has it already; empty: none other.

@@ -15,11 +15,11 @@
 namespace versavis::daemon {
 
 /// Thread-safe.
-class DescriptionVetting {
+class DescriptionSandbox {
  public:
     /// `program` is run as "program --probe-description xml|zip". Good descriptions are kept by
     /// their hash in a file of the directory; where it cannot be written, until the service ends.
-    DescriptionVetting(std::filesystem::path program, const std::filesystem::path& directory);
+    DescriptionSandbox(std::filesystem::path program, const std::filesystem::path& directory);
 
     /// Errors: why it is refused, or that it was cancelled.
     Expected<> vet(const std::string& camera, const Description& description,

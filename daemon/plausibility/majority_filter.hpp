@@ -7,24 +7,24 @@
 #include <optional>
 #include <utility>
 
-#include "doubt.hpp"
+#include "implausibility.hpp"
 
 namespace versavis::daemon {
 
-/// History: what messages were believed. It has `std::optional<Doubt> doubt(message) const`,
-/// `void learn(message)`, `bool repeats(message) const`, true of the newest one come twice, and
-/// `void rebase()`, after which it knows what is usual but not where the next message belongs; one
-/// that has learned nothing doubts nothing. Not thread-safe.
+/// History: what messages were believed. It has `std::optional<Implausibility> doubt(message)
+/// const`, `void learn(message)`, `bool repeats(message) const`, true of the newest one come twice,
+/// and `void rebase()`, after which it knows what is usual but not where the next message belongs;
+/// one that has learned nothing doubts nothing. Not thread-safe.
 ///
 /// Where messages disagree the majority decides, by one candidate and a count of those for it less
 /// those against it (R. Boyer, J. Moore, MJRTY: a fast majority vote algorithm, 1991): lies in
 /// between delay the truth, but do not keep it out.
 template <class History>
-class Witness {
+class MajorityFilter {
  public:
     /// `to_confirm`: majority that messages must have, after nothing was known, until they are
     /// confirmed.
-    explicit Witness(History blank, int to_confirm = 1)
+    explicit MajorityFilter(History blank, int to_confirm = 1)
         : blank_(std::move(blank)),
           usual_(blank_),
           believed_(blank_),
@@ -34,8 +34,9 @@ class Witness {
     /// None: the message is believed, and remembered. `exchanges`: of the clock until now.
     /// `arrival`: what speaks against it already; then it can only be one of several that agree.
     template <class Message>
-    std::optional<Doubt> judge(const Message& message, std::uint64_t exchanges,
-                               const std::optional<Doubt>& arrival = std::nullopt) {
+    std::optional<Implausibility> judge(
+        const Message& message, std::uint64_t exchanges,
+        const std::optional<Implausibility>& arrival = std::nullopt) {
         overturned_ = voted_ = false;
         if (!confirmed()) return arrival ? arrival : judge_unconfirmed(message);
         const auto doubt = believed_.doubt(message);
@@ -84,22 +85,18 @@ class Witness {
     History& believed() { return believed_; }
 
  private:
-    /// Majority of messages that agree among themselves against all before. At half, two equal
-    /// accidents pass; at twice, a true step costs twice as many messages.
+    /// Majority of messages that agree among themselves against all before.
     static constexpr int votes_to_step = 3;
 
     /// An estimate that is contradicted begins anew with the third exchange, and lies may agree for
-    /// a moment. At half, a step of the board's clock passes for one of the stream; at twice, a
-    /// true one costs 0.4 s more.
+    /// a moment.
     static constexpr std::uint64_t exchanges_to_confirm = 4;
 
-    /// Votes against a rival that a message has which fits what is believed. At half, lies among
-    /// the truth add up to a step; at twice, lies that happen to fit a wrong belief make it last
-    /// longer.
+    /// Votes against a rival that a message has which fits what is believed.
     static constexpr int votes_of_truth = 8;
 
     template <class Message>
-    std::optional<Doubt> judge_unconfirmed(const Message& message) {
+    std::optional<Implausibility> judge_unconfirmed(const Message& message) {
         if (const auto doubt = believed_.doubt(message)) {
             if (believed_.repeats(message)) return doubt;
             if (agreed_ > 1) {

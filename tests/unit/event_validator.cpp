@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plausibility/event_witness.hpp"
+#include "plausibility/event_validator.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -8,11 +8,11 @@
 using namespace versavis;
 using namespace versavis::daemon;
 
-TEST_CASE("event_witness: pulses of PPS are a second apart, and no event comes from the future") {
+TEST_CASE("event_validator: pulses of PPS are a second apart, and no event comes from the future") {
     test::Pipelines bench;
     const HostTime begin{40'000'000'000};
     bench.synchronise(begin);
-    EventWitness witness(bench.translator);
+    EventValidator witness(bench.translator);
     const auto doubted = [&](wire::EventKind kind, std::int64_t pulse, Duration off) {
         const HostTime at = begin + seconds(pulse);
         wire::Event event{};
@@ -30,11 +30,12 @@ TEST_CASE("event_witness: pulses of PPS are a second apart, and no event comes f
     CHECK_FALSE(doubted(wire::EventKind::aux_pulse, 23, {}));
 }
 
-TEST_CASE("event_witness: of whatever kind, an event from the future or the far past is doubted") {
+TEST_CASE(
+    "event_validator: of whatever kind, an event from the future or the far past is doubted") {
     test::Pipelines bench;
     const HostTime begin{40'000'000'000};
     bench.synchronise(begin);
-    EventWitness witness(bench.translator);
+    EventValidator witness(bench.translator);
     const HostTime now = begin + seconds(20);
     constexpr int kinds_on_the_wire = 17;
     for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {

@@ -8,7 +8,7 @@
 
 namespace versavis::daemon {
 
-struct Doubt {
+struct Implausibility {
     EventReason reason = EventReason::none;
     std::int64_t said = 0;      ///< by the message
     std::int64_t expected = 0;  ///< by its witnesses

@@ -11,13 +11,14 @@
 namespace versavis::daemon {
 
 /// Not thread-safe.
-class SteadyValue {
+class RunningEstimate {
  public:
     /// Until the scatter is known, values within `first_tolerance` of the first are believed.
-    explicit SteadyValue(Duration first_tolerance)
+    explicit RunningEstimate(Duration first_tolerance)
         : deviation_ns_(static_cast<double>(first_tolerance.ns) / deviations) {}
 
-    SteadyValue(Duration expected, Duration first_tolerance) : SteadyValue(first_tolerance) {
+    RunningEstimate(Duration expected, Duration first_tolerance)
+        : RunningEstimate(first_tolerance) {
         mean_ns_ = static_cast<double>(expected.ns);
         count_ = 1;
     }
@@ -48,21 +49,16 @@ class SteadyValue {
     }
 
  private:
-    /// Mean deviations that an honest value stays within: 6.4 sigma of a bell. At half, one frame
-    /// in 700 is doubted for nothing; at twice, lies twice as large pass.
+    /// Mean deviations that an honest value stays within: 6.4 sigma of a bell.
     static constexpr double deviations = 8;
 
-    /// What is never doubted: the noise of edges and interrupts on a quiet line. At half, values
-    /// that never scattered are doubted for a bus that was busy once; at twice, stamps that are off
-    /// by 20 us pass as good.
+    /// What is never doubted: the noise of edges and interrupts on a quiet line.
     static constexpr Duration floor = microseconds(10);
 
-    /// Values that the scatter is taken of. At half, it scatters itself, and honest values are
-    /// doubted; at twice, what was supposed at first lasts twice as long.
+    /// Values that the scatter is taken of.
     static constexpr double memory = 16;
 
-    /// The same for the mean, which is what gaps are bridged by. At half, the first value after a
-    /// gap may be off by twice as much; at twice, a drift is followed late.
+    /// The same for the mean, which is what gaps are bridged by.
     static constexpr double mean_memory = 256;
 
     double mean_ns_ = 0;

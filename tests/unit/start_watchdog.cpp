@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pipeline/trigger_watch.hpp"
+#include "pipeline/start_watchdog.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace versavis;
 using namespace versavis::daemon;
 
-TEST_CASE("trigger_watch: the board is asked again after two seconds and five periods") {
+TEST_CASE("start_watchdog: the board is asked again after two seconds and five periods") {
     CameraConfiguration configuration;
     configuration.rate_hz = 10;
-    TriggerWatch watch(configuration);
+    StartWatchdog watch(configuration);
     const HostTime begin{100'000'000'000};
     watch.asked(begin);
     CHECK_FALSE(watch.overdue(begin + milliseconds(2500)));
@@ -19,8 +19,8 @@ TEST_CASE("trigger_watch: the board is asked again after two seconds and five pe
     CHECK(watch.overdue(begin + milliseconds(4901)));
 }
 
-TEST_CASE("trigger_watch: triggers count as unanswered until a frame comes") {
-    TriggerWatch watch(CameraConfiguration{});
+TEST_CASE("start_watchdog: triggers count as unanswered until a frame comes") {
+    StartWatchdog watch(CameraConfiguration{});
     watch.recorded(4, {});
     watch.recorded(5, {});
     CHECK(watch.unanswered() == 2);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plausibility/witness.hpp"
+#include "plausibility/majority_filter.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -12,9 +12,9 @@ namespace {
 struct Counting {
     std::optional<int> newest;
 
-    std::optional<Doubt> doubt(int number) const {
+    std::optional<Implausibility> doubt(int number) const {
         if (!newest || number == *newest + 1) return std::nullopt;
-        return Doubt{EventReason::implausible_number, number, *newest + 1};
+        return Implausibility{EventReason::implausible_number, number, *newest + 1};
     }
     void learn(int number) { newest = number; }
     bool repeats(int number) const { return newest == number; }
@@ -23,8 +23,8 @@ struct Counting {
 
 }  // namespace
 
-TEST_CASE("witness: what does not follow is doubted and not remembered") {
-    Witness<Counting> witness{Counting{}};
+TEST_CASE("majority_filter: what does not follow is doubted and not remembered") {
+    MajorityFilter<Counting> witness{Counting{}};
     CHECK_FALSE(witness.judge(1, 0));
     const auto doubt = witness.judge(7, 0);
     REQUIRE(doubt);
@@ -33,8 +33,8 @@ TEST_CASE("witness: what does not follow is doubted and not remembered") {
     CHECK_FALSE(witness.judge(2, 0));
 }
 
-TEST_CASE("witness: where neighbours are asked for, the first message is not confirmed") {
-    Witness<Counting> witness{Counting{}, 2};
+TEST_CASE("majority_filter: where neighbours are asked for, the first message is not confirmed") {
+    MajorityFilter<Counting> witness{Counting{}, 2};
     CHECK_FALSE(witness.judge(50, 0));
     CHECK_FALSE(witness.confirmed());
     CHECK_FALSE(witness.judge(1, 0));
@@ -47,8 +47,8 @@ TEST_CASE("witness: where neighbours are asked for, the first message is not con
     CHECK_FALSE(witness.confirmed());
 }
 
-TEST_CASE("witness: among the first messages the majority is believed") {
-    Witness<Counting> witness{Counting{}, 3};
+TEST_CASE("majority_filter: among the first messages the majority is believed") {
+    MajorityFilter<Counting> witness{Counting{}, 3};
     CHECK_FALSE(witness.judge(1, 0));
     CHECK_FALSE(witness.overturned());
     CHECK(witness.judge(1, 0));  // once more is not against it
@@ -65,8 +65,9 @@ TEST_CASE("witness: among the first messages the majority is believed") {
     CHECK(witness.confirmed());
 }
 
-TEST_CASE("witness: lies among those that agree do not keep a step out, nor does one make it") {
-    Witness<Counting> witness{Counting{}};
+TEST_CASE(
+    "majority_filter: lies among those that agree do not keep a step out, nor does one make it") {
+    MajorityFilter<Counting> witness{Counting{}};
     witness.judge(1, 0);
     int number = 50;
     for (std::uint64_t exchanges = 0; exchanges < 8; ++exchanges) {
@@ -78,8 +79,8 @@ TEST_CASE("witness: lies among those that agree do not keep a step out, nor does
     CHECK(witness.stepped(8));
 }
 
-TEST_CASE("witness: lies that agree among themselves, in between the truth, are no step") {
-    Witness<Counting> witness{Counting{}};
+TEST_CASE("majority_filter: lies that agree among themselves, in between the truth, are no step") {
+    MajorityFilter<Counting> witness{Counting{}};
     witness.judge(1, 0);
     for (int i = 2; i < 40; i += 2) {
         CHECK(witness.judge(100 + i, 10ULL * i));
@@ -90,21 +91,22 @@ TEST_CASE("witness: lies that agree among themselves, in between the truth, are 
     }
 }
 
-TEST_CASE("witness: what contradicts the usual is doubted although nothing is known before it") {
+TEST_CASE(
+    "majority_filter: what contradicts the usual is doubted although nothing is known before it") {
     struct Positive : Counting {
-        std::optional<Doubt> doubt(int number) const {
-            if (number < 0) return Doubt{EventReason::implausible_number, number, 0};
+        std::optional<Implausibility> doubt(int number) const {
+            if (number < 0) return Implausibility{EventReason::implausible_number, number, 0};
             return Counting::doubt(number);
         }
     };
-    Witness<Positive> witness{Positive{}, GENERATE(1, 3)};
+    MajorityFilter<Positive> witness{Positive{}, GENERATE(1, 3)};
     CHECK(witness.judge(-5, 0));
     CHECK_FALSE(witness.judge(1, 0));
 }
 
-TEST_CASE("witness: what arrival contradicts is never believed, but may be of a step") {
-    Witness<Counting> witness{Counting{}};
-    const Doubt late{EventReason::implausible_time, 0, 0};
+TEST_CASE("majority_filter: what arrival contradicts is never believed, but may be of a step") {
+    MajorityFilter<Counting> witness{Counting{}};
+    const Implausibility late{EventReason::implausible_time, 0, 0};
     CHECK(witness.judge(50, 0, late));
     CHECK_FALSE(witness.judge(1, 0));
     CHECK(witness.judge(2, 0, late));
@@ -113,8 +115,9 @@ TEST_CASE("witness: what arrival contradicts is never believed, but may be of a 
     CHECK(witness.stepped(4));
 }
 
-TEST_CASE("witness: three in a row that agree are a step, once the clock was compared again") {
-    Witness<Counting> witness{Counting{}};
+TEST_CASE(
+    "majority_filter: three in a row that agree are a step, once the clock was compared again") {
+    MajorityFilter<Counting> witness{Counting{}};
     witness.judge(1, 10);
     for (const int number : {50, 51, 52}) CHECK(witness.judge(number, 10));
     CHECK_FALSE(witness.stepped(13));
@@ -124,8 +127,8 @@ TEST_CASE("witness: three in a row that agree are a step, once the clock was com
     CHECK_FALSE(witness.stepped(99));
 }
 
-TEST_CASE("witness: accidents that do not agree, or not in a row, are no step") {
-    Witness<Counting> witness{Counting{}};
+TEST_CASE("majority_filter: accidents that do not agree, or not in a row, are no step") {
+    MajorityFilter<Counting> witness{Counting{}};
     witness.judge(1, 0);
     for (const int number : {50, 60, 70, 80}) CHECK(witness.judge(number, 0));
     CHECK_FALSE(witness.stepped(9));

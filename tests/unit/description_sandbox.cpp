@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/description_vetting.hpp"
+#include "camera/description_sandbox.hpp"
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -22,21 +22,21 @@ bool never() { return false; }
 
 }  // namespace
 
-TEST_CASE("description_vetting: a good one is looked at once, also in the next life") {
+TEST_CASE("description_sandbox: a good one is looked at once, also in the next life") {
     const test::TemporaryDirectory directory;
     const std::string daemon = test::program("versavisd");
-    CHECK(DescriptionVetting(daemon, directory.path()).vet("cam0", honest(), never));
-    CHECK(DescriptionVetting("/bin/false", directory.path()).vet("cam0", honest(), never));
+    CHECK(DescriptionSandbox(daemon, directory.path()).vet("cam0", honest(), never));
+    CHECK(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", honest(), never));
     auto other = honest();
     other.bytes.push_back('\n');
-    CHECK_FALSE(DescriptionVetting("/bin/false", directory.path()).vet("cam0", other, never));
+    CHECK_FALSE(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", other, never));
 }
 
-TEST_CASE("description_vetting: why one is refused is told, and kept for this life only") {
+TEST_CASE("description_sandbox: why one is refused is told, and kept for this life only") {
     const test::TemporaryDirectory directory;
     auto broken = honest();
     broken.bytes.resize(1000);
-    DescriptionVetting vetting(test::program("versavisd"), directory.path());
+    DescriptionSandbox vetting(test::program("versavisd"), directory.path());
     for (int i = 0; i < 2; ++i) {
         const auto refused = vetting.vet("cam0", broken, never);
         REQUIRE_FALSE(refused);
@@ -46,30 +46,30 @@ TEST_CASE("description_vetting: why one is refused is told, and kept for this li
     CHECK_FALSE(std::ifstream(directory.path() / "descriptions").good());
 }
 
-TEST_CASE("description_vetting: what ends its reader, or keeps it busy, is refused") {
+TEST_CASE("description_sandbox: what ends its reader, or keeps it busy, is refused") {
     const test::TemporaryDirectory directory;
     const std::string crash = directory.write("crash", "#!/bin/sh\nkill -SEGV $$\n");
     const std::string hang = directory.write("hang", "#!/bin/sh\nexec sleep 100\n");
     std::filesystem::permissions(crash, std::filesystem::perms::owner_all);
     std::filesystem::permissions(hang, std::filesystem::perms::owner_all);
-    const auto crashed = DescriptionVetting(crash, directory.path()).vet("cam0", honest(), never);
+    const auto crashed = DescriptionSandbox(crash, directory.path()).vet("cam0", honest(), never);
     REQUIRE_FALSE(crashed);
     CHECK_THAT(crashed.error().message(), Catch::Contains("ends its reader with signal 11"));
     int asked = 0;
-    const auto stopped = DescriptionVetting(hang, directory.path()).vet("cam0", honest(), [&] {
+    const auto stopped = DescriptionSandbox(hang, directory.path()).vet("cam0", honest(), [&] {
         return ++asked > 3;
     });
     REQUIRE_FALSE(stopped);
     CHECK_THAT(stopped.error().message(), Catch::Contains("stopped"));
 }
 
-TEST_CASE("description_vetting: one that is slow is looked at again, some times") {
+TEST_CASE("description_sandbox: one that is slow is looked at again, some times") {
     const test::TemporaryDirectory directory;
     const std::string runs = directory.path() / "runs";
     const std::string slow =
         directory.write("slow", "#!/bin/sh\necho run >> " + runs + "\nkill -XCPU $$\n");
     std::filesystem::permissions(slow, std::filesystem::perms::owner_all);
-    DescriptionVetting vetting(slow, directory.path());
+    DescriptionSandbox vetting(slow, directory.path());
     for (int i = 0; i < 5; ++i) {
         const auto refused = vetting.vet("cam0", honest(), never);
         REQUIRE_FALSE(refused);

@@ -4,26 +4,26 @@
 
 #include <optional>
 
-#include "doubt.hpp"
 #include "engine/clock/translator.hpp"
+#include "implausibility.hpp"
+#include "majority_filter.hpp"
 #include "pulse_history.hpp"
 #include "wire/messages.hpp"
-#include "witness.hpp"
 
 namespace versavis::daemon {
 
 /// Not thread-safe.
-class EventWitness {
+class EventValidator {
  public:
-    explicit EventWitness(const clock::Translator& translator);
+    explicit EventValidator(const clock::Translator& translator);
 
     /// None: its time is believed.
-    std::optional<Doubt> judge(const wire::Event& event, HostTime received);
+    std::optional<Implausibility> judge(const wire::Event& event, HostTime received);
 
  private:
     const clock::Translator& translator_;
     std::uint32_t clock_life_ = 0;
-    Witness<PulseHistory> pps_;
+    MajorityFilter<PulseHistory> pps_;
 };
 
 }  // namespace versavis::daemon

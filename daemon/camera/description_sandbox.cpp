@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "camera/description_vetting.hpp"
+#include "camera/description_sandbox.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -21,19 +21,16 @@ namespace {
 /// First line of the file: what was found good by other rules is looked at again.
 constexpr const char* file_header = "versavis camera descriptions 2";
 
-/// The most that are kept. At half, more cameras than anybody has; at twice, a device that sends
-/// another one each time fills twice the disk.
+/// The most that are kept.
 constexpr std::size_t most_kept = 1000;
 
-/// Until a probe is killed that has not used up its CPU time. At half, a host that is busy at boot
-/// asks twice; at twice, a probe that hangs is noticed later.
+/// Until a probe is killed that has not used up its CPU time.
 constexpr Duration probe_patience = seconds(60);
 
-/// Probes of one description that may use up their CPU time. At half, a host that is throttled
-/// refuses a good one; at twice, a hostile one takes twice the time.
+/// Probes of one description that may use up their CPU time.
 constexpr unsigned slow_probes = 3;
 
-/// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits longer.
+/// Between looks at `cancelled`.
 constexpr Duration look_interval = milliseconds(20);
 
 /// The most that a probe says.
@@ -133,7 +130,7 @@ class Probe {
 
 }  // namespace
 
-DescriptionVetting::DescriptionVetting(std::filesystem::path program,
+DescriptionSandbox::DescriptionSandbox(std::filesystem::path program,
                                        const std::filesystem::path& directory)
     : program_(std::move(program)), file_(directory / "descriptions") {
     std::ifstream file(file_);
@@ -142,7 +139,7 @@ DescriptionVetting::DescriptionVetting(std::filesystem::path program,
     while (good_.size() < most_kept && std::getline(file, line)) good_.insert(line);
 }
 
-std::optional<std::string> DescriptionVetting::known(const std::string& hash) const {
+std::optional<std::string> DescriptionSandbox::known(const std::string& hash) const {
     const std::lock_guard lock(mutex_);
     if (good_.count(hash) != 0) return "";
     const auto refused = refused_.find(hash);
@@ -150,7 +147,7 @@ std::optional<std::string> DescriptionVetting::known(const std::string& hash) co
 }
 
 /// What is slow is checked again some times: the host may have been throttled.
-void DescriptionVetting::remember(const std::string& hash, const std::string& refused, bool slow) {
+void DescriptionSandbox::remember(const std::string& hash, const std::string& refused, bool slow) {
     const std::lock_guard lock(mutex_);
     if (refused.empty()) return keep(hash);
     if (slow && ++slow_[hash] < slow_probes) return;
@@ -158,7 +155,7 @@ void DescriptionVetting::remember(const std::string& hash, const std::string& re
     refused_[hash] = refused;
 }
 
-void DescriptionVetting::keep(const std::string& hash) {
+void DescriptionSandbox::keep(const std::string& hash) {
     if (good_.size() >= most_kept) good_.clear();
     good_.insert(hash);
     const std::filesystem::path part = file_.string() + ".part";
@@ -170,7 +167,7 @@ void DescriptionVetting::keep(const std::string& hash) {
     if (file) std::filesystem::rename(part, file_, error);
 }
 
-Expected<> DescriptionVetting::vet(const std::string& camera, const Description& description,
+Expected<> DescriptionSandbox::vet(const std::string& camera, const Description& description,
                                    const Cancelled& cancelled) {
     const std::string hash = hash_of(description) + (description.zipped ? " zip" : " xml");
     auto refused = known(hash);

@@ -14,7 +14,7 @@ struct OutputStep {
     Duration after;
 };
 
-class OutputStepWatch {
+class ClockStepDetector {
  public:
     /// None: it did not step since the last look. The clock may be slewed in between: by no more
     /// than 0.5 ms in a second.

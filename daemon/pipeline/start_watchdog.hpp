@@ -9,9 +9,9 @@
 namespace versavis::daemon {
 
 /// Not thread-safe.
-class TriggerWatch {
+class StartWatchdog {
  public:
-    explicit TriggerWatch(const CameraConfiguration& configuration)
+    explicit StartWatchdog(const CameraConfiguration& configuration)
         : patience_(start_patience + period_of(configuration) * patient_periods) {}
 
     void asked(HostTime now) { last_ = now; }
@@ -28,8 +28,7 @@ class TriggerWatch {
     std::uint64_t unanswered() const { return unanswered_; }
 
  private:
-    /// How long the board may take to begin, and the periods on top for slow cameras. At half, a
-    /// board on a busy link is asked twice; at twice, a lost message costs two seconds more.
+    /// How long the board may take to begin, and the periods on top for slow cameras.
     static constexpr Duration start_patience = seconds(2);
     static constexpr int patient_periods = 5;
 

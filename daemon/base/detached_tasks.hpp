@@ -13,8 +13,11 @@
 
 namespace versavis::daemon {
 
+/// How long a thread waits for a camera or stream to be released.
+constexpr Duration release_timeout = milliseconds(250);
+
 /// Thread-safe. May end before its work does.
-class PatientWork {
+class DetachedTasks {
  public:
     /// True: it was done within `patience`. The work must own all that it uses.
     bool run(std::function<void()> work, Duration patience) {

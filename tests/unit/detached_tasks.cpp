@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "base/patient_work.hpp"
+#include "base/detached_tasks.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace versavis;
 using namespace versavis::daemon;
 
-TEST_CASE("patient_work: nobody waits longer than asked", "[threads]") {
-    PatientWork patient;
+TEST_CASE("detached_tasks: nobody waits longer than asked", "[threads]") {
+    DetachedTasks patient;
     CHECK(patient.run([] {}, seconds(10)));
     CHECK(patient.unfinished() == 0);
     std::promise<void> device;
