@@ -102,7 +102,8 @@ int run(const std::string& path) {
     sd_notify(0, "STOPPING=1");
     log(LogLevel::info, "service", "stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
     if ((*service)->stop()) return EX_OK;
-    log(LogLevel::warning, "service", "a device still does not answer: it is left as it is");
+    log(LogLevel::warning, "service",
+        "a device still does not answer: exiting without releasing it");
     ::_exit(EX_OK);  // its thread uses what a return would destroy
 }
 
@@ -189,33 +190,36 @@ int probe(const ProbeOptions& options) {
 
 int main(int argc, char** argv) {
     CLI::App app{
-        "VersaVIS service: hardware-stamped camera frames and IMU samples in shared memory"};
+        "VersaVIS service: publishes hardware-timestamped frames and IMU samples in shared memory"};
     std::string path = default_configuration;
     bool check_only = false;
     bool as_json = false;
     app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
         ->capture_default_str();
-    CLI::Option* check_config =
-        app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
-    app.add_flag("--json", as_json, "As JSON");
+    CLI::Option* check_config = app.add_flag(
+        "--check-config", check_only, "Check the configuration file, report every error, and exit");
+    app.add_flag("--json", as_json, "Print the report as JSON");
     bool list_keys = false;
     CLI::Option* keys = app.add_flag("--keys", list_keys,
-                                     "Print each key of the file with its meaning, range and "
+                                     "Print each configuration key with its meaning, range and "
                                      "default, and exit")
-                            ->excludes(check_config);
+                            ->excludes(check_config)
+                            ->excludes(keys);
     bool check_cables = false;
-    CLI::Option* check_wires = app.add_flag("--check-cameras", check_cables,
-                                            "Prove the wiring of all cameras by pulses, and exit")
-                                   ->excludes(check_config)
-                                   ->excludes(keys);
+    CLI::Option* check_wires =
+        app.add_flag("--check-cameras", check_cables,
+                     "Verify the wiring of all cameras with test pulses, and exit")
+            ->excludes(check_config)
+            ->excludes(keys);
     ProbeOptions probe_options;
     app.add_option("--probe-camera", probe_options.device,
-                   "Set up one camera (address, serial number or name), or 'all', and report")
+                   "Set up one camera (address, serial number or name) or 'all', report, and exit")
         ->excludes(check_config)
         ->excludes(keys)
         ->excludes(check_wires);
-    app.add_option("--bundle", probe_options.bundle,
-                   "Also write description, values and a draft of a preset to this file");
+    app.add_option(
+        "--bundle", probe_options.bundle,
+        "Also write the GenICam description, feature values and a draft preset to this file");
     std::string description;  // for the service itself
     app.add_option("--probe-description", description)->group("");
     app.set_version_flag("--version", VERSAVIS_VERSION);

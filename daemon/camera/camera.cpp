@@ -121,8 +121,8 @@ CameraReport Camera::report() const {
     if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
         report.state = CameraState::failed;
         report.hint = fmt::format(
-            "{}: it has been set up for {} s: its control channel is slow, or it does not finish "
-            "its answers; if that lasts, power it off and on",
+            "{}: set-up has taken {} s so far: its control channel is slow, or its answers are "
+            "incomplete; if that lasts, power it off and on",
             configuration_.device, setting_up.ns / seconds(1).ns);
     }
     return report;
@@ -178,8 +178,8 @@ void Camera::explain(CameraProblem& ended) {
     if (held_since_.ns == 0) held_since_ = host_now();
     if (host_now() - held_since_ > lease_patience) return;
     ended = {CameraState::opening,
-             {configuration_.device, "it is still held, perhaps by a program that was killed",
-              "it frees itself within seconds; it is asked again"}};
+             {configuration_.device, "it is still locked, perhaps by a program that was killed",
+              "the lock expires within seconds; the service keeps trying"}};
 }
 
 /// Waits; not as long when the camera was gone and is back. False: it is to stop.
@@ -327,7 +327,7 @@ Expected<std::unique_ptr<FrameSource>> Camera::receive(ArvCamera* camera,
         mode = *chosen;
         if (!plain && configuration_.receive != ReceiveMode::socket)
             log(LogLevel::info, configuration_.name,
-                "its frames are more than plain images: they are received by a UDP socket");
+                "its frames carry more than plain images: they are received through a UDP socket");
         if (auto done = set_up_packets(camera, configuration_); !done)
             return Unexpected(done.error());
     }
@@ -436,7 +436,7 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
         ++deaf_streams_;
         if (health.taken > few_frames)
             renumbered_before_ns_ = renumbered_ns_.exchange(host_now().ns);
-        return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
+        return problem(CameraState::opening, {configuration_.name, "its frame numbers started over",
                                               "the camera is being reopened"});
     }
     if (silent)

@@ -31,12 +31,14 @@ std::string text(const char* value) { return value == nullptr ? "" : value; }
 CameraProblem absent(const std::string& device) {
     const auto address = parse_address(device);
     if (address && !in_own_network(*address))
-        return {CameraState::unreachable,
-                {device, fmt::format("its address {} is not in any network of this host", device),
-                 "give the camera an address of this host's camera network, or the host one of the "
-                 "camera's"}};
+        return {
+            CameraState::unreachable,
+            {device,
+             fmt::format("no interface of this host is in the subnet of its address {}", device),
+             "give the camera an address in this host's camera network, or the host one in the "
+             "camera's"}};
     return {CameraState::absent,
-            {device, "no such camera: nobody answers",
+            {device, "no camera answers to this name",
              "check cable, power and name ('arv-tool-0.8' lists cameras by address, serial number "
              "and name)"}};
 }
@@ -86,7 +88,7 @@ CameraResult<OpenCamera> open_on_network(const std::string& camera, const std::s
                                                glib_address(found.address).get(), error.out()));
     if (!opened)
         return problem(CameraState::failed,
-                       {device, "it is there but cannot be opened: " + error.text(),
+                       {device, "it was found but cannot be opened: " + error.text(),
                         "check the firewall, or power it off and on"});
     if (arv_gv_device_is_controller(ARV_GV_DEVICE(opened.get())) == FALSE) return held;
     auto own = camera_of(device, std::move(opened));
@@ -124,7 +126,7 @@ CameraResult<Object<ArvDevice>> open_usb_device(const std::string& device, const
         return problem(CameraState::busy,
                        {device, "another program holds it", "close that program"});
     return problem(CameraState::failed,
-                   {device, "it is there but cannot be opened: " + error.text(),
+                   {device, "it was found but cannot be opened: " + error.text(),
                     "check the udev rule, or unplug it and plug it in"});
 }
 

@@ -115,11 +115,11 @@ class Probe {
         if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
         if (WIFEXITED(status) && !said_.empty())
             return {said_.substr(0, said_.find_first_of('\n'))};
-        if (!WIFSIGNALED(status)) return {"it ends its reader"};
+        if (!WIFSIGNALED(status)) return {"parsing it crashes"};
         // The limit of CPU time is one of SIGKILL, too.
         if (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL)
-            return {"reading it takes too much CPU time", true};
-        return {fmt::format("it ends its reader with signal {}", WTERMSIG(status))};
+            return {"parsing it takes too much CPU time", true};
+        return {fmt::format("parsing it crashes with signal {}", WTERMSIG(status))};
     }
 
  private:

@@ -271,7 +271,7 @@ CameraResult<Description> read_usb_description(const std::string& device, const 
     const UsbContext context(started);
     const UsbHandle handle = open_named(context.get(), name);
     if (!handle)
-        return problem(CameraState::failed, {device, "it is there but cannot be opened",
+        return problem(CameraState::failed, {device, "it was found but cannot be opened",
                                              "check the udev rule, or unplug it and plug it in"});
     const ControlInterface control = find_control(libusb_get_device(handle.get()));
     const int code = libusb_claim_interface(handle.get(), control.number);

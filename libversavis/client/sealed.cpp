@@ -31,7 +31,7 @@ Unexpected<> not_handed(const std::filesystem::path& path) {
     return failure(path.string(),
                    "was not handed over by the service: " +
                        std::error_code(errno, std::generic_category()).message(),
-                   "does it still run? try again");
+                   "is it still running? try again");
 }
 
 /// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.

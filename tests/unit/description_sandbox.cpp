@@ -54,7 +54,7 @@ TEST_CASE("description_sandbox: what ends its reader, or keeps it busy, is refus
     std::filesystem::permissions(hang, std::filesystem::perms::owner_all);
     const auto crashed = DescriptionSandbox(crash, directory.path()).vet("cam0", honest(), never);
     REQUIRE_FALSE(crashed);
-    CHECK_THAT(crashed.error().message(), Catch::Contains("ends its reader with signal 11"));
+    CHECK_THAT(crashed.error().message(), Catch::Contains("crashes with signal 11"));
     int asked = 0;
     const auto stopped = DescriptionSandbox(hang, directory.path()).vet("cam0", honest(), [&] {
         return ++asked > 3;

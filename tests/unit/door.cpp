@@ -153,6 +153,7 @@ TEST_CASE("door: where it cannot be made, it says so") {
     CHECK_THAT(Door::open(pipe / "door", sealed_file()).error().message(),
                Catch::Contains("cannot be made a socket: Not a directory"));
     const test::NoThreads none;
-    CHECK_THAT(Door::open(directory.path() / "door", sealed_file()).error().message(),
-               Catch::Contains("gets no thread") && Catch::Contains("raise the limit on tasks"));
+    CHECK_THAT(
+        Door::open(directory.path() / "door", sealed_file()).error().message(),
+        Catch::Contains("cannot start a thread") && Catch::Contains("raise the limit on tasks"));
 }

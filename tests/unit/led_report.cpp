@@ -124,8 +124,8 @@ TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are to
     series.rate_hz = 1000;
     const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 1000);
     CHECK(made.ok());
-    CHECK(notes(made, "only 16 of 64 counts are ever seen"));
-    CHECK(notes(made, "nor would the direction"));
+    CHECK(notes(made, "only 16 of 64 counts ever occur"));
+    CHECK(notes(made, "so would the wrong direction"));
     // What is blind: sixteen pictures off.
     Series off = series;
     off.late_s = 1.6;

@@ -180,7 +180,7 @@ TEST_CASE_METHOD(Files,
     auto writer = this->writer();
     const auto again = McapWriter::create(path, "");
     REQUIRE_FALSE(again);
-    CHECK_THAT(again.error().message(), Contains("name another file with -o"));
+    CHECK_THAT(again.error().message(), Contains("choose another file with -o"));
     const auto nowhere = McapWriter::create("/nowhere/a.mcap", "");
     REQUIRE_FALSE(nowhere);
     CHECK_THAT(nowhere.error().message(), Contains("does its directory exist"));

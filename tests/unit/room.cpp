@@ -37,10 +37,10 @@ TEST_CASE_METHOD(Machine, "room: a ring leaves 64 MiB to others") {
     CHECK(check(100 * mib, with(164)));
     const auto refused = check(100 * mib + 1, with(164));
     REQUIRE_FALSE(refused);
-    CHECK_THAT(refused.error().message(), Contains("/cam0: takes 101 MiB, and 164 MiB are free"));
+    CHECK_THAT(refused.error().message(), Contains("/cam0: needs 101 MiB, and 164 MiB are free"));
     CHECK_THAT(refused.error().message(), Contains("lower 'slots' or 'history_s'"));
     CHECK_THAT(check(100 * mib, with(163)).error().message(),
-               Contains("takes 100 MiB, and 163 MiB are free"));
+               Contains("needs 100 MiB, and 163 MiB are free"));
     CHECK_FALSE(check(1, with(64)));
     CHECK_FALSE(check(1, with(1)));
 }
@@ -80,6 +80,6 @@ TEST_CASE_METHOD(Machine, "room: a ring that does not fit is not made, and leave
     const auto writer = Writer::create(
         directory.path(), {"cam0", StreamKind::frames, 64, 1U << 20U, std::uint64_t{1} << 30U});
     REQUIRE_FALSE(writer);
-    CHECK_THAT(writer.error().message(), Contains("takes 1073741"));
+    CHECK_THAT(writer.error().message(), Contains("needs 1073741"));
     CHECK(std::filesystem::is_empty(directory.path()));
 }

@@ -80,7 +80,7 @@ Expected<BoardIdentity> wait_for_hello(const UsbBus& bus, const std::string& por
     }
     return failure(
         "board at " + port,
-        stop() ? "not waited for any longer"
+        stop() ? "stopped waiting"
                : fmt::format("it has not said hello in {} s", boot_patience.ns / 1'000'000'000),
         "look for it with 'versavis board info'; if it is not there, hold its BOOTSEL "
         "button while you plug it in and flash it again");

@@ -124,7 +124,7 @@ std::string board_text(const json& info) {
             text(info, "port"));
     std::string out = fmt::format(
         "board    {} at {}, {}\n", text(info, "serial"), text(info, "port"),
-        text(info, "source") == "service" ? "as the service says" : "asked by this program");
+        text(info, "source") == "service" ? "as reported by the service" : "queried directly");
     if (state == "incompatible")
         return out + fmt::format(
                          "firmware of protocol {}, which this program does not speak: "

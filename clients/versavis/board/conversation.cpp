@@ -104,7 +104,7 @@ Expected<Greeting> Conversation::greet() {
         if (!heard) return Unexpected(heard.error());
         if (*heard) return greeting;
     }
-    return failure(where_, "does not answer", "plug it in anew, or flash it: versavis flash");
+    return failure(where_, "does not answer", "reconnect it, or flash it: versavis flash");
 }
 
 Expected<bool> Conversation::listen(const std::function<bool(const wire::Packet&)>& take,

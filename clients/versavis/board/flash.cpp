@@ -82,7 +82,7 @@ class Flasher {
         if (!boot_loader) return ended(boot_loader.error(), "the board waits in its boot loader");
         if (settings_.stop())
             return ended({"flashing", "stopped", ""},
-                         "nothing was erased: plug the board in anew for its old firmware, if it "
+                         "nothing was erased: reconnect the board for its old firmware, if it "
                          "had one");
         if (auto done = erase_and_write(*boot_loader, sectors); !done)
             return ended(done.error(), half_written);
@@ -93,7 +93,7 @@ class Flasher {
         }
         settings_.progress("starting", 0, 1);
         if (auto done = boot_loader->reboot(); !done)
-            return ended(done.error(), "the new firmware is complete: plug the board in anew");
+            return ended(done.error(), "the new firmware is complete: reconnect the board");
         return {};
     }
 

@@ -98,7 +98,7 @@ Expected<Picoboot> Picoboot::open(const UsbDevice& device) {
     if (!handle) return Unexpected(handle.error().as_error(where, "cannot be opened"));
     const UsbFunction function = handle->function(vendor_class);
     if (!function.complete())
-        return failure(where, "has no PICOBOOT interface", "is it an RP2040? Plug it in anew");
+        return failure(where, "has no PICOBOOT interface", "is it an RP2040? Reconnect it");
     if (auto claimed = handle->claim(function.interface); !claimed)
         return Unexpected(claimed.error().as_error(where, "cannot be claimed"));
     Picoboot boot_loader(std::move(*handle), function, where);
@@ -210,7 +210,7 @@ Error Picoboot::explain(const Command& command, const UsbError& error) {
                                 ? fmt::format("it refuses ({})", reason(command))
                                 : "it does not answer";
     static_cast<void>(reset());
-    return {where_, fmt::format("{}: {}", what, why), "plug the board in anew"};
+    return {where_, fmt::format("{}: {}", what, why), "reconnect the board"};
 }
 
 /// Of a command that stalled.
@@ -221,7 +221,7 @@ std::string Picoboot::reason(const Command& command) {
     Status status{};
     std::memcpy(&status, bytes.data(), sizeof status);
     if (!size || *size != sizeof status || status.token != command.token)
-        return "it does not say why";
+        return "without giving a reason";
     return name_of_status(status.code);
 }
 

@@ -48,8 +48,7 @@ Error UsbError::as_error(const std::string& where, const std::string& what) cons
             return {where, what + ": the board was unplugged or reset",
                     "check its cable and power"};
         case UsbFault::stalled: return {where, what + ": the board refuses", ""};
-        case UsbFault::late:
-            return {where, what + ": the board does not answer", "plug it in anew"};
+        case UsbFault::late: return {where, what + ": the board does not answer", "reconnect it"};
         case UsbFault::busy:
             return {where, what + ": another program has the board open", "close it"};
         case UsbFault::denied:
@@ -60,7 +59,7 @@ Error UsbError::as_error(const std::string& where, const std::string& what) cons
                     "put firmware into it: hold BOOTSEL while you plug it in, then versavis flash"};
         case UsbFault::other: break;
     }
-    return {where, fmt::format("{}: {}", what, libusb_error_name(code)), "plug it in anew"};
+    return {where, fmt::format("{}: {}", what, libusb_error_name(code)), "reconnect it"};
 }
 
 UsbFunction UsbHandle::function(std::uint8_t interface_class) const {

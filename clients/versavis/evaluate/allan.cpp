@@ -195,7 +195,8 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
                                     [](const auto& point) { return point.deviation <= 0; });
     const auto first = silent ? std::nullopt : first_white(axis.points);
     if (!first || axis.points.size() - *first < least_points)
-        return failure("allan", "no white noise is seen: the deviation never falls with tau^-1/2",
+        return failure("allan",
+                       "no white noise is visible: the deviation never falls with tau^-1/2",
                        "record longer at rest, with a part that measures as often as it is read");
     std::vector<AllanPoint> used(axis.points.begin() + static_cast<std::ptrdiff_t>(*first),
                                  axis.points.end());
@@ -210,7 +211,7 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
     }
     if (noises) noises = fit(used);
     if (!noises)
-        return failure("allan", "no white noise is left when the other noises are taken off",
+        return failure("allan", "no white noise remains after subtracting the other noises",
                        "record longer at rest");
     const auto root = [&](int i) {
         const double value = std::sqrt(noises->squares[i]);
@@ -329,7 +330,7 @@ Expected<AllanResult> evaluate_allan(const RestingImu& imu) {
     const auto moved =
         second_of_motion(imu.gyro, static_cast<std::size_t>(std::lround(result.rate_hz)));
     if (moved)
-        return failure(imu.name, fmt::format("it was moved {} s after the begin", *moved),
+        return failure(imu.name, fmt::format("it was moved {} s after the start", *moved),
                        "leave it at rest, or choose a part of the recording by --from and --to");
     auto done = noise_of(imu.gyro, imu, interval, "gyro", result.gyro);
     if (done) done = noise_of(imu.accel, imu, interval, "accelerometer", result.accel);

@@ -127,8 +127,9 @@ Expected<> judge_messages(const BoardLife& life, ClockEvaluation& evaluation) {
     const auto estimator = make_estimator(EstimatorKind::envelope);
     const std::vector<ClockPoint> history = clock_history(life.stamps, *estimator);
     if (history.empty())
-        return failure("clock", "no exchange with the board can be true: none took any time",
-                       "record again, and see what 'versavis status' says of the clock");
+        return failure("clock",
+                       "no exchange with the board is valid: none has a positive round trip",
+                       "record again, and check the clock in 'versavis status'");
     evaluation.skew_ppm = history.back().skew_ppm;
     SpreadOf innovation;
     SpreadOf residual;
@@ -292,19 +293,19 @@ Expected<ClockEvaluation> evaluate_clock(const RecordedClocks& clocks) {
     evaluation.settled_s = std::min(settling_s, evaluation.duration_s / 2);
     if (evaluation.lives > 1)
         evaluation.notes.push_back(fmt::format(
-            "the board restarted: the longest of {} lives is evaluated", evaluation.lives));
+            "the board restarted: the longest of {} runs is evaluated", evaluation.lives));
     if (auto judged = judge_messages(*longest, evaluation); !judged)
         return Unexpected(judged.error());
     evaluation.labelled = clocks.labelled;
     if (!clocks.pulses.empty()) judge_pulses(clocks, *longest, evaluation);
     if (clocks.pulses.empty())
         evaluation.notes.emplace_back(
-            "without PPS an error that is equal in all messages, as unequal delays of the two "
-            "directions make, is not seen");
+            "without PPS, an error common to all messages, as from unequal delays of the two "
+            "directions, is invisible");
     else if (!clocks.labelled)
         evaluation.notes.emplace_back(
-            "no receiver named the seconds: against PPS, the error of the host's clock counts, "
-            "too");
+            "no receiver named the seconds: the comparison with PPS includes the error of the "
+            "host's clock");
     return evaluation;
 }
 
@@ -331,12 +332,12 @@ std::string to_text(const ClockEvaluation& evaluation) {
         "after {:.0f} s of settling:\n",
         evaluation.exchanges, evaluation.one_way, evaluation.duration_s, evaluation.skew_ppm,
         evaluation.settled_s);
-    text += spread_text("innovation: what a message changed", evaluation.innovation);
+    text += spread_text("innovation: how far a message moved it", evaluation.innovation);
     text += spread_text("residual: middle of an exchange", evaluation.residual);
-    text += spread_text("estimate at the time against smoothed", evaluation.live);
+    text += spread_text("live estimate against smoothed", evaluation.live);
     if (evaluation.pps_published.count > 0) text += "PPS pulses against whole seconds:\n";
     text += spread_text("as published", evaluation.pps_published);
-    text += spread_text("by messages alone, at the time", evaluation.pps_link);
+    text += spread_text("by messages alone, live", evaluation.pps_link);
     text += spread_text("by messages alone, smoothed", evaluation.pps_smoothed);
     for (const std::string& note : evaluation.notes) text += "note: " + note + "\n";
     return text;

@@ -233,7 +233,7 @@ Expected<std::optional<FrameRotation>> FeatureRotation::add(GreyImage image, Out
                                             image.width, image.height));
     if (!tracker_->pyramid.empty() && size != tracker_->size)
         return failure("frame",
-                       fmt::format("is of {} x {} pixels, and those before of {} x {}", size.width,
+                       fmt::format("has {} x {} pixels, and earlier ones {} x {}", size.width,
                                    size.height, tracker_->size.width, tracker_->size.height),
                        "evaluate a recording of one size");
     tracker_->size = size;

@@ -257,14 +257,13 @@ Expected<LedPlace> LedSearch::find(const std::string& stream) const {
             best = place;
         }
     if (clearest == least_contrast)
-        return failure(
-            stream,
-            fmt::format("no LED board is seen in {} pictures: two lights that are always "
-                        "on, with dark gaps and lit LEDs between them",
-                        pictures_),
-            fmt::format("look at one with 'versavis export', and say where the outermost "
-                        "LEDs are: --board {}=X1,Y1,X2,Y2",
-                        stream));
+        return failure(stream,
+                       fmt::format("no LED board was found in {} pictures: two LEDs that are "
+                                   "always on, with dark gaps and lit LEDs between them",
+                                   pictures_),
+                       fmt::format("look at one with 'versavis export', and give the positions of "
+                                   "the outermost LEDs: --board {}=X1,Y1,X2,Y2",
+                                   stream));
     const double dark = median_gap(darkest_, best);
     const double radius = aperture * best.pitch();
     const Point first = centred(darkest_, {best.x1, best.y1}, radius, dark);

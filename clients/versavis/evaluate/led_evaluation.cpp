@@ -98,7 +98,7 @@ Expected<LedReport> LedEvaluation::report() const {
     auto report = led_report(shots_, settings_.report);
     if (!report) return report;
     for (const auto& [camera, error] : not_found_)
-        report->notes.push_back(camera + ": left out, for no LED board is seen");
+        report->notes.push_back(camera + ": left out, no LED board was found");
     return report;
 }
 

@@ -295,11 +295,10 @@ void note_blind_spots(LedReport& report, const std::map<std::string, Camera>& ca
             led_period / std::gcd<std::int64_t>(whole % led_period, led_period);
         if (seen >= led_period) continue;
         report.notes.push_back(fmt::format(
-            "{}: at {:.6g} steps from picture to picture only {} of 64 counts are ever seen: an "
-            "error of {} pictures, or of a multiple of that, would not show{}; at 970 Hz all are "
-            "seen",
+            "{}: at {:.6g} steps from picture to picture only {} of 64 counts ever occur: an error "
+            "of a multiple of {} pictures would go unnoticed{}; at 970 Hz all counts occur",
             name, steps, seen, seen,
-            whole % 4 == 0 ? ", nor would the direction of the striding LEDs" : ""));
+            whole % 4 == 0 ? ", and so would the wrong direction of the running LEDs" : ""));
     }
 }
 
@@ -314,10 +313,10 @@ void note_increments(LedReport& report, const std::map<std::string, Camera>& cam
     if (static_cast<double>(wrong) <= doubtful_share * static_cast<double>(all)) return;
     const std::vector<std::string> fitting = fitting_layouts(cameras, report.rate_hz);
     if (fitting.empty())
-        report.notes.push_back(fmt::format(
-            "{} of {} increments contradict the stamps, whatever the order of the LEDs: is it "
-            "--rate {:g}?",
-            wrong, all, settings.rate_hz));
+        report.notes.push_back(
+            fmt::format("{} of {} increments contradict the stamps, whatever the order of the "
+                        "LEDs: is --rate {:g} right?",
+                        wrong, all, settings.rate_hz));
     else
         report.notes.push_back(
             fmt::format("{} of {} increments contradict the stamps with {}; they fit with {}",
@@ -327,28 +326,27 @@ void note_increments(LedReport& report, const std::map<std::string, Camera>& cam
 void note_cameras(LedReport& report) {
     for (const LedCameraReport& camera : report.cameras) {
         if (2 * camera.saturated > camera.pictures)
-            report.notes.push_back(
-                camera.name +
-                ": its LEDs are saturated, so that offsets within a step are not "
-                "told; reduce its gain, or close its iris");
+            report.notes.push_back(camera.name +
+                                   ": its LEDs are saturated, so offsets within a step are not "
+                                   "measured; reduce its gain, or close its iris");
         else if (camera.read > 0 && camera.split == 0)
-            report.notes.push_back(fmt::format(
-                "{}: no step fell into an exposure, so that offsets within a step are not told; "
-                "expose for {:.4g} us, a little more than a step",
-                camera.name, 1.1e6 / report.rate_hz));
+            report.notes.push_back(
+                fmt::format("{}: no step fell into an exposure, so offsets within a step are not "
+                            "measured; expose for {:.4g} us, a little more than a step",
+                            camera.name, 1.1e6 / report.rate_hz));
         if (camera.too_long > 0)
-            report.notes.push_back(fmt::format(
-                "{}: {} exposures are unknown or last more than {:g} steps; expose shorter, or say "
-                "--exposure {}=US",
-                camera.name, camera.too_long, most_led_steps, camera.name));
+            report.notes.push_back(
+                fmt::format("{}: {} exposures are unknown or last more than {:g} steps; expose "
+                            "shorter, or pass --exposure {}=US",
+                            camera.name, camera.too_long, most_led_steps, camera.name));
         if (camera.untriggered > 0)
             report.notes.push_back(fmt::format(
                 "{}: {} pictures were not triggered: they have no tick, and are in no pair",
                 camera.name, camera.untriggered));
         if (camera.rate_hz > 0 && std::abs(camera.rate_hz / report.rate_hz - 1) > most_skew)
-            report.notes.push_back(
-                fmt::format("{}: by its stamps the board makes {:.3f} steps per second, not {:g}",
-                            camera.name, camera.rate_hz, report.rate_hz));
+            report.notes.push_back(fmt::format(
+                "{}: according to its stamps, the board makes {:.3f} steps per second, not {:g}",
+                camera.name, camera.rate_hz, report.rate_hz));
     }
     if (report.pairs.empty())
         report.notes.emplace_back("only one camera sees the board: there are no pairs");
@@ -374,7 +372,7 @@ Error nothing_read(const LedReport& report) {
                 fmt::format("expose for at most {:.4g} us, three steps",
                             most_led_steps * 1e6 / report.rate_hz)};
     if (hidden >= ambiguous)
-        return {"", counts, "say where the outermost LEDs are: --board CAMERA=X1,Y1,X2,Y2"};
+        return {"", counts, "give the positions of the outermost LEDs: --board CAMERA=X1,Y1,X2,Y2"};
     return {"", counts, "see docs/user/evaluate.md for the board that is expected"};
 }
 
@@ -422,7 +420,7 @@ Expected<LedReport> led_report(const LedShots& shots, const LedReportSettings& s
 
 std::string to_text(const LedReport& report) {
     std::string text = fmt::format("LED board at {:g} steps per second: {}\n", report.rate_hz,
-                                   report.ok() ? "all pairs match" : "NOT all is well");
+                                   report.ok() ? "all pairs match" : "NOT all match");
     for (const LedCameraReport& c : report.cameras)
         text += fmt::format(
             "  {}: {} pictures, {} read, {} ambiguous, {} hidden, {} saturated; {} increments, {} "
@@ -436,7 +434,7 @@ std::string to_text(const LedReport& report) {
             p.first, p.second, p.pairs, p.matches, p.modulo_32, p.mismatches, p.ambiguous);
         if (std::isfinite(p.interval_us))
             text += fmt::format(
-                "; {} exposes {:+.1f} us (+-{:.1f}, 95 %) after what its stamps say, single pairs "
+                "; {} exposes {:+.1f} us (+-{:.1f}, 95 %) later than its stamps say, single pairs "
                 "+-{:.1f} us",
                 p.second, p.offset_us, p.interval_us, p.deviation_us);
         text += "\n";

@@ -372,14 +372,16 @@ Expected<> check(const Problem& problem, const Solution& best, const Matrix7& va
     const std::string motion = motion_text(problem, best.state);
     if (!(sigma <= worst_sigma_s))
         return Unexpected(not_excited(
-            fmt::format("the motion shows the offset only to {:.1f} ms", sigma * 1e3), motion,
-            "turn the rig to and fro about all axes, once a second or faster, by some 30 degrees"));
+            fmt::format("the motion determines the offset only to within {:.1f} ms", sigma * 1e3),
+            motion,
+            "rotate the rig back and forth about all axes, once a second or faster, by some 30 "
+            "degrees"));
     const double rotation = std::sqrt(variances.diagonal().head<3>().maxCoeff());
     if (!(rotation <= worst_rotation))
-        return Unexpected(
-            not_excited(fmt::format("the motion shows the rotation only to {:.0f} degrees",
-                                    std::min(rotation, M_PI) * 180 / M_PI),
-                        motion, "turn the rig about a second axis, too"));
+        return Unexpected(not_excited(
+            fmt::format("the motion determines the rotation only to within {:.0f} degrees",
+                        std::min(rotation, M_PI) * 180 / M_PI),
+            motion, "rotate the rig about a second axis, too"));
     const double cost = huber_cost(best.at, best.scale);
     for (const Solution& other : others) {
         const double apart = std::abs(other.state.offset - best.state.offset);
@@ -388,7 +390,7 @@ Expected<> check(const Problem& problem, const Solution& best, const Matrix7& va
             return Unexpected(not_excited(
                 fmt::format("offsets of {:.1f} ms and of {:.1f} ms fit nearly as well",
                             best.state.offset * 1e3, other.state.offset * 1e3),
-                motion, "turn the rig irregularly: a motion that repeats fits more than once"));
+                motion, "rotate the rig irregularly: periodic motion fits more than once"));
     }
     return {};
 }
@@ -433,7 +435,7 @@ Expected<RotationOffset> rotation_offset(const std::vector<FrameRotation>& frame
     if (solutions.empty())
         return failure("camera and IMU",
                        fmt::format("no offset within {:.0f} ms fits", range * 1e3),
-                       "try a longer --range, and check that camera and IMU are on one rig");
+                       "try a larger --range, and check that camera and IMU are on one rig");
     std::size_t best = 0;
     for (std::size_t i = 1; i < solutions.size(); ++i)
         if (solutions[i].scale < solutions[best].scale) best = i;

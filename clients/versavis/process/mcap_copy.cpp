@@ -200,7 +200,7 @@ class Copy {
         if (!message) return from_.damaged(record.offset, "a message is too short");
         const auto channel = channels_.find(message->channel);
         if (channel == channels_.end())
-            return from_.damaged(record.offset, "a message of a channel that was not told");
+            return from_.damaged(record.offset, "a message of an undeclared channel");
         const std::uint64_t place = records_.size();
         const auto changed = settings_.change(channel->second, *message);
         const std::uint64_t log_time = changed ? changed->log_time : message->log_time;
@@ -260,7 +260,7 @@ Expected<> copy_mcap(const McapReader& from, const std::string& path,
                      const McapCopySettings& settings) {
     std::error_code error;
     if (std::filesystem::exists(path, error))
-        return failure(path, "is there already", "move it away first");
+        return failure(path, "exists already", "move it away first");
     const std::string temporary = fmt::format("{}.{}.part", path, ::getpid());
     FileDescriptor file(::open(temporary.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644));
     if (!file)

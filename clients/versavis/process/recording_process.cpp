@@ -128,7 +128,7 @@ class Processing {
             if (!done) return done;
             if (!proof.begun())
                 report_.notes.push_back(camera +
-                                        ": the begin of its evidence is missing, so its frames "
+                                        ": the beginning of its evidence is missing, so its frames "
                                         "were not paired again");
             auto& proofs = streams_[camera].proofs;
             proofs = proof.finish();
@@ -156,7 +156,8 @@ class Processing {
         by_pps_ = *middle > pps_differs_ns;
         if (by_pps_)
             report_.notes.emplace_back(
-                "PPS made the stamps: the clock was not smoothed, as messages know it less well");
+                "PPS made the stamps: the clock was not smoothed, since messages are less "
+                "accurate");
         return {};
     }
 
@@ -456,14 +457,15 @@ json to_json(const ProcessReport& report) {
 std::string to_text(const ProcessReport& report) {
     std::string text;
     for (const auto& [name, stream] : report.streams) {
-        text += fmt::format("{}: {} of {} stamps made anew, moved by {:.2f} us rms, {:.2f} at most",
-                            name, stream.restamped, stream.items, stream.change_rms_ns * 1e-3,
-                            stream.change_max_ns * 1e-3);
+        text +=
+            fmt::format("{}: {} of {} stamps recomputed, moved by {:.2f} us rms, {:.2f} at most",
+                        name, stream.restamped, stream.items, stream.change_rms_ns * 1e-3,
+                        stream.change_max_ns * 1e-3);
         if (stream.suspect > 0)
             text += fmt::format("; {} of {} suspect frames proved", stream.proved, stream.suspect);
         if (stream.contradicted > 0)
-            text +=
-                fmt::format("; {} paired otherwise now, and left as they are", stream.contradicted);
+            text += fmt::format("; {} would now be paired differently, and were left as they are",
+                                stream.contradicted);
         text += "\n";
     }
     for (const std::string& note : report.notes) text += "note: " + note + "\n";

@@ -65,7 +65,7 @@ Expected<McapWriter> McapWriter::create(const std::string& path, const std::stri
     FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644));
     if (!file)
         return failure(path, "cannot be created: " + reason(errno),
-                       errno == EEXIST ? "name another file with -o; none is overwritten"
+                       errno == EEXIST ? "choose another file with -o; no file is overwritten"
                                        : "does its directory exist, and may you write there?");
     ::flock(file.number(), LOCK_EX | LOCK_NB);
     McapWriter writer(path, std::move(file));

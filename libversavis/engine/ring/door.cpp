@@ -73,7 +73,7 @@ Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, Fi
     try {
         door->thread_ = quiet_thread([self = door.get()] { self->serve(); });
     } catch (const std::system_error& error) {
-        return failure(path.string(), fmt::format("gets no thread: {}", error.what()),
+        return failure(path.string(), fmt::format("cannot start a thread: {}", error.what()),
                        "raise the limit on tasks");
     }
     return door;

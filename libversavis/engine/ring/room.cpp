@@ -36,7 +36,7 @@ std::optional<std::uint64_t> available_memory(const std::filesystem::path& memor
 Error too_large(const std::filesystem::path& ring, std::uint64_t size, std::uint64_t free,
                 const std::string& where, const std::string& more) {
     return {ring.string(),
-            fmt::format("takes {} MiB, and {} MiB are free {}", (size + (1 << 20U) - 1) >> 20U,
+            fmt::format("needs {} MiB, and {} MiB are free {}", (size + (1 << 20U) - 1) >> 20U,
                         free >> 20U, where),
             fmt::format("{}, or {}", cure, more)};
 }
@@ -49,7 +49,7 @@ Expected<> check_memory(const std::filesystem::path& ring, std::uint64_t size,
     if (available && size > *available - std::min(*available, memory_left))
         return Unexpected(too_large(ring, size, *available,
                                     "in this machine's memory, of which some is left to others",
-                                    "end other programs"));
+                                    "close other programs"));
     return {};
 }
 
