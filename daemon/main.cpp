@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
-#include <fstream>
 
 #include "base/library_log.hpp"
 #include "base/log.hpp"
@@ -16,6 +15,7 @@
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
+#include "posix/file.hpp"
 #include "service.hpp"
 #include "settings/configuration.hpp"
 #include "settings/key_report.hpp"
@@ -125,11 +125,9 @@ CameraConfiguration camera_to_probe(const std::string& device, const Configurati
 }
 
 int write_bundle(const std::string& path, const std::string& text) {
-    std::ofstream file(path);
-    file << text << '\n';
-    file.close();
-    if (file) return EX_OK;
-    fmt::print(stderr, "{}: cannot be written; check its directory and permissions\n", path);
+    const auto written = write_whole_file(path, text + '\n');
+    if (written) return EX_OK;
+    fmt::print(stderr, "{}\n", written.error().message());
     return EX_CANTCREAT;
 }
 

@@ -81,20 +81,18 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                        "choose a shorter one with --socket");
     std::memcpy(self.sun_path, socket_path.c_str(), socket_path.size() + 1);
     ::unlink(socket_path.c_str());
-    const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (::bind(listener, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 ||
-        ::listen(listener, 1) != 0) {
+    FileDescriptor listener(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    if (::bind(listener.get(), reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0 ||
+        ::listen(listener.get(), 1) != 0) {
         const std::string reason = std::generic_category().message(errno);
-        ::close(listener);
         return failure(socket_path, fmt::format("cannot listen: {}", reason),
                        "choose another with --socket");
     }
     try {
         return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, surroundings,
                                                         truth, std::move(cameras), std::move(chip),
-                                                        listener));
+                                                        std::move(listener)));
     } catch (const std::exception& error) {
-        ::close(listener);
         return failure(scenario.board.image, error.what(),
                        "see the line before; ./dev firmware builds an image that starts");
     }
@@ -103,7 +101,7 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
 BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
                      Surroundings& surroundings, GroundTruth& truth,
                      std::vector<TriggeredCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
-                     int listener)
+                     FileDescriptor listener)
     : serial_(scenario.board.serial),
       seed_(scenario.seed),
       clock_errors_(scenario.board.clock),
@@ -117,7 +115,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
       leds_(surroundings.leds.get()),
       truth_(truth),
       cameras_(std::move(cameras)),
-      listener_(listener),
+      listener_(std::move(listener)),
       chip_(std::move(chip)) {
     if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
     boot({}, clock_errors_, zero);
@@ -129,7 +127,6 @@ BoardHost::~BoardHost() {
     thread_.join();
     if (leds_ != nullptr) leds_->settle(HostTime{INT64_MAX});  // nobody waits for the rest
     drop_host();
-    ::close(listener_);
     ::unlink(socket_path_.c_str());
 }
 
@@ -290,17 +287,18 @@ HostTime BoardHost::signal_samples() {
 void BoardHost::wait(HostTime until) const {
     const std::int64_t left_ns = std::max<std::int64_t>(0, (until - host_now()).ns);
     const timespec timeout{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
-    pollfd readable{host_ >= 0 ? host_ : listener_, POLLIN, 0};
+    pollfd readable{(host_ ? host_ : listener_).get(), POLLIN, 0};
     ::ppoll(&readable, 1, &timeout, nullptr);
 }
 
 void BoardHost::accept_host() {
-    if (host_ < 0) host_ = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (!host_)
+        host_ = FileDescriptor(
+            ::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
 }
 
 void BoardHost::drop_host() {
-    if (host_ >= 0) ::close(host_);
-    host_ = -1;
+    host_ = {};
     late_.clear();
     coming_.clear();
 }
@@ -333,18 +331,18 @@ void BoardHost::write_late(HostTime now) {
         board_->consume(out.size(), board_now());
     }
     for (; !late_.empty() && late_.front().first <= now; late_.pop_front())
-        ::send(host_, late_.front().second.data(), late_.front().second.size(), MSG_NOSIGNAL);
+        ::send(host_.get(), late_.front().second.data(), late_.front().second.size(), MSG_NOSIGNAL);
 }
 
 void BoardHost::exchange_bytes() {
     accept_host();
-    if (host_ < 0) {
+    if (!host_) {
         board_->consume(board_->transmitted().size(), board_now());
         return;
     }
     std::uint8_t buffer[4096];
     ssize_t size = 0;
-    while ((size = ::recv(host_, buffer, sizeof buffer, 0)) > 0)
+    while ((size = ::recv(host_.get(), buffer, sizeof buffer, 0)) > 0)
         coming_.emplace_back(host_now() + link_delay_, std::vector(buffer, buffer + size));
     if (size == 0 || errno != EAGAIN) return drop_host();
     for (; !coming_.empty() && coming_.front().first <= host_now(); coming_.pop_front()) {
@@ -358,7 +356,8 @@ void BoardHost::exchange_bytes() {
     const auto out = board_->transmitted();
     // Stamped before writing: the host may receive the bytes before this process continues.
     const firmware::Nanoseconds leaving = board_now();
-    const ssize_t sent = out.empty() ? 0 : ::send(host_, out.data(), out.size(), MSG_NOSIGNAL);
+    const ssize_t sent =
+        out.empty() ? 0 : ::send(host_.get(), out.data(), out.size(), MSG_NOSIGNAL);
     if (sent > 0) board_->consume(static_cast<std::size_t>(sent), leaving);
 }
 

@@ -19,6 +19,7 @@
 #include "emulated_board.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "ground_truth.hpp"
+#include "posix/file_descriptor.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
 
@@ -42,7 +43,7 @@ class BoardHost {
  private:
     BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
               Surroundings& surroundings, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
-              std::unique_ptr<EmulatedChip> chip, int listener);
+              std::unique_ptr<EmulatedChip> chip, FileDescriptor listener);
 
     void run();
     void live();
@@ -76,8 +77,8 @@ class BoardHost {
     TimingBoard* leds_;  ///< nullptr: there is none
     GroundTruth& truth_;
     std::vector<TriggeredCamera*> cameras_;
-    int listener_;
-    int host_ = -1;
+    FileDescriptor listener_;
+    FileDescriptor host_;
 
     std::unique_ptr<SkewedClock> clock_;
     std::unique_ptr<EmulatedChip> chip_;  ///< none: the core runs in this process

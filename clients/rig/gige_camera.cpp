@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -70,13 +69,13 @@ bool same(const sockaddr_in& a, const sockaddr_in& b) {
 
 /// Receives broadcasts. Never on loopback: a rig there must not show up on the machine's real
 /// networks.
-int open_broadcast_socket(sockaddr_in self) {
-    if ((ntohl(self.sin_addr.s_addr) >> 24U) == 127) return -1;
+FileDescriptor open_broadcast_socket(sockaddr_in self) {
+    if ((ntohl(self.sin_addr.s_addr) >> 24U) == 127) return {};
     self.sin_addr.s_addr = INADDR_BROADCAST;
-    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-    ::bind(socket, reinterpret_cast<const sockaddr*>(&self), sizeof self);
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&self), sizeof self);
     return socket;
 }
 
@@ -96,29 +95,29 @@ Expected<std::unique_ptr<GigeCamera>> GigeCamera::create(const Scenario& scenari
                                                          GroundTruth& truth) {
     const auto family = settings.model.empty() ? rig_family() : load_camera_family(settings.model);
     if (!family) return Unexpected(family.error());
-    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     sockaddr_in self{};
     self.sin_family = AF_INET;
     self.sin_port = htons(gvcp_port);
     const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
     if (inet_pton(AF_INET, settings.address.c_str(), &self.sin_addr) != 1 ||
-        ::bind(socket, reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0) {
+        ::bind(socket.get(), reinterpret_cast<const sockaddr*>(&self), sizeof self) != 0) {
         const std::string reason = std::generic_category().message(errno);
-        ::close(socket);
         return failure(
             fmt::format("camera {}", settings.name),
             fmt::format("cannot listen on {}:{}: {}", settings.address, gvcp_port, reason),
             "is another rig running? use other addresses of 127.0.0.0/8");
     }
     return std::unique_ptr<GigeCamera>(new GigeCamera(scenario, settings, zero, surroundings, truth,
-                                                      *family, socket,
+                                                      *family, std::move(socket),
                                                       open_broadcast_socket(self)));
 }
 
 GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
                        const Surroundings& surroundings, GroundTruth& truth,
-                       const CameraFamily& family, int socket, int broadcast_socket)
+                       const CameraFamily& family, FileDescriptor socket,
+                       FileDescriptor broadcast_socket)
     : settings_(settings),
       faults_(faults_of(scenario, settings.name)),
       zero_(zero),
@@ -132,9 +131,9 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       view_(scenario, settings, surroundings),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, scenario.seed),
       random_(scenario.seed),
-      socket_(socket),
-      broadcast_socket_(broadcast_socket),
-      events_(socket) {
+      socket_(std::move(socket)),
+      broadcast_socket_(std::move(broadcast_socket)),
+      events_(socket_.get()) {
     configure_stream();
     server_ = std::thread([this] { serve(); });
 }
@@ -142,13 +141,11 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
 GigeCamera::~GigeCamera() {
     stop_ = true;
     server_.join();
-    ::close(socket_);
-    if (broadcast_socket_ >= 0) ::close(broadcast_socket_);
 }
 
 void GigeCamera::serve() {
     while (!stop_) {
-        pollfd readable[] = {{socket_, POLLIN, 0}, {broadcast_socket_, POLLIN, 0}};
+        pollfd readable[] = {{socket_.get(), POLLIN, 0}, {broadcast_socket_.get(), POLLIN, 0}};
         ::poll(readable, 2, poll_ms);
         if (!muted() && power_cycle_pending_.exchange(false)) power_cycle();
         for (const pollfd& entry : readable)
@@ -185,7 +182,7 @@ void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in&
     put_half(reply, static_cast<std::uint16_t>(body.size()));
     put_half(reply, half(packet, 6));
     reply.insert(reply.end(), body.begin(), body.end());
-    ::sendto(socket_, reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from),
+    ::sendto(socket_.get(), reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from),
              sizeof from);
 }
 

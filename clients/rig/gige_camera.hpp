@@ -17,6 +17,7 @@
 #include "gige_registers.hpp"
 #include "ground_truth.hpp"
 #include "gvsp_transmitter.hpp"
+#include "posix/file_descriptor.hpp"
 #include "scenario.hpp"
 #include "skewed_clock.hpp"
 #include "triggered_camera.hpp"
@@ -45,7 +46,7 @@ class GigeCamera final : public TriggeredCamera {
  private:
     GigeCamera(const Scenario& scenario, const CameraScenario& settings, HostTime zero,
                const Surroundings& surroundings, GroundTruth& truth, const CameraFamily& family,
-               int socket, int broadcast_socket);
+               FileDescriptor socket, FileDescriptor broadcast_socket);
 
     void serve();
     void receive(int socket);
@@ -111,8 +112,8 @@ class GigeCamera final : public TriggeredCamera {
     std::atomic<std::int64_t> muted_until_ns_{INT64_MIN};
     std::atomic<bool> power_cycle_pending_{false};
     std::atomic<bool> stop_{false};
-    int socket_;
-    int broadcast_socket_;  ///< receives discovery; -1 on loopback, which does not broadcast
+    FileDescriptor socket_;
+    FileDescriptor broadcast_socket_;  ///< receives discovery; none on loopback
     EventSender events_;
     std::thread server_;
 };

@@ -3,7 +3,6 @@
 
 #include <arpa/inet.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -114,9 +113,9 @@ GvspTransmitter::GvspTransmitter(const std::string& address, double link_mbps, d
     sockaddr_in self{};
     self.sin_family = AF_INET;
     self.sin_addr.s_addr = inet_addr(address.c_str());
-    ::bind(socket_, reinterpret_cast<const sockaddr*>(&self), sizeof self);
+    ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&self), sizeof self);
     const int buffer = 4 << 20;
-    ::setsockopt(socket_, SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
+    ::setsockopt(socket_.get(), SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
     thread_ = std::thread([this] { run(); });
 }
 
@@ -127,7 +126,6 @@ GvspTransmitter::~GvspTransmitter() {
     }
     wake_.notify_all();
     thread_.join();
-    ::close(socket_);
 }
 
 void GvspTransmitter::configure(const StreamSettings& settings) {
@@ -138,7 +136,7 @@ void GvspTransmitter::configure(const StreamSettings& settings) {
 std::uint16_t GvspTransmitter::source_port() const {
     sockaddr_in self{};
     socklen_t size = sizeof self;
-    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&self), &size);
+    ::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&self), &size);
     return ntohs(self.sin_port);
 }
 
@@ -288,7 +286,7 @@ void GvspTransmitter::send_packets(const StreamFrame& frame, const StreamSetting
             &destination, sizeof destination, parts[count].data(), 2, nullptr, 0, 0};
         ++count;
     }
-    if (count > 0) ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
+    if (count > 0) ::sendmmsg(socket_.get(), messages.data(), static_cast<unsigned>(count), 0);
 }
 
 void GvspTransmitter::resend(std::uint64_t block_id, std::uint32_t first, std::uint32_t last) {
@@ -314,7 +312,7 @@ void GvspTransmitter::send_test_packet() {
         settings = settings_;
     }
     const std::vector<std::uint8_t> packet(settings.packet_size - ip_udp_header);
-    ::sendto(socket_, packet.data(), packet.size(), 0,
+    ::sendto(socket_.get(), packet.data(), packet.size(), 0,
              reinterpret_cast<const sockaddr*>(&settings.destination), sizeof settings.destination);
 }
 

@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+#include "posix/file_descriptor.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::rig {
@@ -90,7 +91,7 @@ class GvspTransmitter {
                                                   const StreamSettings& settings, std::uint32_t id);
     bool muted() const;
 
-    int socket_;
+    FileDescriptor socket_;
     double link_mbps_;
     double packet_loss_;
     std::mt19937_64 random_;

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <sstream>
 
 #include "commands/board_commands.hpp"
 #include "commands/camera_commands.hpp"
@@ -21,6 +22,7 @@
 #include "commands/snapshot.hpp"
 #include "commands/tail.hpp"
 #include "pairing/pair_replay.hpp"
+#include "posix/file.hpp"
 #include "status/status_document.hpp"
 #include "status/status_view.hpp"
 #include "versavis/ring_path.hpp"
@@ -65,14 +67,14 @@ int watch_status(const std::string& instance, bool json) {
 
 int replay_pairing(const std::string& recording, const std::string& decisions, bool json) {
     std::ifstream file;
-    std::ofstream out;
+    std::ostringstream out;
     if (recording != "-") file.open(recording);
     if (!file) return fail({recording, "cannot be read", "check its name and permissions"});
-    if (!decisions.empty()) out.open(decisions);
-    if (!out) return fail({decisions, "cannot be written", "check its directory and permissions"});
     const auto summary = client::replay_pairing(recording == "-" ? std::cin : file,
                                                 decisions.empty() ? nullptr : &out);
     if (!summary) return fail(summary.error());
+    const auto written = decisions.empty() ? Expected<>() : write_whole_file(decisions, out.str());
+    if (!written) return fail(written.error());
     fmt::print("{}", client::to_text(*summary, json));
     return EX_OK;
 }

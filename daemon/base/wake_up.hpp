@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "posix/file_descriptor.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {
@@ -16,28 +17,25 @@ namespace versavis::daemon {
 class WakeUp {
  public:
     WakeUp() : file_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
-    ~WakeUp() { ::close(file_); }
-    WakeUp(const WakeUp&) = delete;
-    WakeUp& operator=(const WakeUp&) = delete;
 
     /// From any thread.
     void signal() const {
         const std::uint64_t one = 1;
-        [[maybe_unused]] const auto written = ::write(file_, &one, sizeof one);
+        [[maybe_unused]] const auto written = ::write(file_.get(), &one, sizeof one);
     }
 
     /// Returns when there was a signal since the last wait, or after `timeout`.
     void wait(Duration timeout) const {
         const std::int64_t ns = std::max<std::int64_t>(timeout.ns, 0);
         const timespec limit{ns / 1'000'000'000, ns % 1'000'000'000};
-        pollfd signalled{file_, POLLIN, 0};
+        pollfd signalled{file_.get(), POLLIN, 0};
         if (::ppoll(&signalled, 1, &limit, nullptr) <= 0) return;
         std::uint64_t count = 0;
-        [[maybe_unused]] const auto taken = ::read(file_, &count, sizeof count);
+        [[maybe_unused]] const auto taken = ::read(file_.get(), &count, sizeof count);
     }
 
  private:
-    int file_;
+    FileDescriptor file_;
 };
 
 }  // namespace versavis::daemon

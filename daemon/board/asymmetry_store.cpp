@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board/asymmetry_store.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "base/state_directory.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::daemon {
 
@@ -28,25 +25,6 @@ nlohmann::json read(const std::filesystem::path& path) {
     if (!file) return nlohmann::json::object();
     nlohmann::json document = nlohmann::json::parse(file, nullptr, false);
     return document.is_object() ? document : nlohmann::json(nullptr);
-}
-
-/// True: the file is on the disk, whole.
-bool write_through(const std::string& path, const std::string& text) {
-    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
-    if (file < 0) return false;
-    const bool written =
-        ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-    const bool done = written && ::fsync(file) == 0;
-    return ::close(file) == 0 && done;
-}
-
-/// True: what was renamed there keeps its name, whatever happens to the machine.
-bool sync_directory(const std::filesystem::path& path) {
-    const int directory = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (directory < 0) return false;
-    const bool done = ::fsync(directory) == 0;
-    ::close(directory);
-    return done;
 }
 
 bool plausible(const nlohmann::json& entry) {
@@ -78,12 +56,9 @@ Expected<> AsymmetryStore::save(const std::string& port, const clock::Asymmetry&
     nlohmann::json document = read(path_);
     if (document.is_null()) document = nlohmann::json::object();
     document[port] = {{"offset_ns", asymmetry.offset.ns}, {"sigma_ns", asymmetry.sigma.ns}};
-    const std::string part = path_.string() + ".part";
-    if (!write_through(part, document.dump(2) + '\n') ||
-        ::rename(part.c_str(), path_.c_str()) != 0 || !sync_directory(path_.parent_path()))
-        return failure(path_.string(), "cannot be written",
-                       "make its directory, or set 'state_directory'");
-    return {};
+    auto written = write_whole_file(path_, document.dump(2) + '\n', 0640);
+    if (!written) written.error().cure = "make its directory, or set 'state_directory'";
+    return written;
 }
 
 }  // namespace versavis::daemon

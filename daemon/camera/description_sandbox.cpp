@@ -14,6 +14,8 @@
 #include <array>
 #include <fstream>
 
+#include "posix/file.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -158,13 +160,10 @@ void DescriptionSandbox::remember(const std::string& hash, const std::string& re
 void DescriptionSandbox::keep(const std::string& hash) {
     if (good_.size() >= most_kept) good_.clear();
     good_.insert(hash);
-    const std::filesystem::path part = file_.string() + ".part";
-    std::ofstream file(part);
-    file << file_header << '\n';
-    for (const std::string& line : good_) file << line << '\n';
-    file.close();
-    std::error_code error;  // then it is looked at again in the next life
-    if (file) std::filesystem::rename(part, file_, error);
+    std::string text = fmt::format("{}\n", file_header);
+    for (const std::string& line : good_) text += line + '\n';
+    // Where it fails, they are looked at again in the next life.
+    static_cast<void>(write_whole_file(file_, text));
 }
 
 Expected<> DescriptionSandbox::vet(const std::string& camera, const Description& description,

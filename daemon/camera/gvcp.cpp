@@ -68,14 +68,13 @@ sockaddr_in endpoint(in_addr address, std::uint16_t at) {
     return end;
 }
 
-int open_socket(in_addr interface) {
-    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+FileDescriptor open_socket(in_addr interface) {
+    FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     const sockaddr_in own = endpoint(interface, 0);
     const int yes = 1;
-    ::setsockopt(socket, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
-    if (::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0) return socket;
-    ::close(socket);
-    return -1;
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+    if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0) return {};
+    return socket;
 }
 
 std::uint16_t half_at(const std::uint8_t* bytes) {
@@ -162,13 +161,9 @@ DeviceSearch::DeviceSearch(std::string name)
     const bool near = address_ && in_own_network(*address_);
     for (const Interface& own : own_interfaces()) {
         if (near && !contains(own, *address_)) continue;
-        if (const int socket = open_socket(own.address); socket >= 0)
-            sockets_.push_back({socket, own.address});
+        if (auto socket = open_socket(own.address))
+            sockets_.push_back({std::move(socket), own.address});
     }
-}
-
-DeviceSearch::~DeviceSearch() {
-    for (const Socket& socket : sockets_) ::close(socket.descriptor);
 }
 
 void DeviceSearch::ask() const {
@@ -178,7 +173,7 @@ void DeviceSearch::ask() const {
     put(packet, 0xFFFF, 2);
     const sockaddr_in to = endpoint(address_.value_or(in_addr{INADDR_BROADCAST}), gvcp_port);
     for (const Socket& socket : sockets_)
-        ::sendto(socket.descriptor, packet.data(), packet.size(), 0,
+        ::sendto(socket.descriptor.get(), packet.data(), packet.size(), 0,
                  reinterpret_cast<const sockaddr*>(&to), sizeof to);
 }
 
@@ -186,7 +181,7 @@ std::optional<NetworkDevice> DeviceSearch::receive(const Socket& socket) const {
     std::uint8_t packet[header_size + 1024];
     sockaddr_in from{};
     socklen_t from_size = sizeof from;
-    const ssize_t size = ::recvfrom(socket.descriptor, packet, sizeof packet, 0,
+    const ssize_t size = ::recvfrom(socket.descriptor.get(), packet, sizeof packet, 0,
                                     reinterpret_cast<sockaddr*>(&from), &from_size);
     if (size < static_cast<ssize_t>(header_size + discovery_size) ||
         half_at(packet + 2) != discovery + 1)
@@ -200,7 +195,7 @@ std::optional<NetworkDevice> DeviceSearch::receive(const Socket& socket) const {
 
 std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancelled& cancelled) {
     std::vector<pollfd> polled;
-    for (const Socket& socket : sockets_) polled.push_back({socket.descriptor, POLLIN, 0});
+    for (const Socket& socket : sockets_) polled.push_back({socket.descriptor.get(), POLLIN, 0});
     const HostTime deadline = host_now() + patience;
     // All that a broadcast reaches answers at once: it is not repeated as often.
     Duration interval = address_ ? ask_interval : ask_interval * 10;
@@ -220,11 +215,7 @@ std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancell
 GvcpClient::GvcpClient(in_addr interface, in_addr address)
     : name_(to_text(address)), socket_(open_socket(interface)), repeat_after_(answer_time) {
     const sockaddr_in to = endpoint(address, gvcp_port);
-    ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-}
-
-GvcpClient::~GvcpClient() {
-    if (socket_ >= 0) ::close(socket_);
+    ::connect(socket_.get(), reinterpret_cast<const sockaddr*>(&to), sizeof to);
 }
 
 std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t command,
@@ -238,15 +229,15 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
     put(packet, static_cast<std::uint32_t>(body.size()), 2);
     put(packet, id_, 2);
     packet.insert(packet.end(), body.begin(), body.end());
-    std::vector<pollfd> polled{{socket_, POLLIN, 0}};
+    std::vector<pollfd> polled{{socket_.get(), POLLIN, 0}};
     const HostTime asked = host_now();
     const HostTime deadline = asked + patience;
     while (host_now() < deadline && !cancelled()) {
-        ::send(socket_, packet.data(), packet.size(), 0);
+        ::send(socket_.get(), packet.data(), packet.size(), 0);
         const HostTime again = std::min(deadline, host_now() + repeat_after_);
         while (readable(polled, again, cancelled)) {
             std::uint8_t answer[header_size + block + 4];
-            const ssize_t size = ::recv(socket_, answer, sizeof answer, 0);
+            const ssize_t size = ::recv(socket_.get(), answer, sizeof answer, 0);
             if (size < 0) break;  // nobody listens there: it may boot
             const bool ours = size >= static_cast<ssize_t>(header_size) &&
                               half_at(answer + 2) == command + 1 && half_at(answer + 6) == id_;

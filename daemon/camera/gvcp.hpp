@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "posix/file_descriptor.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 
@@ -44,16 +45,13 @@ bool in_own_network(in_addr address);
 class DeviceSearch {
  public:
     explicit DeviceSearch(std::string name);
-    ~DeviceSearch();
-    DeviceSearch(const DeviceSearch&) = delete;
-    DeviceSearch& operator=(const DeviceSearch&) = delete;
 
     /// Asks, again and again, for at most `patience`.
     std::optional<NetworkDevice> wait(Duration patience, const Cancelled& cancelled);
 
  private:
     struct Socket {
-        int descriptor = -1;
+        FileDescriptor descriptor;
         in_addr interface {};
     };
     void ask() const;
@@ -68,9 +66,6 @@ class DeviceSearch {
 class GvcpClient {
  public:
     GvcpClient(in_addr interface, in_addr address);
-    ~GvcpClient();
-    GvcpClient(const GvcpClient&) = delete;
-    GvcpClient& operator=(const GvcpClient&) = delete;
 
     /// `size` bytes from a multiple of four on. Each block is asked for until `patience` is over.
     Expected<std::vector<std::uint8_t>> read(std::uint32_t address, std::size_t size,
@@ -84,7 +79,7 @@ class GvcpClient {
                                                      const Cancelled& cancelled);
 
     std::string name_;
-    int socket_;
+    FileDescriptor socket_;
     std::uint16_t id_ = 0;
     Duration repeat_after_;  ///< twice the time that the newest answer took, or what is usual
 };

@@ -3,7 +3,6 @@
 
 #include <poll.h>
 #include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -69,9 +68,8 @@ ImageReceiver::ImageReceiver(ArvDevice* device, PacketRing ring, const Stream& s
       thread_([this] { run(); }) {}
 
 ImageReceiver::~ImageReceiver() {
-    ::eventfd_write(stop_, 1);
+    ::eventfd_write(stop_.get(), 1);
     thread_.join();
-    ::close(stop_);
     for (const std::uint32_t slot : assembler_.close())
         pipeline_.abandon(slot, EventReason::none, 0);
     ArvDevice* device = device_;
@@ -86,7 +84,7 @@ ImageReceiver::~ImageReceiver() {
 
 void ImageReceiver::run() {
     name_thread("receive " + configuration_.name);
-    pollfd stopped{stop_, POLLIN, 0};
+    pollfd stopped{stop_.get(), POLLIN, 0};
     while (::poll(&stopped, 1, 0) == 0) {
         const HostTime now = host_now();
         const std::uint32_t arrived = drain(now);
@@ -110,7 +108,7 @@ std::uint32_t ImageReceiver::drain(HostTime now) {
 /// While packets come, nobody needs to be woken by each: it sleeps until the frame's last one
 /// should be there. In silence, the next packet wakes it.
 void ImageReceiver::wait(std::uint32_t arrived, HostTime now) const {
-    pollfd ready[] = {{stop_, POLLIN, 0}, {ring_.descriptor(), POLLIN, 0}};
+    pollfd ready[] = {{stop_.get(), POLLIN, 0}, {ring_.descriptor(), POLLIN, 0}};
     const auto left = assembler_.time_left(now);
     if (arrived > 0 && left) {
         const timespec sleep = as_timespec(std::clamp(*left, shortest_sleep, longest_sleep));

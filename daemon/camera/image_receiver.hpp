@@ -13,6 +13,7 @@
 #include "camera/gvcp.hpp"
 #include "camera/packet_ring.hpp"
 #include "engine/pairing/block_id.hpp"
+#include "posix/file_descriptor.hpp"
 
 namespace versavis::daemon {
 
@@ -59,7 +60,7 @@ class ImageReceiver final : public FrameSource, private FrameAssembler::Owner {
     std::uint16_t request_ = 0;
     std::atomic<std::uint64_t> packets_{0};
     std::atomic<bool> no_image_{false};
-    int stop_;
+    FileDescriptor stop_;
     std::thread thread_;
 };
 

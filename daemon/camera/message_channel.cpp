@@ -5,7 +5,6 @@
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 
@@ -80,25 +79,23 @@ std::vector<std::uint8_t> event_acknowledge(const EventPacket& packet) {
 std::unique_ptr<MessageChannel> MessageChannel::open(in_addr interface, in_addr camera,
                                                      std::vector<EventNumber> numbers,
                                                      std::uint64_t ticks_per_second, Sink sink) {
-    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     sockaddr_in own{};
     own.sin_family = AF_INET;
     own.sin_addr = interface;
     socklen_t size = sizeof own;
-    if (::bind(socket, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
-        ::getsockname(socket, reinterpret_cast<sockaddr*>(&own), &size) != 0) {
-        ::close(socket);
+    if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
+        ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&own), &size) != 0)
         return nullptr;
-    }
-    return std::unique_ptr<MessageChannel>(new MessageChannel(socket, ntohs(own.sin_port), camera,
-                                                              std::move(numbers), ticks_per_second,
-                                                              std::move(sink)));
+    return std::unique_ptr<MessageChannel>(
+        new MessageChannel(std::move(socket), ntohs(own.sin_port), camera, std::move(numbers),
+                           ticks_per_second, std::move(sink)));
 }
 
-MessageChannel::MessageChannel(int socket, std::uint16_t port, in_addr camera,
+MessageChannel::MessageChannel(FileDescriptor socket, std::uint16_t port, in_addr camera,
                                std::vector<EventNumber> numbers, std::uint64_t ticks_per_second,
                                Sink sink)
-    : socket_(socket),
+    : socket_(std::move(socket)),
       stop_(::eventfd(0, EFD_CLOEXEC)),
       port_(port),
       camera_(camera),
@@ -108,16 +105,14 @@ MessageChannel::MessageChannel(int socket, std::uint16_t port, in_addr camera,
       thread_([this] { run(); }) {}
 
 MessageChannel::~MessageChannel() {
-    ::eventfd_write(stop_, 1);
+    ::eventfd_write(stop_.get(), 1);
     thread_.join();
-    ::close(socket_);
-    ::close(stop_);
 }
 
 void MessageChannel::run() {
     name_thread("messages");
     for (;;) {
-        pollfd ready[] = {{socket_, POLLIN, 0}, {stop_, POLLIN, 0}};
+        pollfd ready[] = {{socket_.get(), POLLIN, 0}, {stop_.get(), POLLIN, 0}};
         if (::poll(ready, 2, -1) < 0) continue;  // stop_ ends it
         if (ready[1].revents != 0) return;
         receive();
@@ -128,7 +123,7 @@ void MessageChannel::receive() {
     std::uint8_t packet[largest_packet + 1];
     sockaddr_in from{};
     socklen_t from_size = sizeof from;
-    const ssize_t size = ::recvfrom(socket_, packet, sizeof packet, 0,
+    const ssize_t size = ::recvfrom(socket_.get(), packet, sizeof packet, 0,
                                     reinterpret_cast<sockaddr*>(&from), &from_size);
     if (size < 0 || static_cast<std::size_t>(size) > largest_packet ||
         from.sin_addr.s_addr != camera_.s_addr)
@@ -137,8 +132,8 @@ void MessageChannel::receive() {
     if (!events) return;
     if (events->acknowledge) {
         const auto answer = event_acknowledge(*events);
-        ::sendto(socket_, answer.data(), answer.size(), 0, reinterpret_cast<const sockaddr*>(&from),
-                 sizeof from);
+        ::sendto(socket_.get(), answer.data(), answer.size(), 0,
+                 reinterpret_cast<const sockaddr*>(&from), sizeof from);
     }
     if (events->request == newest_request_) return;  // it had no answer in time
     newest_request_ = events->request;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "pipeline/camera_event.hpp"
+#include "posix/file_descriptor.hpp"
 
 namespace versavis::daemon {
 
@@ -60,15 +61,15 @@ class MessageChannel {
     std::uint16_t port() const { return port_; }
 
  private:
-    MessageChannel(int socket, std::uint16_t port, in_addr camera, std::vector<EventNumber> numbers,
-                   std::uint64_t ticks_per_second, Sink sink);
+    MessageChannel(FileDescriptor socket, std::uint16_t port, in_addr camera,
+                   std::vector<EventNumber> numbers, std::uint64_t ticks_per_second, Sink sink);
 
     void run();
     void receive();
     void take(const EventItem& item);
 
-    int socket_;
-    int stop_;
+    FileDescriptor socket_;
+    FileDescriptor stop_;
     std::uint16_t port_;
     in_addr camera_;
     std::vector<EventNumber> numbers_;

@@ -7,7 +7,6 @@
 #include <net/if.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cstring>
@@ -72,8 +71,8 @@ PacketRing::PacketRing(in_addr from, std::size_t packet_size)
 
 PacketRing::PacketRing(PacketRing&& other) noexcept
     : from_(other.from_),
-      datagrams_(std::exchange(other.datagrams_, -1)),
-      packets_(std::exchange(other.packets_, -1)),
+      datagrams_(std::move(other.datagrams_)),
+      packets_(std::move(other.packets_)),
       port_(other.port_),
       slot_size_(other.slot_size_),
       memory_(std::exchange(other.memory_, nullptr)),
@@ -81,8 +80,6 @@ PacketRing::PacketRing(PacketRing&& other) noexcept
 
 PacketRing::~PacketRing() {
     if (memory_ != nullptr) ::munmap(memory_, ring_size);
-    if (packets_ >= 0) ::close(packets_);
-    if (datagrams_ >= 0) ::close(datagrams_);
 }
 
 Expected<PacketRing> PacketRing::open(in_addr own, in_addr from, std::size_t packet_size) {
@@ -92,14 +89,14 @@ Expected<PacketRing> PacketRing::open(in_addr own, in_addr from, std::size_t pac
 }
 
 Expected<> PacketRing::bind(in_addr own) {
-    if (datagrams_ < 0 || packets_ < 0) return failed("is not made");
-    receive_nothing(datagrams_);
+    if (!datagrams_ || !packets_) return failed("is not made");
+    receive_nothing(datagrams_.get());
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr = own;
     socklen_t size = sizeof address;
-    if (::bind(datagrams_, reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
-        ::getsockname(datagrams_, reinterpret_cast<sockaddr*>(&address), &size) != 0)
+    if (::bind(datagrams_.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
+        ::getsockname(datagrams_.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0)
         return failed("no UDP port");
     port_ = ntohs(address.sin_port);
 
@@ -109,19 +106,20 @@ Expected<> PacketRing::bind(in_addr own) {
     request.tp_block_nr = block_count;
     request.tp_frame_size = static_cast<unsigned>(slot_size_);
     request.tp_frame_nr = static_cast<unsigned>(block_size / slot_size_ * block_count);
-    if (::setsockopt(packets_, SOL_PACKET, PACKET_VERSION, &version, sizeof version) != 0 ||
-        ::setsockopt(packets_, SOL_PACKET, PACKET_RX_RING, &request, sizeof request) != 0)
+    if (::setsockopt(packets_.get(), SOL_PACKET, PACKET_VERSION, &version, sizeof version) != 0 ||
+        ::setsockopt(packets_.get(), SOL_PACKET, PACKET_RX_RING, &request, sizeof request) != 0)
         return failed("no ring");
-    void* memory = ::mmap(nullptr, ring_size, PROT_READ | PROT_WRITE, MAP_SHARED, packets_, 0);
+    void* memory =
+        ::mmap(nullptr, ring_size, PROT_READ | PROT_WRITE, MAP_SHARED, packets_.get(), 0);
     if (memory == MAP_FAILED) return failed("no memory");
     memory_ = static_cast<std::uint8_t*>(memory);
 
-    receive_only(packets_, from_, own, port_);
+    receive_only(packets_.get(), from_, own, port_);
     sockaddr_ll link{};
     link.sll_family = AF_PACKET;
     link.sll_protocol = htons(ETH_P_IP);
     link.sll_ifindex = static_cast<int>(if_nametoindex(interface_of(own.s_addr).c_str()));
-    if (::bind(packets_, reinterpret_cast<const sockaddr*>(&link), sizeof link) != 0)
+    if (::bind(packets_.get(), reinterpret_cast<const sockaddr*>(&link), sizeof link) != 0)
         return failed("is not bound");
     return {};
 }
@@ -152,8 +150,8 @@ void PacketRing::send(std::span<const std::uint8_t> datagram, std::uint16_t to_p
     to.sin_family = AF_INET;
     to.sin_addr = from_;
     to.sin_port = htons(to_port);
-    ::sendto(datagrams_, datagram.data(), datagram.size(), 0, reinterpret_cast<sockaddr*>(&to),
-             sizeof to);
+    ::sendto(datagrams_.get(), datagram.data(), datagram.size(), 0,
+             reinterpret_cast<sockaddr*>(&to), sizeof to);
 }
 
 }  // namespace versavis::daemon

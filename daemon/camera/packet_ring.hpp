@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <span>
 
+#include "posix/file_descriptor.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::daemon {
@@ -26,7 +27,7 @@ class PacketRing {
     std::uint16_t port() const { return port_; }
 
     /// Readable when there is a packet.
-    int descriptor() const { return packets_; }
+    int descriptor() const { return packets_.get(); }
 
     /// The oldest one, IP header included, until release(); empty: there is none. One that was cut
     /// has no bytes behind its header.
@@ -42,8 +43,8 @@ class PacketRing {
     std::uint8_t* slot() const;
 
     in_addr from_{};
-    int datagrams_ = -1;  ///< holds the port, and receives nothing
-    int packets_ = -1;
+    FileDescriptor datagrams_;  ///< holds the port, and receives nothing
+    FileDescriptor packets_;
     std::uint16_t port_ = 0;
     std::size_t slot_size_ = 0;
     std::uint8_t* memory_ = nullptr;

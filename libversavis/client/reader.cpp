@@ -32,7 +32,7 @@ Expected<std::shared_ptr<const Mapping>> map(const std::filesystem::path& path,
                                              const Options& options) {
     auto file = open_trusted(path, options.owner);
     if (!file) return Unexpected(file.error());
-    if (options.sealed_only && !is_sealed(file->file.descriptor()))
+    if (options.sealed_only && !is_sealed(file->file.get()))
         return failure(path.string(), "is not sealed",
                        "set 'sealed = true' in [memory] of the service's configuration");
     auto mapping = Mapping::open(*file, path, Mapping::Access::read_only);

@@ -35,7 +35,7 @@ Unexpected<> not_handed(const std::filesystem::path& path) {
 }
 
 /// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.
-File receive(int connection) {
+FileDescriptor receive(int connection) {
     alignas(cmsghdr) char room[CMSG_SPACE(sizeof(int))]{};
     msghdr message{};
     message.msg_control = room;
@@ -47,7 +47,7 @@ File receive(int connection) {
     if (rights == nullptr) return {};
     int file = 0;
     std::memcpy(&file, CMSG_DATA(rights), sizeof file);
-    return File(file);
+    return FileDescriptor(file);
 }
 
 bool is_of(int connection, std::uint32_t owner) {
@@ -64,25 +64,26 @@ bool is_sealed(int file) {
     return found != -1 && (found & seals) == seals;
 }
 
-Expected<File> fetch_sealed(int socket, const std::filesystem::path& path, std::uint32_t owner) {
-    const File connection(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+Expected<FileDescriptor> fetch_sealed(int socket, const std::filesystem::path& path,
+                                      std::uint32_t owner) {
+    const FileDescriptor connection(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     if (!connection) return not_handed(path);
     for (const int option : {SO_RCVTIMEO, SO_SNDTIMEO})
-        ::setsockopt(connection.descriptor(), SOL_SOCKET, option, &patience, sizeof patience);
+        ::setsockopt(connection.get(), SOL_SOCKET, option, &patience, sizeof patience);
     // By what was looked at, not by the name, which may be another's by now.
     const std::string name = "/proc/self/fd/" + std::to_string(socket);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     name.copy(address.sun_path, name.size());
-    if (::connect(connection.descriptor(), reinterpret_cast<const sockaddr*>(&address),
-                  sizeof address) != 0)
+    if (::connect(connection.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+        0)
         return not_handed(path);
-    if (!is_of(connection.descriptor(), owner))
+    if (!is_of(connection.get(), owner))
         return failure(path.string(), "is served by another user than its owner",
                        "somebody else may have put it there: remove it");
-    File file = receive(connection.descriptor());
+    FileDescriptor file = receive(connection.get());
     if (!file) return not_handed(path);
-    if (!is_sealed(file.descriptor()))
+    if (!is_sealed(file.get()))
         return failure(path.string(), "is not sealed, though it should be",
                        "install service and clients of the same release");
     return file;

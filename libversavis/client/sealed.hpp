@@ -16,6 +16,7 @@ bool is_sealed(int file);
 
 /// From the socket, open with O_PATH, of the user who must be its peer. Waits for a second at most.
 /// Errors: nobody there, another user, or what came is not sealed. `path` is for messages.
-Expected<File> fetch_sealed(int socket, const std::filesystem::path& path, std::uint32_t owner);
+Expected<FileDescriptor> fetch_sealed(int socket, const std::filesystem::path& path,
+                                      std::uint32_t owner);
 
 }  // namespace versavis::ring

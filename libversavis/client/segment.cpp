@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <boost/interprocess/exceptions.hpp>
 #include <cerrno>
@@ -69,20 +68,20 @@ Expected<Mapping> Mapping::open_unchecked(int file, const std::filesystem::path&
 
 Expected<Mapping> Mapping::open(const std::filesystem::path& path, Access access) {
     const int mode = access == Access::read_only ? O_RDONLY : O_RDWR;
-    File file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    FileDescriptor file(::open(path.c_str(), mode | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     if (!file)
         return failure(
             path.string(),
             "cannot be opened: " + std::error_code(errno, std::generic_category()).message(),
             "is the service running?");
     struct stat status {};
-    ::fstat(file.descriptor(), &status);
+    ::fstat(file.get(), &status);
     return open({std::move(file), {status.st_dev, status.st_ino}}, path, access);
 }
 
 Expected<Mapping> Mapping::open(const NamedFile& file, const std::filesystem::path& path,
                                 Access access) {
-    auto mapping = open_unchecked(file.file.descriptor(), path, access);
+    auto mapping = open_unchecked(file.file.get(), path, access);
     if (!mapping) return mapping;
     // SYNC 7: acquire here, release at the end of the writer's fill_header(): with the magic, the
     // rest of the header is complete. Without it a header could be checked and used half filled.
@@ -127,10 +126,6 @@ void Mapping::read_constants() {
     constants_.life = from.abi_minor >= minor_with_life ? from.life : 0;
     constants_.pid_namespace = from.abi_minor >= minor_with_life ? from.pid_namespace : 0;
     constants_.has_attributes = from.abi_minor >= minor_with_attributes;
-}
-
-File::~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 FileId file_id(const std::filesystem::path& path) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "posix/file_descriptor.hpp"
 #include "versavis/error.hpp"
 #include "versavis/ring_layout.hpp"
 
@@ -40,28 +41,9 @@ using FileId = std::pair<std::uint64_t, std::uint64_t>;
 /// Of the file that has this name now; zeros: none has.
 FileId file_id(const std::filesystem::path& path);
 
-/// A file descriptor that closes itself.
-class File {
- public:
-    File() = default;  ///< none
-    explicit File(int descriptor) : descriptor_(descriptor) {}
-    File(File&& other) noexcept { std::swap(descriptor_, other.descriptor_); }
-    File& operator=(File&& other) noexcept {
-        std::swap(descriptor_, other.descriptor_);
-        return *this;
-    }
-    ~File();
-
-    int descriptor() const { return descriptor_; }
-    explicit operator bool() const { return descriptor_ >= 0; }
-
- private:
-    int descriptor_ = -1;
-};
-
 /// A segment that is open, and what has its name: of a sealed one, a socket.
 struct NamedFile {
-    File file;
+    FileDescriptor file;
     FileId name;
 };
 

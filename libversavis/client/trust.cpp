@@ -56,16 +56,15 @@ Expected<NamedFile> open_trusted(const std::filesystem::path& path,
     const auto parent = path.parent_path();
     const auto name = path.filename();
     constexpr int itself = O_NOFOLLOW | O_CLOEXEC;
-    const File directory(::open(parent.c_str(), O_PATH | O_CLOEXEC));
+    const FileDescriptor directory(::open(parent.c_str(), O_PATH | O_CLOEXEC));
     if (!directory) return not_opened(path);
-    File file(::openat(directory.descriptor(), name.c_str(), O_RDONLY | O_NONBLOCK | itself));
+    FileDescriptor file(::openat(directory.get(), name.c_str(), O_RDONLY | O_NONBLOCK | itself));
     const bool sealed = !file && errno == ENXIO;  // it is a socket
-    if (sealed) file = File(::openat(directory.descriptor(), name.c_str(), O_PATH | itself));
+    if (sealed) file = FileDescriptor(::openat(directory.get(), name.c_str(), O_PATH | itself));
     if (!file) return not_opened(path);
     struct stat of_file {};
     struct stat of_directory {};
-    if (::fstat(file.descriptor(), &of_file) != 0 ||
-        ::fstat(directory.descriptor(), &of_directory) != 0)
+    if (::fstat(file.get(), &of_file) != 0 || ::fstat(directory.get(), &of_directory) != 0)
         return not_opened(path);
     if (of_file.st_uid != of_directory.st_uid || (of_directory.st_mode & S_IWOTH) != 0)
         return failure(path.string(), "does not belong to the owner of its directory",
@@ -78,7 +77,7 @@ Expected<NamedFile> open_trusted(const std::filesystem::path& path,
                        "if the service runs as that user, name it in VERSAVIS_OWNER, or as owner");
     const FileId id{of_file.st_dev, of_file.st_ino};
     if (!sealed) return NamedFile{std::move(file), id};
-    auto segment = fetch_sealed(file.descriptor(), path, of_file.st_uid);
+    auto segment = fetch_sealed(file.get(), path, of_file.st_uid);
     if (!segment) return Unexpected(segment.error());
     return NamedFile{std::move(*segment), id};
 }

@@ -34,7 +34,7 @@ bool has_successor(const std::filesystem::path& path, FileId known, FileId refus
 }
 
 Expected<std::unique_ptr<Watch>> Watch::start() {
-    File event(::eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK));
+    FileDescriptor event(::eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK));
     if (!event)
         return failure("a descriptor to wait on",
                        std::error_code(errno, std::generic_category()).message());
@@ -54,10 +54,10 @@ Watch::~Watch() {
 
 void Watch::calm() {
     eventfd_t count{};
-    ::eventfd_read(event_.descriptor(), &count);
+    ::eventfd_read(event_.get(), &count);
 }
 
-void Watch::signal() { ::eventfd_write(event_.descriptor(), 1); }
+void Watch::signal() { ::eventfd_write(event_.get(), 1); }
 
 void Watch::arm(std::vector<WatchTarget> targets, std::optional<HostTime> deadline) {
     become(Watched{std::move(targets), deadline}, false);

@@ -40,7 +40,7 @@ class Watch {
     ~Watch();
 
     /// Readable from the beginning, until calm() is called.
-    int fd() const { return event_.descriptor(); }
+    int fd() const { return event_.get(); }
 
     /// Makes it unreadable. Look for items *after* this, and arm() when there are none.
     void calm();
@@ -57,13 +57,13 @@ class Watch {
         std::optional<HostTime> deadline;
     };
 
-    explicit Watch(File event) : event_(std::move(event)) {}
+    explicit Watch(FileDescriptor event) : event_(std::move(event)) {}
     void become(std::optional<Watched> watched, bool stop);
     void run();
     void keep(std::uint32_t version, Watched watched) const;
     bool outdated(std::uint32_t version) const;
 
-    File event_;
+    FileDescriptor event_;
     std::mutex mutex_;
     std::optional<Watched> watched_;        ///< none: the thread sleeps
     std::atomic<std::uint32_t> version_{};  ///< changes when the thread shall look up; its futex

@@ -161,23 +161,28 @@ TEST_CASE(
     CHECK_THAT(text, Catch::Contains(std::to_string(rows.size()) + " exchanges, " +
                                      std::to_string(samples.size()) + " one-way messages"));
 
-    Process stopped(
-        {program("versavis"), "--instance", "record", "clock", "record", "--exchanges", exchanges},
-        stack.log_path("stopped.log"));
+    CHECK(stack.tool({"clock", "record", "--exchanges", exchanges}, &text) == 69);
+    CHECK_THAT(text, Catch::Contains("none is overwritten"));
+
+    const std::string second_file = stack.log_path("second.csv");
+    const std::string third_file = stack.log_path("third.csv");
+    Process stopped({program("versavis"), "--instance", "record", "clock", "record", "--exchanges",
+                     second_file},
+                    stack.log_path("stopped.log"));
     REQUIRE(stopped.wait_for_output("recording to", seconds(10)));
     auto stream = wait_for_stream<ClockStream>("clock", "record");
     const auto seen = next_of<RecordedExchange>(stream);
     stopped.signal(SIGINT);
     CHECK(stopped.wait(seconds(10)) == 0);
-    const auto until_stopped = read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns");
+    const auto until_stopped = read_csv(second_file, "h1_ns,m2_ns,m3_ns,h4_ns");
     check_exchanges(until_stopped);
     REQUIRE_FALSE(until_stopped.empty());
     CHECK(until_stopped.back()[3] >= seen.arrived.ns);
 
-    CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", exchanges}, &text) ==
+    CHECK(stack.tool({"clock", "record", "--seconds", "60", "--exchanges", third_file}, &text) ==
           69);
     CHECK_THAT(text, Catch::Contains("board: restarted"));
-    check_exchanges(read_csv(exchanges, "h1_ns,m2_ns,m3_ns,h4_ns"));
+    check_exchanges(read_csv(third_file, "h1_ns,m2_ns,m3_ns,h4_ns"));
     ClockStream all = from_the_first(stack);
     const auto first = next_of<RecordedRestart>(all);
     const auto second = next_of<RecordedRestart>(all);

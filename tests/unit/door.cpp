@@ -25,35 +25,34 @@ using namespace versavis::ring;
 
 namespace {
 
-File sealed_file() {
-    File file(::memfd_create("file", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-    ::ftruncate(file.descriptor(), page_size);
-    ::fcntl(file.descriptor(), F_ADD_SEALS,
+FileDescriptor sealed_file() {
+    FileDescriptor file(::memfd_create("file", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    ::ftruncate(file.get(), page_size);
+    ::fcntl(file.get(), F_ADD_SEALS,
             F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL);
     return file;
 }
 
-File make_socket() {
-    return File(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+FileDescriptor make_socket() {
+    return FileDescriptor(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
 }
 
-bool connects(const File& socket, const std::filesystem::path& path) {
+bool connects(const FileDescriptor& socket, const std::filesystem::path& path) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    return ::connect(socket.descriptor(), reinterpret_cast<sockaddr*>(&address), sizeof address) ==
-           0;
+    return ::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
 }
 
-File connect(const std::filesystem::path& path) {
-    File socket = make_socket();
+FileDescriptor connect(const std::filesystem::path& path) {
+    FileDescriptor socket = make_socket();
     connects(socket, path);
     return socket;
 }
 
 /// It gets one byte, and with it a descriptor of that file, and then nothing more.
-bool is_handed(const File& socket, const File& file) {
-    pollfd any{socket.descriptor(), POLLIN, 0};
+bool is_handed(const FileDescriptor& socket, const FileDescriptor& file) {
+    pollfd any{socket.get(), POLLIN, 0};
     ::poll(&any, 1, -1);
     std::array<char, 2> bytes{};
     iovec data{bytes.data(), bytes.size()};
@@ -63,17 +62,17 @@ bool is_handed(const File& socket, const File& file) {
     message.msg_iovlen = 1;
     message.msg_control = room.data();
     message.msg_controllen = room.size();
-    const auto size = ::recvmsg(socket.descriptor(), &message, MSG_CMSG_CLOEXEC);
+    const auto size = ::recvmsg(socket.get(), &message, MSG_CMSG_CLOEXEC);
     const cmsghdr* rights = CMSG_FIRSTHDR(&message);
     if (size != 1 || rights == nullptr || rights->cmsg_len != CMSG_LEN(sizeof(int))) return false;
     int descriptor = -1;
     std::memcpy(&descriptor, CMSG_DATA(rights), sizeof descriptor);
-    const File handed(descriptor);
+    const FileDescriptor handed(descriptor);
     struct stat one {};
     struct stat other {};
     ::poll(&any, 1, -1);
-    return ::fstat(handed.descriptor(), &one) == 0 && ::fstat(file.descriptor(), &other) == 0 &&
-           one.st_ino == other.st_ino && ::recv(socket.descriptor(), bytes.data(), 1, 0) == 0;
+    return ::fstat(handed.get(), &one) == 0 && ::fstat(file.get(), &other) == 0 &&
+           one.st_ino == other.st_ino && ::recv(socket.get(), bytes.data(), 1, 0) == 0;
 }
 
 }  // namespace
@@ -83,7 +82,7 @@ TEST_CASE("door: a crowd that takes nothing, or leaves at once, stops nobody") {
     const auto path = directory.path() / "door";
     const auto door = Door::open(path, sealed_file());
     REQUIRE(door);
-    std::vector<File> crowd;
+    std::vector<FileDescriptor> crowd;
     for (int i = 0; i < 200; ++i) {
         if (i % 2 == 0)
             crowd.push_back(connect(path));
@@ -96,8 +95,8 @@ TEST_CASE("door: a crowd that takes nothing, or leaves at once, stops nobody") {
 TEST_CASE("door: who connects gets one byte with the file, without a word, and is disconnected") {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto path = directory.path() / "door";
-    const File file = sealed_file();
-    const auto door = Door::open(path, File(::dup(file.descriptor())));
+    const FileDescriptor file = sealed_file();
+    const auto door = Door::open(path, FileDescriptor(::dup(file.get())));
     REQUIRE(door);
     CHECK(is_handed(connect(path), file));
 }
@@ -105,21 +104,21 @@ TEST_CASE("door: who connects gets one byte with the file, without a word, and i
 TEST_CASE("door: without a descriptor to be had it rests, and lets all in later") {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto path = directory.path() / "door";
-    const File file = sealed_file();
+    const FileDescriptor file = sealed_file();
     const auto others = test::threads();
-    const auto door = Door::open(path, File(::dup(file.descriptor())));
+    const auto door = Door::open(path, FileDescriptor(::dup(file.get())));
     REQUIRE(door);
     test::Rest rest(test::wait_for_one_more(others));
     rest.wait();
-    std::vector<File> crowd;
+    std::vector<FileDescriptor> crowd;
     for (int i = 0; i < 50; ++i) crowd.push_back(make_socket());
     {
         const test::NoDescriptors none;
         // The first has the descriptor at which the door has been waiting for somebody.
-        for (const File& socket : crowd) CHECK(connects(socket, path));
+        for (const FileDescriptor& socket : crowd) CHECK(connects(socket, path));
         rest.wait();
     }
-    for (const File& socket : crowd) CHECK(is_handed(socket, file));
+    for (const FileDescriptor& socket : crowd) CHECK(is_handed(socket, file));
 }
 
 TEST_CASE("door: where an address has no room for the path, and whatever lay there") {

@@ -469,7 +469,7 @@ TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before 
         const StreamReport& camera_report = report->streams.at("cam0");
         std::ofstream(files.path() / "told") << camera_report.items;
         return camera_report.lost > 0 && report->stopped_early && camera->head() < 5000 &&
-               report->stopped_early->message().find("-o") != std::string::npos;
+               report->stopped_early->message().find("free some") != std::string::npos;
     }));
     const Frames frames = frames_in(settings.output);
     CHECK(frames.numbers.size() > 500);
@@ -559,7 +559,7 @@ TEST_CASE_METHOD(Instance, "recorder: what cannot be recorded says why") {
     CHECK_THAT(refusal(wrong), Contains("has no streams to record"));
     wrong = settings();
     wrong.output = "/nowhere/a.mcap";
-    CHECK_THAT(refusal(wrong), Contains("cannot be created"));
+    CHECK_THAT(refusal(wrong), Contains("make its directory"));
     wrong = settings();
     wrong.calibration = {"/nowhere/chain.yaml"};
     CHECK_THAT(refusal(wrong), Contains("/nowhere/chain.yaml: cannot be read"));

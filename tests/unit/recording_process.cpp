@@ -295,7 +295,7 @@ TEST_CASE("recording_process: what cannot be done is told, and leaves no file") 
     Minute().file.write(old_file);
     const auto onto_itself = process_recording(old_file, old_file, on);
     REQUIRE_FALSE(onto_itself);
-    CHECK_THAT(onto_itself.error().message(), Contains("exists already"));
+    CHECK_THAT(onto_itself.error().message(), Contains("none is overwritten"));
     int asked = 0;
     const auto stopped = process_recording(old_file, new_file,
                                            [&](double share) { return share == 0 || ++asked < 1; });

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "base/file_descriptor.hpp"
+#include "posix/file_descriptor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
@@ -86,8 +86,8 @@ TEST_CASE("repair: a file that is being written is left alone, and so is what li
     const Sample sample(test::sample_recording(1, false, true, mono8));
     const std::string before = content(sample.path);
     {
-        const client::FileDescriptor recorder(::open(sample.path.c_str(), O_RDWR | O_CLOEXEC));
-        REQUIRE(::flock(recorder.number(), LOCK_EX | LOCK_NB) == 0);
+        const FileDescriptor recorder(::open(sample.path.c_str(), O_RDWR | O_CLOEXEC));
+        REQUIRE(::flock(recorder.get(), LOCK_EX | LOCK_NB) == 0);
         CHECK_FALSE(repair(sample.path, ""));
         CHECK_FALSE(repair(sample.path, sample.path + ".new"));
     }

@@ -71,24 +71,24 @@ class Peer {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
         path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-        REQUIRE(::bind(socket_.descriptor(), reinterpret_cast<sockaddr*>(&address),
-                       sizeof address) == 0);
-        REQUIRE(::listen(socket_.descriptor(), 4) == 0);
+        REQUIRE(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0);
+        REQUIRE(::listen(socket_.get(), 4) == 0);
         thread_ = std::thread([this, answer = std::move(answer)] {
-            const File connection(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
+            const FileDescriptor connection(
+                ::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
             if (!connection) return;
-            answer(connection.descriptor());
+            answer(connection.get());
             char byte = 0;
-            ::recv(connection.descriptor(), &byte, 1, 0);  // until the other one has left
+            ::recv(connection.get(), &byte, 1, 0);  // until the other one has left
         });
     }
     ~Peer() {
-        ::shutdown(socket_.descriptor(), SHUT_RDWR);
+        ::shutdown(socket_.get(), SHUT_RDWR);
         thread_.join();
     }
 
  private:
-    File socket_;
+    FileDescriptor socket_;
     std::thread thread_;
 };
 
@@ -145,11 +145,11 @@ TEST_CASE_METHOD(Instance, "sealed: nobody cuts it short or writes to it, as who
     Writer writer = write();
     const auto handed = open_trusted(path(), std::nullopt);
     REQUIRE(handed);
-    const int file = handed->file.descriptor();
+    const int file = handed->file.get();
     CHECK(is_sealed(file));
     const std::string own = "/proc/self/fd/" + std::to_string(file);
-    const File again(::open(own.c_str(), O_RDWR | O_CLOEXEC));
-    for (const int any : {file, again.descriptor()}) {
+    const FileDescriptor again(::open(own.c_str(), O_RDWR | O_CLOEXEC));
+    for (const int any : {file, again.get()}) {
         CHECK(::ftruncate(any, 0) != 0);
         CHECK(::ftruncate(any, 1 << 20) != 0);
         CHECK(::pwrite(any, "x", 1, 0) != 1);
@@ -162,11 +162,11 @@ TEST_CASE_METHOD(Instance, "sealed: nobody cuts it short or writes to it, as who
 TEST_CASE("sealed: only with each of the four seals, and only what can have them") {
     const int missing = GENERATE(0, F_SEAL_SEAL, F_SEAL_SHRINK, F_SEAL_GROW, F_SEAL_FUTURE_WRITE);
     const int all = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE;
-    const File file(::memfd_create("file", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-    REQUIRE(::fcntl(file.descriptor(), F_ADD_SEALS, all & ~missing) == 0);
-    CHECK(is_sealed(file.descriptor()) == (missing == 0));
-    const File socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    CHECK_FALSE(is_sealed(socket.descriptor()));
+    const FileDescriptor file(::memfd_create("file", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    REQUIRE(::fcntl(file.get(), F_ADD_SEALS, all & ~missing) == 0);
+    CHECK(is_sealed(file.get()) == (missing == 0));
+    const FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    CHECK_FALSE(is_sealed(socket.get()));
 }
 
 TEST_CASE_METHOD(Instance, "sealed: one that is not can be cut short under its readers") {
@@ -224,8 +224,8 @@ TEST_CASE_METHOD(Instance, "sealed: of a service that was killed, the name is kn
 
 TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothing of it kept") {
     directory.write("file", std::string(page_size, 'x'));
-    const File plain(::open((directory.path() / "file").c_str(), O_RDONLY | O_CLOEXEC));
-    const File soft(::memfd_create("soft", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    const FileDescriptor plain(::open((directory.path() / "file").c_str(), O_RDONLY | O_CLOEXEC));
+    const FileDescriptor soft(::memfd_create("soft", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     const auto before = open_files();
     const auto told = [&](const std::function<void(int)>& answer) {
         const Peer peer(path(), answer);
@@ -239,14 +239,13 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
                Catch::Contains("handed over by the service: Protocol error"));
     CHECK_THAT(told([](int connection) { send(connection, {}); }),
                Catch::Contains("handed over by the service: Protocol error"));
-    for (const std::vector<int>& files :
-         {std::vector<int>{plain.descriptor()}, {soft.descriptor()}, {0, 1, 2}})
+    for (const std::vector<int>& files : {std::vector<int>{plain.get()}, {soft.get()}, {0, 1, 2}})
         CHECK_THAT(told([&](int connection) { send(connection, files); }),
                    Catch::Contains("is not sealed, though it should be"));
     CHECK(open_files() == before);
-    REQUIRE(::fcntl(soft.descriptor(), F_ADD_SEALS,
+    REQUIRE(::fcntl(soft.get(), F_ADD_SEALS,
                     F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0);
-    CHECK_THAT(told([&](int connection) { send(connection, {soft.descriptor()}); }),
+    CHECK_THAT(told([&](int connection) { send(connection, {soft.get()}); }),
                Catch::Contains("frames"));  // empty: it cannot be mapped
 }
 
@@ -255,7 +254,7 @@ TEST_CASE_METHOD(Instance, "sealed: where no descriptor is left to connect, that
     CHECK(in_process([&] {
         const rlimit few{64, 64};
         if (::setrlimit(RLIMIT_NOFILE, &few) != 0) return false;
-        std::vector<File> files;
+        std::vector<FileDescriptor> files;
         for (int file = ::dup(0); file >= 0; file = ::dup(0)) files.emplace_back(file);
         files.pop_back();  // for the directory
         files.pop_back();  // and what has the name in it
@@ -280,15 +279,14 @@ TEST_CASE_METHOD(Instance, "sealed: served by another user than its owner, or to
         REQUIRE(::chown(path().c_str(), stranger, stranger) == 0);
         CHECK_THAT(refusal(), Catch::Contains("does not belong"));
     }
-    const File socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    const FileDescriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path().string().copy(address.sun_path, sizeof address.sun_path - 1);
     std::filesystem::remove(path());
-    REQUIRE(::bind(socket.descriptor(), reinterpret_cast<sockaddr*>(&address), sizeof address) ==
-            0);
+    REQUIRE(::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0);
     REQUIRE(in_process([&] {  // who listens is known by the socket from then on
-        return ::seteuid(stranger) == 0 && ::listen(socket.descriptor(), 4) == 0;
+        return ::seteuid(stranger) == 0 && ::listen(socket.get(), 4) == 0;
     }));
     CHECK_THAT(refusal(), Catch::Contains("is served by another user"));
 }

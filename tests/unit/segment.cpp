@@ -77,11 +77,11 @@ bool forget_to_populate() {
 
 /// How many of its pages are touched without waiting.
 std::size_t pages_at_hand(const Mapping& mapping) {
-    const File map(::open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC));
+    const FileDescriptor map(::open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC));
     std::vector<std::uint64_t> pages(mapping.size() / page_size);
     const auto first = reinterpret_cast<std::uintptr_t>(&mapping.header()) / page_size;
     const auto size = static_cast<ssize_t>(pages.size() * sizeof pages[0]);
-    if (::pread(map.descriptor(), pages.data(), static_cast<std::size_t>(size),
+    if (::pread(map.get(), pages.data(), static_cast<std::size_t>(size),
                 static_cast<off_t>(first * sizeof pages[0])) != size)
         return 0;
     return static_cast<std::size_t>(std::count_if(
@@ -183,14 +183,14 @@ TEST_CASE("segment: all pages are at hand, also where the kernel must be asked f
 }
 
 TEST_CASE("segment: a file closes with its owner, whatever its number") {
-    CHECK_FALSE(File());
+    CHECK_FALSE(FileDescriptor());
     CHECK(test::in_process([] {
         ::close(0);
         {
-            File zero(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-            if (!zero || zero.descriptor() != 0) return false;
-            const File moved(std::move(zero));
-            if (zero || moved.descriptor() != 0) return false;  // NOLINT: what is left is none
+            FileDescriptor zero(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+            if (!zero || zero.get() != 0) return false;
+            const FileDescriptor moved(std::move(zero));
+            if (zero || moved.get() != 0) return false;  // NOLINT: what is left is none
         }
         return ::fcntl(0, F_GETFD) == -1 && ::fcntl(1, F_GETFD) != -1;
     }));

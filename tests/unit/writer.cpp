@@ -214,10 +214,10 @@ TEST_CASE_METHOD(Memory, "writer: a sealed one is no program, unless Linux is to
         const auto writer = Writer::create({directory.path(), true}, events);
         struct stat file {};
         const auto handed = open_trusted(path("events"), std::nullopt);
-        return !writer || !handed || ::fstat(handed->file.descriptor(), &file) != 0 ||
+        return !writer || !handed || ::fstat(handed->file.get(), &file) != 0 ||
                (file.st_mode & 0111U) != 0;
     };
-    if (File(::memfd_create("new", MFD_CLOEXEC | no_program))) CHECK_FALSE(executable());
+    if (FileDescriptor(::memfd_create("new", MFD_CLOEXEC | no_program))) CHECK_FALSE(executable());
     CHECK(in_process([&] {
         return test::refuse(SYS_memfd_create, EINVAL,
                             MFD_CLOEXEC | MFD_ALLOW_SEALING | no_program) &&

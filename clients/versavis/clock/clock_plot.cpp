@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "clock/svg_panel.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::client {
 

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 
 #include "engine/clock/recording.hpp"
+#include "posix/file.hpp"
 #include "versavis/stream.hpp"
 
 namespace versavis::client {
@@ -22,11 +22,11 @@ constexpr Duration longest_wait = milliseconds(200);
 class Recording {
  public:
     Expected<> open(const ClockRecordSettings& settings) {
-        if (auto opened = open(exchange_file_, settings.exchanges, "h1_ns,m2_ns,m3_ns,h4_ns");
+        if (auto opened = open(exchange_file_, settings.exchanges, "h1_ns,m2_ns,m3_ns,h4_ns\n");
             !opened)
             return opened;
         if (settings.one_way.empty()) return {};
-        return open(one_way_file_, settings.one_way, "m_ns,h_ns");
+        return open(one_way_file_, settings.one_way, "m_ns,h_ns\n");
     }
 
     /// False: the board restarted, and this item belongs to its new boot.
@@ -37,22 +37,21 @@ class Recording {
     void service_restarted() { service_restarted_ = true; }
 
     Expected<> close() {
-        exchange_file_.close();
-        if (one_way_file_.is_open()) one_way_file_.close();
-        if (!exchange_file_ || !one_way_file_)
-            return failure("recording", "could not be written completely", "is the disk full?");
-        return {};
+        auto closed = exchange_file_->close();
+        if (closed && one_way_file_) closed = one_way_file_->close();
+        return closed;
     }
 
     std::uint64_t exchanges() const { return exchanges_; }
     std::uint64_t one_way() const { return one_way_; }
 
  private:
-    static Expected<> open(std::ofstream& file, const std::string& path, const char* header) {
-        file.open(path);
-        file << header << '\n';
-        if (!file.flush())
-            return failure(path, "cannot be written", "check its directory and permissions");
+    static Expected<> open(std::optional<NewFile>& into, const std::string& path,
+                           const char* header) {
+        auto file = NewFile::create(path);
+        if (!file) return Unexpected(file.error());
+        file->write(header);
+        into.emplace(std::move(*file));
         return {};
     }
 
@@ -63,16 +62,16 @@ class Recording {
 
     bool take(const clock::RecordedExchange& told) {
         if (!same_life(told.nonce)) return false;
-        exchange_file_ << fmt::format("{},{},{},{}\n", told.sent.ns, told.received.ns,
-                                      told.answered.ns, told.arrived.ns);
+        exchange_file_->write(fmt::format("{},{},{},{}\n", told.sent.ns, told.received.ns,
+                                          told.answered.ns, told.arrived.ns));
         ++exchanges_;
         return true;
     }
 
     bool take(const clock::RecordedMessage& told) {
         if (!same_life(told.nonce)) return false;
-        if (one_way_file_.is_open())
-            one_way_file_ << fmt::format("{},{}\n", told.departed.ns, told.arrived.ns);
+        if (one_way_file_)
+            one_way_file_->write(fmt::format("{},{}\n", told.departed.ns, told.arrived.ns));
         ++one_way_;
         return true;
     }
@@ -87,8 +86,8 @@ class Recording {
 
     bool take(const clock::RecordedOutput& /*told*/) { return true; }
 
-    std::ofstream exchange_file_;
-    std::ofstream one_way_file_;
+    std::optional<NewFile> exchange_file_;
+    std::optional<NewFile> one_way_file_;
     std::optional<std::uint32_t> nonce_;
     bool service_restarted_ = false;
     std::uint64_t exchanges_ = 0;

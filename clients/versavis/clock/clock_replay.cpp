@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "clock/clock_replay.hpp"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <numeric>
 
 #include "base/plausible_time.hpp"
 #include "clock/clock_csv.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::client {
 
@@ -173,22 +170,6 @@ Expected<void> check_output(const std::string& out, const std::vector<std::strin
             return failure(out, "is an input as well and would be overwritten",
                            "name another file");
     return {};
-}
-
-Expected<void> write_whole_file(const std::string& path, const std::string& text) {
-    std::error_code error;
-    const auto kind = std::filesystem::status(path, error).type();
-    const bool special = kind != std::filesystem::file_type::not_found &&
-                         kind != std::filesystem::file_type::regular;
-    const std::string temporary = special ? path : fmt::format("{}.{}.part", path, getpid());
-    std::ofstream file(temporary, std::ios::binary);
-    file << text;
-    file.close();
-    if (file && !special) std::filesystem::rename(temporary, path, error);
-    if (file && (special || !error)) return {};
-    if (!special) std::filesystem::remove(temporary, error);
-    return failure(path, "cannot be written",
-                   "check its directory, permissions and the free space");
 }
 
 }  // namespace versavis::client

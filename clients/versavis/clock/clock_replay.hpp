@@ -86,8 +86,4 @@ Expected<ClockReplaySummary> replay_clock(const ClockReplaySettings& settings);
 /// Error: `out` is one of the inputs. A slip of the hand must not destroy a recording.
 Expected<void> check_output(const std::string& out, const std::vector<std::string>& inputs);
 
-/// Writes `text` under a temporary name, then renames; straight to `path` when that is not a
-/// regular file.
-Expected<void> write_whole_file(const std::string& path, const std::string& text);
-
 }  // namespace versavis::client

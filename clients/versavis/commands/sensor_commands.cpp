@@ -8,11 +8,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "clock/clock_replay.hpp"
 #include "evaluate/allan_report.hpp"
 #include "evaluate/clock_evaluation.hpp"
 #include "evaluate/recorded_imu.hpp"
 #include "export/export.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::client {
 

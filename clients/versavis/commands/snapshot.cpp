@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "posix/file.hpp"
 #include "status/status_document.hpp"
 #include "versavis/stream.hpp"
 
@@ -40,9 +41,12 @@ Expected<> write_png(const std::string& path, const ImageView& view,
     image.height = view.height;
     image.format = *format;
     const auto stride = static_cast<png_int_32>(view.stride / view.layout.bytes_per_channel);
-    if (png_image_write_to_file(&image, path.c_str(), 0, pixels.data(), stride, nullptr) == 0)
-        return failure(path, image.message, "is its directory writable?");
-    return {};
+    std::string png(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
+    png_alloc_size_t size = png.size();
+    if (png_image_write_to_memory(&image, png.data(), &size, 0, pixels.data(), stride, nullptr) ==
+        0)
+        return failure(path, image.message);
+    return write_whole_file(path, {png.data(), size});
 }
 
 }  // namespace

@@ -7,9 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
-#include <system_error>
 
 namespace versavis::client {
 
@@ -78,30 +76,17 @@ BagWriter::BagWriter(std::string path, FileDescriptor file, BagCompression compr
     : path_(std::move(path)), file_(std::move(file)), compression_(compression) {}
 
 Expected<BagWriter> BagWriter::create(const std::string& path, BagCompression compression) {
-    FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644));
-    if (!file) return failure(path, "cannot be created: " + std::generic_category().message(errno));
-    BagWriter writer(path, std::move(file), compression);
+    auto file = create_file(path, O_WRONLY);
+    if (!file) return Unexpected(file.error());
+    BagWriter writer(path, std::move(*file), compression);
     if (auto begun = writer.append(bag_header(0, 0, 0)); !begun) return Unexpected(begun.error());
     return writer;
 }
 
-Unexpected<Error> BagWriter::failed() const {
-    return failure(path_, "cannot be written: " + std::generic_category().message(errno),
-                   "is the disk full?");
+Expected<> BagWriter::append(std::string_view bytes) {
+    at_ += bytes.size();
+    return write_all(file_, path_, bytes);
 }
-
-Expected<> BagWriter::append(std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-        const ssize_t written = ::write(file_.number(), bytes.data(), bytes.size());
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return failed();
-        bytes = bytes.subspan(static_cast<std::size_t>(written));
-        at_ += static_cast<std::uint64_t>(written);
-    }
-    return {};
-}
-
-Expected<> BagWriter::append(const std::string& bytes) { return append(as_bytes(bytes)); }
 
 std::uint32_t BagWriter::add_connection(const std::string& topic, const BagType& type) {
     const auto number = static_cast<std::uint32_t>(connections_.size());
@@ -174,7 +159,8 @@ Expected<> BagWriter::end_chunk() {
                               field("size", raw(static_cast<std::uint32_t>(chunk_.size())))) +
         raw(static_cast<std::uint32_t>(data.size()));
     if (auto written = append(head); !written) return written;
-    if (auto written = append(data); !written) return written;
+    const auto* text = reinterpret_cast<const char*>(data.data());
+    if (auto written = append({text, data.size()}); !written) return written;
     std::string indexes;
     for (const auto& [connection, entries] : index_) {
         std::string list;
@@ -209,11 +195,9 @@ Expected<> BagWriter::finish() {
         if (auto written = append(record(Op::chunk_info, fields, list)); !written) return written;
     }
     const std::string head = bag_header(index, told, static_cast<std::uint32_t>(chunks_.size()));
-    if (::pwrite(file_.number(), head.data(), head.size(), 0) !=
-            static_cast<ssize_t>(head.size()) ||
-        ::fsync(file_.number()) != 0)
-        return failed();
-    return {};
+    if (::pwrite(file_.get(), head.data(), head.size(), 0) != static_cast<ssize_t>(head.size()))
+        return not_written(path_);
+    return sync_file(file_, path_);
 }
 
 }  // namespace versavis::client

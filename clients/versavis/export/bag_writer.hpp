@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/file_descriptor.hpp"
+#include "posix/file.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {
@@ -57,11 +57,9 @@ class BagWriter {
     };
 
     BagWriter(std::string path, FileDescriptor file, BagCompression compression);
-    Expected<> append(std::span<const std::byte> bytes);
-    Expected<> append(const std::string& bytes);
+    Expected<> append(std::string_view bytes);
     Expected<> end_chunk();
     Expected<std::vector<std::byte>> compressed() const;
-    Unexpected<Error> failed() const;
 
     std::string path_;
     FileDescriptor file_;

@@ -12,8 +12,8 @@
 #include "engine/clock/recording.hpp"
 #include "engine/pairing/recording.hpp"
 #include "export/metadata_csv.hpp"
-#include "export/text_file.hpp"
 #include "pairing/evidence_json.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::client {
 
@@ -42,7 +42,7 @@ std::string json_line(const RecordedItem& item) {
 }
 
 struct Output {
-    TextFile file;
+    NewFile file;
     std::string name;
     bool rows;  ///< else lines of JSON
     std::uint64_t count = 0;
@@ -58,7 +58,7 @@ Expected<std::map<std::string, Output>> open_files(const Recording& recording,
             continue;
         const std::string columns = csv_columns(stream.kind);
         const std::string name = stream.name + (columns.empty() ? ".jsonl" : ".csv");
-        auto file = TextFile::create(directory / name);
+        auto file = NewFile::create(directory / name);
         if (!file) return Unexpected(file.error());
         if (!columns.empty()) file->write(columns + "\n");
         outputs.emplace(stream.name, Output{std::move(*file), name, !columns.empty()});
@@ -75,7 +75,7 @@ Expected<> write_gaps(const Recording& recording, const std::filesystem::path& d
     std::string text = "stream,time_ns,reason,items\n";
     for (const auto& gap : *gaps)
         text += fmt::format("{},{},{},{}\n", gap.stream, gap.time.ns, gap.reason, gap.items);
-    return write_text(directory / "gaps.csv", text);
+    return write_new_file(directory / "gaps.csv", text);
 }
 
 }  // namespace

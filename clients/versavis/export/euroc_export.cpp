@@ -10,7 +10,7 @@
 
 #include "export/metadata_csv.hpp"
 #include "export/png_crew.hpp"
-#include "export/text_file.hpp"
+#include "posix/file.hpp"
 
 namespace versavis::client {
 
@@ -109,7 +109,7 @@ class EurocExport {
         if (auto opened = open_files(); !opened) return opened;
         if (auto written = write_items(); !written) return written;
         if (auto written = crew_.finish(); !written) return written;
-        for (TextFile& file : files_)
+        for (NewFile& file : files_)
             if (auto closed = file.close(); !closed) return closed;
         return write_lists();
     }
@@ -129,10 +129,10 @@ class EurocExport {
     fs::path camera_folder(std::size_t camera) const { return mav_ / fmt::format("cam{}", camera); }
     fs::path imu_folder(std::size_t imu) const { return mav_ / fmt::format("imu{}", imu); }
 
-    TextFile& camera_file(std::size_t camera, std::size_t which) {
+    NewFile& camera_file(std::size_t camera, std::size_t which) {
         return files_[camera * files_of_camera + which];
     }
-    TextFile& imu_file(std::size_t imu, std::size_t which) {
+    NewFile& imu_file(std::size_t imu, std::size_t which) {
         return files_[selection_.cameras.size() * files_of_camera + imu * files_of_imu + which];
     }
 
@@ -147,14 +147,14 @@ class EurocExport {
     }
 
     Expected<> write_yaml(const ExportCalibration& calibration) const {
-        auto written = write_text(mav_ / "body.yaml", "%YAML:1.0\ncomment: VersaVIS\n");
+        auto written = write_new_file(mav_ / "body.yaml", "%YAML:1.0\ncomment: VersaVIS\n");
         for (std::size_t i = 0; i < selection_.cameras.size() && written; ++i)
-            written =
-                write_text(camera_folder(i) / "sensor.yaml",
-                           camera_yaml(selection_.cameras[i], formats_[i], calibration.cameras[i]));
+            written = write_new_file(
+                camera_folder(i) / "sensor.yaml",
+                camera_yaml(selection_.cameras[i], formats_[i], calibration.cameras[i]));
         for (std::size_t i = 0; i < selection_.imus.size() && written; ++i)
-            written = write_text(imu_folder(i) / "sensor.yaml",
-                                 imu_yaml(selection_.imus[i], calibration.noise));
+            written = write_new_file(imu_folder(i) / "sensor.yaml",
+                                     imu_yaml(selection_.imus[i], calibration.noise));
         return written;
     }
 
@@ -173,7 +173,7 @@ class EurocExport {
                               "#" + csv_columns(ring::StreamKind::imu) + "\n");
         }
         for (const auto& [path, header] : list) {
-            auto file = TextFile::create(path);
+            auto file = NewFile::create(path);
             if (!file) return Unexpected(file.error());
             file->write(header);
             files_.push_back(std::move(*file));
@@ -214,8 +214,8 @@ class EurocExport {
             ++without_exposure_[frame.camera];
         camera_file(frame.camera, 2).write(fmt::format("{},{}\n", frame.name.ns, csv_row(item)));
         if (!item.png.empty() && !item.payload.empty() && format.shift == 0)
-            return write_text(path,
-                              {reinterpret_cast<const char*>(item.png.data()), item.png.size()});
+            return write_new_file(
+                path, {reinterpret_cast<const char*>(item.png.data()), item.png.size()});
         auto pixels = export_pixels(format, data, item.payload);
         if (pixels.empty())
             return failure(item.stream,
@@ -238,7 +238,7 @@ class EurocExport {
         std::string times;
         for (const SelectedFrame& frame : selection_.frames)
             if (frame.camera == 0) times += fmt::format("{}\n", frame.name.ns);
-        return write_text(mav_ / "times.txt", times);
+        return write_new_file(mav_ / "times.txt", times);
     }
 
     const Recording& recording_;
@@ -246,7 +246,7 @@ class EurocExport {
     const std::vector<ExportFormat>& formats_;
     const fs::path mav_;
     const ExportWatch& watch_;
-    std::vector<TextFile> files_;
+    std::vector<NewFile> files_;
     PngCrew crew_;
     std::uint64_t frames_ = 0;
     std::vector<std::uint64_t> without_exposure_;  ///< frames of each camera

@@ -14,7 +14,7 @@
 #include "export/csv_export.hpp"
 #include "export/euroc_export.hpp"
 #include "export/export_directory.hpp"
-#include "export/text_file.hpp"
+#include "posix/file.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {
@@ -147,13 +147,13 @@ Expected<> write_kalibr(const Selection& selection, const ExportCalibration& cal
         cameras[i].topic = image_topic(selection.cameras[i].name);
     }
     if (!cameras.empty())
-        if (auto written = write_text(directory / "camchain.yaml", camchain_text(cameras));
+        if (auto written = write_new_file(directory / "camchain.yaml", camchain_text(cameras));
             !written)
             return written;
     for (std::size_t i = 0; i < selection.imus.size() && calibration.noise; ++i) {
         const auto& imu = selection.imus[i];
         const std::string name = i == 0 ? "imu.yaml" : fmt::format("imu{}.yaml", i);
-        if (auto written = write_text(
+        if (auto written = write_new_file(
                 directory / name, imu_text(*calibration.noise, imu_topic(imu.name), imu.rate_hz));
             !written)
             return written;
@@ -166,7 +166,7 @@ Expected<> write_left_out(const Selection& selection, const std::filesystem::pat
     for (const auto& item : selection.left_out)
         text += fmt::format("{},{},{},{},{}\n", selection.stream(item.stream), item.time.ns,
                             item.number, item.tick, to_string(item.reason));
-    return write_text(directory / "left_out.csv", text);
+    return write_new_file(directory / "left_out.csv", text);
 }
 
 void note_peculiarities(const std::vector<ExportFormat>& formats, ExportKind kind,

@@ -4,14 +4,12 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include <cerrno>
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
-#include <system_error>
 
+#include "posix/file.hpp"
 #include "versavis/pixel_format.hpp"
 
 namespace versavis::client {
@@ -21,10 +19,6 @@ namespace {
 /// Fastest: on the noise of a camera, more effort gains some percent. Sub is the filter that the
 /// recorder uses, too.
 constexpr int png_effort = 1;
-
-struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-};
 
 void stay_silent(png_structp, png_const_charp) {}
 
@@ -55,11 +49,6 @@ const char* bayer_order(const std::string& name) {
     if (order == "GR") return "grbg";
     if (order == "GB") return "gbrg";
     return order == "BG" ? "bggr" : nullptr;
-}
-
-Expected<> unwritten(const std::string& path) {
-    return failure(path, "cannot be written: " + std::generic_category().message(errno),
-                   "is the disk full?");
 }
 
 }  // namespace
@@ -106,15 +95,15 @@ std::vector<std::byte> export_pixels(const ExportFormat& format, const FrameMeta
 
 Expected<> write_png(const std::string& path, const ExportFormat& format, std::uint32_t width,
                      std::uint32_t height, std::span<const std::byte> pixels) {
-    std::unique_ptr<std::FILE, Close> file(std::fopen(path.c_str(), "wxe"));
-    if (!file) return unwritten(path);
+    auto file = NewFile::create(path);
+    if (!file) return Unexpected(file.error());
     png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, stay_silent);
     png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
-    const bool good =
-        info != nullptr && write_rows(png, info, file.get(), format, width, height, pixels.data());
+    const bool good = info != nullptr &&
+                      write_rows(png, info, file->stream(), format, width, height, pixels.data());
     png_destroy_write_struct(&png, &info);
-    if (std::fclose(file.release()) != 0 || !good) return unwritten(path);
-    return {};
+    if (!good) return not_written(path);
+    return file->close();
 }
 
 }  // namespace versavis::client

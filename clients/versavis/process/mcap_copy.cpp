@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "process/mcap_copy.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <filesystem>
-#include <system_error>
 
 #include "base/byte_cursor.hpp"
-#include "base/file_descriptor.hpp"
+#include "posix/file.hpp"
 #include "recording/mcap_summary.hpp"
 
 namespace versavis::client {
@@ -60,8 +57,7 @@ std::string attachment_record(const McapAttachment& attachment) {
 
 class Copy {
  public:
-    Copy(const McapReader& from, FileDescriptor to, std::string path,
-         const McapCopySettings& settings)
+    Copy(const McapReader& from, WholeFile to, std::string path, const McapCopySettings& settings)
         : from_(from), to_(std::move(to)), path_(std::move(path)), settings_(settings) {}
 
     Expected<> run() {
@@ -71,8 +67,7 @@ class Copy {
         if (!copied) return copied;
         if (auto added = add_attachment(); !added) return added;
         if (auto ended = append(mcap_end(summary_, at_)); !ended) return ended;
-        if (::fsync(to_.number()) != 0) return failed();
-        return {};
+        return to_.finish();
     }
 
  private:
@@ -227,23 +222,12 @@ class Copy {
     }
 
     Expected<> append(std::string_view text) {
-        while (!text.empty()) {
-            const ssize_t written = ::write(to_.number(), text.data(), text.size());
-            if (written < 0 && errno == EINTR) continue;
-            if (written < 0) return failed();
-            text.remove_prefix(static_cast<std::size_t>(written));
-            at_ += static_cast<std::uint64_t>(written);
-        }
-        return {};
-    }
-
-    Unexpected<Error> failed() const {
-        return failure(path_, "cannot be written: " + std::generic_category().message(errno),
-                       "is the disk full?");
+        at_ += text.size();
+        return to_.write(text);
     }
 
     const McapReader& from_;
-    FileDescriptor to_;
+    WholeFile to_;
     std::string path_;
     const McapCopySettings& settings_;
     McapBuffer buffer_;
@@ -259,18 +243,10 @@ class Copy {
 Expected<> copy_mcap(const McapReader& from, const std::string& path,
                      const McapCopySettings& settings) {
     std::error_code error;
-    if (std::filesystem::exists(path, error))
-        return failure(path, "exists already", "move it away first");
-    const std::string temporary = fmt::format("{}.{}.part", path, ::getpid());
-    FileDescriptor file(::open(temporary.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644));
-    if (!file)
-        return failure(path, "cannot be created: " + std::generic_category().message(errno),
-                       "check its directory and permissions");
-    auto copied = Copy(from, std::move(file), path, settings).run();
-    if (copied) std::filesystem::rename(temporary, path, error);
-    if (copied && error) copied = failure(path, "cannot be created: " + error.message());
-    if (!copied) std::filesystem::remove(temporary, error);
-    return copied;
+    if (std::filesystem::exists(path, error)) return not_written(path, EEXIST);
+    auto file = WholeFile::create(path);
+    if (!file) return Unexpected(file.error());
+    return Copy(from, std::move(*file), path, settings).run();
 }
 
 }  // namespace versavis::client

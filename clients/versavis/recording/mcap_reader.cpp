@@ -155,7 +155,7 @@ Expected<McapReader> McapReader::open(const std::string& path) {
     FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (!file) return failure(path, "cannot be read: " + reason(errno));
     struct stat facts {};
-    const bool regular = ::fstat(file.number(), &facts) == 0 && S_ISREG(facts.st_mode);
+    const bool regular = ::fstat(file.get(), &facts) == 0 && S_ISREG(facts.st_mode);
     if (!regular) return failure(path, "is not a file", "name a recording");
     McapReader reader(path, std::move(file), static_cast<std::uint64_t>(facts.st_size));
     if (auto begun = reader.read_header(); !begun) return Unexpected(begun.error());
@@ -176,7 +176,7 @@ Expected<> McapReader::read(std::uint64_t offset, std::span<std::byte> into) con
         return damaged(offset, "the file ends before that");
     while (!into.empty()) {
         const ssize_t got =
-            ::pread(file_.number(), into.data(), into.size(), static_cast<off_t>(offset));
+            ::pread(file_.get(), into.data(), into.size(), static_cast<off_t>(offset));
         if (got < 0 && errno == EINTR) continue;
         if (got < 0)
             return failure(path_,

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "base/file_descriptor.hpp"
+#include "posix/file_descriptor.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {

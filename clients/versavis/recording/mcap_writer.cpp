@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <limits>
-#include <system_error>
 
 #include "recording/mcap_record.hpp"
 
@@ -44,15 +43,6 @@ std::uint32_t crc_of(std::uint32_t before, std::span<const std::byte> bytes) {
     return ::crc32_gzip_refl(before, data, bytes.size());
 }
 
-std::string reason(int error) { return std::generic_category().message(error); }
-
-Unexpected<Error> unwritten(const std::string& path, int error) {
-    const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-    return failure(path, "cannot be written: " + reason(error),
-                   full ? "free some of the disk, or record to another one with -o"
-                        : "is the disk there and well?");
-}
-
 }  // namespace
 
 McapWriter::McapWriter(std::string path, FileDescriptor file)
@@ -62,13 +52,10 @@ McapWriter::McapWriter(std::string path, FileDescriptor file)
       summary_room_(summary_base) {}
 
 Expected<McapWriter> McapWriter::create(const std::string& path, const std::string& library) {
-    FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644));
-    if (!file)
-        return failure(path, "cannot be created: " + reason(errno),
-                       errno == EEXIST ? "choose another file with -o; no file is overwritten"
-                                       : "does its directory exist, and may you write there?");
-    ::flock(file.number(), LOCK_EX | LOCK_NB);
-    McapWriter writer(path, std::move(file));
+    auto file = create_file(path, O_RDWR);
+    if (!file) return Unexpected(file.error());
+    ::flock(file->get(), LOCK_EX | LOCK_NB);
+    McapWriter writer(path, std::move(*file));
     writer.pending_ =
         mcap_magic + mcap_record(McapOpcode::header, mcap_text("ros2") + mcap_text(library));
     if (auto written = writer.flush(); !written) {
@@ -127,7 +114,7 @@ void McapWriter::take_back() {
     last_time_ = mark_.last_time;
     // A crash after the next chunk must leave nothing behind it. Where that fails, what comes next
     // overwrites it all the same.
-    if (::ftruncate(file_.number(), static_cast<off_t>(offset_)) == 0) reserved_ = offset_;
+    if (::ftruncate(file_.get(), static_cast<off_t>(offset_)) == 0) reserved_ = offset_;
     auto& places = places_[mark_.channel];
     places.pop_back();
     if (places.empty()) places_.erase(mark_.channel);
@@ -238,11 +225,10 @@ Expected<> McapWriter::end_file() {
         pending_.clear();
         offset_ = end;
     }
-    if (::ftruncate(file_.number(), static_cast<off_t>(offset_)) != 0 && written)
-        return unwritten(path_, errno);
+    if (::ftruncate(file_.get(), static_cast<off_t>(offset_)) != 0 && written)
+        return not_written(path_);
     if (!written) return written;
-    if (::fsync(file_.number()) != 0) return unwritten(path_, errno);
-    return {};
+    return sync_file(file_, path_);
 }
 
 Expected<> McapWriter::flush(std::span<const std::byte> body) {
@@ -251,10 +237,10 @@ Expected<> McapWriter::flush(std::span<const std::byte> body) {
     iovec parts[]{{pending_.data(), pending_.size()},
                   {const_cast<std::byte*>(body.data()), body.size()}};
     for (std::size_t first = parts[0].iov_len > 0 ? 0 : 1; first < 2 && parts[first].iov_len > 0;) {
-        const ssize_t written = ::pwritev(file_.number(), parts + first,
-                                          static_cast<int>(2 - first), static_cast<off_t>(offset_));
+        const ssize_t written = ::pwritev(file_.get(), parts + first, static_cast<int>(2 - first),
+                                          static_cast<off_t>(offset_));
         if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return unwritten(path_, errno);
+        if (written < 0) return not_written(path_);
         offset_ += static_cast<std::uint64_t>(written);
         auto left = static_cast<std::size_t>(written);
         for (; first < 2; ++first) {
@@ -273,9 +259,9 @@ Expected<> McapWriter::flush(std::span<const std::byte> body) {
 
 Expected<> McapWriter::write_at(std::uint64_t offset, const std::string& bytes) const {
     const ssize_t written =
-        ::pwrite(file_.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        ::pwrite(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (written == static_cast<ssize_t>(bytes.size())) return {};
-    return unwritten(path_, written < 0 ? errno : ENOSPC);
+    return not_written(path_, written < 0 ? errno : ENOSPC);
 }
 
 /// For the next `size` bytes, and the summary that follows: a disk that is full ends a recording
@@ -286,7 +272,7 @@ Expected<> McapWriter::reserve(std::uint64_t size) {
     while (!set_aside(needed + ahead_)) {
         const bool full = errno == ENOSPC || errno == EDQUOT;
         if (!full) return {};
-        if (ahead_ == 0) return unwritten(path_, errno);
+        if (ahead_ == 0) return not_written(path_);
         // To be refused so much takes long on some file systems: it is not asked for again.
         ahead_ = ahead_ > least_ahead ? ahead_ / 2 : 0;
     }
@@ -296,7 +282,7 @@ Expected<> McapWriter::reserve(std::uint64_t size) {
 /// Where the file system knows how: else the file lies in more pieces, and takes what there is.
 bool McapWriter::set_aside(std::uint64_t size) {
     const auto at = static_cast<off_t>(offset_);
-    if (::fallocate(file_.number(), FALLOC_FL_KEEP_SIZE, at, static_cast<off_t>(size)) != 0)
+    if (::fallocate(file_.get(), FALLOC_FL_KEEP_SIZE, at, static_cast<off_t>(size)) != 0)
         return false;
     reserved_ = offset_ + size;
     return true;

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/file_descriptor.hpp"
+#include "posix/file.hpp"
 #include "recording/mcap_summary.hpp"
 #include "versavis/error.hpp"
 
@@ -76,7 +76,7 @@ class McapWriter {
     Expected<> close_before_chunk();
 
     const std::string& path() const { return path_; }
-    int descriptor() const { return file_.number(); }
+    int descriptor() const { return file_.get(); }
     std::uint64_t size() const { return offset_ + pending_.size(); }
 
  private:

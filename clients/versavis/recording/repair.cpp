@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "base/byte_cursor.hpp"
+#include "posix/file.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/mcap_summary.hpp"
 
@@ -28,28 +29,6 @@ std::string reason(int error) { return std::generic_category().message(error); }
 
 std::string as_text(std::span<const std::byte> bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Unexpected<Error> unwritten(const std::string& path) {
-    return failure(path, "cannot be written: " + reason(errno), "is the disk full?");
-}
-
-Expected<> write_at(const FileDescriptor& file, const std::string& path, std::uint64_t offset,
-                    std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-        const ssize_t written =
-            ::pwrite(file.number(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return unwritten(path);
-        bytes = bytes.subspan(static_cast<std::size_t>(written));
-        offset += static_cast<std::uint64_t>(written);
-    }
-    return {};
-}
-
-Expected<> write_at(const FileDescriptor& file, const std::string& path, std::uint64_t offset,
-                    const std::string& bytes) {
-    return write_at(file, path, offset, std::as_bytes(std::span(bytes.data(), bytes.size())));
 }
 
 /// Reads what the file holds once more, and says what its end must be.
@@ -199,19 +178,11 @@ Expected<> copy(const McapReader& from, std::uint64_t begin, std::uint64_t end,
     for (std::uint64_t at = begin; at < end;) {
         const auto part = std::span(block).first(std::min<std::uint64_t>(copy_size, end - at));
         if (auto got = from.read(at, part); !got) return got;
-        if (auto put = write_at(to, path, at - begin, part); !put) return put;
+        const auto* text = reinterpret_cast<const char*>(part.data());
+        if (auto put = write_all(to, path, {text, part.size()}); !put) return put;
         at += part.size();
     }
-    if (::fsync(to.number()) != 0) return unwritten(path);
-    return {};
-}
-
-Expected<FileDescriptor> create(const std::string& path) {
-    FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644));
-    if (!file)
-        return failure(path, "cannot be created: " + reason(errno),
-                       errno == EEXIST ? "move it away first" : "");
-    return file;
+    return sync_file(to, path);
 }
 
 /// Error: somebody else, the recorder most likely, holds the file.
@@ -222,7 +193,7 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
             path,
             std::string(in_place ? "cannot be written: " : "cannot be read: ") + reason(errno),
             in_place ? "repair it into a new file with -o" : "");
-    if (::flock(file.number(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
+    if (::flock(file.get(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
         return failure(path, "is being written by another process",
                        "stop the recorder, then check whether the file is complete");
     return file;
@@ -234,33 +205,32 @@ Error with_cure(Error damage) {
 }
 
 Expected<> append_end(const FileDescriptor& file, const std::string& path, const Stock& stock) {
-    if (auto written = write_at(file, path, stock.kept(), stock.end()); !written) {
-        [[maybe_unused]] const int back =
-            ::ftruncate(file.number(), static_cast<off_t>(stock.kept()));
+    ::lseek(file.get(), static_cast<off_t>(stock.kept()), SEEK_SET);
+    if (auto written = write_all(file, path, stock.end()); !written) {
+        [[maybe_unused]] const int back = ::ftruncate(file.get(), static_cast<off_t>(stock.kept()));
         return written;
     }
-    if (::fsync(file.number()) != 0) return unwritten(path);
-    return {};
+    return sync_file(file, path);
 }
 
 Expected<> repair_in_place(const FileDescriptor& file, const McapReader& reader, const Stock& stock,
                            RepairReport& report) {
     if (report.cut_bytes > 0) {
         report.cut_file = reader.path() + ".cut";
-        const auto cut = create(report.cut_file);
+        const auto cut = create_file(report.cut_file, O_WRONLY);
         if (!cut) return Unexpected(cut.error());
         if (auto kept = copy(reader, stock.kept(), reader.size(), *cut, report.cut_file); !kept) {
             ::unlink(report.cut_file.c_str());
             return kept;
         }
     }
-    if (::ftruncate(file.number(), static_cast<off_t>(stock.kept())) != 0)
-        return unwritten(reader.path());
+    if (::ftruncate(file.get(), static_cast<off_t>(stock.kept())) != 0)
+        return not_written(reader.path());
     return append_end(file, reader.path(), stock);
 }
 
 Expected<> repair_into(const std::string& output, const McapReader& reader, const Stock& stock) {
-    const auto file = create(output);
+    const auto file = create_file(output, O_WRONLY);
     if (!file) return Unexpected(file.error());
     auto written = copy(reader, 0, stock.kept(), *file, output);
     if (written) written = append_end(*file, output, stock);

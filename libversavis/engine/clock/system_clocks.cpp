@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <ctime>
 
+#include "posix/file_descriptor.hpp"
+
 namespace versavis::clock {
 
 namespace {
@@ -29,11 +31,6 @@ clockid_t clock_id(SystemClock clock) {
 class KernelClocks final : public SystemClocks {
  public:
     KernelClocks() : timer_(::timerfd_create(CLOCK_REALTIME, TFD_NONBLOCK | TFD_CLOEXEC)) { arm(); }
-    ~KernelClocks() override {
-        if (timer_ >= 0) ::close(timer_);
-    }
-    KernelClocks(const KernelClocks&) = delete;
-    KernelClocks& operator=(const KernelClocks&) = delete;
 
     std::int64_t read_ns(SystemClock clock) override {
         timespec now{};
@@ -53,7 +50,7 @@ class KernelClocks final : public SystemClocks {
 
     std::uint32_t times_set() override {
         std::uint64_t expirations = 0;
-        if (timer_ >= 0 && ::read(timer_, &expirations, sizeof expirations) < 0 &&
+        if (timer_ && ::read(timer_.get(), &expirations, sizeof expirations) < 0 &&
             errno == ECANCELED) {
             ++times_set_;
             arm();
@@ -68,12 +65,12 @@ class KernelClocks final : public SystemClocks {
         itimerspec end{};
         end.it_value.tv_sec = never_s;
         const int flags = TFD_TIMER_ABSTIME | TFD_TIMER_CANCEL_ON_SET;
-        if (timer_ >= 0 && ::timerfd_settime(timer_, flags, &end, nullptr) != 0 &&
+        if (timer_ && ::timerfd_settime(timer_.get(), flags, &end, nullptr) != 0 &&
             errno == ECANCELED)
             ++times_set_;  // again, since it was read
     }
 
-    int timer_;
+    FileDescriptor timer_;
     std::atomic<std::uint32_t> times_set_{0};
 };
 

@@ -94,13 +94,12 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
                        "run the service as the user that owns it");
     if (auto trusted = check_trust(path); !trusted) return Unexpected(trusted.error());
-    File lock(::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600));
+    FileDescriptor lock(::open((path / lock_name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600));
     if (!lock)
         return failure(path.string(),
                        fmt::format("cannot be locked: {}", std::generic_category().message(errno)),
                        "run the service as the user that owns it");
-    if (::flock(lock.descriptor(), LOCK_EX | LOCK_NB) != 0)
-        return served(path, living_writer(path));
+    if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return served(path, living_writer(path));
     OwnedDirectory owned(path, std::move(lock));
     if (const std::uint32_t process = living_writer(path); process != 0)
         return served(path, process);

@@ -33,11 +33,11 @@ class OwnedDirectory {
     EpochBlock& epochs() { return epochs_; }
 
  private:
-    OwnedDirectory(std::filesystem::path path, File lock)
-        : path_(std::move(path)), lock_(std::move(lock)), epochs_(lock_.descriptor()) {}
+    OwnedDirectory(std::filesystem::path path, FileDescriptor lock)
+        : path_(std::move(path)), lock_(std::move(lock)), epochs_(lock_.get()) {}
 
     std::filesystem::path path_;
-    File lock_;
+    FileDescriptor lock_;
     EpochBlock epochs_;  ///< in the file that is locked
 };
 

@@ -53,21 +53,21 @@ void hand_over(int segment, int connection) {
 
 }  // namespace
 
-Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, File segment) {
-    const File directory(::open(path.parent_path().c_str(), O_PATH | O_CLOEXEC));
-    File socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path,
+                                           FileDescriptor segment) {
+    const FileDescriptor directory(::open(path.parent_path().c_str(), O_PATH | O_CLOEXEC));
+    FileDescriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     if (!directory || !socket) return not_made(path);
     // An address holds 107 characters, and a path may be longer.
     const std::string name =
-        fmt::format("/proc/self/fd/{}/{}", directory.descriptor(), path.filename().string());
+        fmt::format("/proc/self/fd/{}/{}", directory.get(), path.filename().string());
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     name.copy(address.sun_path, sizeof address.sun_path);  // zero-terminated or full
     ::unlink(path.c_str());
-    if (::bind(socket.descriptor(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
-            0 ||
+    if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
         ::chmod(path.c_str(), 0660) != 0 ||  // whatever umask says
-        ::listen(socket.descriptor(), waiting) != 0)
+        ::listen(socket.get(), waiting) != 0)
         return not_made(path);
     std::unique_ptr<Door> door(new Door(std::move(segment), std::move(socket)));
     try {
@@ -79,18 +79,19 @@ Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path, Fi
     return door;
 }
 
-Door::Door(File segment, File socket) : segment_(std::move(segment)), socket_(std::move(socket)) {}
+Door::Door(FileDescriptor segment, FileDescriptor socket)
+    : segment_(std::move(segment)), socket_(std::move(socket)) {}
 
 Door::~Door() {
-    ::shutdown(socket_.descriptor(), SHUT_RDWR);  // accept() returns
+    ::shutdown(socket_.get(), SHUT_RDWR);  // accept() returns
     if (thread_.joinable()) thread_.join();
 }
 
 void Door::serve() const {
     for (;;) {
-        const File connection(::accept4(socket_.descriptor(), nullptr, nullptr, SOCK_CLOEXEC));
+        const FileDescriptor connection(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
         if (connection)
-            hand_over(segment_.descriptor(), connection.descriptor());
+            hand_over(segment_.get(), connection.get());
         else if (errno == EINVAL)
             return;
         else

@@ -15,17 +15,18 @@ class Door {
  public:
     /// Listens at `path`, which may be renamed, until destroyed; owner and group may connect.
     /// Errors: the socket cannot be made there, no thread to be had.
-    static Expected<std::unique_ptr<Door>> open(const std::filesystem::path& path, File segment);
+    static Expected<std::unique_ptr<Door>> open(const std::filesystem::path& path,
+                                                FileDescriptor segment);
     Door(const Door&) = delete;
     Door& operator=(const Door&) = delete;
     ~Door();
 
  private:
-    Door(File segment, File socket);
+    Door(FileDescriptor segment, FileDescriptor socket);
     void serve() const;
 
-    File segment_;
-    File socket_;
+    FileDescriptor segment_;
+    FileDescriptor socket_;
     std::thread thread_;
 };
 

@@ -68,8 +68,9 @@ void read_boot_id(std::uint8_t (&boot_id)[16]) {
             static_cast<std::uint8_t>(std::strtoul(text.substr(2 * i, 2).c_str(), nullptr, 16));
 }
 
-Expected<> reserve(const File& file, const std::filesystem::path& path, std::uint64_t size) {
-    const int error = ::posix_fallocate(file.descriptor(), 0, static_cast<off_t>(size));
+Expected<> reserve(const FileDescriptor& file, const std::filesystem::path& path,
+                   std::uint64_t size) {
+    const int error = ::posix_fallocate(file.get(), 0, static_cast<off_t>(size));
     if (error == 0) return {};
     return failure(path.string(),
                    fmt::format("cannot reserve {} MiB: {}", size >> 20U, reason(error)),
@@ -78,10 +79,10 @@ Expected<> reserve(const File& file, const std::filesystem::path& path, std::uin
 
 /// A file of its own, whatever lay there under this name. None of it is ever shared with somebody
 /// else's: what is left there is removed, and O_EXCL follows no link.
-Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) {
+Expected<FileDescriptor> make_file(const std::filesystem::path& path, std::uint64_t size) {
     ::unlink(path.c_str());
-    File file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0640));
-    if (!file || ::fchmod(file.descriptor(), 0640) != 0)  // whatever umask says
+    FileDescriptor file(::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0640));
+    if (!file || ::fchmod(file.get(), 0640) != 0)  // whatever umask says
         return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)),
                        "does its directory belong to the service's user?");
     if (auto reserved = reserve(file, path, size); !reserved) {
@@ -94,19 +95,20 @@ Expected<File> make_file(const std::filesystem::path& path, std::uint64_t size) 
 /// MFD_NOEXEC_SEAL: that it holds no program, which a host may insist on since Linux 6.3.
 constexpr unsigned no_program = 1U << 3U;
 
-Expected<File> make_nameless(const std::filesystem::path& path, std::uint64_t size) {
+Expected<FileDescriptor> make_nameless(const std::filesystem::path& path, std::uint64_t size) {
     const unsigned flags = MFD_CLOEXEC | MFD_ALLOW_SEALING;
-    File file(::memfd_create(path.filename().c_str(), flags | no_program));
-    if (!file) file = File(::memfd_create(path.filename().c_str(), flags));  // an older Linux
+    FileDescriptor file(::memfd_create(path.filename().c_str(), flags | no_program));
+    if (!file)
+        file = FileDescriptor(::memfd_create(path.filename().c_str(), flags));  // an older Linux
     if (!file) return failure(path.string(), fmt::format("cannot be created: {}", reason(errno)));
     if (auto reserved = reserve(file, path, size); !reserved) return Unexpected(reserved.error());
     return file;
 }
 
 /// From here on the only one who can write is who has mapped it already.
-Expected<std::unique_ptr<Door>> seal(File file, const std::filesystem::path& path) {
+Expected<std::unique_ptr<Door>> seal(FileDescriptor file, const std::filesystem::path& path) {
     const int seals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL;
-    if (::fcntl(file.descriptor(), F_ADD_SEALS, seals) != 0)
+    if (::fcntl(file.get(), F_ADD_SEALS, seals) != 0)
         return failure(path.string(), fmt::format("cannot be sealed: {}", reason(errno)),
                        "set 'sealed = false' in [memory], or use Linux 5.1 or newer");
     return Door::open(path, std::move(file));
@@ -120,11 +122,10 @@ void release(const std::filesystem::path& path, const Mapping& dead) {
         dead.generation(slot).fetch_add(2, std::memory_order_relaxed);
     // SYNC 4: release fence here, acquire fence in Payload::valid(), as in Writer::acquire().
     std::atomic_thread_fence(std::memory_order_release);
-    const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+    const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC));
     const auto begin = static_cast<off_t>(constants.slots_at);
-    ::fallocate(file, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
+    ::fallocate(file.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, begin,
                 static_cast<off_t>(constants.total_size) - begin);
-    ::close(file);
 }
 
 /// What dead writers left in the directory takes memory that is needed now.
@@ -200,7 +201,7 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     const auto temporary = place.directory / ("." + shape.name + ".new");
     const std::uint64_t size = total_size(shape);
     auto old = Mapping::open(path, Mapping::Access::read_write);
-    const auto make = [&]() -> Expected<File> {
+    const auto make = [&]() -> Expected<FileDescriptor> {
         auto fits = place.sealed ? check_memory(path, size) : check_room(path, size);
         if (!fits) return Unexpected(fits.error());
         return place.sealed ? make_nameless(path, size) : make_file(temporary, size);
@@ -211,8 +212,7 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
         file = make();
     }
     if (!file) return Unexpected(file.error());
-    auto mapping =
-        Mapping::open_unchecked(file->descriptor(), temporary, Mapping::Access::read_write);
+    auto mapping = Mapping::open_unchecked(file->get(), temporary, Mapping::Access::read_write);
     if (!mapping) {
         ::unlink(temporary.c_str());
         return Unexpected(mapping.error());

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Owns a file descriptor.
+// The owner of a file descriptor, which it closes.
 #pragma once
 
 #include <unistd.h>
 
 #include <utility>
 
-namespace versavis::client {
+namespace versavis {
 
 class FileDescriptor {
  public:
-    explicit FileDescriptor(int number = -1) : number_(number) {}
+    FileDescriptor() = default;  ///< none
+    explicit FileDescriptor(int number) : number_(number) {}
     FileDescriptor(FileDescriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
     FileDescriptor& operator=(FileDescriptor&& other) noexcept {
         std::swap(number_, other.number_);
@@ -20,11 +21,11 @@ class FileDescriptor {
         if (number_ >= 0) ::close(number_);
     }
 
-    int number() const { return number_; }
+    int get() const { return number_; }
     explicit operator bool() const { return number_ >= 0; }
 
  private:
-    int number_;
+    int number_ = -1;
 };
 
-}  // namespace versavis::client
+}  // namespace versavis

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "posix/file.hpp"
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "../support/in_process.hpp"
+#include "../support/small_disk.hpp"
+#include "../support/temporary_directory.hpp"
+
+using namespace versavis;
+using Catch::Contains;
+
+namespace {
+
+std::string content(const std::string& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::size_t files_in(const std::filesystem::path& directory) {
+    using Entries = std::filesystem::directory_iterator;
+    return static_cast<std::size_t>(std::distance(Entries(directory), Entries()));
+}
+
+}  // namespace
+
+TEST_CASE("file: a new one takes no other's place") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.path() / "file";
+    REQUIRE(write_new_file(path, "first"));
+    const auto again = write_new_file(path, "second");
+    REQUIRE_FALSE(again);
+    CHECK_THAT(again.error().message(),
+               Contains(path + ": cannot be written: File exists") && Contains("name another"));
+    CHECK(content(path) == "first");
+}
+
+TEST_CASE("file: a whole one takes the place of the old one when it is finished") {
+    const test::TemporaryDirectory directory;
+    const std::string path = directory.write("file", "old");
+    {
+        auto file = WholeFile::create(path);
+        REQUIRE(file);
+        REQUIRE(file->write("half of the new one"));
+    }
+    CHECK(content(path) == "old");
+    CHECK(files_in(directory.path()) == 1);
+    REQUIRE(write_whole_file(path, "new"));
+    CHECK(content(path) == "new");
+    CHECK(files_in(directory.path()) == 1);
+}
+
+TEST_CASE("file: a device is written as it is") {
+    CHECK(write_whole_file("/dev/null", "text"));
+    CHECK(std::filesystem::is_character_file("/dev/null"));
+    const auto full = write_whole_file("/dev/full", "text");
+    REQUIRE_FALSE(full);
+    CHECK_THAT(full.error().message(), Contains("No space left on device; free some of the disk"));
+}
+
+TEST_CASE("file: without its directory, the error says to make it") {
+    for (const auto& written :
+         {write_new_file("/nowhere/file", ""), write_whole_file("/nowhere/file", "")}) {
+        REQUIRE_FALSE(written);
+        CHECK_THAT(written.error().message(),
+                   Contains("/nowhere/file: cannot be written") && Contains("make its directory"));
+    }
+}
+
+TEST_CASE("file: on a full disk the old one stays, and nothing of the new one") {
+    const test::TemporaryDirectory directory;
+    CHECK(test::in_process([&] {
+        if (!test::mount_small_disk(directory.path(), "64k")) return true;
+        const std::string path = directory.write("file", "old");
+        return !write_whole_file(path, std::string(1 << 20U, 'x')) && content(path) == "old" &&
+               files_in(directory.path()) == 1;
+    }));
+}
