@@ -199,15 +199,11 @@ std::vector<Need> needs_of(const Configuration& configuration, std::uint32_t pre
     return needs.take();
 }
 
-std::string text(const char* padded, std::size_t capacity) {
-    return {padded, strnlen(padded, capacity)};
-}
-
 /// With what distinguishes it from others.
 std::string name_of(const wire::BoardHello& board) {
     std::vector<std::string> facts;
-    if (board.firmware[0] != 0) facts.push_back(text(board.firmware, sizeof board.firmware));
-    if (board.serial[0] != 0) facts.push_back("serial " + text(board.serial, sizeof board.serial));
+    if (board.firmware[0] != 0) facts.push_back(board::text(board.firmware));
+    if (board.serial[0] != 0) facts.push_back("serial " + board::text(board.serial));
     return facts.empty() ? "the board" : fmt::format("the board ({})", fmt::join(facts, ", "));
 }
 

@@ -263,7 +263,7 @@ Expected<SelfTest> self_test(const SelfTestSettings& settings, TestBoard& board)
     if (!wires) return Unexpected(wires.error());
     Tester tester(settings, board);
     if (auto done = tester.run(); !done) return Unexpected(done.error());
-    const Greeting& greeting = board.greeting();
+    const device::Greeting& greeting = board.greeting();
     SelfTest test{greeting.serial(), greeting.firmware(), std::move(tester.lines)};
     demand(test.lines, *wires);
     test.passed = passed(test.lines);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "board/usb_bus.hpp"
+#include "device/usb_bus.hpp"
 
 #include <fmt/format.h>
 #include <libusb.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 
-namespace versavis::client {
+namespace versavis::device {
 
 namespace {
 
@@ -81,16 +81,21 @@ UsbFunction UsbHandle::function(std::uint8_t interface_class) const {
     return function;
 }
 
-std::string UsbHandle::serial() const {
+std::string UsbHandle::port() const { return port_of(libusb_get_device(handle_.get())); }
+
+std::optional<std::string> UsbHandle::serial() const {
     libusb_device_descriptor descriptor{};
     libusb_get_device_descriptor(libusb_get_device(handle_.get()), &descriptor);
     std::array<unsigned char, 256> text{};
     const int size = libusb_get_string_descriptor_ascii(handle_.get(), descriptor.iSerialNumber,
                                                         text.data(), static_cast<int>(text.size()));
-    return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()),
-                                  static_cast<std::size_t>(size))
-                    : "";
+    if (size > 0)
+        return std::string(reinterpret_cast<const char*>(text.data()),
+                           static_cast<std::size_t>(size));
+    return descriptor.iSerialNumber == 0 ? std::optional(std::string()) : std::nullopt;
 }
+
+void UsbHandle::reset() { libusb_reset_device(handle_.get()); }
 
 // The last first: a driver of several interfaces looks for all of them when it gets its first one.
 UsbHandle::~UsbHandle() {
@@ -182,4 +187,4 @@ std::vector<UsbDevice> UsbBus::find(std::uint16_t vendor, std::uint16_t product)
     return found;
 }
 
-}  // namespace versavis::client
+}  // namespace versavis::device

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The USB devices that the tool talks to, through libusb.
+// The USB devices that service and tool talk to, through libusb.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@ struct libusb_context;
 struct libusb_device;
 struct libusb_device_handle;
 
-namespace versavis::client {
+namespace versavis::device {
 
 /// Why something on USB was not done.
 enum class UsbFault {
@@ -59,7 +60,12 @@ class UsbHandle {
 
     /// Its first interface of this class.
     UsbFunction function(std::uint8_t interface_class) const;
-    std::string serial() const;
+    /// Bus, then the ports of the hubs on the way, as the kernel names it.
+    std::string port() const;
+    /// Empty: it has none. None: it has one and does not say it, as a device that hangs.
+    std::optional<std::string> serial() const;
+    /// Of the bus. It may be another device after that, which has to be found anew.
+    void reset();
 
     /// Takes the interface from the kernel, too, if that has a driver for it.
     UsbExpected<> claim(int interface);
@@ -76,6 +82,8 @@ class UsbHandle {
     UsbExpected<std::size_t> control(std::uint8_t type, std::uint8_t request, std::uint16_t value,
                                      int interface, std::span<std::uint8_t> data, Duration timeout);
 
+    libusb_device_handle* get() const { return handle_.get(); }
+
  private:
     std::shared_ptr<libusb_device_handle> handle_;
     std::vector<int> claimed_;
@@ -87,7 +95,7 @@ class UsbDevice {
     UsbDevice(std::shared_ptr<libusb_context> context, libusb_device* device);
 
     UsbExpected<UsbHandle> open() const;
-    /// As the service names it: bus, then the ports of the hubs on the way.
+    /// See UsbHandle::port().
     const std::string& port() const { return port_; }
 
  private:
@@ -103,10 +111,12 @@ class UsbBus {
     /// All devices of this vendor and product.
     std::vector<UsbDevice> find(std::uint16_t vendor, std::uint16_t product) const;
 
+    libusb_context* get() const { return context_.get(); }
+
  private:
     explicit UsbBus(std::shared_ptr<libusb_context> context) : context_(std::move(context)) {}
 
     std::shared_ptr<libusb_context> context_;
 };
 
-}  // namespace versavis::client
+}  // namespace versavis::device
