@@ -201,8 +201,7 @@ int main(int argc, char** argv) {
     CLI::Option* keys = app.add_flag("--keys", list_keys,
                                      "Print each configuration key with its meaning, range and "
                                      "default, and exit")
-                            ->excludes(check_config)
-                            ->excludes(keys);
+                            ->excludes(check_config);
     bool check_cables = false;
     CLI::Option* check_wires =
         app.add_flag("--check-cameras", check_cables,
