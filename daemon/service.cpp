@@ -184,7 +184,7 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     }
     const EventSource source = source_of(event.kind);
     if (const auto count = skipped_triggers(event)) cameras_->triggers_skipped(event.source, count);
-    if (event.kind == wire::EventKind::stored) unkept_ = event.value == 0;
+    if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
     if (source == EventSource::imu) {
@@ -202,8 +202,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
 }
 
 void Service::use_pps(const wire::Event& event) {
-    if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
-    if (event.kind == wire::EventKind::utc_label)
+    if (event.kind == wire::BoardEventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
+    if (event.kind == wire::BoardEventKind::utc_label)
         translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
 }
 

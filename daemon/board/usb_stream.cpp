@@ -68,7 +68,7 @@ class UsbStream final : public ByteStream {
         return {};
     }
 
-    std::string port() const override { return port_.handle().port(); }
+    std::string port() const override { return port_.handle().device().port(); }
 
     /// Only here are events handled, so what completes is seen, and stamped, by this thread: none
     /// of it can complete between the look and the wait.

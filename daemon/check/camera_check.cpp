@@ -71,9 +71,9 @@ class Recorder final : public BoardListener {
     void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& event, HostTime /*received*/) override {
         const std::lock_guard lock(mutex_);
-        if (event.kind == wire::EventKind::stray_edge) records_.strays.push_back(event);
-        if (event.kind == wire::EventKind::trigger_skipped) ++records_.skipped;
-        if (event.kind == wire::EventKind::triggers_skipped) records_.skipped += event.detail;
+        if (event.kind == wire::BoardEventKind::stray_edge) records_.strays.push_back(event);
+        if (event.kind == wire::BoardEventKind::trigger_skipped) ++records_.skipped;
+        if (event.kind == wire::BoardEventKind::triggers_skipped) records_.skipped += event.detail;
     }
 
     bool wait_connected(Duration timeout) {

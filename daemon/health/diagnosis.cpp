@@ -549,7 +549,7 @@ bool answered_by_nobody(std::int64_t answer) {
 }
 
 Fault fault_of(const ImuFailure& failure) {
-    if (failure.kind == wire::EventKind::imu_silent) return Fault::imu_silent;
+    if (failure.kind == wire::BoardEventKind::imu_silent) return Fault::imu_silent;
     if (failure.step == imu_step_running) return Fault::imu_failed;
     return answered_by_nobody(failure.answer) ? Fault::imu_missing : Fault::imu_wrong;
 }

@@ -60,7 +60,7 @@ void ImuPipeline::restart() {
 bool ImuPipeline::note_state(const wire::Event& event, HostTime now) {
     const std::lock_guard lock(mutex_);
     ImuFailure& last = report_.failure;
-    report_.working = event.kind == wire::EventKind::imu_ready;
+    report_.working = event.kind == wire::BoardEventKind::imu_ready;
     if (report_.working) return last.times <= 1;
     const bool again = last.kind == event.kind && last.step == event.detail &&
                        last.answer == event.value && now - last.last < forgotten_after;

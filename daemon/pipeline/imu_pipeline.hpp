@@ -17,7 +17,7 @@ namespace versavis::daemon {
 
 /// The last failure of a part that the board reported.
 struct ImuFailure {
-    wire::EventKind kind = wire::EventKind::imu_failed;
+    wire::BoardEventKind kind = wire::BoardEventKind::imu_failed;
     std::uint16_t step = 0;  ///< of its set-up, or imu_step_running
     std::int64_t answer = 0;
     std::uint64_t times = 0;  ///< in a row; 0: none

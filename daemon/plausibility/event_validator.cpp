@@ -26,7 +26,7 @@ EventValidator::EventValidator(const clock::Translator& translator)
 std::optional<Implausibility> EventValidator::judge(const wire::Event& event, HostTime received) {
     const Pulse pulse{static_cast<std::uint32_t>(event.value), BoardTime{event.time_ns}};
     if (const auto doubt = contradicts_arrival(pulse.at, received, translator_)) return doubt;
-    if (event.kind != wire::EventKind::pps) return std::nullopt;
+    if (event.kind != wire::BoardEventKind::pps) return std::nullopt;
     const clock::ClockContact contact = translator_.contact();
     if (contact.life != clock_life_) pps_.forget();
     clock_life_ = contact.life;

@@ -52,10 +52,10 @@ bool possible(const wire::ImuSample& message) {
 bool possible(const wire::Event& message) {
     if (!in_life(message.time_ns)) return false;
     switch (message.kind) {
-        case wire::EventKind::utc_label:
+        case wire::BoardEventKind::utc_label:
             return message.value >= 0 && message.value <= latest_label_s;
-        case wire::EventKind::triggers_skipped: return message.detail > 0;
-        case wire::EventKind::stored: return message.value == 0 || message.value == 1;
+        case wire::BoardEventKind::triggers_skipped: return message.detail > 0;
+        case wire::BoardEventKind::stored: return message.value == 0 || message.value == 1;
         default: return true;
     }
 }

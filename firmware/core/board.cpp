@@ -459,7 +459,8 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
     // The gate closes as soon as it can, which is no sooner than the port can.
     if (!late || (gate && !level)) return;
     ++health_.late_outputs;
-    event(wire::EventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked, 0);
+    event(wire::BoardEventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked,
+          0);
 }
 
 void Board::poll_configuration(Nanoseconds now) {
@@ -481,7 +482,7 @@ void Board::poll_storage(Nanoseconds now) {
     const Persist::Outcome outcome = hal_.persist.take_outcome();
     if (outcome == Persist::Outcome::busy) return;
     storing_ = false;
-    event(wire::EventKind::stored, 0, now, outcome == Persist::Outcome::stored ? 1 : 0, 0);
+    event(wire::BoardEventKind::stored, 0, now, outcome == Persist::Outcome::stored ? 1 : 0, 0);
 }
 
 void Board::poll_imus(Nanoseconds now) {
@@ -530,9 +531,9 @@ void Board::exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds
         outputs_.pulse(start + duration / 2, output_test, true, configuration_.ports.pulse_ns);
 }
 
-void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-                  std::uint16_t detail) {
-    if (kind == wire::EventKind::stray_edge) {
+void Board::event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at,
+                  std::int64_t value, std::uint16_t detail) {
+    if (kind == wire::BoardEventKind::stray_edge) {
         // A floating line makes many; all are counted, some are reported.
         ++health_.stray_edges;
         if (at < next_stray_) return;

@@ -39,7 +39,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
 
  private:
     void exposure(const wire::Exposure& record) override;
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+    void event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
                std::uint16_t detail) override;
     void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) override;
     void refuse(const wire::Refusal& refusal) override;

@@ -30,13 +30,13 @@ void Board::poll_edges(Nanoseconds now) {
             edges_lost(all_lines);
             spi_imu_.edges_lost();
             health_.lost_edges += lost;
-            event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+            event(wire::BoardEventKind::edge_overflow, 0, now, lost, 0);
         } else if (noise_.take(edge)) {
             take_edge(edge, now);
         } else {
             ++health_.noisy_inputs;
             if (edge.input < camera_count) edges_lost(1U << edge.input);
-            event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
+            event(wire::BoardEventKind::input_noisy, edge.input, edge.at, 0, 0);
         }
     }
     Nanoseconds settled = edge.at;
@@ -146,14 +146,14 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         case wire::pulse_pps:
             pps_.pulse(at);
             nmea_.pulse(at);
-            return event(wire::EventKind::pps, 0, at, number, 0);
+            return event(wire::BoardEventKind::pps, 0, at, number, 0);
         case wire::pulse_aux0:
         case wire::pulse_aux1:
-            return event(wire::EventKind::aux_pulse,
+            return event(wire::BoardEventKind::aux_pulse,
                          static_cast<std::uint8_t>(input - wire::pulse_aux0), at, number, 0);
         case wire::pulse_sync: break;
     }
-    event(wire::EventKind::sync_pulse, 0, at, number, 0);
+    event(wire::BoardEventKind::sync_pulse, 0, at, number, 0);
     const Nanoseconds since = at - last_sync_;
     last_sync_ = at;
     if (on_sync_.cameras == 0 || configuring_) return follow_sync(at);
@@ -173,9 +173,10 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
 
 void Board::follow_sync(Nanoseconds at) {
     const GridClock::SyncPulse pulse = grid_clock_.sync_pulse(at, any_running());
-    if (pulse.what == GridClock::Sync::lost) event(wire::EventKind::sync_lost, 0, at, pulse.off, 0);
+    if (pulse.what == GridClock::Sync::lost)
+        event(wire::BoardEventKind::sync_lost, 0, at, pulse.off, 0);
     if (pulse.what == GridClock::Sync::taken)
-        event(wire::EventKind::sync_taken, 0, at, pulse.off, 0);
+        event(wire::BoardEventKind::sync_taken, 0, at, pulse.off, 0);
     if (pulse.what == GridClock::Sync::followed || pulse.what == GridClock::Sync::taken)
         grid_moved();
 }
@@ -197,7 +198,7 @@ void Board::poll_nmea() {
             const Nanoseconds at =
                 received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
             if (nmea_.take(bytes[i], at, label))
-                event(wire::EventKind::utc_label, 0, label.pulse, label.utc_s, 0);
+                event(wire::BoardEventKind::utc_label, 0, label.pulse, label.utc_s, 0);
         }
 }
 

@@ -151,7 +151,7 @@ void CameraChannel::decide(Nanoseconds now, Nanoseconds settled) {
 
 void CameraChannel::skip(wire::SkipReason reason) {
     ++skipped_;
-    reports_.event(wire::EventKind::trigger_skipped, camera_, trigger_at_,
+    reports_.event(wire::BoardEventKind::trigger_skipped, camera_, trigger_at_,
                    static_cast<std::int64_t>(grid_.tick()), static_cast<std::uint16_t>(reason));
 }
 
@@ -163,7 +163,7 @@ void CameraChannel::skip_late(Nanoseconds late_by) {
         skip(wire::SkipReason::late);
     } else if (skipped > 0) {
         skipped_ += static_cast<std::uint32_t>(skipped);
-        reports_.event(wire::EventKind::triggers_skipped, camera_, trigger_at_,
+        reports_.event(wire::BoardEventKind::triggers_skipped, camera_, trigger_at_,
                        static_cast<std::int64_t>(grid_.tick()),
                        static_cast<std::uint16_t>(skipped));
     }

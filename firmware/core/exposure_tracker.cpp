@@ -46,7 +46,7 @@ void ExposureTracker::start_edge(Nanoseconds at) {
         if (flights_[i].record.trigger_ns + soonest <= at && !started(flights_[i])) found = i;
     if (found == count_) {
         edges_lost();  // if the line rose twice, an end in between was missed
-        return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
+        return reports_.event(wire::BoardEventKind::stray_edge, camera_, at, 1);
     }
     // The line has only one level: whatever still waits before this trigger was ignored, or its end
     // edge was lost.
@@ -57,7 +57,7 @@ void ExposureTracker::start_edge(Nanoseconds at) {
 
 ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
     if (count_ == 0 || !started(flights_[0])) {
-        reports_.event(wire::EventKind::stray_edge, camera_, at, 0);
+        reports_.event(wire::BoardEventKind::stray_edge, camera_, at, 0);
         return {};
     }
     wire::Exposure& record = flights_[0].record;

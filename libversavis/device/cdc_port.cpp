@@ -21,8 +21,8 @@ constexpr std::array<std::uint8_t, 7> touch_coding{0xB0, 0x04, 0, 0, 0, 0, 8};
 }  // namespace
 
 UsbExpected<CdcPort> CdcPort::open(UsbHandle handle) {
-    const UsbFunction control = handle.function(LIBUSB_CLASS_COMM);
-    const UsbFunction data = handle.function(LIBUSB_CLASS_DATA);
+    const UsbFunction control = handle.device().function({LIBUSB_CLASS_COMM});
+    const UsbFunction data = handle.device().function({LIBUSB_CLASS_DATA});
     if (control.interface < 0 || !data.complete())
         return Unexpected(UsbError{UsbFault::foreign, 0});
     for (const int interface : {control.interface, data.interface})

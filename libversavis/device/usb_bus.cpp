@@ -40,7 +40,34 @@ std::string port_of(libusb_device* device) {
     return name;
 }
 
+bool fits(const libusb_interface_descriptor& setting, const UsbClass& wanted) {
+    return setting.bInterfaceClass == wanted.code &&
+           setting.bInterfaceSubClass == wanted.subclass.value_or(setting.bInterfaceSubClass) &&
+           setting.bInterfaceProtocol == wanted.protocol.value_or(setting.bInterfaceProtocol);
+}
+
+libusb_device_descriptor descriptor_of(libusb_device* device) {
+    libusb_device_descriptor descriptor{};
+    libusb_get_device_descriptor(device, &descriptor);
+    return descriptor;
+}
+
+/// Empty: the device has none. None: it has one and does not say it.
+std::optional<std::string> text_of(libusb_device_handle* handle,
+                                   std::uint8_t libusb_device_descriptor::*index) {
+    const std::uint8_t at = descriptor_of(libusb_get_device(handle)).*index;
+    std::array<unsigned char, 256> text{};
+    const int size =
+        libusb_get_string_descriptor_ascii(handle, at, text.data(), static_cast<int>(text.size()));
+    if (size > 0)
+        return std::string(reinterpret_cast<const char*>(text.data()),
+                           static_cast<std::size_t>(size));
+    return at == 0 ? std::optional(std::string()) : std::nullopt;
+}
+
 }  // namespace
+
+const char* UsbError::name() const { return libusb_error_name(code); }
 
 Error UsbError::as_error(const std::string& where, const std::string& what) const {
     switch (fault) {
@@ -59,40 +86,19 @@ Error UsbError::as_error(const std::string& where, const std::string& what) cons
                     "put firmware into it: hold BOOTSEL while you plug it in, then versavis flash"};
         case UsbFault::other: break;
     }
-    return {where, fmt::format("{}: {}", what, libusb_error_name(code)), "reconnect it"};
+    return {where, fmt::format("{}: {}", what, name()), "reconnect it"};
 }
-
-UsbFunction UsbHandle::function(std::uint8_t interface_class) const {
-    UsbFunction function;
-    libusb_config_descriptor* configuration = nullptr;
-    if (libusb_get_active_config_descriptor(libusb_get_device(handle_.get()), &configuration) != 0)
-        return function;
-    for (int i = 0; i < configuration->bNumInterfaces && function.interface < 0; ++i) {
-        const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
-        if (setting.bInterfaceClass != interface_class) continue;
-        function.interface = setting.bInterfaceNumber;
-        for (int e = 0; e < setting.bNumEndpoints; ++e) {
-            const std::uint8_t address = setting.endpoint[e].bEndpointAddress;
-            ((address & LIBUSB_ENDPOINT_IN) != 0 ? function.endpoint_in : function.endpoint_out) =
-                address;
-        }
-    }
-    libusb_free_config_descriptor(configuration);
-    return function;
-}
-
-std::string UsbHandle::port() const { return port_of(libusb_get_device(handle_.get())); }
 
 std::optional<std::string> UsbHandle::serial() const {
-    libusb_device_descriptor descriptor{};
-    libusb_get_device_descriptor(libusb_get_device(handle_.get()), &descriptor);
-    std::array<unsigned char, 256> text{};
-    const int size = libusb_get_string_descriptor_ascii(handle_.get(), descriptor.iSerialNumber,
-                                                        text.data(), static_cast<int>(text.size()));
-    if (size > 0)
-        return std::string(reinterpret_cast<const char*>(text.data()),
-                           static_cast<std::size_t>(size));
-    return descriptor.iSerialNumber == 0 ? std::optional(std::string()) : std::nullopt;
+    return text_of(handle_.get(), &libusb_device_descriptor::iSerialNumber);
+}
+
+std::string UsbHandle::manufacturer() const {
+    return text_of(handle_.get(), &libusb_device_descriptor::iManufacturer).value_or("");
+}
+
+std::string UsbHandle::product() const {
+    return text_of(handle_.get(), &libusb_device_descriptor::iProduct).value_or("");
 }
 
 void UsbHandle::reset() { libusb_reset_device(handle_.get()); }
@@ -157,11 +163,33 @@ UsbDevice::UsbDevice(std::shared_ptr<libusb_context> context, libusb_device* dev
               [kept = context_](libusb_device* old) { libusb_unref_device(old); }),
       port_(port_of(device)) {}
 
+bool UsbDevice::is(std::uint16_t vendor, std::uint16_t product) const {
+    const libusb_device_descriptor found = descriptor_of(device_.get());
+    return found.idVendor == vendor && found.idProduct == product;
+}
+
+UsbFunction UsbDevice::function(const UsbClass& wanted) const {
+    UsbFunction function;
+    libusb_config_descriptor* configuration = nullptr;
+    if (libusb_get_active_config_descriptor(device_.get(), &configuration) != 0) return function;
+    for (int i = 0; i < configuration->bNumInterfaces && function.interface < 0; ++i) {
+        const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
+        if (!fits(setting, wanted)) continue;
+        function.interface = setting.bInterfaceNumber;
+        for (int e = 0; e < setting.bNumEndpoints; ++e) {
+            const std::uint8_t address = setting.endpoint[e].bEndpointAddress;
+            ((address & LIBUSB_ENDPOINT_IN) != 0 ? function.endpoint_in : function.endpoint_out) =
+                address;
+        }
+    }
+    libusb_free_config_descriptor(configuration);
+    return function;
+}
+
 UsbExpected<UsbHandle> UsbDevice::open() const {
     libusb_device_handle* handle = nullptr;
     if (const int code = libusb_open(device_.get(), &handle); code != 0) return usb_failure(code);
-    return UsbHandle(std::shared_ptr<libusb_device_handle>(
-        handle, [kept = device_](libusb_device_handle* old) { libusb_close(old); }));
+    return UsbHandle(*this, {handle, libusb_close});
 }
 
 Expected<UsbBus> UsbBus::open() {
@@ -173,17 +201,18 @@ Expected<UsbBus> UsbBus::open() {
         std::shared_ptr<libusb_context>(context, [](libusb_context* old) { libusb_exit(old); }));
 }
 
-std::vector<UsbDevice> UsbBus::find(std::uint16_t vendor, std::uint16_t product) const {
+std::vector<UsbDevice> UsbBus::devices() const {
     std::vector<UsbDevice> found;
     libusb_device** devices = nullptr;
     const ssize_t count = libusb_get_device_list(context_.get(), &devices);
-    for (ssize_t i = 0; i < count; ++i) {
-        libusb_device_descriptor descriptor{};
-        libusb_get_device_descriptor(devices[i], &descriptor);
-        if (descriptor.idVendor == vendor && descriptor.idProduct == product)
-            found.emplace_back(context_, devices[i]);
-    }
+    for (ssize_t i = 0; i < count; ++i) found.emplace_back(context_, devices[i]);
     if (count >= 0) libusb_free_device_list(devices, 1);
+    return found;
+}
+
+std::vector<UsbDevice> UsbBus::find(std::uint16_t vendor, std::uint16_t product) const {
+    std::vector<UsbDevice> found = devices();
+    std::erase_if(found, [&](const UsbDevice& device) { return !device.is(vendor, product); });
     return found;
 }
 

@@ -33,12 +33,20 @@ struct UsbError {
     UsbFault fault = UsbFault::other;
     int code = 0;  ///< of libusb
 
+    const char* name() const;  ///< of the code
     /// As an error of the device named `where`.
     Error as_error(const std::string& where, const std::string& what) const;
 };
 
 template <class T = void>
 using UsbExpected = Expected<T, UsbError>;
+
+/// What a function is for; no subclass or protocol: whatever it has.
+struct UsbClass {
+    std::uint8_t code = 0;
+    std::optional<std::uint8_t> subclass{};
+    std::optional<std::uint8_t> protocol{};
+};
 
 /// Where the function of a class lies within a device.
 struct UsbFunction {
@@ -49,21 +57,41 @@ struct UsbFunction {
     bool complete() const { return interface >= 0 && endpoint_in != 0 && endpoint_out != 0; }
 };
 
+class UsbHandle;
+
+/// A device on the bus. It need not be there any more.
+class UsbDevice {
+ public:
+    UsbDevice(std::shared_ptr<libusb_context> context, libusb_device* device);
+
+    bool is(std::uint16_t vendor, std::uint16_t product) const;
+    UsbExpected<UsbHandle> open() const;
+    /// Its first interface of this class.
+    UsbFunction function(const UsbClass& wanted) const;
+    /// Bus, then the ports of the hubs on the way, as the kernel names it.
+    const std::string& port() const { return port_; }
+
+ private:
+    std::shared_ptr<libusb_context> context_;
+    std::shared_ptr<libusb_device> device_;
+    std::string port_;
+};
+
 /// A device that is open. Interfaces that were claimed are given back with it, and the kernel's
 /// driver has them again.
 class UsbHandle {
  public:
-    explicit UsbHandle(std::shared_ptr<libusb_device_handle> handle) : handle_(std::move(handle)) {}
+    UsbHandle(UsbDevice device, std::shared_ptr<libusb_device_handle> handle)
+        : device_(std::move(device)), handle_(std::move(handle)) {}
     UsbHandle(UsbHandle&&) noexcept = default;
     UsbHandle& operator=(UsbHandle&&) = delete;
     ~UsbHandle();
 
-    /// Its first interface of this class.
-    UsbFunction function(std::uint8_t interface_class) const;
-    /// Bus, then the ports of the hubs on the way, as the kernel names it.
-    std::string port() const;
+    const UsbDevice& device() const { return device_; }
     /// Empty: it has none. None: it has one and does not say it, as a device that hangs.
     std::optional<std::string> serial() const;
+    std::string manufacturer() const;
+    std::string product() const;
     /// Of the bus. It may be another device after that, which has to be found anew.
     void reset();
 
@@ -85,30 +113,17 @@ class UsbHandle {
     libusb_device_handle* get() const { return handle_.get(); }
 
  private:
+    UsbDevice device_;
     std::shared_ptr<libusb_device_handle> handle_;
     std::vector<int> claimed_;
-};
-
-/// A device on the bus. It need not be there any more.
-class UsbDevice {
- public:
-    UsbDevice(std::shared_ptr<libusb_context> context, libusb_device* device);
-
-    UsbExpected<UsbHandle> open() const;
-    /// See UsbHandle::port().
-    const std::string& port() const { return port_; }
-
- private:
-    std::shared_ptr<libusb_context> context_;
-    std::shared_ptr<libusb_device> device_;
-    std::string port_;
 };
 
 class UsbBus {
  public:
     static Expected<UsbBus> open();
 
-    /// All devices of this vendor and product.
+    std::vector<UsbDevice> devices() const;
+    /// Those of this vendor and product.
     std::vector<UsbDevice> find(std::uint16_t vendor, std::uint16_t product) const;
 
     libusb_context* get() const { return context_.get(); }

@@ -475,13 +475,13 @@ TEST_CASE("diagnosis: of an IMU: nobody answers, another part does, it is silent
     ImuStatus& imu = bench.status.imus[0];
     imu.delivery.full = false;
     imu.report.working = false;
-    imu.report.failure = {wire::EventKind::imu_failed, 1, 0, 5, now};
+    imu.report.failure = {wire::BoardEventKind::imu_failed, 1, 0, 5, now};
     check(bench.imu(), Fault::imu_missing, "adis16448");
     imu.report.failure.answer = 120;
     check(bench.imu(), Fault::imu_wrong, "0x78");
     imu.report.failure.step = imu_step_running;
     check(bench.imu(), Fault::imu_failed, "set up again");
-    imu.report.failure.kind = wire::EventKind::imu_silent;
+    imu.report.failure.kind = wire::BoardEventKind::imu_silent;
     check(bench.imu(), Fault::imu_silent, "nothing");
     imu.report.failure = {};
     imu.recent.faulty = 100;

@@ -13,7 +13,7 @@ TEST_CASE("event_validator: pulses of PPS are a second apart, and no event comes
     const HostTime begin{40'000'000'000};
     bench.synchronise(begin);
     EventValidator witness(bench.translator);
-    const auto doubted = [&](wire::EventKind kind, std::int64_t pulse, Duration off) {
+    const auto doubted = [&](wire::BoardEventKind kind, std::int64_t pulse, Duration off) {
         const HostTime at = begin + seconds(pulse);
         wire::Event event{};
         event.kind = kind;
@@ -21,13 +21,13 @@ TEST_CASE("event_validator: pulses of PPS are a second apart, and no event comes
         event.time_ns = (test::Pipelines::to_board(at) + off).ns;
         return witness.judge(event, at + milliseconds(2)).has_value();
     };
-    CHECK(doubted(wire::EventKind::pps, 0, {}));  // it is alone
-    for (int i = 1; i < 20; ++i) CHECK_FALSE(doubted(wire::EventKind::pps, i, {}));
-    CHECK(doubted(wire::EventKind::pps, 20, -milliseconds(300)));
-    CHECK(doubted(wire::EventKind::pps, 21, -microseconds(200)));
-    CHECK_FALSE(doubted(wire::EventKind::pps, 22, {}));
-    CHECK(doubted(wire::EventKind::aux_pulse, 23, seconds(1000)));
-    CHECK_FALSE(doubted(wire::EventKind::aux_pulse, 23, {}));
+    CHECK(doubted(wire::BoardEventKind::pps, 0, {}));  // it is alone
+    for (int i = 1; i < 20; ++i) CHECK_FALSE(doubted(wire::BoardEventKind::pps, i, {}));
+    CHECK(doubted(wire::BoardEventKind::pps, 20, -milliseconds(300)));
+    CHECK(doubted(wire::BoardEventKind::pps, 21, -microseconds(200)));
+    CHECK_FALSE(doubted(wire::BoardEventKind::pps, 22, {}));
+    CHECK(doubted(wire::BoardEventKind::aux_pulse, 23, seconds(1000)));
+    CHECK_FALSE(doubted(wire::BoardEventKind::aux_pulse, 23, {}));
 }
 
 TEST_CASE(
@@ -39,10 +39,10 @@ TEST_CASE(
     const HostTime now = begin + seconds(20);
     constexpr int kinds_on_the_wire = 17;
     for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {
-        if (static_cast<wire::EventKind>(kind) == wire::EventKind::pps) continue;
+        if (static_cast<wire::BoardEventKind>(kind) == wire::BoardEventKind::pps) continue;
         INFO("kind " << kind);
         wire::Event event{};
-        event.kind = static_cast<wire::EventKind>(kind);
+        event.kind = static_cast<wire::BoardEventKind>(kind);
         const auto doubt = [&](Duration age) {
             event.time_ns = test::Pipelines::to_board(now - age).ns;
             return witness.judge(event, now);

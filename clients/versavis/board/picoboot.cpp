@@ -96,7 +96,7 @@ Expected<Picoboot> Picoboot::open(const device::UsbDevice& device) {
     const std::string where = fmt::format("boot loader at {}", device.port());
     auto handle = device.open();
     if (!handle) return Unexpected(handle.error().as_error(where, "cannot be opened"));
-    const device::UsbFunction function = handle->function(vendor_class);
+    const device::UsbFunction function = device.function({vendor_class});
     if (!function.complete())
         return failure(where, "has no PICOBOOT interface", "is it an RP2040? Reconnect it");
     if (auto claimed = handle->claim(function.interface); !claimed)

@@ -48,9 +48,9 @@ std::uint32_t part_of(unsigned output) {
 /// Of an event; none: it is of no pulse input.
 std::optional<unsigned> input_of(const wire::Event& event) {
     switch (event.kind) {
-        case wire::EventKind::pps: return wire::pulse_pps;
-        case wire::EventKind::aux_pulse: return wire::pulse_aux0 + unsigned{event.source & 1U};
-        case wire::EventKind::sync_pulse: return wire::pulse_sync;
+        case wire::BoardEventKind::pps: return wire::pulse_pps;
+        case wire::BoardEventKind::aux_pulse: return wire::pulse_aux0 + unsigned{event.source & 1U};
+        case wire::BoardEventKind::sync_pulse: return wire::pulse_sync;
         default: return std::nullopt;
     }
 }

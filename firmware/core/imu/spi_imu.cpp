@@ -118,17 +118,17 @@ void SpiImu::next_step(Nanoseconds now) {
     readings_ = 0;
     arm();
     if (job_state_ == Job::none)
-        fail(wire::EventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
+        fail(wire::BoardEventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
 }
 
 void SpiImu::check_step(Nanoseconds now) {
     const SetupStep& step = setup_[step_];
     const ImuReply& reply = replies_[0];
     const auto at = static_cast<std::uint16_t>(step_);
-    if (reply.refused) return fail(wire::EventKind::imu_silent, now, 0, at);
+    if (reply.refused) return fail(wire::BoardEventKind::imu_silent, now, 0, at);
     if (step.action == SetupStep::Action::expect) {
         const std::uint16_t answer = part_->answer(job_.transfers[0], reply);
-        if (answer != step.value) return fail(wire::EventKind::imu_failed, now, answer, at);
+        if (answer != step.value) return fail(wire::BoardEventKind::imu_failed, now, answer, at);
     }
     ++step_;
     resume_ = now + static_cast<Nanoseconds>(step.pause_us) * 1000;
@@ -147,10 +147,11 @@ void SpiImu::run(Nanoseconds now) {
     served_at_ = now;
     edges_lost_ = false;
     fast_edges_ = 0;
-    report_event(wire::EventKind::imu_ready, now, part_->identity());
+    report_event(wire::BoardEventKind::imu_ready, now, part_->identity());
 }
 
-void SpiImu::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail) {
+void SpiImu::fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value,
+                  std::uint16_t detail) {
     bus_.disarm();
     job_state_ = Job::none;
     report_failure(kind, now, value, detail);
@@ -197,7 +198,7 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
     if (!ready_edges_.find(reply.started, sample.time_ns, edge)) return false;
     Nanoseconds next = 0;
     if (ready_edges_.next(edge, next) && next <= reply.ended)
-        return drop(wire::EventKind::imu_failed, now);
+        return drop(wire::BoardEventKind::imu_failed, now);
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
     if (edges_lost_) {
@@ -261,7 +262,7 @@ bool SpiImu::refused() const {
 }
 
 /// A reading gives no sample; its number will be missing.
-bool SpiImu::drop(wire::EventKind kind, Nanoseconds now) {
+bool SpiImu::drop(wire::BoardEventKind kind, Nanoseconds now) {
     readings_ = 0;
     if (!count_error()) fail(kind, now, 0, while_running);
     return false;
@@ -270,7 +271,7 @@ bool SpiImu::drop(wire::EventKind kind, Nanoseconds now) {
 bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     job_state_ = Job::none;
     sample = {};
-    if (refused()) return drop(wire::EventKind::imu_silent, now);
+    if (refused()) return drop(wire::BoardEventKind::imu_silent, now);
     if (part_->parse(replies_, readings_, sample) == Verdict::unsure) {
         arm_reading(not_routed, now, 1);
         return false;
@@ -282,7 +283,7 @@ bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     sample.time_ns = reply.started;
     if (paced_by_part() && !stamp(reply, now, sample)) return false;
     stamp_accel(sample);
-    if (!finish(sample)) fail(wire::EventKind::imu_failed, now, 0, while_running);
+    if (!finish(sample)) fail(wire::BoardEventKind::imu_failed, now, 0, while_running);
     return true;
 }
 
@@ -307,16 +308,16 @@ bool SpiImu::poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample)
         (!paced_by_part() || replies_[readings_ - 1].started < settled))
         taken = take(now, sample);
     if (job_state_ == Job::armed && now >= job_until_)
-        fail(wire::EventKind::imu_silent, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_silent, now, 0, while_running);
     if (state_ == State::set_up && job_state_ == Job::none && now >= resume_) next_step(now);
     if (state_ != State::running) return taken;
     if (!paced_by_part()) {
         pace(now);
     } else if (now >= silent_at_) {
-        fail(wire::EventKind::imu_silent, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_silent, now, 0, while_running);
     } else if (fast_edges_ >= max_fast_edges) {
         // A part that has reset itself continues at another rate.
-        fail(wire::EventKind::imu_failed, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_failed, now, 0, while_running);
     } else if (job_state_ == Job::none) {
         // Neither the newest edge nor its echoes, whether they have come or not, start a reading.
         arm_reading(input_imu_ready, max(began_, ready_edges_.quiet_until()), part_->readings());

@@ -53,13 +53,13 @@ class SpiImu final : public ImuPort {
     void check_step(Nanoseconds now);
     void run(Nanoseconds now);
     void expect_edge(Nanoseconds now) { silent_at_ = now + patience_; }
-    void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
+    void fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
     void adapt(ImuTransfer& transfer) const;
     void arm();
     void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings);
     bool take(Nanoseconds now, wire::ImuSample& sample);
     bool refused() const;
-    bool drop(wire::EventKind kind, Nanoseconds now);
+    bool drop(wire::BoardEventKind kind, Nanoseconds now);
     bool stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sample);
     void stamp_accel(wire::ImuSample& sample) const;
     void pace(Nanoseconds now);

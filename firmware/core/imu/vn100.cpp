@@ -164,10 +164,10 @@ void Vn100::next_step(Nanoseconds now) {
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
-    report_event(wire::EventKind::imu_ready, now, 100);
+    report_event(wire::BoardEventKind::imu_ready, now, 100);
 }
 
-void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
+void Vn100::fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value) {
     report_failure(
         kind, now, value,
         state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
@@ -210,7 +210,7 @@ bool Vn100::take_line(Nanoseconds now) {
     drop(end);
     if (!waiting_) return true;
     if (error)
-        fail(wire::EventKind::imu_failed, now, code);
+        fail(wire::BoardEventKind::imu_failed, now, code);
     else if (answer)
         next_step(now);
     return true;
@@ -314,7 +314,7 @@ bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (waiting_ && step_ == Step::baud && baud_ != wanted_baud()) {
         set_baud(wanted_baud());  // it may have changed before it answered: ask again
     } else if (state_ == State::running || waiting_) {
-        fail(wire::EventKind::imu_silent, now, 0);
+        fail(wire::BoardEventKind::imu_silent, now, 0);
         return false;
     }
     send_step(now);

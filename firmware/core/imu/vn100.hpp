@@ -70,7 +70,7 @@ class Vn100 final : public ImuPort {
     Nanoseconds count(std::uint64_t startup_ns);
     bool parse(Nanoseconds now, wire::ImuSample& sample);
     void drop(std::size_t size);
-    void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value);
+    void fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value);
 
     ImuUart& uart_;
     wire::ImuConfiguration configuration_{};
