@@ -11,7 +11,7 @@ constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: two crystals differ by
 constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
-/// Bounds the work of one poll. At half, a burst of edges takes more polls; at twice, other work
+/// Bounds the work of one poll. If lower, a burst of edges takes more polls; if higher, other work
 /// waits longer.
 constexpr unsigned edges_a_poll = 24;
 
@@ -44,7 +44,7 @@ void Board::poll_edges(Nanoseconds now) {
         more_ = true;
     else
         settled = hal_.edges.settled();
-    if (bouncing_ != 0)
+    if (unsettled_ != 0)
         settle_exposures(settled);
     else if (settled > settled_)
         settled_ = settled;
@@ -61,7 +61,7 @@ void Board::edges_lost(std::uint32_t lines) {
     }
     light_.edges_lost(lines);
     exposing_ = static_cast<std::uint8_t>(exposing_ & ~lines);
-    stirred_ = true;
+    dirty_ = true;
 }
 
 void Board::take_edge(const Edge& edge, Nanoseconds now) {
@@ -77,7 +77,7 @@ void Board::take_edge(const Edge& edge, Nanoseconds now) {
         const auto input = static_cast<wire::PulseInput>(edge.input - input_pulse);
         const bool falling = (configuration_.ports.falling >> input & 1U) != 0;
         if (edge.level == falling) return;
-        stirred_ = true;
+        dirty_ = true;
         if (echoes_[input].take(edge.at))
             take_pulse(input, edge.at);
         else
@@ -95,12 +95,12 @@ void Board::take_exposure_edge(const Edge& edge) {
             edges_lost(all_lines);
     }
     camera.edge(edge.at, edge.level);
-    stirred_ = true;
+    dirty_ = true;
     const bool exposing = camera.exposing(edge.level);
     light_.edge(edge.input, exposing);
     const auto bit = static_cast<std::uint8_t>(1U << edge.input);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
-    bouncing_ = static_cast<std::uint8_t>(bouncing_ | bit);
+    unsettled_ = static_cast<std::uint8_t>(unsettled_ | bit);
     if (!exposing) switch_slaves();
 }
 
@@ -111,8 +111,8 @@ void Board::settle_exposures(Nanoseconds known) {
     Nanoseconds settled = known;
     for (;; settled = known) {
         unsigned first = camera_count;
-        for (unsigned i = 0; bouncing_ >> i != 0; ++i) {
-            if ((bouncing_ >> i & 1U) == 0) continue;
+        for (unsigned i = 0; unsettled_ >> i != 0; ++i) {
+            if ((unsettled_ >> i & 1U) == 0) continue;
             const Nanoseconds at = cameras_[i].settled(known);
             if (at > settled || (at == settled && cameras_[i].is_slave())) continue;
             settled = at;
@@ -124,7 +124,7 @@ void Board::settle_exposures(Nanoseconds known) {
         edge.input = static_cast<std::uint8_t>(first);
         const bool counts = cameras_[first].take_edge(known, edge.at, edge.level);
         if (cameras_[first].is_bouncing()) break;
-        bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << first));
+        unsettled_ = static_cast<std::uint8_t>(unsettled_ & ~(1U << first));
         if (counts) judge_exposure_edge(edge);
     }
     if (settled > settled_) settled_ = settled;
@@ -132,7 +132,7 @@ void Board::settle_exposures(Nanoseconds known) {
 
 void Board::judge_exposure_edge(const Edge& edge) {
     CameraChannel& master = cameras_[edge.input];
-    stirred_ = true;
+    dirty_ = true;
     master.exposure_edge(edge.at, edge.level);
     if ((masters_ >> edge.input & 1U) == 0) return;
     for (CameraChannel& slave : cameras_)

@@ -134,7 +134,7 @@ void Illumination::close_gate(Nanoseconds now) {
         min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
     const Nanoseconds unused = gate_off_ - closed;
     last_off_ = closed;
-    saved_ += unused - earned(unused);  // what a late end cost is already taken off
+    saved_ += unused - earned(unused);  // what a late end cost is already subtracted
     saved_at_ = closed;
     gate_off_ = never;
 }

@@ -149,7 +149,7 @@ export class UsbHost {
         if (this.device.is_attached) this.begin();
     }
 
-    /// Sets the device up anew, as after an error.
+    /// Sets the device up again, as after an error.
     reset() {
         this.lose();
         this.state = 'attached';
@@ -372,7 +372,7 @@ export class UsbHost {
         this.is_held = true;
     }
 
-    /// The bus is free after so many bits. Slots begin anew after a success.
+    /// The bus is free after so many bits. Slots start over after a success.
     release(bits, moved) {
         this.busy_until = this.clock.now + cycles_of_bits(bits + gap_bits);
         if (moved) this.slot_base = this.busy_until;

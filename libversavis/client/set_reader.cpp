@@ -15,13 +15,13 @@ namespace versavis {
 
 namespace {
 
-// Sets that may wait for frames. Half: with one camera far behind, sets of the last 3 s at 20 Hz.
-// Twice: items of so many more are held, which costs little, and most are overwritten anyway.
+// Sets that may wait for frames: 6 s at 20 Hz, with one camera far behind. More cost little, but
+// most of their items are overwritten anyway.
 constexpr std::size_t most_pending = 128;
 
-// Between two looks at the IMU at most, whether or not a set waits for its samples. Half: a reader
-// whose cameras are slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is
-// overtaken.
+// Between two looks at the IMU at most, whether or not a set waits for its samples. If lower, a
+// reader whose cameras are slow wakes up more often; if higher, a ring of less than 0.2 s of
+// samples is overtaken.
 constexpr Duration unwatched = milliseconds(100);
 
 // Losses of a camera that one look bears, as in ImuWindow.
@@ -79,7 +79,7 @@ struct SetReader::State {
     std::optional<HostTime> next_deadline() const;
 };
 
-/// What is to be told: a restart once for all streams.
+/// The pause to report: a restart once for all streams.
 std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64_t life_now) {
     if (why.why != Pause::restarted || life_now == life) return std::nullopt;
     life = life_now;
@@ -91,7 +91,7 @@ std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64
     return why;
 }
 
-/// What is to be told: the end of the first camera that ends, until one of them goes on.
+/// The pause to report: the end of the first camera that ends, until one of them continues.
 std::optional<NoItem> SetReader::State::gone(const NoItem& why, std::size_t camera) {
     if (why.why != Pause::gone) return std::nullopt;
     const bool is_first = !any_ended();

@@ -17,15 +17,15 @@ namespace {
 using namespace clock;
 using nlohmann::json;
 
-// The estimate begins anew with the recording, and is settled after this. Half: its beginning is
-// judged as well. Twice: short recordings have nothing left to judge.
+// The estimate starts with the recording, and is settled after this. If lower, its beginning is
+// judged as well; if higher, short recordings have nothing left to judge.
 constexpr double settling_s = 20;
 
-// Less tells nothing. Half: a handful of exchanges. Twice: only refuses more.
+// A shorter recording has only a handful of exchanges.
 constexpr double least_s = 10;
 
-// How long a reading of the output clock holds after it. It is read once a second. Half: one that
-// came late makes a gap. Twice: a slewed clock is 0.5 us further off.
+// How long a reading of the output clock holds after it. It is read once a second. If lower, one
+// that came late makes a gap; if higher, a slewed clock is 0.5 us further off.
 constexpr Duration reading_holds = seconds(2);
 
 constexpr std::int64_t second_ns = 1'000'000'000;

@@ -82,7 +82,7 @@ Expected<> LedEvaluation::add(const std::string& camera, std::uint64_t life, Out
     const auto picture = grey_picture(camera, frame, pixels);
     if (!picture) return Unexpected(picture.error());
     const auto given = settings_.exposures.find(camera);
-    LedShot shot;
+    LedObservation shot;
     shot.life = life;
     shot.epoch = frame.epoch;
     shot.tick = frame.tick();

@@ -16,8 +16,8 @@ namespace {
 constexpr std::string_view magic = "#ROSBAG V2.0\n";
 constexpr std::size_t bag_header_size = 4096;  ///< the format fixes it
 
-/// A chunk ends when it has so many bytes; ROS itself takes as many. At half there are more index
-/// records, at twice a reader that wants one message decompresses more.
+/// A chunk ends at this size, which ROS itself uses. If lower, there are more index records; if
+/// higher, a reader that wants one message decompresses more.
 constexpr std::size_t chunk_threshold = 768 << 10U;
 
 enum class Op : std::uint8_t {

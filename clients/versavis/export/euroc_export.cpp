@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "export/metadata_csv.hpp"
-#include "export/png_crew.hpp"
+#include "export/png_encoder_pool.hpp"
 #include "posix/file.hpp"
 
 namespace versavis::client {
@@ -247,7 +247,7 @@ class EurocExport {
     const fs::path mav_;
     const ExportWatch& watch_;
     std::vector<NewFile> files_;
-    PngCrew crew_;
+    PngEncoderPool crew_;
     std::uint64_t frames_ = 0;
     std::vector<std::uint64_t> without_exposure_;  ///< frames of each camera
 };

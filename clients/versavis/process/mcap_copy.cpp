@@ -77,7 +77,7 @@ class Copy {
             return failure(path_, "stopped before the end of the recording");
         Expected<> done;
         switch (record.opcode) {
-            case McapOpcode::data_end: return false;  // the summary is made anew
+            case McapOpcode::data_end: return false;  // the summary is rebuilt
             case McapOpcode::message_index: return true;
             case McapOpcode::chunk: done = chunk_at(record.offset); break;
             case McapOpcode::attachment:

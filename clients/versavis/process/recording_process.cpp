@@ -21,8 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-// Stamps that are off the link's by more were made by PPS, which is better than messages are. Half
-// or twice: between 1 and 4 us, either is as good.
+// Stamps that are off the link's by more were made by PPS, which is better than messages are.
 constexpr double pps_differs_ns = 2000;
 
 constexpr std::uint32_t no_proof = UINT32_MAX;
@@ -61,7 +60,7 @@ Duration uncertain(const ProvedFrame& proof, HostTime middle) {
     return std::max(half, proof.arrival.arrived - middle);
 }
 
-/// How the link's asymmetry was taken off live.
+/// How the link's asymmetry was subtracted live.
 Duration asymmetry_of(const Recording& recording) {
     const Attachment* status = recording.attachment("status.json");
     if (status == nullptr) return {};
@@ -179,8 +178,8 @@ class Processing {
                     });
     }
 
-    /// Within an epoch each stamp lies after the one before, as live: what would not is held just
-    /// after that, and says so.
+    /// Within an epoch each stamp is later than the previous one, as live: one that would not be is
+    /// held just after it, and flagged.
     static void hold(Change change, std::uint64_t life, std::uint32_t epoch, Stream& stream) {
         if (life != stream.life || epoch != stream.epoch) stream.newest.reset();
         stream.life = life;
@@ -203,7 +202,8 @@ class Processing {
         Change change{item.time, item.time, sample.host_time, sample.sigma_ns, sample.flags,
                       no_proof,  false};
         const auto stamp = clock_of(sample.board_time - sample.filter_delay, sample.host_time);
-        // What else is uncertain, as the filter's delay, is not told apart: sigma stays.
+        // Other uncertainties, such as the filter's delay, are not stored separately, so sigma
+        // stays.
         if (stamp) set(change, *stamp);
         hold(change, item.life, sample.epoch, stream);
     }
@@ -417,7 +417,7 @@ std::optional<ChangedMessage> Processing::change(const McapChannel& channel,
 
 Expected<ProcessReport> process_recording(const std::string& path, const std::string& output,
                                           const std::function<bool(double share)>& go_on) {
-    const auto recording = Recording::open_file(path);  // it alone is written anew
+    const auto recording = Recording::open_file(path);  // only this one is rewritten
     if (!recording) return Unexpected(recording.error());
     ProcessReport report;
     report.file = output;

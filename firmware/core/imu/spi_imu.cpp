@@ -7,38 +7,38 @@ namespace {
 
 constexpr Nanoseconds mhz_ns = 1'000'000'000'000;
 
-/// A reading on a grid is armed this long ahead, of 1 ms at the highest rate. At half, a slow poll
-/// misses it; at twice, the highest rate leaves no time between two readings.
+/// A reading on a grid is armed this long ahead, of 1 ms at the highest rate. If lower, a slow poll
+/// misses it; if higher, the highest rate leaves no time between two readings.
 constexpr Nanoseconds set_ahead = 500'000;
 
-/// No transfer takes this long unless the bus hangs. At half, a slow poll restarts a part on I2C;
-/// at twice, a bus that hangs is noticed later.
+/// No transfer takes this long unless the bus hangs. If lower, a slow poll restarts a part on I2C;
+/// if higher, a bus that hangs is noticed later.
 constexpr Nanoseconds transfer_limit = 25'000'000;
 
-/// Of the slowest part. At half, it does not answer yet; at twice, sampling begins later.
+/// Of the slowest part. If lower, it does not answer yet; if higher, sampling begins later.
 constexpr Nanoseconds power_up_time = 300'000'000;
 
-/// At half, jitter of a part restarts it; at twice, samples of a part that reset itself are
+/// If lower, jitter of a part restarts it; if higher, samples of a part that reset itself are
 /// published for longer.
 constexpr unsigned max_fast_edges = 20;
 
-/// Added to twenty periods. At half, a slow poll restarts fast parts; at twice, silence is told
-/// late.
+/// Added to twenty periods. If lower, a slow poll restarts fast parts; if higher, silence is
+/// reported late.
 constexpr Nanoseconds silence_floor = 100'000'000;
 
-/// Around the bytes of the accelerometer: how far a port's clock pauses between bytes. At half,
-/// such a port may name the wrong edge; at twice, more samples do not know which it was.
+/// Around the bytes of the accelerometer: how far a port's clock pauses between bytes. If lower,
+/// such a port may name the wrong edge; if higher, more samples do not know which it was.
 constexpr Nanoseconds accel_margin = 2'000;
 
-/// Clocks of accelerometers are exact to a sixteenth. At half, a coarse clock goes unstamped; at
-/// twice, a clock that jumps is believed.
+/// Clocks of accelerometers are exact to a sixteenth. If lower, a coarse clock goes unstamped; if
+/// higher, a clock that jumps is accepted.
 constexpr Nanoseconds accel_tolerance = 16;
 constexpr Nanoseconds accel_age_step = 32;
 
 constexpr std::uint16_t while_running = 0xFFFF;
 
-/// The fastest that parts on I2C share with cables of a few decimetres. At half, 1 kHz does not
-/// fit; at twice, most pull-ups are too weak.
+/// The fastest that parts on I2C share with cables of a few decimetres. If lower, 1 kHz does not
+/// fit; if higher, most pull-ups are too weak.
 constexpr std::uint32_t i2c_clock_hz = 400'000;
 constexpr std::uint8_t i2c_address = 0x68;  ///< the second is the next one
 constexpr std::uint8_t reads = 0x80;        ///< of a register's address on the SPI bus
@@ -202,7 +202,7 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
     if (edges_lost_) {
-        // How many there were is told by the period of the part.
+        // How many there were follows from the part's period.
         const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
         due = periods > due ? periods : due;

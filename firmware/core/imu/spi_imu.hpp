@@ -9,6 +9,9 @@
 
 namespace versavis::firmware {
 
+/// Sets up an IMU on SPI or I2C by its ImuPart, reads it at each data-ready edge or on the board's
+/// grid, and checks and stamps its samples. Part of Board, called from Board::poll() only; the port
+/// runs the transfers by interrupts.
 class SpiImu final : public ImuPort {
  public:
     SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports);
@@ -76,7 +79,7 @@ class SpiImu final : public ImuPort {
     bool job_reads_ = false;     ///< its transfers are those that begin a sample
     Nanoseconds job_until_ = 0;  ///< when it must have ended; never: it waits for an edge
     unsigned readings_ = 0;      ///< of the sample that is being read
-    Nanoseconds period_ = 0;     ///< of the edges, as the part was told
+    Nanoseconds period_ = 0;     ///< of the edges, as configured in the part
     Nanoseconds accel_period_ = 0;
     unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed

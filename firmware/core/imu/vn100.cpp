@@ -28,8 +28,8 @@ constexpr std::size_t pressure_at = 52;
 constexpr Nanoseconds base_period = 1'250'000;  // of its own samples
 constexpr Nanoseconds power_up_time = 300'000'000;
 
-/// Edges closer to the one before are its echoes; the part's are a base period apart. At half, long
-/// reflections count double; at four times, two samples might be one.
+/// Edges closer to the one before are its echoes; the part's are a base period apart. If lower,
+/// long reflections count double; if higher, two samples might be one.
 constexpr Nanoseconds longest_echo = 300'000;
 
 std::uint32_t word32(const std::uint8_t* bytes) {
@@ -272,7 +272,7 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     const Nanoseconds off = edges_[newest] - stamp_ - since_last;
     const bool agrees = off < base_period / 2 && -off < base_period / 2;
     stamp_ = edges_[newest];
-    // A clock that stood still, or began anew, says nothing about the edge.
+    // A clock that stood still, or restarted, says nothing about the edge.
     if (since_last <= 0 || !agrees) return;
     sample.time_ns = stamp_;
     sample.flags |= wire::imu_stamped;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/ending.hpp"
+#include "engine/ring/segment_lifecycle.hpp"
 
 #include <climits>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A thread that takes none of the program's signals: they are for threads that the program knows.
+// Starts a thread with all signals blocked: signals are for the program's own threads.
 #pragma once
 
 #include <pthread.h>
@@ -10,9 +10,9 @@
 
 namespace versavis::ring {
 
-/// Throws std::system_error where no thread is to be had, as std::thread does.
+/// Throws std::system_error if no thread can be started, as std::thread does.
 template <class Work>
-std::thread quiet_thread(Work work) {
+std::thread start_thread_without_signals(Work work) {
     struct Quiet {
         Quiet() {
             sigset_t all;

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pulses that do not fit what is followed: whether they fit each other, so that they are to be
-// followed instead.
+// Pulses that do not fit the train being followed: if they fit each other, they are followed
+// instead.
 #pragma once
 
 #include "base/hal.hpp"
 
 namespace versavis::firmware {
 
-class PulseRival {
+class CandidatePulseTrain {
  public:
-    /// Pulses that must agree. At half, an echo is followed; at twice, a sender that began anew is
+    /// Pulses that must agree. If lower, an echo is followed; if higher, a sender that restarted is
     /// ignored for longer.
     static constexpr unsigned enough = 3;
 
     void clear() { count_ = 0; }
 
-    /// A pulse that does not fit. True: with those before, it is one of `enough` that are whole
-    /// periods apart, each to one part in `tolerance`.
+    /// Adds a pulse that does not fit. True: it is the last of `enough` that are whole periods
+    /// apart, each to one part in `tolerance`.
     bool add(Nanoseconds at, Nanoseconds period, Nanoseconds tolerance) {
         const Nanoseconds gap = at - newest_;
         const Nanoseconds periods = count_ == 0 ? 0 : (gap + period / 2) / period;
@@ -40,7 +40,7 @@ class PulseRival {
     Nanoseconds periods() const { return periods_; }
 
  private:
-    /// In periods. At half, a receiver that drops pulses is found later; at twice, noise agrees
+    /// In periods. If lower, a receiver that drops pulses is found later; if higher, noise agrees
     /// more easily.
     static constexpr Nanoseconds longest_gap = 4;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Wakes the readers of a ring: a few at once, a crowd by a thread of its own, so that no number of
-// readers holds the writer up.
+// Wakes the readers of a ring: a few directly, many by a separate thread, so that no number of
+// readers delays the writer.
 #pragma once
 
 #include <atomic>
@@ -9,25 +9,26 @@
 
 namespace versavis::ring {
 
-/// The thread is there from the first crowd on. One thread at a time may call wake().
-class Crowd {
+/// The thread runs from the first time that many readers wait. Called by the thread that publishes,
+/// one at a time.
+class WaiterWaker {
  public:
-    Crowd() = default;
-    Crowd(const Crowd&) = delete;
-    Crowd& operator=(const Crowd&) = delete;
-    ~Crowd();  ///< waits for the thread, which uses the word
+    WaiterWaker() = default;
+    WaiterWaker(const WaiterWaker&) = delete;
+    WaiterWaker& operator=(const WaiterWaker&) = delete;
+    ~WaiterWaker();  ///< waits for the thread, which uses the word
 
     /// Wakes all who sleep on `word`, which is the same in all calls.
     void wake(const std::atomic<std::uint32_t>& word);
 
  private:
-    void tell();
+    void notify();
     void call(const std::atomic<std::uint32_t>& word);
     void run(const std::atomic<std::uint32_t>& word);
 
     // No lock: the thread could lose the processor while it holds one.
     std::atomic<std::uint32_t> calls_{};
-    std::atomic<bool> present_{false};  ///< the thread found a crowd when it was last called
+    std::atomic<bool> present_{false};  ///< the thread found many sleepers when it was last called
     std::atomic<bool> stop_{false};
     std::thread thread_;
 };

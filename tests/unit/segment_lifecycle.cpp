@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/ending.hpp"
+#include "engine/ring/segment_lifecycle.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -29,7 +29,8 @@ TEST_CASE_METHOD(Ended,
     CHECK(readers.asleep() == 3);
 }
 
-TEST_CASE_METHOD(Ended, "ending: all readers are woken, and those about to sleep do not") {
+TEST_CASE_METHOD(Ended,
+                 "segment_lifecycle: all readers are woken, and those about to sleep do not") {
     const bool ends = GENERATE(true, false);
     reinstate(header);
     const test::Sleepers readers(header.wake, 3);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/door.hpp"
+#include "engine/ring/segment_server.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,17 +13,17 @@
 #include <cstring>
 #include <system_error>
 
-#include "client/quiet_thread.hpp"
+#include "client/thread_without_signals.hpp"
 
 namespace versavis::ring {
 
 namespace {
 
-/// Who may connect at once and wait to be let in. Half or twice: each waits for some microseconds.
+/// Connections that may be pending.
 constexpr int waiting = 64;
 
-/// Before the next try where no descriptor or memory is to be had. Half: a service that is short of
-/// both spends twice as much on it. Twice: who connects then waits for longer.
+/// Before the next try when no descriptor or memory is available. If lower, a service that is short
+/// of both spends more on it; if higher, clients that connect then wait longer.
 constexpr auto pause = std::chrono::milliseconds(10);
 
 Unexpected<> not_made(const std::filesystem::path& path) {
@@ -33,7 +33,7 @@ Unexpected<> not_made(const std::filesystem::path& path) {
         "does its directory belong to the service's user?");
 }
 
-/// Never waits. Who does not take it, or has left, goes without.
+/// Never waits. A client that does not take it, or has left, gets nothing.
 void hand_over(int segment, int connection) {
     char byte{};
     iovec data{&byte, sizeof byte};
@@ -53,8 +53,8 @@ void hand_over(int segment, int connection) {
 
 }  // namespace
 
-Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path,
-                                           FileDescriptor segment) {
+Expected<std::unique_ptr<SegmentServer>> SegmentServer::open(const std::filesystem::path& path,
+                                                             FileDescriptor segment) {
     const FileDescriptor directory(::open(path.parent_path().c_str(), O_PATH | O_CLOEXEC));
     FileDescriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
     if (!directory || !socket) return not_made(path);
@@ -69,25 +69,25 @@ Expected<std::unique_ptr<Door>> Door::open(const std::filesystem::path& path,
         ::chmod(path.c_str(), 0660) != 0 ||  // whatever umask says
         ::listen(socket.get(), waiting) != 0)
         return not_made(path);
-    std::unique_ptr<Door> door(new Door(std::move(segment), std::move(socket)));
+    std::unique_ptr<SegmentServer> server(new SegmentServer(std::move(segment), std::move(socket)));
     try {
-        door->thread_ = quiet_thread([self = door.get()] { self->serve(); });
+        server->thread_ = start_thread_without_signals([self = server.get()] { self->serve(); });
     } catch (const std::system_error& error) {
         return failure(path.string(), fmt::format("cannot start a thread: {}", error.what()),
                        "raise the limit on tasks");
     }
-    return door;
+    return server;
 }
 
-Door::Door(FileDescriptor segment, FileDescriptor socket)
+SegmentServer::SegmentServer(FileDescriptor segment, FileDescriptor socket)
     : segment_(std::move(segment)), socket_(std::move(socket)) {}
 
-Door::~Door() {
+SegmentServer::~SegmentServer() {
     ::shutdown(socket_.get(), SHUT_RDWR);  // accept() returns
     if (thread_.joinable()) thread_.join();
 }
 
-void Door::serve() const {
+void SegmentServer::serve() const {
     for (;;) {
         const FileDescriptor connection(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC));
         if (connection)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pulse_rival.hpp"
+#include "candidate_pulse_train.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -9,8 +9,8 @@ namespace {
 constexpr Nanoseconds second = 1'000'000'000;
 }
 
-TEST_CASE("pulse_rival: three pulses whole periods apart agree, over short gaps") {
-    PulseRival rival;
+TEST_CASE("candidate_pulse_train: three pulses whole periods apart agree, over short gaps") {
+    CandidatePulseTrain rival;
     CHECK_FALSE(rival.add(second, second, 5'000));
     CHECK_FALSE(rival.add(2 * second, second, 5'000));
     CHECK(rival.add(6 * second, second, 5'000));
@@ -25,26 +25,26 @@ TEST_CASE("pulse_rival: three pulses whole periods apart agree, over short gaps"
     CHECK(rival.first() == 8 * second);
 }
 
-TEST_CASE("pulse_rival: pulses agree up to the tolerance of the time between them") {
+TEST_CASE("candidate_pulse_train: pulses agree up to the tolerance of the time between them") {
     const Nanoseconds sign = GENERATE(1, -1);
     const Nanoseconds periods = GENERATE(1, 4);
     CAPTURE(sign, periods);
     const Nanoseconds furthest = periods * (second + sign * 200'000);
     for (const Nanoseconds beyond : {0, 1}) {
-        PulseRival rival;
+        CandidatePulseTrain rival;
         CHECK_FALSE(rival.add(0, second, 5'000));
         CHECK_FALSE(rival.add(furthest, second, 5'000));
         CHECK(rival.add(2 * furthest + sign * beyond, second, 5'000) == (beyond == 0));
     }
 }
 
-TEST_CASE("pulse_rival: one that does not agree begins anew") {
+TEST_CASE("candidate_pulse_train: one that does not agree begins anew") {
     const Nanoseconds odd = GENERATE(as<Nanoseconds>{}, 2 * second + 200'001,  // off
                                      second + 300'000'000,  // less than half a period
                                      second,                // the same again
                                      6 * second);           // too long ago
     CAPTURE(odd);
-    PulseRival rival;
+    CandidatePulseTrain rival;
     CHECK_FALSE(rival.add(0, second, 5'000));
     CHECK_FALSE(rival.add(second, second, 5'000));
     CHECK_FALSE(rival.add(odd, second, 5'000));

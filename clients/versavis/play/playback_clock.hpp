@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// When an item of a recording is due to be published again.
+// When an item of a recording is due for publication.
 #pragma once
 
 #include <optional>
@@ -8,12 +8,12 @@
 
 namespace versavis::client {
 
-class Pace {
+class PlaybackClock {
  public:
-    explicit Pace(double rate) : rate_(rate) {}
+    explicit PlaybackClock(double rate) : rate_(rate) {}
 
-    /// When the item of this stamp is due, asked at `now`. Stamps that jump, since the output clock
-    /// was set or the recorder's machine slept, are no reason to wait: the next item comes at once.
+    /// When the item of this stamp is due, asked at `now`. Stamps that jump, because the output
+    /// clock was set or the recorder's machine slept, cause no wait: the next item is due at once.
     HostTime due(OutputTime stamp, HostTime now);
 
     /// The same for one that others set the pace of: `now` if it is older than the first of them,

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What interrupts leave for the main loop: the core is to be polled.
+// A flag set by interrupts: the main loop is to poll the core.
 #pragma once
 
 #include "registers.hpp"
 
 namespace versavis::rp2040 {
 
-class Attention {
+class WakeFlag {
  public:
     void ask() {
         asked_ = true;
@@ -15,7 +15,7 @@ class Attention {
     /// The main loop runs when no interrupt does; without it, it sleeps on.
     static void wake() { system_control() = 0; }
     static void sleep_after_interrupts() { system_control() = sleep_on_exit; }
-    /// What happens from here on asks anew.
+    /// Later events set it again.
     void forget() { asked_ = false; }
     bool asked() const { return asked_; }
 

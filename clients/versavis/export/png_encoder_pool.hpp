@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Writes PNG files, as many at a time as there are processors.
+// Writes PNG files in parallel, one per processor. Called by one thread.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@
 
 namespace versavis::client {
 
-class PngCrew {
+class PngEncoderPool {
  public:
-    PngCrew();
+    PngEncoderPool();
 
     /// Waits when all are busy. Errors: of files that were given before.
     Expected<> write(const std::string& path, const ExportFormat& format, std::uint32_t width,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The end of a segment, told to its readers.
+// Marks a segment as superseded or closed, and wakes its readers.
 #pragma once
 
 #include "versavis/ring_layout.hpp"

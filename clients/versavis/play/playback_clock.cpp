@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "play/pace.hpp"
+#include "play/playback_clock.hpp"
 
 #include <algorithm>
 
@@ -8,12 +8,13 @@ namespace versavis::client {
 namespace {
 
 /// Streams lie in the file within a second of one another, and pauses of a service that restarts
-/// last some seconds. At half such a pause would be skipped, at twice a jump back is waited for.
+/// last some seconds. If lower, such a pause would be skipped; if higher, a jump back is waited
+/// for.
 constexpr Duration longest_step = seconds(10);
 
 }  // namespace
 
-HostTime Pace::due(OutputTime stamp, HostTime now) {
+HostTime PlaybackClock::due(OutputTime stamp, HostTime now) {
     if (!anchor_ || absolute(stamp - newest_) > longest_step) {
         anchor_ = stamp;
         anchored_ = now;
@@ -23,12 +24,12 @@ HostTime Pace::due(OutputTime stamp, HostTime now) {
     return at(stamp);
 }
 
-HostTime Pace::due_beside(OutputTime stamp, HostTime now) const {
+HostTime PlaybackClock::due_beside(OutputTime stamp, HostTime now) const {
     const bool beside = anchor_ && stamp >= *anchor_ && absolute(stamp - newest_) <= longest_step;
     return beside ? at(stamp) : now;
 }
 
-HostTime Pace::at(OutputTime stamp) const {
+HostTime PlaybackClock::at(OutputTime stamp) const {
     const auto since = static_cast<double>((stamp - *anchor_).ns) / rate_;
     return anchored_ + Duration{static_cast<std::int64_t>(since)};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/room.hpp"
+#include "engine/ring/memory_budget.hpp"
 
 #include <fmt/format.h>
 #include <sys/statvfs.h>
@@ -14,9 +14,9 @@ namespace versavis::ring {
 
 namespace {
 
-/// Memory that a ring leaves to everything else, this service's own included. Half: a machine that
-/// is nearly full starts, and other programs are ended later. Twice: a small computer needs smaller
-/// rings than it must.
+/// Memory that a ring leaves to everything else, this service's own included. If lower, a machine
+/// that is nearly full starts, and the kernel kills other programs later; if higher, a small
+/// computer is restricted to smaller rings than necessary.
 constexpr std::uint64_t memory_left = 64 << 20U;
 
 constexpr const char* cure = "lower 'slots' or 'history_s'";
@@ -53,8 +53,8 @@ Expected<> check_memory(const std::filesystem::path& ring, std::uint64_t size,
     return {};
 }
 
-Expected<> check_room(const std::filesystem::path& ring, std::uint64_t size,
-                      const std::filesystem::path& memory) {
+Expected<> check_tmpfs_space(const std::filesystem::path& ring, std::uint64_t size,
+                             const std::filesystem::path& memory) {
     struct statvfs system {};
     const std::filesystem::path directory = ring.parent_path();
     if (::statvfs(directory.c_str(), &system) == 0) {

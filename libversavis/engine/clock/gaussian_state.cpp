@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/clock/belief_matrix.hpp"
+#include "engine/clock/gaussian_state_matrix.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -40,19 +40,19 @@ double to_seconds(Duration span) { return static_cast<double>(span.ns) * 1e-9; }
 
 }  // namespace
 
-Belief Belief::after_exchange(double round_trip_ns) {
-    Belief belief;
-    belief.mean[3] = start_delay_of_round_trip * round_trip_ns;
-    const double delay_sigma = belief.mean[3];
+GaussianState GaussianState::after_exchange(double round_trip_ns) {
+    GaussianState state;
+    state.mean[3] = start_delay_of_round_trip * round_trip_ns;
+    const double delay_sigma = state.mean[3];
     const double offset_sigma = start_sigma_of_round_trip * round_trip_ns;
-    matrix(belief).diagonal() << offset_sigma * offset_sigma, start_skew_sigma * start_skew_sigma,
+    matrix(state).diagonal() << offset_sigma * offset_sigma, start_skew_sigma * start_skew_sigma,
         drift_walk * drift_walk * drift_memory_s / 2, delay_sigma * delay_sigma;
-    return belief;
+    return state;
 }
 
-BeliefMatrix transition(Duration span) {
+StateMatrix transition(Duration span) {
     const double seconds = to_seconds(span);
-    BeliefMatrix result = BeliefMatrix::Identity();
+    StateMatrix result = StateMatrix::Identity();
     result(0, 1) = seconds;
     result(0, 2) = 0.5 * seconds * seconds;
     result(1, 2) = seconds;
@@ -60,12 +60,12 @@ BeliefMatrix transition(Duration span) {
     return result;
 }
 
-BeliefMatrix process_noise(Duration span) {
+StateMatrix process_noise(Duration span) {
     const double t = std::abs(to_seconds(span));
     const double t2 = t * t;
     const double skew = skew_walk * skew_walk;
     const double drift = drift_walk * drift_walk;
-    BeliefMatrix noise = BeliefMatrix::Zero();
+    StateMatrix noise = StateMatrix::Zero();
     noise(0, 0) = skew * t2 * t / 3 + drift * t2 * t2 * t / 20;
     noise(0, 1) = noise(1, 0) = skew * t2 / 2 + drift * t2 * t2 / 8;
     noise(0, 2) = noise(2, 0) = drift * t2 * t / 6;
@@ -76,25 +76,25 @@ BeliefMatrix process_noise(Duration span) {
     return noise;
 }
 
-Belief Belief::after(Duration span) const {
-    const BeliefMatrix change = transition(span);
-    Belief later;
+GaussianState GaussianState::after(Duration span) const {
+    const StateMatrix change = transition(span);
+    GaussianState later;
     vector(later) = change * vector(*this);
     matrix(later) = change * matrix(*this) * change.transpose() + process_noise(span);
     return later;
 }
 
-double Belief::offset_after(Duration span) const {
+double GaussianState::offset_after(Duration span) const {
     const double seconds = to_seconds(span);
     return mean[0] + seconds * (mean[1] + 0.5 * seconds * mean[2]);
 }
 
-BeliefVector level_by_component(double sign, Duration span) {
+StateVector level_by_component(double sign, Duration span) {
     const double seconds = to_seconds(span);
     return {sign, sign * seconds, sign * 0.5 * seconds * seconds, 1};
 }
 
-double Belief::offset_variance_after(Duration span) const {
+double GaussianState::offset_variance_after(Duration span) const {
     const double seconds = to_seconds(span);
     const double half_square = 0.5 * seconds * seconds;
     const auto c = matrix(*this);

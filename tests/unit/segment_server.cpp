@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/door.hpp"
+#include "engine/ring/segment_server.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -77,11 +77,11 @@ bool is_handed(const FileDescriptor& socket, const FileDescriptor& file) {
 
 }  // namespace
 
-TEST_CASE("door: a crowd that takes nothing, or leaves at once, stops nobody") {
+TEST_CASE("segment_server: a crowd that takes nothing, or leaves at once, stops nobody") {
     const test::TemporaryDirectory directory("/dev/shm");
-    const auto path = directory.path() / "door";
-    const auto door = Door::open(path, sealed_file());
-    REQUIRE(door);
+    const auto path = directory.path() / "server";
+    const auto server = SegmentServer::open(path, sealed_file());
+    REQUIRE(server);
     std::vector<FileDescriptor> crowd;
     for (int i = 0; i < 200; ++i) {
         if (i % 2 == 0)
@@ -92,45 +92,47 @@ TEST_CASE("door: a crowd that takes nothing, or leaves at once, stops nobody") {
     }
 }
 
-TEST_CASE("door: who connects gets one byte with the file, without a word, and is disconnected") {
+TEST_CASE(
+    "segment_server: who connects gets one byte with the file, without a word, and is "
+    "disconnected") {
     const test::TemporaryDirectory directory("/dev/shm");
-    const auto path = directory.path() / "door";
+    const auto path = directory.path() / "server";
     const FileDescriptor file = sealed_file();
-    const auto door = Door::open(path, FileDescriptor(::dup(file.get())));
-    REQUIRE(door);
+    const auto server = SegmentServer::open(path, FileDescriptor(::dup(file.get())));
+    REQUIRE(server);
     CHECK(is_handed(connect(path), file));
 }
 
-TEST_CASE("door: without a descriptor to be had it rests, and lets all in later") {
+TEST_CASE("segment_server: without a descriptor to be had it rests, and lets all in later") {
     const test::TemporaryDirectory directory("/dev/shm");
-    const auto path = directory.path() / "door";
+    const auto path = directory.path() / "server";
     const FileDescriptor file = sealed_file();
     const auto others = test::threads();
-    const auto door = Door::open(path, FileDescriptor(::dup(file.get())));
-    REQUIRE(door);
+    const auto server = SegmentServer::open(path, FileDescriptor(::dup(file.get())));
+    REQUIRE(server);
     test::Rest rest(test::wait_for_one_more(others));
     rest.wait();
     std::vector<FileDescriptor> crowd;
     for (int i = 0; i < 50; ++i) crowd.push_back(make_socket());
     {
         const test::NoDescriptors none;
-        // The first has the descriptor at which the door has been waiting for somebody.
+        // The first has the descriptor at which the server has been waiting for somebody.
         for (const FileDescriptor& socket : crowd) CHECK(connects(socket, path));
         rest.wait();
     }
     for (const FileDescriptor& socket : crowd) CHECK(is_handed(socket, file));
 }
 
-TEST_CASE("door: where an address has no room for the path, and whatever lay there") {
+TEST_CASE("segment_server: where an address has no room for the path, and whatever lay there") {
     const test::TemporaryDirectory directory("/dev/shm");
     const auto deep = directory.path() / std::string(150, 'd');
     std::filesystem::create_directory(deep);
-    std::filesystem::create_symlink("victim", deep / "door");
+    std::filesystem::create_symlink("victim", deep / "server");
     {
-        const auto door = Door::open(deep / "door", sealed_file());
-        REQUIRE(door);
-        CHECK(open_trusted(deep / "door", std::nullopt));
-        std::filesystem::rename(deep / "door", deep / "renamed");
+        const auto server = SegmentServer::open(deep / "server", sealed_file());
+        REQUIRE(server);
+        CHECK(open_trusted(deep / "server", std::nullopt));
+        std::filesystem::rename(deep / "server", deep / "renamed");
         CHECK(open_trusted(deep / "renamed", std::nullopt));
     }
     CHECK_THAT(open_trusted(deep / "renamed", std::nullopt).error().message(),
@@ -138,21 +140,21 @@ TEST_CASE("door: where an address has no room for the path, and whatever lay the
     CHECK_FALSE(std::filesystem::exists(deep / "victim"));
 }
 
-TEST_CASE("door: where it cannot be made, it says so") {
-    CHECK_THAT(Door::open("/nowhere/door", sealed_file()).error().message(),
+TEST_CASE("segment_server: where it cannot be made, it says so") {
+    CHECK_THAT(SegmentServer::open("/nowhere/server", sealed_file()).error().message(),
                Catch::Contains("cannot be made a socket: No such file or directory"));
-    CHECK_THAT(Door::open("/proc/door", sealed_file()).error().message(),
-               Catch::Contains("/proc/door: cannot be made a socket"));
+    CHECK_THAT(SegmentServer::open("/proc/server", sealed_file()).error().message(),
+               Catch::Contains("/proc/server: cannot be made a socket"));
     const std::string longest(300, 'x');
-    CHECK_THAT(Door::open("/" + longest + "/door", sealed_file()).error().message(),
+    CHECK_THAT(SegmentServer::open("/" + longest + "/server", sealed_file()).error().message(),
                Catch::Contains("cannot be made a socket: File name too long"));
     const test::TemporaryDirectory directory("/dev/shm");
     const auto pipe = directory.path() / "pipe";
     REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-    CHECK_THAT(Door::open(pipe / "door", sealed_file()).error().message(),
+    CHECK_THAT(SegmentServer::open(pipe / "server", sealed_file()).error().message(),
                Catch::Contains("cannot be made a socket: Not a directory"));
     const test::NoThreads none;
     CHECK_THAT(
-        Door::open(directory.path() / "door", sealed_file()).error().message(),
+        SegmentServer::open(directory.path() / "server", sealed_file()).error().message(),
         Catch::Contains("cannot start a thread") && Catch::Contains("raise the limit on tasks"));
 }

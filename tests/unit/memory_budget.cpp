@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/ring/room.hpp"
+#include "engine/ring/memory_budget.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -22,7 +22,8 @@ struct Machine {
 
     /// With so much memory available.
     Expected<> check(std::uint64_t size, const std::string& memory) const {
-        return check_room(directory.path() / "cam0", size, directory.write("meminfo", memory));
+        return check_tmpfs_space(directory.path() / "cam0", size,
+                                 directory.write("meminfo", memory));
     }
 };
 
@@ -33,7 +34,7 @@ std::string with(std::uint64_t available_mib) {
 
 }  // namespace
 
-TEST_CASE_METHOD(Machine, "room: a ring leaves 64 MiB to others") {
+TEST_CASE_METHOD(Machine, "memory_budget: a ring leaves 64 MiB to others") {
     CHECK(check(100 * mib, with(164)));
     const auto refused = check(100 * mib + 1, with(164));
     REQUIRE_FALSE(refused);
@@ -45,25 +46,27 @@ TEST_CASE_METHOD(Machine, "room: a ring leaves 64 MiB to others") {
     CHECK_FALSE(check(1, with(1)));
 }
 
-TEST_CASE_METHOD(Machine, "room: where the machine does not tell, the file system decides") {
+TEST_CASE_METHOD(Machine,
+                 "memory_budget: where the machine does not tell, the file system decides") {
     for (const char* memory : {"", "MemTotal: 5 kB\n", "MemAvailable: much\n", "\n\n"})
         CHECK(check(mib, memory));
-    CHECK(check_room(directory.path() / "cam0", mib, directory.path() / "nothing"));
+    CHECK(check_tmpfs_space(directory.path() / "cam0", mib, directory.path() / "nothing"));
 }
 
-TEST_CASE_METHOD(Machine, "room: a file system that is too small says how to enlarge it") {
+TEST_CASE_METHOD(Machine, "memory_budget: a file system that is too small says how to enlarge it") {
     const auto refused = check(std::uint64_t{1} << 50U, "");
     REQUIRE_FALSE(refused);
     CHECK_THAT(refused.error().message(), Contains("free in its file system"));
     CHECK_THAT(refused.error().message(), Contains("remount"));
 }
 
-TEST_CASE_METHOD(Machine, "room: a file system that does not count its blocks has room") {
+TEST_CASE_METHOD(Machine, "memory_budget: a file system that does not count its blocks has room") {
     // As a tmpfs without a limit.
-    CHECK(check_room("/proc/cam0", mib, directory.write("meminfo", "")));
+    CHECK(check_tmpfs_space("/proc/cam0", mib, directory.write("meminfo", "")));
 }
 
-TEST_CASE_METHOD(Machine, "room: a ring may take all of its file system, and no byte more") {
+TEST_CASE_METHOD(Machine,
+                 "memory_budget: a ring may take all of its file system, and no byte more") {
     const auto meminfo = directory.write("meminfo", "");
     const auto mounted = [&] { return test::mount_small_disk(directory.path(), "1m"); };
     if (!in_process(mounted)) {
@@ -71,12 +74,13 @@ TEST_CASE_METHOD(Machine, "room: a ring may take all of its file system, and no 
         return;
     }
     CHECK(in_process([&] {
-        return mounted() && check_room(directory.path() / "cam0", mib, meminfo) &&
-               !check_room(directory.path() / "cam0", mib + 1, meminfo);
+        return mounted() && check_tmpfs_space(directory.path() / "cam0", mib, meminfo) &&
+               !check_tmpfs_space(directory.path() / "cam0", mib + 1, meminfo);
     }));
 }
 
-TEST_CASE_METHOD(Machine, "room: a ring that does not fit is not made, and leaves nothing behind") {
+TEST_CASE_METHOD(Machine,
+                 "memory_budget: a ring that does not fit is not made, and leaves nothing behind") {
     const auto writer = Writer::create(
         directory.path(), {"cam0", StreamKind::frames, 64, 1U << 20U, std::uint64_t{1} << 30U});
     REQUIRE_FALSE(writer);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "client/quiet_thread.hpp"
+#include "client/thread_without_signals.hpp"
 
 #include <catch2/catch.hpp>
 #include <vector>
@@ -21,10 +21,10 @@ std::vector<int> blocked_signals() {
 
 }  // namespace
 
-TEST_CASE("quiet_thread: takes no signal, and its maker takes those that it did") {
+TEST_CASE("thread_without_signals: takes no signal, and its maker takes those that it did") {
     const std::vector<int> before = blocked_signals();
     std::vector<int> inside;
-    quiet_thread([&] { inside = blocked_signals(); }).join();
+    start_thread_without_signals([&] { inside = blocked_signals(); }).join();
     CHECK(inside.size() == 12);
     CHECK(blocked_signals() == before);
 }
