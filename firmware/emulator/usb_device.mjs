@@ -369,8 +369,8 @@ export class UsbDevice {
     }
 
     nak(endpoint, is_in) {
-        const told = endpoint !== 0 && (this.endpoint_control(endpoint, is_in) & (1 << 16)) !== 0;
-        if (told) {
+        const asked = endpoint !== 0 && (this.endpoint_control(endpoint, is_in) & (1 << 16)) !== 0;
+        if (asked) {
             this.stalls_or_naks |= 1 << (2 * endpoint + (is_in ? 0 : 1));
             this.update_line();
         }

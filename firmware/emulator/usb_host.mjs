@@ -256,11 +256,11 @@ export class UsbHost {
     /// The device wants to know of NAKs: each has its effect.
     tells_naks() {
         const { device, endpoints } = this;
-        const told = 1 << 16;
+        const report_bit = 1 << 16;
         return (
             ((device.endpoint_control(endpoints.bulk_in, true) |
                 device.endpoint_control(endpoints.bulk_out, false)) &
-                told) !==
+                report_bit) !==
             0
         );
     }

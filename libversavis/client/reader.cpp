@@ -75,7 +75,7 @@ struct Reader::Contact {
     Pulse pulse;
     std::int64_t looked_ns{};  ///< coarse clock
     bool alive{};
-    bool told_gone = false;        ///< by the last look
+    bool reported_gone = false;    ///< by the last look
     std::uint64_t read = 0;        ///< number behind that of the item that was handed out last
     std::unique_ptr<Watch> watch;  ///< once fd() was called
 
@@ -248,7 +248,7 @@ Received Reader::look() {
         received = take();  // published since the last look
         if (is(received, Pause::nothing)) received = hand_over();
     }
-    contact_->told_gone = is(received, Pause::gone);
+    contact_->reported_gone = is(received, Pause::gone);
     return received;
 }
 
@@ -301,7 +301,7 @@ FutexWord Reader::wake_word() const {
 }
 
 WatchTarget Reader::target(std::uint32_t seen) const {
-    return {mapping_, path_, seen, contact_->told_gone, contact_->refused(), contact_->pulse};
+    return {mapping_, path_, seen, contact_->reported_gone, contact_->refused(), contact_->pulse};
 }
 
 /// True when next() has something new to return.
@@ -312,7 +312,7 @@ bool Reader::ready() {
     };
     if (!not_there()) return true;
     if (writer_seen()) return false;
-    if (!contact_->told_gone || !not_there()) return true;
+    if (!contact_->reported_gone || !not_there()) return true;
     return has_successor(path_, mapping_->name(), contact_->refused());
 }
 
@@ -330,9 +330,9 @@ Received Reader::next(Duration timeout) {
     for (;;) {
         const auto mapping = mapping_;  // a successor may take its place
         const FutexWord word = wake_word();
-        const bool told = contact_->told_gone;
+        const bool reported = contact_->reported_gone;
         auto received = next();
-        const bool ends = contact_->told_gone && !told;
+        const bool ends = contact_->reported_gone && !reported;
         if (!is_quiet(received) || ends) return received;
         const Duration left = left_until(deadline);
         if (left == Duration{}) return received;

@@ -113,8 +113,8 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
         }
         report.lost += frame.error().lost;
         if (frame.error().why == Pause::lost) ++losses;
-        if (auto told = restarted(frame.error(), cameras[camera].reader().life())) return told;
-        if (auto told = gone(frame.error(), camera)) return told;
+        if (auto pause = restarted(frame.error(), cameras[camera].reader().life())) return pause;
+        if (auto pause = gone(frame.error(), camera)) return pause;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
     }
     return std::nullopt;
@@ -122,7 +122,7 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
 
 std::optional<NoItem> SetReader::State::collect() {
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
-        if (auto told = collect(camera)) return told;
+        if (auto pause = collect(camera)) return pause;
     if (!imu) return std::nullopt;
     const auto collected = imu->collect();
     return collected ? std::nullopt : restarted(collected.error(), imu->reader().life());
@@ -242,7 +242,7 @@ SetReader::~SetReader() = default;
 Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
     const HostTime deadline = deadline_after(timeout);
     for (bool is_last = false;;) {
-        if (const auto told = state_->collect()) return Unexpected<NoItem>(*told);
+        if (const auto pause = state_->collect()) return Unexpected<NoItem>(*pause);
         if (auto set = state_->ready()) return std::move(*set);
         const auto give_up = state_->next_deadline();
         state_->waiting.set_deadline(give_up);

@@ -76,7 +76,7 @@ class ClockItems {
     explicit ClockItems(RecordedClocks& clocks) : clocks_(clocks) {}
 
     void add(const ClockItem& item) {
-        std::visit([this](const auto& told) { take(told); }, item);
+        std::visit([this](const auto& recorded) { take(recorded); }, item);
     }
 
  private:
@@ -87,24 +87,26 @@ class ClockItems {
         return clocks_.lives.back();
     }
 
-    void take(const RecordedExchange& told) {
-        if (!is_plausible(told.sent.ns) || !is_plausible(told.received.ns) ||
-            !is_plausible(told.answered.ns) || !is_plausible(told.arrived.ns))
+    void take(const RecordedExchange& recorded) {
+        if (!is_plausible(recorded.sent.ns) || !is_plausible(recorded.received.ns) ||
+            !is_plausible(recorded.answered.ns) || !is_plausible(recorded.arrived.ns))
             return;
-        BoardLife& known = life(told.nonce);
+        BoardLife& known = life(recorded.nonce);
         known.stamps.messages.push_back(
-            {told.arrived, Exchange{told.sent, told.received, told.answered, told.arrived}});
+            {recorded.arrived,
+             Exchange{recorded.sent, recorded.received, recorded.answered, recorded.arrived}});
         ++known.exchanges;
     }
-    void take(const RecordedMessage& told) {
-        if (!is_plausible(told.departed.ns) || !is_plausible(told.arrived.ns)) return;
-        life(told.nonce)
-            .stamps.messages.push_back({told.arrived, OneWay{told.departed, told.arrived}});
+    void take(const RecordedMessage& recorded) {
+        if (!is_plausible(recorded.departed.ns) || !is_plausible(recorded.arrived.ns)) return;
+        life(recorded.nonce)
+            .stamps.messages.push_back(
+                {recorded.arrived, OneWay{recorded.departed, recorded.arrived}});
     }
-    void take(const RecordedRestart& told) { life(told.nonce); }
-    void take(const RecordedOutput& told) {
-        if (is_plausible(told.host.ns) && is_plausible(told.minus_host.ns))
-            clocks_.outputs.push_back(told);
+    void take(const RecordedRestart& recorded) { life(recorded.nonce); }
+    void take(const RecordedOutput& recorded) {
+        if (is_plausible(recorded.host.ns) && is_plausible(recorded.minus_host.ns))
+            clocks_.outputs.push_back(recorded);
     }
 
     RecordedClocks& clocks_;
@@ -253,8 +255,8 @@ Expected<RecordedClocks> read_clocks(const Recording& recording,
                        "record the stream clock, and events for PPS");
     const auto read = recording.glance(streams, [&](const RecordedItem& item) {
         if (item.kind == ring::StreamKind::clock) {
-            const auto told = from_metadata(unpack<ClockMetadata>(item.metadata));
-            if (told) items.add(*told);
+            const auto recorded = from_metadata(unpack<ClockMetadata>(item.metadata));
+            if (recorded) items.add(*recorded);
         } else {
             add_event(item, clocks);
         }

@@ -466,9 +466,9 @@ nlohmann::json to_json(const LedReport& report) {
              {"rate_hz", c.rate_hz > 0 ? nlohmann::json(c.rate_hz) : nlohmann::json()},
              {"binary_first", c.binary_first}});
     for (const LedPairReport& p : report.pairs) {
-        const bool told = std::isfinite(p.interval_us);
-        const auto number = [told](double value) {
-            return told ? nlohmann::json(value) : nlohmann::json();
+        const bool finite = std::isfinite(p.interval_us);
+        const auto number = [finite](double value) {
+            return finite ? nlohmann::json(value) : nlohmann::json();
         };
         document["pairs"].push_back({{"first", p.first},
                                      {"second", p.second},

@@ -41,7 +41,7 @@ struct Stream {
     ring::StreamKind kind = ring::StreamKind::frames;
     std::vector<Change> changes;  ///< by `before`
     std::vector<ProvedFrame> proofs;
-    ProcessedStream told;
+    ProcessedStream counts;
     std::uint64_t life = 0;
     std::uint32_t epoch = 0;
     std::optional<OutputTime> newest;  ///< of this epoch, suspects aside
@@ -170,7 +170,7 @@ class Processing {
                     [this](const RecordedItem& item) {
                         Stream& stream = streams_[item.stream];
                         stream.kind = item.kind;
-                        ++stream.told.items;
+                        ++stream.counts.items;
                         if (item.kind == ring::StreamKind::imu)
                             restamp_sample(item, stream);
                         else
@@ -211,7 +211,7 @@ class Processing {
     void restamp_frame(const RecordedItem& item, Stream& stream) const {
         const auto frame = unpack<FrameMetadata>(item.metadata);
         const bool suspect = (frame.flags & flag_suspect) != 0;
-        stream.told.suspect += suspect ? 1U : 0U;
+        stream.counts.suspect += suspect ? 1U : 0U;
         const std::uint32_t index = proof_of(frame, stream.proofs);
         const ProvedFrame* proof = index == no_proof ? nullptr : &stream.proofs[index];
         if (suspect) {
@@ -221,7 +221,7 @@ class Processing {
         Change change{item.time, item.time, frame.host_time, frame.sigma_ns, frame.flags,
                       no_proof,  false};
         const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
-        stream.told.contradicted += contradicted ? 1U : 0U;
+        stream.counts.contradicted += contradicted ? 1U : 0U;
         const bool by_board = frame.stamp_kind() != StampKind::arrival && !contradicted;
         const auto stamp = by_board ? clock_of(frame.board_time, frame.host_time) : std::nullopt;
         if (stamp) {
@@ -257,7 +257,7 @@ class Processing {
                        static_cast<std::uint32_t>(proof.exposure.kind);
         change.sigma_ns = sigma_of(stamp->sigma, uncertain(proof, stamp->host));
         hold(change, item.life, frame.epoch, stream);
-        ++stream.told.proved;
+        ++stream.counts.proved;
     }
 
     static std::uint32_t proof_of(const FrameMetadata& frame,
@@ -272,22 +272,22 @@ class Processing {
     }
 
     void finish(const std::string& name, Stream& stream) {
-        ProcessedStream& told = stream.told;
-        told.restamped = stream.changes.size();
+        ProcessedStream& counts = stream.counts;
+        counts.restamped = stream.changes.size();
         std::uint64_t steady = 0;
         for (const Change& change : stream.changes) {
-            told.sigma_after_ns += change.sigma_ns;
+            counts.sigma_after_ns += change.sigma_ns;
             if (change.proof != no_proof) continue;
             const auto moved = static_cast<double>((change.after - change.before).ns);
-            told.change_rms_ns += moved * moved;
-            told.change_max_ns = std::max(told.change_max_ns, std::abs(moved));
+            counts.change_rms_ns += moved * moved;
+            counts.change_max_ns = std::max(counts.change_max_ns, std::abs(moved));
             ++steady;
         }
-        if (steady > 0) told.change_rms_ns = std::sqrt(told.change_rms_ns / steady);
-        if (told.restamped > 0) told.sigma_after_ns /= static_cast<double>(told.restamped);
+        if (steady > 0) counts.change_rms_ns = std::sqrt(counts.change_rms_ns / steady);
+        if (counts.restamped > 0) counts.sigma_after_ns /= static_cast<double>(counts.restamped);
         std::stable_sort(stream.changes.begin(), stream.changes.end(),
                          [](const auto& a, const auto& b) { return a.before < b.before; });
-        if (told.items > 0) report_.streams[name] = told;
+        if (counts.items > 0) report_.streams[name] = counts;
     }
 
     const Change* change_of(const std::string& name, OutputTime before) const {

@@ -223,7 +223,7 @@ struct ByteLink {
     /// `received` is when they entered the board.
     virtual std::size_t read(std::uint8_t* data, Nanoseconds& received) = 0;
     /// Asks when the newest byte written leaves, which means acknowledged or, if the link knows no
-    /// more, handed over. Only the newest question is answered; a link that cannot tell never
+    /// more, handed over. Only the newest question is answered; a link that does not know never
     /// answers.
     virtual void watch_departure() {}
     /// True, once: the byte asked about left at `at`, no later than the host could receive it. A

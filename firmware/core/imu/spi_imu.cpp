@@ -238,9 +238,9 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     const Nanoseconds tolerance = accel_period_ / accel_tolerance;
     if (off > tolerance || -off > tolerance || end >= taken + period) return;
     const Nanoseconds age = (sample.time_ns - taken) / accel_age_step;
-    const auto told = static_cast<std::int16_t>(age);
-    if (told != age) return;
-    sample.accel_age = told;
+    const auto sent = static_cast<std::int16_t>(age);
+    if (sent != age) return;
+    sample.accel_age = sent;
     sample.flags |= wire::imu_accel_stamped;
 }
 

@@ -137,12 +137,12 @@ bool OutputClock::was_suspended() {
 /// be read.
 bool OutputClock::was_set(HostTime now, bool seen_step) {
     const std::uint32_t times = clocks_->times_set();
-    const bool told = times != std::exchange(times_set_, times);
+    const bool reported = times != std::exchange(times_set_, times);
     const bool known = seen_step || now < set_is_known_until_;
-    if (seen_step && !told) set_is_known_until_ = now + longest_report;
-    if (told && !seen_step) set_is_known_until_ = {};
+    if (seen_step && !reported) set_is_known_until_ = now + longest_report;
+    if (reported && !seen_step) set_is_known_until_ = {};
     // TAI goes on when UTC alone is stepped, as by a leap second: the comparison says all of it.
-    return told && !known && kind_ == OutputClockKind::realtime;
+    return reported && !known && kind_ == OutputClockKind::realtime;
 }
 
 void OutputClock::look_for_steps(HostTime now, bool seen_step) {

@@ -28,7 +28,7 @@ class SystemClocks {
     virtual KernelState kernel_state() = 0;
 
     /// How often CLOCK_REALTIME was set (by a person, a daemon, a leap second or the end of a
-    /// suspend) since this object was made, as far as this call can tell. A system call: some ten
+    /// suspend) since this object was made, as far as this call shows. A system call: some ten
     /// times as expensive as read_ns().
     virtual std::uint32_t times_set() = 0;
 };
