@@ -91,18 +91,6 @@ TEST_CASE("clock: a recorded trace is translated again") {
     CHECK(newest[3] == "converging");
 }
 
-TEST_CASE("clock: a recorded trace is drawn") {
-    const Command clock;
-    std::string output;
-    REQUIRE(
-        clock.run({"plot", "--exchanges", trace, "--out", clock.path("p.svg"), "--title", "a < b"},
-                  &output) == 0);
-    std::string svg;
-    for (const std::string& line : lines(clock.path("p.svg"))) svg += line + "\n";
-    CHECK_THAT(svg,
-               Catch::StartsWith("<?xml") && Catch::EndsWith("</svg>\n") && Contains("a &lt; b"));
-}
-
 TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     const Command clock;
     const std::string query = clock.directory.write("q.csv", "available_ns,board_ns\n1,2\n");
@@ -112,7 +100,7 @@ TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     std::string output;
     CHECK(clock.run({"replay", "--exchanges", bad, "--query", query, "--out", out}, &output) == 69);
     CHECK_THAT(output, Contains("bad.csv, line 2, column m3_ns: 'three' is not an integer"));
-    CHECK(clock.run({"plot", "--exchanges", "/nowhere.csv", "--out", out}, &output) == 69);
+    CHECK(clock.run({"history", "--exchanges", "/nowhere.csv", "--out", out}, &output) == 69);
     CHECK_THAT(output, Contains("/nowhere.csv: cannot be read"));
     CHECK_FALSE(std::filesystem::exists(out));
 
@@ -125,7 +113,7 @@ TEST_CASE("clock: what is wrong is said, with the exit code for it") {
     CHECK(clock.run({"replay", "--exchanges", trace, "--query", query, "--out", out, "--estimator",
                      "ekf", "--smoothed"},
                     &output) == 64);
-    for (const char* command : {"status", "replay", "plot"})
+    for (const char* command : {"status", "replay", "history"})
         CHECK(clock.run({command, "--help"}, &output) == 0);
     CHECK(clock.run({"status", "--instance", "nobody"}, &output) == 69);
 }

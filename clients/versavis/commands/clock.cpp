@@ -57,7 +57,7 @@ ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
     add_status();
     add_record();
     add_replay();
-    add_plot();
+    add_history();
 }
 
 void ClockCommands::add_status() {
@@ -101,13 +101,15 @@ void ClockCommands::add_replay() {
         "Use all messages for each answer, including later ones (estimator envelope only)");
 }
 
-void ClockCommands::add_plot() {
-    CLI::App* plot = clock_->add_subcommand(
-        "plot", "Plot offset, skew, residual and innovation over recorded exchanges as SVG");
-    add_inputs(*plot, plot_settings_.exchanges, plot_settings_.oneway);
-    plot->add_option("--out", plot_settings_.out, "SVG file to write")->required();
-    add_estimator(*plot, estimator_, fair_start_);
-    plot->add_option("--title", plot_settings_.title, "Title (default: the name of the file)");
+void ClockCommands::add_history() {
+    CLI::App* history = clock_->add_subcommand(
+        "history",
+        "Write offset, skew, residual and innovation over recorded exchanges; "
+        "'python3 -m versavis.plot' draws the file");
+    add_inputs(*history, history_settings_.exchanges, history_settings_.oneway);
+    history->add_option("--out", history_settings_.out, "CSV file to write: one row per exchange")
+        ->required();
+    add_estimator(*history, estimator_, fair_start_);
 }
 
 bool ClockCommands::chosen() const { return clock_->parsed(); }
@@ -117,7 +119,7 @@ int ClockCommands::run(const std::string& instance) {
     if (status_->parsed()) return show_status(instance);
     if (record_->parsed()) return record(instance);
     if (fair_start_ && estimator_ == EstimatorKind::ekf) estimator_ = EstimatorKind::ekf_fair;
-    return replay_->parsed() ? replay() : plot();
+    return replay_->parsed() ? replay() : history();
 }
 
 int ClockCommands::show_status(const std::string& instance) const {
@@ -153,11 +155,11 @@ int ClockCommands::replay() {
     return EX_OK;
 }
 
-int ClockCommands::plot() {
-    plot_settings_.estimator = estimator_;
-    const auto drawn = plot_clock(plot_settings_);
-    if (!drawn) return fail(drawn.error());
-    fmt::print("{}: {} exchanges\n", plot_settings_.out, *drawn);
+int ClockCommands::history() {
+    history_settings_.estimator = estimator_;
+    const auto rows = write_clock_history(history_settings_);
+    if (!rows) return fail(rows.error());
+    fmt::print("{}: {} exchanges\n", history_settings_.out, *rows);
     return EX_OK;
 }
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <string>
 
-#include "clock/clock_plot.hpp"
+#include "clock/clock_history.hpp"
 #include "clock/clock_record.hpp"
 #include "clock/clock_replay.hpp"
 
@@ -32,11 +32,11 @@ class ClockCommands {
     void add_status();
     void add_record();
     void add_replay();
-    void add_plot();
+    void add_history();
     int show_status(const std::string& instance) const;
     int record(const std::string& instance);
     int replay();
-    int plot();
+    int history();
 
     CLI::App* clock_;
     CLI::App* status_ = nullptr;
@@ -48,7 +48,7 @@ class ClockCommands {
     double recording_s_ = 0;
     ClockRecordSettings record_settings_;
     ClockReplaySettings replay_settings_;
-    ClockPlotSettings plot_settings_;
+    ClockHistorySettings history_settings_;
 };
 
 }  // namespace versavis::client

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "base/plausible_time.hpp"
-#include "clock/clock_plot.hpp"
+#include "clock/clock_history.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::client {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Draws how an estimator of the board's clock behaves on recorded exchanges.
+// How an estimator of the board's clock behaves on recorded exchanges.
 #pragma once
 
 #include <string>
@@ -23,23 +23,17 @@ struct ClockPoint {
 /// Replays the recording; one point per exchange, in order of time.
 std::vector<ClockPoint> clock_history(const ClockRecording& recording, ClockEstimator& estimator);
 
-struct ClockPlotTexts {
-    std::string title;
-    std::string estimator;
-};
+/// One row per point, below the names of its fields.
+std::string to_csv(const std::vector<ClockPoint>& history);
 
-/// An SVG document: offset, skew, residual and innovation, at the start and after convergence.
-std::string clock_svg(const std::vector<ClockPoint>& history, const ClockPlotTexts& texts);
-
-struct ClockPlotSettings {
+struct ClockHistorySettings {
     std::string exchanges;
     std::string oneway;
     std::string out;
-    std::string title;  ///< empty: the name of the file
     EstimatorKind estimator = EstimatorKind::envelope;
 };
 
-/// Returns the number of exchanges drawn.
-Expected<std::size_t> plot_clock(const ClockPlotSettings& settings);
+/// Returns the number of rows written. `out` appears complete or not at all.
+Expected<std::size_t> write_clock_history(const ClockHistorySettings& settings);
 
 }  // namespace versavis::client
