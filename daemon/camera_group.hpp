@@ -65,7 +65,7 @@ class CameraGroup {
     void start(CameraPipeline& pipeline, pairing::Start how);
     void start_streaming(const Unit& unit, pairing::Start how);
 
-    CameraEnvironment environment_;
+    CameraContext environment_;
     clock::Translator& translator_;
     EventJournal& events_;
     BoardLink& board_;

@@ -18,6 +18,7 @@
 #include "posix/file.hpp"
 #include "service.hpp"
 #include "settings/configuration.hpp"
+#include "settings/key_report.hpp"
 #include "settings/problem_report.hpp"
 
 namespace {
@@ -101,7 +102,8 @@ int run(const std::string& path) {
     sd_notify(0, "STOPPING=1");
     log(LogLevel::info, "service", "stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
     if ((*service)->stop()) return EX_OK;
-    log(LogLevel::warning, "service", "a device still does not answer: it is left as it is");
+    log(LogLevel::warning, "service",
+        "a device still does not answer: exiting without releasing it");
     ::_exit(EX_OK);  // its thread uses what a return would destroy
 }
 
@@ -186,26 +188,35 @@ int probe(const ProbeOptions& options) {
 
 int main(int argc, char** argv) {
     CLI::App app{
-        "VersaVIS service: hardware-stamped camera frames and IMU samples in shared memory"};
+        "VersaVIS service: publishes hardware-timestamped frames and IMU samples in shared memory"};
     std::string path = default_configuration;
     bool check_only = false;
     bool as_json = false;
     app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
         ->capture_default_str();
-    CLI::Option* check_config =
-        app.add_flag("--check-config", check_only, "Tell all that is wrong in the file, and exit");
-    app.add_flag("--json", as_json, "As JSON");
+    CLI::Option* check_config = app.add_flag(
+        "--check-config", check_only, "Check the configuration file, report every error, and exit");
+    app.add_flag("--json", as_json, "Print the report as JSON");
+    bool list_keys = false;
+    CLI::Option* keys = app.add_flag("--keys", list_keys,
+                                     "Print each configuration key with its meaning, range and "
+                                     "default, and exit")
+                            ->excludes(check_config);
     bool check_cables = false;
-    CLI::Option* check_wires = app.add_flag("--check-cameras", check_cables,
-                                            "Prove the wiring of all cameras by pulses, and exit")
-                                   ->excludes(check_config);
+    CLI::Option* check_wires =
+        app.add_flag("--check-cameras", check_cables,
+                     "Verify the wiring of all cameras with test pulses, and exit")
+            ->excludes(check_config)
+            ->excludes(keys);
     ProbeOptions probe_options;
     app.add_option("--probe-camera", probe_options.device,
-                   "Set up one camera (address, serial number or name), or 'all', and report")
+                   "Set up one camera (address, serial number or name) or 'all', report, and exit")
         ->excludes(check_config)
+        ->excludes(keys)
         ->excludes(check_wires);
-    app.add_option("--bundle", probe_options.bundle,
-                   "Also write description, values and a draft of a preset to this file");
+    app.add_option(
+        "--bundle", probe_options.bundle,
+        "Also write the GenICam description, feature values and a draft preset to this file");
     std::string description;  // for the service itself
     app.add_option("--probe-description", description)->group("");
     app.set_version_flag("--version", VERSAVIS_VERSION);
@@ -215,10 +226,14 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
-    if (as_json && !check_only && !check_cables && probe_options.device.empty())
-        return app.exit(CLI::RequiresError("--json",
-                                           "--check-config, --check-cameras or --probe-camera")),
+    if (as_json && !check_only && !list_keys && !check_cables && probe_options.device.empty())
+        return app.exit(CLI::RequiresError(
+                   "--json", "--check-config, --keys, --check-cameras or --probe-camera")),
                EX_USAGE;
+    if (list_keys) {
+        fmt::print("{}\n", as_json ? to_json(describe_keys()) : to_text(describe_keys()));
+        return EX_OK;
+    }
     if (check_cables) return check_wiring(path, as_json);
     if (!probe_options.device.empty()) {
         probe_options.json = as_json;

@@ -18,14 +18,12 @@ namespace versavis::daemon {
 namespace {
 
 /// Items that rings keep for readers that sleep. IMU, unless `history_s` says more or less: 16 s at
-/// 1 kHz, 2 MiB. Events: 0.5 MiB. Clock: a minute with an IMU at 1 kHz, 8 MiB. At half, a reader
-/// may sleep half as long; at twice, each takes twice the memory.
+/// 1 kHz, 2 MiB. Events: 0.5 MiB. Clock: a minute with an IMU at 1 kHz, 8 MiB.
 constexpr std::uint32_t imu_items = 16384;
 constexpr std::uint32_t event_items = 4096;
 constexpr std::uint32_t clock_items = 65536;
 
-/// For cameras that are mute when the service is to end. At half, one that is busy stays under
-/// control for some seconds; at twice, the end takes longer than the two seconds it may.
+/// For cameras that are mute when the service is to end.
 constexpr Duration stop_patience = seconds(1);
 
 ring::Shape ring_of(const ImuConfiguration& imu) {
@@ -103,11 +101,11 @@ Expected<> Service::make_cameras() {
     auto presets = load_presets(preset_directory(configuration_));
     if (!presets) return Unexpected(presets.error());
     BoardListener& self = *this;
-    Configuration told = configuration_;
-    for (CameraConfiguration& camera : told.cameras) use_named_preset(*presets, camera);
+    Configuration for_board = configuration_;
+    for (CameraConfiguration& camera : for_board.cameras) use_named_preset(*presets, camera);
     board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         told, configuration_.clock.exchange_rate_hz, translator_,
-                                         *clock_recorder_, self);
+                                         for_board, configuration_.clock.exchange_rate_hz,
+                                         translator_, *clock_recorder_, self);
     cameras_ = std::make_unique<CameraGroup>(
         place_of(directory_, configuration_), std::move(*presets),
         state_directory(configuration_.state_directory), translator_, *events_, *board_);
@@ -168,12 +166,12 @@ bool Service::imu_sample(const wire::ImuSample& sample, HostTime received) {
     return false;
 }
 
-void Service::exchange_doubted(const Doubt& doubt) {
+void Service::exchange_doubted(const Implausibility& doubt) {
     events_->add(
         {EventKind::message_doubted, doubt.reason, 0, "board", doubt.said, {}, doubt.expected});
 }
 
-/// An event that is doubted is told, but nothing is made of its time.
+/// A doubted event is reported, but nothing is made of its time.
 void Service::board_event(const wire::Event& event, HostTime received) {
     const auto doubt = event_witness_.judge(event, received);
     if (!doubt) use_pps(event);
@@ -186,16 +184,16 @@ void Service::board_event(const wire::Event& event, HostTime received) {
     }
     const EventSource source = source_of(event.kind);
     if (const auto count = skipped_triggers(event)) cameras_->triggers_skipped(event.source, count);
-    if (event.kind == wire::EventKind::stored) unkept_ = event.value == 0;
-    if (const auto told = remark(event)) log(told->level, "board", "{}", told->text);
+    if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
+    if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);
     if (source == EventSource::imu) {
         for (auto& imu : imus_)
             if (imu->port() == event.source) {
-                const bool told = imu->tell(event, host_now());
+                const bool is_new = imu->note_state(event, host_now());
                 const ImuReport report = imu->report();
                 entry->source_name = report.name;
-                if (told)
+                if (is_new)
                     log(report.working ? LogLevel::info : LogLevel::warning, report.name, "{}",
                         report.working ? "it answers, and samples" : describe_failure(report));
             }
@@ -204,8 +202,8 @@ void Service::board_event(const wire::Event& event, HostTime received) {
 }
 
 void Service::use_pps(const wire::Event& event) {
-    if (event.kind == wire::EventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
-    if (event.kind == wire::EventKind::utc_label)
+    if (event.kind == wire::BoardEventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
+    if (event.kind == wire::BoardEventKind::utc_label)
         translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
 }
 

@@ -12,10 +12,10 @@
 #include "board/grid_alignment.hpp"
 #include "camera_group.hpp"
 #include "engine/ring/directory.hpp"
-#include "health/output_step_watch.hpp"
+#include "health/clock_step_detector.hpp"
 #include "health/status_publisher.hpp"
 #include "pipeline/imu_pipeline.hpp"
-#include "plausibility/event_witness.hpp"
+#include "plausibility/event_validator.hpp"
 #include "publish/clock_recorder.hpp"
 #include "publish/event_journal.hpp"
 #include "settings/configuration.hpp"
@@ -64,18 +64,18 @@ class Service final : private BoardListener {
     void board_lost() override;
     void exposure(const wire::Exposure& record, HostTime received) override;
     bool imu_sample(const wire::ImuSample& sample, HostTime received) override;
-    void exchange_doubted(const Doubt& doubt) override;
+    void exchange_doubted(const Implausibility& doubt) override;
     void board_event(const wire::Event& event, HostTime received) override;
 
     Configuration configuration_;
     ring::OwnedDirectory directory_;
     clock::Translator translator_;
     StatusPublisher status_;
-    OutputStepWatch output_steps_;
+    ClockStepDetector output_steps_;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     std::unique_ptr<EventJournal> events_;
-    EventWitness event_witness_{translator_};
+    EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;
     std::vector<std::unique_ptr<ImuPipeline>> imus_;
     std::unique_ptr<BoardLink> board_;

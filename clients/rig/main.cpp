@@ -110,28 +110,28 @@ int main(int argc, char** argv) {
     std::string truth_path;
     std::string board = "native";
     std::string image = EmulatedChip::default_image();
-    auto* run_command = app.add_subcommand(
-        "run", "Run the rig of a scenario until it is interrupted (SIGINT or SIGTERM)");
+    auto* run_command =
+        app.add_subcommand("run", "Run the rig of a scenario until SIGINT or SIGTERM");
     run_command->add_option("scenario", scenario_path, "Scenario file (docs/user/rig.md)")
         ->required();
     run_command->add_option("--socket", socket_path, "Unix socket of the board")
         ->capture_default_str();
     run_command
         ->add_option("--board", board,
-                     "native: its firmware as a part of this process; rp2040: "
-                     "as it is flashed, on the emulated chip")
+                     "native: firmware core within this process; rp2040: firmware image on the "
+                     "emulated chip")
         ->check(CLI::IsMember({"native", "rp2040"}))
         ->capture_default_str();
-    run_command->add_option("--image", image, "Firmware for the rp2040, an .elf or .uf2")
+    run_command->add_option("--image", image, "Firmware image for rp2040, .elf or .uf2")
         ->capture_default_str();
     run_command->add_option("--truth", truth_path,
-                            "File for the ground truth, one JSON object per line");
+                            "Write the ground truth to this file, one JSON object per line");
 
     JudgeSettings settings;
     settings.instance = default_instance();
     bool as_json = false;
     auto* judge_command = app.add_subcommand(
-        "judge", "Compare what the service publishes with the ground truth. Exits 0 if it agrees");
+        "judge", "Compare what the service publishes with the ground truth. Exits 0 if they agree");
     judge_command->add_option("scenario", scenario_path, "Scenario file that the rig is running")
         ->required();
     judge_command
@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
         ->required();
     judge_command->add_option("--instance", settings.instance, "Instance of the service")
         ->capture_default_str();
-    judge_command->add_option("--seconds", settings.seconds, "How many seconds to record")
+    judge_command->add_option("--seconds", settings.seconds, "Seconds to record")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     judge_command->add_flag("--json", as_json,

@@ -82,7 +82,8 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"Inspect the VersaVIS service: its state, its streams and their items"};
+    CLI::App app{
+        "Inspect the VersaVIS service, record and evaluate its streams, flash and test boards"};
     app.require_subcommand(1);
     app.set_version_flag("--version", VERSAVIS_VERSION);
     std::string instance = default_instance();
@@ -112,16 +113,16 @@ int main(int argc, char** argv) {
     tail_command->add_flag("--json", json, "Print one JSON object per line");
     tail_command->add_flag("--oldest", tail.oldest, "Start with the oldest item still in the ring");
 
-    auto* pair = app.add_subcommand("pair", "Pairing of frames with exposures");
+    auto* pair = app.add_subcommand("pair", "Pair frames with exposures offline");
     pair->require_subcommand(1);
     std::string recording;
     std::string decisions;
-    auto* replay = pair->add_subcommand("replay",
-                                        "Redo the pairing from a recording made with: versavis "
-                                        "tail CAMERA-evidence --oldest --json");
+    auto* replay = pair->add_subcommand(
+        "replay",
+        "Repeat the pairing from a log made with: versavis tail CAMERA-evidence --oldest --json");
     replay->add_option("recording", recording, "File to read; - for standard input")->required();
     replay->add_option("-o,--output", decisions,
-                       "File for the decisions, one JSON object per line");
+                       "Write the decisions to this file, one JSON object per line");
     replay->add_flag("--json", json, "Print the summary as a JSON object");
 
     client::ClockCommands clock(app, [] { return stop_requested != 0; });

@@ -23,7 +23,7 @@ class LineLimit {
         return false;
     }
 
-    /// How many did not, told once their window is over; zero: none, or not over yet.
+    /// How many did not, known once their window is over; zero: none, or not over yet.
     std::uint64_t collect(HostTime now) {
         if (now - began_ < window) return 0;
         const std::uint64_t count = suppressed_;
@@ -31,9 +31,7 @@ class LineLimit {
         return count;
     }
 
-    /// At half, the cause of a failure may be cut off; at twice, a flood takes twice the journal.
     static constexpr unsigned lines = 10;
-    /// At half, a flood takes twice the journal; at twice, its extent is told later.
     static constexpr Duration window = seconds(10);
 
  private:

@@ -13,7 +13,7 @@ namespace versavis::daemon {
 
 /// Whose number `source` of such an event is.
 enum class EventSource { board, camera, imu };
-EventSource source_of(wire::EventKind kind);
+EventSource source_of(wire::BoardEventKind kind);
 
 /// Triggers that were not sent, by this event.
 std::uint64_t skipped_triggers(const wire::Event& event);

@@ -3,10 +3,8 @@
 
 #include <fmt/ranges.h>
 
-#include <cstring>
-#include <random>
-
 #include "base/thread_name.hpp"
+#include "engine/board/board_words.hpp"
 #include "engine/board/firmware_file.hpp"
 #include "settings/board_configuration.hpp"
 #include "settings/board_parts.hpp"
@@ -26,11 +24,6 @@ constexpr Duration retry_refused = seconds(5);
 /// Time for one answer; the board takes milliseconds. At half, a loaded host gives up on a healthy
 /// board; at twice, a dead one is noticed later.
 constexpr Duration answer_timeout = milliseconds(1000);
-
-/// Hellos until the board is given up, and the time for the answer to each. At half, a board that
-/// boots is missed at first; at twice, a foreign device on the port holds the link up longer.
-constexpr int hello_attempts = 5;
-constexpr Duration hello_timeout = milliseconds(250);
 
 /// The board reports its health every second: one that is silent for so long may have begun a new
 /// life, and is greeted again. At half, all boards are; at twice, a lost board is noticed later.
@@ -62,10 +55,6 @@ constexpr Duration largest_clock_surprise = milliseconds(500);
 constexpr int strangers_to_believe = 3;
 
 constexpr std::uint8_t all_cameras = 0xFF;
-
-std::string text(const char* padded, std::size_t capacity) {
-    return {padded, strnlen(padded, capacity)};
-}
 
 /// Why a board of another major version cannot be used, and what to do.
 std::string describe_mismatch(const wire::BoardHello& hello) {
@@ -152,8 +141,7 @@ void BoardLink::run() {
         }
         stream_ = std::move(*stream);
         reader_.emplace(*stream_, wake_);
-        host_nonce_ = std::random_device{}();
-        host_sequence_ = 0;
+        encoder_ = {};
         decoder_ = {};
         dropped_bytes_ = 0;
         const auto ended = serve();
@@ -221,35 +209,34 @@ Expected<> BoardLink::handshake() {
     greeted_ = false;
     anew_ = false;
     strangers_ = 0;
-    // A delimiter first: whatever an earlier connection left unfinished ends here.
-    const std::uint8_t delimiter = 0;
-    if (auto sent = stream_->write({&delimiter, 1}); !sent) return sent;
-    for (int attempt = 0; attempt < hello_attempts && !greeted_; ++attempt) {
-        if (auto sent = send(wire::HostHello{wire::protocol_major, wire::protocol_minor, {}});
-            !sent)
-            return sent;
-        auto done = read_until([this] { return greeted_; }, hello_timeout, "does not answer");
-        if (!done && attempt == hello_attempts - 1) return done;
-    }
-    if (hello_.major != wire::protocol_major) {
-        set_state(BoardState::incompatible, describe_mismatch(hello_));
+    Expected<> waited;
+    const auto answered = device::greet(
+        encoder_, [this](auto bytes) { return stream_->write(bytes); },
+        [&](Duration timeout) -> Expected<bool> {
+            waited = read_until([this] { return greeted_; }, timeout, "does not answer");
+            return greeted_;
+        });
+    if (!answered) return Unexpected(answered.error());
+    if (!*answered) return waited;
+    if (!greeting_.understood) {
+        set_state(BoardState::incompatible, describe_mismatch(greeting_.hello));
         return failure("board", "incompatible protocol");
     }
     const std::lock_guard lock(report_mutex_);
     report_.port = stream_->port();
-    report_.serial = text(hello_.serial, sizeof hello_.serial);
-    report_.firmware = text(hello_.firmware, sizeof hello_.firmware);
+    report_.serial = greeting_.serial();
+    report_.firmware = greeting_.firmware();
     report_.nonce = nonce_;
-    report_.capabilities = hello_.capabilities;
-    report_.present = hello_.present;
-    report_.fastest_imu_millihertz = hello_.fastest_imu_millihertz;
+    report_.capabilities = greeting_.hello.capabilities;
+    report_.present = greeting_.hello.present;
+    report_.fastest_imu_millihertz = greeting_.hello.fastest_imu_millihertz;
     ++report_.connections;
     return {};
 }
 
 Expected<> BoardLink::configure() {
     // The board would refuse it, too, but cannot say what it has instead.
-    if (const auto missing = missing_parts(file_, hello_); !missing.empty()) {
+    if (const auto missing = missing_parts(file_, greeting_.hello); !missing.empty()) {
         set_state(BoardState::refused, fmt::format("{}", fmt::join(missing, "; ")));
         return failure("board", "lacks what its configuration asks for");
     }
@@ -317,10 +304,8 @@ Expected<> BoardLink::read(Duration timeout) {
 }
 
 void BoardLink::take(const wire::Packet& packet, HostTime received) {
-    wire::BoardHello hello{};
-    wire::HelloVersion version{};
-    if (packet.read(version) && version.major != wire::protocol_major) return take(version);
-    if (packet.read(hello)) return take(hello, packet.header, received);
+    if (const auto greeting = device::read_greeting(packet))
+        return take(*greeting, packet.header, received);
     if (!greeted_ || anew_ || !of_this_life(packet.header)) return;
     last_packet_ = received;
     const bool used =
@@ -356,7 +341,7 @@ void BoardLink::take_answer(const wire::Packet& packet) {
     wire::Log line{};
     wire::Refusal refusal{};
     if (packet.read(line))
-        log(static_cast<LogLevel>(line.level), "board", "{}", text(line.text, sizeof line.text));
+        log(static_cast<LogLevel>(line.level), "board", "{}", board::text(line.text));
     if (packet.read(refusal) && refusal.id == configuration_.id)
         refusals_.push_back(describe(file_, refusal));
     if (packet.read(answer_)) answered_ = answer_.id == configuration_.id;
@@ -367,9 +352,17 @@ void BoardLink::take_answer(const wire::Packet& packet) {
 }
 
 /// The answer to ours, or one that nobody asked for: then the board begins a new life.
-void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, HostTime received) {
-    if (!possible(hello)) return count_impossible();
-    const bool same = same_life(hello, header.nonce, received);
+void BoardLink::take(const device::Greeting& greeting, const wire::Header& header,
+                     HostTime received) {
+    if (!greeting.understood) {  // more cannot be read of it
+        // Flashed while the link stayed open; else the second answer to two hellos.
+        anew_ = anew_ || (greeted_ && greeting_.understood);
+        greeted_ = true;
+        greeting_ = greeting;
+        return;
+    }
+    if (!possible(greeting.hello)) return count_impossible();
+    const bool same = same_life(greeting.hello, header.nonce, received);
     if (greeted_) {
         anew_ = anew_ || !same;  // else the second answer to two hellos
         if (same) of_this_life(header);
@@ -377,7 +370,7 @@ void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, 
     }
     last_packet_ = received;
     greeted_ = true;
-    hello_ = hello;
+    greeting_ = greeting;
     clock_.abandon();
     nonce_ = header.nonce;
     sequence_.begin(header.sequence);
@@ -389,17 +382,7 @@ void BoardLink::take(const wire::BoardHello& hello, const wire::Header& header, 
     last_life_ = nonce_;
 }
 
-/// It is there, and of another major version: more cannot be read of its hello.
-void BoardLink::take(const wire::HelloVersion& other) {
-    // Flashed while the link stayed open; else the second answer to two hellos.
-    anew_ = anew_ || (greeted_ && hello_.major == wire::protocol_major);
-    greeted_ = true;
-    hello_ = {};
-    hello_.major = other.major;
-    hello_.minor = other.minor;
-}
-
-void BoardLink::note(const std::optional<Doubt>& doubt) {
+void BoardLink::note(const std::optional<Implausibility>& doubt) {
     if (!doubt) return;
     {
         const std::lock_guard lock(report_mutex_);
@@ -441,8 +424,7 @@ void BoardLink::count_impossible() {
 
 template <class T>
 Expected<> BoardLink::send(const T& message) {
-    wire::Frame frame{};
-    wire::encode(message, host_nonce_, host_sequence_++, frame);
+    const wire::Frame frame = encoder_.encode(message);
     if constexpr (std::is_same_v<T, wire::ClockRequest>) clock_.leaves();
     return stream_->write({frame.bytes, frame.size});
 }

@@ -20,11 +20,11 @@
 #include "board/byte_stream.hpp"
 #include "board/clock_exchange.hpp"
 #include "board/stamping_reader.hpp"
+#include "device/handshake.hpp"
 #include "engine/clock/translator.hpp"
 #include "engine/pairing/pairing.hpp"
 #include "plausibility/packet_check.hpp"
 #include "settings/configuration.hpp"
-#include "wire/packet.hpp"
 
 namespace versavis::daemon {
 
@@ -40,7 +40,7 @@ class BoardListener {
     virtual void exposure(const wire::Exposure& record, HostTime received) = 0;
     /// False: the sample is doubted, and nothing may be made of its times.
     virtual bool imu_sample(const wire::ImuSample& sample, HostTime received) = 0;
-    virtual void exchange_doubted(const Doubt& doubt) = 0;
+    virtual void exchange_doubted(const Implausibility& doubt) = 0;
     virtual void board_event(const wire::Event& event, HostTime received) = 0;
 };
 
@@ -108,12 +108,11 @@ class BoardLink {
     Expected<> read(Duration timeout);
     Expected<> read_until(const std::function<bool()>& done, Duration timeout, const char* what);
     void take(const wire::Packet& packet, HostTime received);
-    void take(const wire::BoardHello& hello, const wire::Header& header, HostTime received);
-    void take(const wire::HelloVersion& other);
+    void take(const device::Greeting& greeting, const wire::Header& header, HostTime received);
     void take_answer(const wire::Packet& packet);
     bool same_life(const wire::BoardHello& hello, std::uint32_t nonce, HostTime received) const;
     bool of_this_life(const wire::Header& header);
-    void note(const std::optional<Doubt>& doubt);
+    void note(const std::optional<Implausibility>& doubt);
     void count_impossible();
     template <class T, class Use>
     bool use(const wire::Packet& packet, Use&& use);
@@ -139,8 +138,7 @@ class BoardLink {
     // Of the link's thread.
     std::unique_ptr<ByteStream> stream_;
     std::optional<StampingReader> reader_;
-    std::uint32_t host_nonce_ = 0;
-    std::uint32_t host_sequence_ = 0;
+    device::Encoder encoder_;
     ClockExchange clock_;
     wire::Decoder decoder_;
     SequenceWatch sequence_;
@@ -149,7 +147,7 @@ class BoardLink {
     bool connected_ = false;
     std::uint64_t dropped_bytes_ = 0;  ///< of this connection, told so far
     bool anew_ = false;  ///< the board began a new life, or seems to: greet it at once
-    wire::BoardHello hello_{};
+    device::Greeting greeting_;
     std::uint32_t nonce_ = 0;
     std::uint32_t stranger_ = 0;  ///< nonce of the last packets that are of no known life
     int strangers_ = 0;           ///< how many of them came in a row

@@ -16,12 +16,12 @@ constexpr Duration request_timeout = milliseconds(500);
 constexpr double earliest_part = 0.75;
 constexpr double latest_part = 1.25;
 
-std::optional<Doubt> contradicts_causality(const clock::Exchange& exchange) {
+std::optional<Implausibility> contradicts_causality(const clock::Exchange& exchange) {
     const Duration waited = exchange.arrived - exchange.sent;
     const Duration held = exchange.answered - exchange.received;
     if (held.ns >= 0 && held < waited) return std::nullopt;
-    return Doubt{EventReason::implausible_time, exchange.answered.ns,
-                 (exchange.received + waited).ns};
+    return Implausibility{EventReason::implausible_time, exchange.answered.ns,
+                          (exchange.received + waited).ns};
 }
 
 }  // namespace
@@ -76,7 +76,8 @@ std::optional<ClockExchange::Request> ClockExchange::request_of(const wire::Cloc
 }
 
 /// The board cannot have had the request for longer than the host waited.
-std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTime received) {
+std::optional<Implausibility> ClockExchange::take(const wire::ClockAnswer& answer,
+                                                  HostTime received) {
     const auto request = request_of(answer);
     if (!request || received - request->sent > request_timeout) return std::nullopt;
     settle();
@@ -89,11 +90,12 @@ std::optional<Doubt> ClockExchange::take(const wire::ClockAnswer& answer, HostTi
 }
 
 /// The answer left after it was written.
-std::optional<Doubt> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
+std::optional<Implausibility> ClockExchange::take(const wire::ClockFollowUp& follow_up) {
     if (!exchange_ || follow_up.id != exchange_id_) return std::nullopt;
     clock::Exchange exchange = *exchange_;
     if (follow_up.sent_ns < exchange.answered.ns)
-        return Doubt{EventReason::implausible_time, follow_up.sent_ns, exchange.answered.ns};
+        return Implausibility{EventReason::implausible_time, follow_up.sent_ns,
+                              exchange.answered.ns};
     exchange.answered.ns = follow_up.sent_ns;
     if (const auto doubt = contradicts_causality(exchange)) return doubt;
     exchange_ = exchange;

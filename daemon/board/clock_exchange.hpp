@@ -8,7 +8,7 @@
 #include <random>
 
 #include "engine/clock/translator.hpp"
-#include "plausibility/doubt.hpp"
+#include "plausibility/implausibility.hpp"
 #include "publish/clock_recorder.hpp"
 #include "wire/messages.hpp"
 
@@ -35,8 +35,8 @@ class ClockExchange {
     HostTime next_request() const { return next_request_; }
 
     /// Doubted: what contradicts causality is not used.
-    std::optional<Doubt> take(const wire::ClockAnswer& answer, HostTime received);
-    std::optional<Doubt> take(const wire::ClockFollowUp& follow_up);
+    std::optional<Implausibility> take(const wire::ClockAnswer& answer, HostTime received);
+    std::optional<Implausibility> take(const wire::ClockFollowUp& follow_up);
 
     /// When a sample left tells of the clock, too.
     void take(const wire::ImuSample& sample, HostTime received);

@@ -16,22 +16,14 @@ namespace {
 
 unsigned in_us(Duration duration) { return static_cast<unsigned>(duration.ns / 1000); }
 
-/// Bytes that the kernel keeps while the receive thread is late: 0.27 s of gigabit Ethernet. At
-/// half, a loaded host loses packets; at twice, each camera takes 32 MiB more at worst.
+/// Bytes that the kernel keeps while the receive thread is late: 0.27 s of gigabit Ethernet.
 constexpr int receive_buffer = 32 << 20;
 
-/// Silence within a frame after which its last packets are asked for, and asked for again. At half,
-/// moments when the sender or the host is busy look like the loss of all that follows, for which
-/// Aravis gives up asking; at twice, frames that lost their last packets are 2 ms later.
+/// Silence within a frame after which its last packets are asked for, and asked for again.
 constexpr Duration packet_timeout = milliseconds(2);
 
-/// Complete frames in a row that paused for longer than that. At half, a busy host or switch looks
-/// like a camera that pauses; at twice, it is found out after twice as many frames.
+/// Complete frames in a row that paused for longer than that.
 constexpr unsigned frames_with_pauses = 3;
-
-/// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
-/// longer for one that is mute.
-constexpr Duration goodbye = milliseconds(250);
 
 /// The socket of the stream with this port, which Aravis does not hand out.
 std::optional<int> find_socket(std::uint16_t port) {
@@ -65,7 +57,7 @@ Expected<> set_up_packets(ArvCamera* camera, const CameraConfiguration& configur
 Expected<std::unique_ptr<FrameSource>> AravisStream::create(
     ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
     CameraPipeline& pipeline, FrameMeter* meter, Object<ArvChunkParser> chunks,
-    PatientWork& patient) {
+    DetachedTasks& patient) {
     std::unique_ptr<AravisStream> self(
         new AravisStream(configuration, setup, pipeline, meter, patient));
     self->calls_back_ = ARV_IS_GV_DEVICE(arv_camera_get_device(camera));
@@ -92,7 +84,7 @@ AravisStream::~AravisStream() {
     // may be mute. The slots are free as soon as nobody writes into them.
     ArvStream* stream = stream_.get();
     if (stream != nullptr && calls_back_) {
-        patient_.run([stream] { g_object_unref(stream); }, goodbye);
+        patient_.run([stream] { g_object_unref(stream); }, release_timeout);
         ended_->get_future().wait();
     } else if (stream != nullptr) {
         g_object_unref(stream);
@@ -173,7 +165,7 @@ void AravisStream::note_starvation() {
     guint64 failures = 0;
     guint64 underruns = 0;
     arv_stream_get_statistics(stream_.get(), &completed, &failures, &underruns);
-    if (underruns > underruns_) pipeline_.starved(1);
+    if (underruns > underruns_) pipeline_.buffer_underrun(1);
     underruns_ = underruns;
 }
 

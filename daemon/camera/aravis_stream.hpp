@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "base/patient_work.hpp"
+#include "base/detached_tasks.hpp"
 #include "camera/frame_source.hpp"
 #include "engine/pairing/block_id.hpp"
 
@@ -24,7 +24,7 @@ class AravisStream final : public FrameSource {
     static Expected<std::unique_ptr<FrameSource>> create(
         ArvCamera* camera, const CameraConfiguration& configuration, const CameraSetup& setup,
         CameraPipeline& pipeline, FrameMeter* meter, Object<ArvChunkParser> chunks,
-        PatientWork& patient);
+        DetachedTasks& patient);
     ~AravisStream() override;  ///< gives back all slots; the camera need not answer any more
 
     bool needs_polling() const override { return !calls_back_; }
@@ -33,7 +33,7 @@ class AravisStream final : public FrameSource {
 
  private:
     AravisStream(const CameraConfiguration& configuration, const CameraSetup& setup,
-                 CameraPipeline& pipeline, FrameMeter* meter, PatientWork& patient)
+                 CameraPipeline& pipeline, FrameMeter* meter, DetachedTasks& patient)
         : FrameSource(configuration, setup, pipeline, meter), patient_(patient) {}
 
     static void on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
@@ -45,7 +45,7 @@ class AravisStream final : public FrameSource {
     void note_pauses(bool good);
     void enlarge_receive_buffer() const;
 
-    PatientWork& patient_;
+    DetachedTasks& patient_;
     bool calls_back_ = true;
     std::shared_ptr<std::promise<void>> ended_ = std::make_shared<std::promise<void>>();
     std::atomic<bool> closing_{false};

@@ -10,21 +10,17 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Pixels that are looked at. At half each way, small lights are missed; at twice, metering takes
-/// four times as long in the receive thread.
+/// Pixels that are looked at.
 constexpr std::uint32_t columns = 64;
 constexpr std::uint32_t rows = 48;
 
-/// Part of the step to the right exposure that is taken at once. At half, it takes twice the steps;
-/// at twice, brightness oscillates.
+/// Part of the step to the right exposure that is taken at once.
 constexpr double part_of_the_way = 0.7;
 
-/// Relative error of brightness that is left alone. At half, noise moves the exposure; at twice,
-/// one sees the difference between cameras.
+/// Relative error of brightness that is left alone.
 constexpr double dead_zone = 0.04;
 
-/// Brightness that a black image counts as: one step of 8 bits. At half, the way out of the dark
-/// begins with larger steps, which are limited anyway; at twice, with smaller ones.
+/// Brightness that a black image counts as: one step of 8 bits.
 constexpr double darkest = 1.0 / 255;
 
 // Pixel Format Naming Convention: bits 24 to 31 say grey or Bayer, 16 to 23 the bits that a pixel

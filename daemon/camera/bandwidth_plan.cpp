@@ -16,8 +16,7 @@ constexpr double ethernet_overhead = 38;  // preamble, header, checksum and gap,
 constexpr double gvsp_overhead = 36;      // IP, UDP and GVSP headers, bytes
 constexpr double leader_and_trailer = 2;  // packets
 
-/// Part of a link that cameras may fill; the rest is for control and resends. At half, two cameras
-/// are refused that fit; twice does not exist.
+/// Part of a link that cameras may fill; the rest is for control and resends.
 constexpr double usable_part = 0.95;
 
 double packets_per_frame(const BandwidthNeed& need) {

@@ -19,63 +19,49 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A program that was killed keeps a camera until its heartbeat is missed, 3 s by default. At half,
-/// the service's own earlier life is taken for another program; at twice, another program is named
-/// five seconds later.
+/// A program that was killed keeps a camera until its heartbeat is missed, 3 s by default.
 constexpr Duration lease_patience = seconds(5);
 
 /// Finding and setting up takes a second, or ten when a large description is looked at for the
-/// first time. At half, such a camera shows as stuck meanwhile; at twice, a stuck one shows later.
+/// first time.
 constexpr Duration set_up_patience = seconds(20);
 
-/// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
-/// longer for one that is mute.
-constexpr Duration goodbye = milliseconds(250);
-
-/// From one look at whether a camera is there to the next. At half, twice the packets; at twice,
-/// one that was switched off for a moment is not seen to be.
+/// From one look at whether a camera is there to the next.
 constexpr Duration presence_interval = milliseconds(250);
 
 /// Until a camera that leaves triggers unanswered is asked whether it restarted, and then between
-/// questions. At half, a lost frame causes some; at twice, it is back 0.1 s later.
+/// questions.
 constexpr Duration first_doubt = milliseconds(150);
 constexpr std::uint64_t triggers_of_doubt = 3;
 constexpr Duration doubt_interval = milliseconds(50);
 
-/// Time of an answer to that. At half, a loaded camera does not answer in time; at twice, the watch
-/// sees less often what else happens.
+/// Time of an answer to that.
 constexpr Duration doubt_patience = milliseconds(30);
 
 /// Packets come, but no frame for so long: the camera began to count anew, less than 100 back, and
-/// Aravis takes its frames for late ones. At half, a frame that is sent twice would do; at twice,
-/// frames are missed longer.
+/// Aravis takes its frames for late ones.
 constexpr Duration time_of_deafness = milliseconds(300);
 
 /// Streams in a row in which, after few frames or none, packets came and no frame completed: the
-/// camera's block ids stand still. At one, a camera that restarts its ids early would do; at twice,
-/// it is said some seconds later.
+/// camera's block ids stand still. One such stream may also be a camera that restarts its ids
+/// early.
 constexpr unsigned deaf_streams_of_stuck_ids = 3;
 constexpr std::uint64_t few_frames = 3;
 
-/// Ids that began anew twice within so long do it for no reason of the host. At half, a camera that
-/// does it each 20 s is not named; at twice, two power cuts look like it.
+/// Ids that began anew twice within so long do it for no reason of the host.
 constexpr Duration renumbering_memory = seconds(30);
 
-/// Between looks at a streaming camera. At half, an idle service wakes twice as often; at twice,
-/// loss of control shows 20 ms later.
+/// Between looks at a streaming camera.
 constexpr Duration step = milliseconds(20);
 
-/// Between readings of what changes slowly. At half, twice the control packets; at twice, a shared
-/// link is replanned three seconds later.
+/// Between readings of what changes slowly.
 constexpr Duration housekeeping_interval = seconds(3);
 
-/// A camera is silent that leaves so many triggers and so much time without a frame. At half, a
-/// camera that skips some is opened anew; at twice, slow cameras are missed longer.
+/// A camera is silent that leaves so many triggers and so much time without a frame.
 constexpr std::uint64_t triggers_of_silence = 5;
 constexpr Duration time_of_silence = seconds(2);
 
-/// The same for a camera without triggers, whose rate nobody knows. At half, one slower than 0.4 Hz
-/// is opened anew for ever; at twice, a mute one is missed for ten seconds.
+/// The same for a camera without triggers, whose rate nobody knows.
 constexpr Duration time_of_free_silence = seconds(5);
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
@@ -95,7 +81,7 @@ struct Camera::Health {
     std::optional<GvcpClient> client;
 };
 
-Camera::Camera(const CameraConfiguration& configuration, CameraEnvironment& environment,
+Camera::Camera(const CameraConfiguration& configuration, CameraContext& environment,
                CameraPipeline& pipeline, Hooks hooks)
     : configuration_(configuration),
       environment_(environment),
@@ -135,8 +121,8 @@ CameraReport Camera::report() const {
     if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
         report.state = CameraState::failed;
         report.hint = fmt::format(
-            "{}: it has been set up for {} s: its control channel is slow, or it does not finish "
-            "its answers; if that lasts, power it off and on",
+            "{}: set-up has taken {} s so far: its control channel is slow, or its answers are "
+            "incomplete; if that lasts, power it off and on",
             configuration_.device, setting_up.ns / seconds(1).ns);
     }
     return report;
@@ -191,8 +177,8 @@ void Camera::explain(CameraProblem& ended) {
     if (held_since_.ns == 0) held_since_ = host_now();
     if (host_now() - held_since_ > lease_patience) return;
     ended = {CameraState::opening,
-             {configuration_.device, "it is still held, perhaps by a program that was killed",
-              "it frees itself within seconds; it is asked again"}};
+             {configuration_.device, "it is still locked, perhaps by a program that was killed",
+              "the lock expires within seconds; the service keeps trying"}};
 }
 
 /// Waits; not as long when the camera was gone and is back. False: it is to stop.
@@ -204,7 +190,7 @@ bool Camera::wait_to_retry(CameraState why) {
         if (!device_ || until - host_now() < presence_interval) continue;
         const bool there = answers(doubt_patience);
         if (there && gone) {
-            retry_.begin_anew();
+            retry_.restart();
             return true;
         }
         gone = !there;
@@ -232,7 +218,7 @@ CameraResult<> Camera::session() {
     g_signal_connect_data(arv_camera_get_device(camera), "control-lost",
                           G_CALLBACK(on_control_lost), new Flag(lost), forget, GConnectFlags{});
     auto ended = pause({}) ? set_up_and_stream(camera, *lost) : CameraResult<>{};
-    environment_.patient.run([camera] { g_object_unref(camera); }, goodbye);
+    environment_.patient.run([camera] { g_object_unref(camera); }, release_timeout);
     return ended;
 }
 
@@ -322,7 +308,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
             arv_camera_stop_acquisition(camera, nullptr);
             g_object_unref(camera);
         },
-        goodbye);
+        release_timeout);
     return {};
 }
 
@@ -340,7 +326,7 @@ Expected<std::unique_ptr<FrameSource>> Camera::receive(ArvCamera* camera,
         mode = *chosen;
         if (!plain && configuration_.receive != ReceiveMode::socket)
             log(LogLevel::info, configuration_.name,
-                "its frames are more than plain images: they are received by a UDP socket");
+                "its frames carry more than plain images: they are received through a UDP socket");
         if (auto done = set_up_packets(camera, configuration_); !done)
             return Unexpected(done.error());
     }
@@ -361,7 +347,7 @@ Expected<std::unique_ptr<FrameSource>> Camera::receive(ArvCamera* camera,
                                 std::move(chunks), environment_.patient);
 }
 
-/// Cameras on one link are told how long to pause between packets.
+/// Cameras on one link are set to pause between packets.
 void Camera::plan_bandwidth(ArvCamera* camera, AravisNodeMap& nodes, std::uint64_t payload) {
     ArvDevice* device = arv_camera_get_device(camera);
     packet_delay_ = Duration{-1};  // what it was left with is unknown
@@ -424,7 +410,7 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
                                : "set Width, Height and PixelFormat in [camera.features], or power "
                                  "it off and on"});
     }
-    clock_stands_ = configuration_.camera_clock && frames.clock_stands();
+    clock_stands_ = configuration_.camera_clock && frames.clock_frozen();
     if (clock_stands_)
         return problem(CameraState::opening, {configuration_.name, "its clock stands still",
                                               "the camera is being reopened without it"});
@@ -449,7 +435,7 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
         ++deaf_streams_;
         if (health.taken > few_frames)
             renumbered_before_ns_ = renumbered_ns_.exchange(host_now().ns);
-        return problem(CameraState::opening, {configuration_.name, "its frames are numbered anew",
+        return problem(CameraState::opening, {configuration_.name, "its frame numbers started over",
                                               "the camera is being reopened"});
     }
     if (silent)
@@ -556,7 +542,7 @@ void Camera::control_exposure(AravisNodeMap& nodes) {
             done.error().message());
         pipeline_.set_camera_exposure({}, host_now());
     } else {
-        read_exposure(nodes);  // it may take another one than it was told
+        read_exposure(nodes);  // the camera may round it
     }
     const double period_ns = 1e9 / configuration_.rate_hz;
     exposure_holds_ =

@@ -13,12 +13,12 @@
 #include <thread>
 #include <vector>
 
-#include "base/patient_work.hpp"
+#include "base/detached_tasks.hpp"
 #include "camera/auto_exposure.hpp"
 #include "camera/bandwidth_plan.hpp"
 #include "camera/camera_state.hpp"
-#include "camera/description_vetting.hpp"
-#include "camera/device_claims.hpp"
+#include "camera/description_sandbox.hpp"
+#include "camera/device_locks.hpp"
 #include "camera/gvcp.hpp"
 #include "camera/preset_run.hpp"
 #include "camera/retry.hpp"
@@ -56,9 +56,9 @@ struct CameraReport {
 };
 
 /// What all cameras share.
-struct CameraEnvironment {
-    CameraEnvironment(ring::Place place, std::vector<CameraPreset> known_presets,
-                      const std::filesystem::path& state)
+struct CameraContext {
+    CameraContext(ring::Place place, std::vector<CameraPreset> known_presets,
+                  const std::filesystem::path& state)
         : rings(std::move(place)),
           presets(std::move(known_presets)),
           descriptions(own_program, state) {}
@@ -66,9 +66,9 @@ struct CameraEnvironment {
     ring::Place rings;
     std::vector<CameraPreset> presets;
     BandwidthPlan bandwidth;
-    DescriptionVetting descriptions;
-    DeviceClaims claims;
-    PatientWork patient;
+    DescriptionSandbox descriptions;
+    DeviceLocks claims;
+    DetachedTasks patient;
     std::timed_mutex aravis;  ///< what Aravis cannot do in two threads: parsing, listing USB
 };
 
@@ -83,7 +83,7 @@ class Camera {
             exposure;  ///< will be set next: the board must know before it holds
     };
 
-    Camera(const CameraConfiguration& configuration, CameraEnvironment& environment,
+    Camera(const CameraConfiguration& configuration, CameraContext& environment,
            CameraPipeline& pipeline, Hooks hooks);
     ~Camera();
     Camera(const Camera&) = delete;
@@ -130,7 +130,7 @@ class Camera {
     bool pause(Duration duration);
 
     CameraConfiguration configuration_;
-    CameraEnvironment& environment_;
+    CameraContext& environment_;
     CameraPipeline& pipeline_;
     Hooks hooks_;
     std::atomic<bool> streaming_{false};

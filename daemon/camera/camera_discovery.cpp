@@ -13,18 +13,15 @@ namespace versavis::daemon {
 namespace {
 
 /// Until a camera that is asked by its address is taken for absent: some answer after a third of a
-/// second. At half, one with a slow control channel may be missed; at twice, the state of one that
-/// is absent is known a second later.
+/// second.
 constexpr Duration address_patience = seconds(1);
 
 /// The same for one that is asked by broadcast, before USB is looked at, and after: cameras may
-/// wait a second with their answer. At half, slow ones are never found; at twice, the state is
-/// known a second later.
+/// wait a second with their answer.
 constexpr Duration first_broadcast_patience = milliseconds(100);
 constexpr Duration broadcast_patience = seconds(1);
 
-/// For one register. At half, a busy camera does not answer in time; at twice, a mute one is waited
-/// for longer.
+/// For one register.
 constexpr Duration answer_patience = milliseconds(500);
 
 constexpr std::chrono::milliseconds look_interval(20);
@@ -34,18 +31,20 @@ std::string text(const char* value) { return value == nullptr ? "" : value; }
 CameraProblem absent(const std::string& device) {
     const auto address = parse_address(device);
     if (address && !in_own_network(*address))
-        return {CameraState::unreachable,
-                {device, fmt::format("its address {} is not in any network of this host", device),
-                 "give the camera an address of this host's camera network, or the host one of the "
-                 "camera's"}};
+        return {
+            CameraState::unreachable,
+            {device,
+             fmt::format("no interface of this host is in the subnet of its address {}", device),
+             "give the camera an address in this host's camera network, or the host one in the "
+             "camera's"}};
     return {CameraState::absent,
-            {device, "no such camera: nobody answers",
+            {device, "no camera answers to this name",
              "check cable, power and name ('arv-tool-0.8' lists cameras by address, serial number "
              "and name)"}};
 }
 
 CameraResult<> check_claim(const std::string& camera, const std::string& device,
-                           const std::string& identity, DeviceClaims& claims) {
+                           const std::string& identity, DeviceLocks& claims) {
     const std::string holder = claims.claim(camera, identity);
     if (holder.empty()) return {};
     return problem(CameraState::misconfigured,
@@ -89,7 +88,7 @@ CameraResult<OpenCamera> open_on_network(const std::string& camera, const std::s
                                                glib_address(found.address).get(), error.out()));
     if (!opened)
         return problem(CameraState::failed,
-                       {device, "it is there but cannot be opened: " + error.text(),
+                       {device, "it was found but cannot be opened: " + error.text(),
                         "check the firewall, or power it off and on"});
     if (arv_gv_device_is_controller(ARV_GV_DEVICE(opened.get())) == FALSE) return held;
     auto own = camera_of(device, std::move(opened));
@@ -127,7 +126,7 @@ CameraResult<Object<ArvDevice>> open_usb_device(const std::string& device, const
         return problem(CameraState::busy,
                        {device, "another program holds it", "close that program"});
     return problem(CameraState::failed,
-                   {device, "it is there but cannot be opened: " + error.text(),
+                   {device, "it was found but cannot be opened: " + error.text(),
                     "check the udev rule, or unplug it and plug it in"});
 }
 

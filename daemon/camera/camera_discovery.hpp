@@ -10,8 +10,8 @@
 
 #include "camera/aravis_node_map.hpp"
 #include "camera/camera_state.hpp"
-#include "camera/description_vetting.hpp"
-#include "camera/device_claims.hpp"
+#include "camera/description_sandbox.hpp"
+#include "camera/device_locks.hpp"
 #include "camera/gvcp.hpp"
 
 namespace versavis::daemon {
@@ -23,8 +23,8 @@ struct OpenCamera {
 
 /// What all that open cameras share.
 struct CameraOpening {
-    DescriptionVetting& descriptions;
-    DeviceClaims& claims;
+    DescriptionSandbox& descriptions;
+    DeviceLocks& claims;
     std::timed_mutex& aravis;  ///< Aravis parses into one state, and lists USB into another
 };
 

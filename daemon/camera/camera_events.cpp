@@ -10,8 +10,7 @@ namespace {
 
 constexpr std::uint32_t message_channel_count = 0x0900;
 
-/// Until a camera that got no answer sends an event again, and how often it does. At half, a busy
-/// host gets some twice; at twice, a lost one is known later.
+/// Until a camera that got no answer sends an event again, and how often it does.
 constexpr std::uint32_t resend_after_ms = 100;
 constexpr std::uint32_t resends = 2;
 

@@ -17,8 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Features that a description may name in its categories, for the report. At half, some models of
-/// many features are cut; at twice, a hostile one makes it twice as long.
+/// Features that a description may name in its categories, for the report.
 constexpr std::size_t most_features = 5000;
 
 bool never() { return false; }
@@ -93,8 +92,8 @@ ProbeReport probe_camera(const CameraConfiguration& configuration,
         report.problem = presets.error().message();
         return report;
     }
-    DescriptionVetting descriptions(own_program, "/dev/null");  // nothing is kept
-    DeviceClaims claims;
+    DescriptionSandbox descriptions(own_program, "/dev/null");  // nothing is kept
+    DeviceLocks claims;
     std::timed_mutex aravis;
     auto opened = open_camera(configuration.name, configuration.device,
                               {descriptions, claims, aravis}, never);

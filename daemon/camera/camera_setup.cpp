@@ -15,20 +15,16 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Letters of a name that are looked at; GigE Vision knows 32. At half, long names are cut; at
-/// twice, nothing changes.
+/// Letters of a name that are looked at; GigE Vision knows 32.
 constexpr std::size_t longest_name = 256;
 
-/// The largest frame. At half, the largest sensors of 2020 would be refused with 16 bits; at twice,
-/// a camera that lies takes twice the memory, for each slot.
+/// The largest frame.
 constexpr std::uint64_t largest_frame = 256 << 20;
 
-/// Bytes that a pixel may take: three colours of 16 bits, and padding. At half, colour images would
-/// be refused; at twice, twice the memory for a camera that lies.
+/// Bytes that a pixel may take: three colours of 16 bits, and padding.
 constexpr std::uint64_t most_bytes_per_pixel = 8;
 
-/// What may follow the pixels, such as chunks. At half, still thousands of them; at twice, a MiB
-/// more for a camera that lies.
+/// What may follow the pixels, such as chunks.
 constexpr std::uint64_t largest_extra = 1 << 20;
 
 /// What the camera says of itself; empty when it does not.
@@ -245,7 +241,7 @@ Expected<> set_up_camera(ArvCamera* camera, AravisNodeMap& nodes,
     if (auto has_all = check_groups(*preset, configuration); !has_all) return has_all;
     PresetRun run(*preset, nodes, variables_of(*preset, configuration));
     for (const std::string& group : wanted_groups(configuration)) run.carry_out(group);
-    // One that cannot be told its rate keeps its own, and is held against the configured one.
+    // One whose rate cannot be set keeps its own, which is compared with the configured one.
     if (configuration.trigger == TriggerSource::free_run)
         arv_camera_set_frame_rate(camera, configuration.rate_hz, nullptr);
     setup.steps = run.results();

@@ -15,8 +15,7 @@ namespace {
 
 constexpr std::size_t url_size = 512;
 
-/// For one block of memory. At half, a camera that is busy is given up; at twice, a mute one holds
-/// its thread up for longer.
+/// For one block of memory.
 constexpr Duration block_patience = seconds(3);
 
 const char* const no_description = "it cannot be used: ask its maker for another firmware";

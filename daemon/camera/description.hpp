@@ -10,8 +10,7 @@
 
 namespace versavis::daemon {
 
-/// The largest description that is read. At half, a verbose one that is not zipped would be
-/// refused; at twice, a camera can keep its thread busy for twice as long.
+/// The largest description that is read.
 inline constexpr std::uint64_t largest_description = 8 << 20;
 
 /// Of GigE Vision.

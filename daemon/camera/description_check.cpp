@@ -22,12 +22,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// The unzipped text. At half, the most verbose cameras are refused; at twice, a hostile one may
-/// take twice the memory.
+/// The unzipped text.
 constexpr std::size_t largest_text = 24 << 20;
 
-/// Memory and time of the probe. At half, large descriptions are refused; at twice, so much more
-/// may be needed in the service, which parses what was found good.
+/// Memory and time of the probe.
 constexpr rlim_t probe_memory = 128 << 20;
 constexpr rlim_t probe_seconds = 5;
 

@@ -11,15 +11,13 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Steps from a feature down to its registers. Cameras need about ten. At half, still twice what is
-/// needed; at twice, still far from the end of a stack.
+/// Steps from a feature down to its registers. Cameras need about ten.
 constexpr unsigned deepest_chain = 50;
 
-/// Nodes that are looked at to know one value. Cameras need hundreds at most. At half, elaborate
-/// ones might be refused; at twice, one value may take twice the time.
+/// Nodes that are looked at to know one value. Cameras need hundreds at most.
 constexpr std::uint64_t most_steps = 20'000;
 
-/// Bytes of one register. At half, tables of cameras could be refused; at twice, twice the memory.
+/// Bytes of one register.
 constexpr std::int64_t longest_register = 1 << 20;
 
 /// The name under which an offset of an index is exposed as a variable.

@@ -11,34 +11,25 @@ namespace {
 /// Of a packet that came; less: how often it was asked for.
 constexpr std::uint8_t here = 0xFF;
 
-/// How often one packet is asked for. At half, one that is lost twice costs its frame; at twice,
-/// complete frames wait twice as long behind one whose packets are gone.
+/// How often one packet is asked for.
 constexpr std::uint8_t most_asks = 3;
 
-/// What a camera takes to send a packet again. At half, slow cameras send them twice; at twice, a
-/// packet that is lost twice makes its frame 3 ms later.
+/// What a camera takes to send a packet again.
 constexpr Duration answer_time = milliseconds(3);
 
-/// Silence within a frame after which its last packets are asked for. At half, moments when the
-/// sender is busy look like loss; at twice, a frame that lost its last packet is 1 ms later.
+/// Silence within a frame after which its last packets are asked for.
 constexpr Duration silence = milliseconds(1);
 
-/// Part of a frame's packets that may be asked for. At half, bursts of loss that a camera could
-/// mend cost frames; at twice, a network that drops what it cannot carry is given half as much
-/// again.
+/// Part of a frame's packets that may be asked for.
 constexpr std::uint32_t part_to_ask_for = 4;
 
 /// A frame whose number is behind the newest by less is late, not new: its packets were lost on a
-/// detour, or sent again too late. At half, frames that return from longer detours seem to be new;
-/// at twice, a camera that began to count anew is found out later.
+/// detour, or sent again too late.
 constexpr std::uint64_t numbers_of_late_frames = 100;
 
-/// At half, packets that overtake others cost a frame; at twice, stray numbers hold twice the
-/// slots.
 constexpr std::size_t most_open = 4;
 
-/// Frames after which most of a longer length is believed; a shorter one is at once. At half, a
-/// burst of loss makes the frames after it late; at twice, a slower link costs wake-ups for longer.
+/// Frames after which most of a longer length is believed; a shorter one is at once.
 constexpr int length_memory = 8;
 
 /// A frame is never of more packets: numbers of 24 bits must do.

@@ -10,12 +10,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Least time that packets which were lost may take to come again. At half, two resends do not fit;
-/// at twice, complete frames wait longer behind a broken one.
+/// Least time that packets which were lost may take to come again.
 constexpr Duration shortest_retention = milliseconds(100);
 
-/// From the end of the exposure to the trailer, for a large sensor. At half, frames of slow sensors
-/// are given up; at twice, complete frames wait longer behind a broken one.
+/// From the end of the exposure to the trailer, for a large sensor.
 constexpr Duration readout = milliseconds(50);
 
 }  // namespace
@@ -25,7 +23,7 @@ Duration frame_retention(const CameraConfiguration& configuration) {
     return std::max(shortest_retention, exposure + readout);
 }
 
-/// Bytes from row to row, by the pixel format; by the size for formats that do not tell.
+/// Bytes from row to row, by the pixel format; by the size for formats that do not say.
 std::uint32_t FrameSource::stride(const Received& frame) const {
     const std::uint32_t bits = frame.pixel_format >> 16U & 0xFFU;
     if (bits == 0)
@@ -51,8 +49,8 @@ void FrameSource::note_size(const Received& frame, EventReason refused) {
                                         std::uint64_t{static_cast<std::uint16_t>(frame.height)}
                                             << 32U |
                                         (frame.size & 0xFFFFFFFFU);
-    if (now == 0 || now == misfit_) changed_ = now;
-    misfit_ = now;
+    if (now == 0 || now == last_mismatch_) changed_ = now;
+    last_mismatch_ = now;
 }
 
 std::string FrameSource::changed() const {

@@ -38,7 +38,7 @@ class FrameSource {
     std::string changed() const;
 
     /// Its stamps are the same for frame after frame.
-    bool clock_stands() const { return equal_stamps_ >= stamps_of_a_standing_clock; }
+    bool clock_frozen() const { return equal_stamps_ >= stamps_of_a_standing_clock; }
 
     /// Frames of any kind that were taken so far.
     std::uint64_t taken() const { return taken_; }
@@ -74,8 +74,6 @@ class FrameSource {
     CameraPipeline& pipeline_;
 
  private:
-    /// At half, two frames in a row that a clock of coarse ticks stamps alike would do; at twice,
-    /// it shows three frames later.
     static constexpr unsigned stamps_of_a_standing_clock = 4;
 
     EventReason refusal(const Received& frame) const;
@@ -87,9 +85,9 @@ class FrameSource {
     std::atomic<std::uint64_t> changed_{0};  ///< width, height and the bytes that do not fit
     std::atomic<unsigned> equal_stamps_{0};
     std::atomic<std::uint64_t> taken_{0};
-    std::uint64_t misfit_ = 0;  ///< the same of the newest frame, when it does not fit
-    CameraTime stamp_;          ///< of the newest frame
-    std::uint32_t width_ = 0;   ///< of the first frame: the others must be of the same size
+    std::uint64_t last_mismatch_ = 0;  ///< the same of the newest frame, when it does not fit
+    CameraTime stamp_;                 ///< of the newest frame
+    std::uint32_t width_ = 0;          ///< of the first frame: the others must be of the same size
     std::uint32_t height_ = 0;
 };
 

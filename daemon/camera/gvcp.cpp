@@ -28,15 +28,13 @@ constexpr std::size_t discovery_size = 0xF8;
 constexpr std::size_t block = 512;  ///< the most that a device must deliver at once
 
 /// Between the first two questions to one address, and then twice as long each time, because a slow
-/// camera answers all of them before anything else. At half, twice the packets; at twice, a camera
-/// that has booted is seen 50 ms later.
+/// camera answers all of them before anything else.
 constexpr Duration ask_interval = milliseconds(50);
 
-/// Until a question is asked again, of a camera that has not shown that it takes longer. At half, a
-/// slow camera gets each one twice; at twice, a lost packet costs twice the time.
+/// Until a question is asked again, of a camera that has not shown that it takes longer.
 constexpr Duration answer_time = milliseconds(200);
 
-/// Between looks at `cancelled`. At half, twice the wake-ups; at twice, a stop waits 20 ms longer.
+/// Between looks at `cancelled`.
 constexpr Duration look_interval = milliseconds(20);
 
 struct Interface {

@@ -18,16 +18,10 @@ constexpr std::uint64_t stream_address = 0x0D18;
 constexpr std::uint64_t capabilities = 0x0934;
 constexpr std::uint32_t capability_resend = 1U << 2U;
 
-/// While a frame comes, the thread sleeps until its last packet should be there, between these. At
-/// half of the shortest, twice the wake-ups where the estimate is poor; at twice, frames are
-/// complete 0.5 ms later. At half of the longest, twice the wake-ups; at twice, fast links fill
-/// half of the ring meanwhile, and gaps are asked for 4 ms later.
+/// While a frame comes, the thread sleeps until its last packet should be there, within these
+/// limits. In the longest, fast links fill a quarter of the ring.
 constexpr Duration shortest_sleep = microseconds(500);
 constexpr Duration longest_sleep = milliseconds(8);
-
-/// For a camera that is let go. At half, one that is busy is left behind; at twice, a stop waits
-/// longer for one that is mute.
-constexpr Duration goodbye = milliseconds(250);
 
 timespec as_timespec(Duration duration) {
     constexpr std::int64_t second_ns = 1'000'000'000;
@@ -38,7 +32,7 @@ timespec as_timespec(Duration duration) {
 
 Expected<std::unique_ptr<FrameSource>> ImageReceiver::create(
     ArvCamera* camera, const NetworkDevice& device, const CameraConfiguration& configuration,
-    const CameraSetup& setup, CameraPipeline& pipeline, FrameMeter* meter, PatientWork& patient) {
+    const CameraSetup& setup, CameraPipeline& pipeline, FrameMeter* meter, DetachedTasks& patient) {
     ArvDevice* control = arv_camera_get_device(camera);
     GlibError error;
     Stream stream;
@@ -61,7 +55,7 @@ Expected<std::unique_ptr<FrameSource>> ImageReceiver::create(
 
 ImageReceiver::ImageReceiver(ArvDevice* device, PacketRing ring, const Stream& stream,
                              const CameraConfiguration& configuration, const CameraSetup& setup,
-                             CameraPipeline& pipeline, FrameMeter* meter, PatientWork& patient)
+                             CameraPipeline& pipeline, FrameMeter* meter, DetachedTasks& patient)
     : FrameSource(configuration, setup, pipeline, meter),
       device_(device),
       patient_(patient),
@@ -85,7 +79,7 @@ ImageReceiver::~ImageReceiver() {
             arv_device_write_register(device, stream_port, 0, nullptr);
             g_object_unref(device);
         },
-        goodbye);
+        release_timeout);
 }
 
 void ImageReceiver::run() {
@@ -129,7 +123,7 @@ void ImageReceiver::wait(std::uint32_t arrived, HostTime now) const {
 std::optional<FrameAssembler::Memory> ImageReceiver::begin_frame() {
     const auto slot = pipeline_.acquire();
     if (!slot) {
-        pipeline_.starved(1);
+        pipeline_.buffer_underrun(1);
         return std::nullopt;
     }
     return FrameAssembler::Memory{*slot,

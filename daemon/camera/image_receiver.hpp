@@ -7,7 +7,7 @@
 #include <memory>
 #include <thread>
 
-#include "base/patient_work.hpp"
+#include "base/detached_tasks.hpp"
 #include "camera/frame_assembler.hpp"
 #include "camera/frame_source.hpp"
 #include "camera/gvcp.hpp"
@@ -26,7 +26,7 @@ class ImageReceiver final : public FrameSource, private FrameAssembler::Owner {
                                                          const CameraConfiguration& configuration,
                                                          const CameraSetup& setup,
                                                          CameraPipeline& pipeline,
-                                                         FrameMeter* meter, PatientWork& patient);
+                                                         FrameMeter* meter, DetachedTasks& patient);
     ~ImageReceiver() override;  ///< gives back all slots; the camera need not answer any more
 
     std::uint64_t packets() const override { return packets_; }
@@ -41,7 +41,7 @@ class ImageReceiver final : public FrameSource, private FrameAssembler::Owner {
 
     ImageReceiver(ArvDevice* device, PacketRing ring, const Stream& stream,
                   const CameraConfiguration& configuration, const CameraSetup& setup,
-                  CameraPipeline& pipeline, FrameMeter* meter, PatientWork& patient);
+                  CameraPipeline& pipeline, FrameMeter* meter, DetachedTasks& patient);
 
     std::optional<FrameAssembler::Memory> begin_frame() override;
     void end_frame(const FrameAssembler::Frame& frame) override;
@@ -52,7 +52,7 @@ class ImageReceiver final : public FrameSource, private FrameAssembler::Owner {
     void wait(std::uint32_t arrived, HostTime now) const;
 
     ArvDevice* device_;
-    PatientWork& patient_;
+    DetachedTasks& patient_;
     PacketRing ring_;
     Stream stream_;
     FrameAssembler assembler_;

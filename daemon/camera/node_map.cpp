@@ -9,8 +9,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A float has 24 bits. At half, its rounding is taken for another value; at twice, so are steps of
-/// one in ten million.
+/// A float has 24 bits.
 constexpr double rounding = 2e-7;
 
 std::optional<double> number(const std::string& text) {

@@ -18,12 +18,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// What the kernel keeps while the receive thread is late: 0.2 s of gigabit Ethernet. At half, a
-/// loaded host loses packets; at twice, each camera takes 32 MiB more.
+/// What the kernel keeps while the receive thread is late: 0.2 s of gigabit Ethernet.
 constexpr std::size_t ring_size = 32 << 20;
 
-/// The kernel allocates it in blocks, which slots do not cross. At half, more is left over at their
-/// ends; at twice, memory in one piece is harder to get.
+/// The kernel allocates it in blocks, which slots do not cross.
 constexpr std::size_t block_size = 1 << 20;
 
 constexpr std::size_t block_count = ring_size / block_size;

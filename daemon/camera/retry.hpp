@@ -25,17 +25,12 @@ class Retry {
     }
 
     /// It was gone and is back: what was wrong with it may be mended.
-    void begin_anew() { longer_ = first; }
+    void restart() { longer_ = first; }
 
-    /// At half, an absent camera is asked more often; at twice, one that boots is back 0.1 s later.
     static constexpr Duration soon = milliseconds(100);
 
-    /// At half, a misconfigured camera is opened anew more often; at twice, one that was mended
-    /// is seen half a second later.
     static constexpr Duration first = milliseconds(500);
 
-    /// At half, a camera that cannot be used is bothered twice as often; at twice, one that was
-    /// mended without being switched off is seen ten seconds later.
     static constexpr Duration longest = seconds(10);
 
  private:

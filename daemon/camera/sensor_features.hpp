@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which of a camera's features tell the state of its sensor.
+// Which of a camera's features hold the state of its sensor.
 #pragma once
 
 #include <string>

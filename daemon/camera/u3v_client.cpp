@@ -7,27 +7,24 @@
 #include <cstring>
 #include <optional>
 
-#include "base/usb_handles.hpp"
+#include "device/usb_bus.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {
 
 namespace {
 
-/// For one answer. At half, a camera that is busy is given up; at twice, a mute one holds its
-/// thread up for longer.
+/// For one answer.
 constexpr Duration answer_patience = milliseconds(500);
 
-/// The same for a camera that says that its answer takes longer. At half, one that erases its flash
-/// is given up; at twice, one that never ends holds its thread up for longer.
+/// The same for a camera that says that its answer takes longer.
 constexpr Duration longest_patience = seconds(5);
 
 /// A question is put so often: what is left of an earlier program's may come first.
 constexpr unsigned most_tries = 3;
 
-/// Between looks at whether it is cancelled. At half, an idle wait wakes twice as often; at twice,
-/// a stop comes later.
-constexpr unsigned look_interval_ms = 20;
+/// Between looks at whether it is cancelled.
+constexpr Duration look_interval = milliseconds(20);
 
 /// Aravis divides what it reads by the room in a packet: a header, and the longest text of GenCP.
 constexpr std::uint64_t smallest_packet = 12 + 8 + 64;
@@ -45,6 +42,8 @@ constexpr std::uint16_t acknowledge = 1U << 14U;
 constexpr std::uint16_t read_memory = 0x0800;
 constexpr std::uint16_t pending = 0x0805;
 constexpr std::size_t usb_packet = 1024;  ///< of SuperSpeed: a buffer holds a number of them
+
+constexpr device::UsbClass control_class{0xEF, 5, 0};  ///< of USB3 Vision
 
 /// More bootstrap registers.
 constexpr std::uint64_t abrm_manifest = 0x1D0;
@@ -73,66 +72,24 @@ std::uint64_t number_in(const Bytes& bytes, std::size_t at, std::size_t size) {
     return value;
 }
 
-/// Where the control channel lies.
-struct ControlInterface {
-    int number = -1;
-    std::uint8_t in = 0;
-    std::uint8_t out = 0;
-};
-
-ControlInterface find_control(libusb_device* device) {
-    ControlInterface control;
-    libusb_config_descriptor* configuration = nullptr;
-    if (libusb_get_active_config_descriptor(device, &configuration) != 0) return control;
-    for (int i = 0; i < configuration->bNumInterfaces; ++i) {
-        const libusb_interface_descriptor& setting = configuration->interface[i].altsetting[0];
-        if (setting.bInterfaceClass != LIBUSB_CLASS_MISCELLANEOUS ||
-            setting.bInterfaceSubClass != 5 || setting.bInterfaceProtocol != 0)
-            continue;
-        control.number = setting.bInterfaceNumber;
-        for (int e = 0; e < setting.bNumEndpoints; ++e) {
-            const std::uint8_t address = setting.endpoint[e].bEndpointAddress;
-            ((address & LIBUSB_ENDPOINT_IN) != 0 ? control.in : control.out) = address;
-        }
-    }
-    libusb_free_config_descriptor(configuration);
-    return control;
-}
-
-bool is_named(libusb_device_handle* handle, const libusb_device_descriptor& descriptor,
-              const UsbName& name) {
-    return text_descriptor(handle, descriptor.iSerialNumber) == name.serial &&
-           text_descriptor(handle, descriptor.iProduct) == name.model &&
-           text_descriptor(handle, descriptor.iManufacturer) == name.vendor;
-}
-
 /// None: nothing that can be opened has the name.
-UsbHandle open_named(libusb_context* context, const UsbName& name) {
-    libusb_device** devices = nullptr;
-    const ssize_t count = libusb_get_device_list(context, &devices);
-    UsbHandle found;
-    for (ssize_t i = 0; i < count && !found; ++i) {
-        libusb_device_descriptor descriptor{};
-        libusb_device_handle* handle = nullptr;
-        if (libusb_get_device_descriptor(devices[i], &descriptor) != 0 ||
-            find_control(devices[i]).number < 0 || libusb_open(devices[i], &handle) != 0)
-            continue;
-        UsbHandle candidate(handle);
-        if (is_named(handle, descriptor, name)) found = std::move(candidate);
+std::optional<device::UsbHandle> open_named(const device::UsbBus& bus, const UsbName& name) {
+    for (const device::UsbDevice& candidate : bus.devices()) {
+        if (candidate.function(control_class).interface < 0) continue;
+        auto handle = candidate.open();
+        if (handle && handle->serial().value_or("") == name.serial &&
+            handle->product() == name.model && handle->manufacturer() == name.vendor)
+            return std::move(*handle);
     }
-    if (count >= 0) libusb_free_device_list(devices, 1);
-    return found;
+    return std::nullopt;
 }
 
 /// Memory of one camera whose control interface is claimed.
 class ControlChannel {
  public:
-    ControlChannel(libusb_device_handle* handle, const ControlInterface& control,
+    ControlChannel(device::UsbHandle& handle, const device::UsbFunction& control,
                    const Cancelled& cancelled)
         : handle_(handle), control_(control), cancelled_(cancelled) {}
-    ~ControlChannel() { libusb_release_interface(handle_, control_.number); }
-    ControlChannel(const ControlChannel&) = delete;
-    ControlChannel& operator=(const ControlChannel&) = delete;
 
     /// `block`: bytes for one question.
     std::optional<Bytes> read(std::uint64_t address, std::uint64_t size, std::uint64_t block) {
@@ -162,11 +119,8 @@ class ControlChannel {
             put(question, address, 8);
             put(question, 0, 2);
             put(question, size, 2);
-            int sent = 0;
-            if (libusb_bulk_transfer(handle_, control_.out, question.data(),
-                                     static_cast<int>(question.size()), &sent,
-                                     static_cast<unsigned>(answer_patience.ns / 1'000'000)) != 0)
-                libusb_clear_halt(handle_, control_.out);
+            if (!handle_.write(control_.endpoint_out, question, answer_patience))
+                static_cast<void>(handle_.clear_halt(control_.endpoint_out));
             else if (auto answer = receive(size))
                 return answer;
         }
@@ -179,14 +133,12 @@ class ControlChannel {
         HostTime until = asked + answer_patience;
         Bytes buffer((header_size + size + usb_packet - 1) / usb_packet * usb_packet);
         while (host_now() < until && !cancelled_()) {
-            int got = 0;
-            const int code =
-                libusb_bulk_transfer(handle_, control_.in, buffer.data(),
-                                     static_cast<int>(buffer.size()), &got, look_interval_ms);
-            if (code == LIBUSB_ERROR_TIMEOUT && got == 0) continue;
-            if (code == LIBUSB_ERROR_PIPE) libusb_clear_halt(handle_, control_.in);
-            if (code != 0) return std::nullopt;
-            const auto length = static_cast<std::size_t>(got);
+            const auto got = handle_.read(control_.endpoint_in, buffer, look_interval);
+            if (!got && got.error().fault == device::UsbFault::late) continue;
+            if (!got && got.error().fault == device::UsbFault::stalled)
+                static_cast<void>(handle_.clear_halt(control_.endpoint_in));
+            if (!got) return std::nullopt;
+            const std::size_t length = *got;
             if (length < header_size || number_in(buffer, 0, 4) != magic ||
                 number_in(buffer, 10, 2) != id_)
                 continue;  // left over
@@ -203,8 +155,8 @@ class ControlChannel {
         return std::nullopt;
     }
 
-    libusb_device_handle* handle_;
-    ControlInterface control_;
+    device::UsbHandle& handle_;
+    device::UsbFunction control_;
     const Cancelled& cancelled_;
     std::uint16_t id_ = 0;
 };
@@ -266,26 +218,23 @@ CameraResult<Description> read_checked(const std::string& device, ControlChannel
 
 CameraResult<Description> read_usb_description(const std::string& device, const UsbName& name,
                                                const Cancelled& cancelled) {
-    libusb_context* started = nullptr;
-    if (const int code = libusb_init(&started); code != 0)
-        return problem(CameraState::failed,
-                       {device, fmt::format("libusb cannot start: {}", libusb_error_name(code)),
-                        "restart the service"});
-    const UsbContext context(started);
-    const UsbHandle handle = open_named(context.get(), name);
+    const auto bus = device::UsbBus::open();
+    if (!bus)
+        return problem(CameraState::failed, {device, bus.error().what, "restart the service"});
+    auto handle = open_named(*bus, name);
     if (!handle)
-        return problem(CameraState::failed, {device, "it is there but cannot be opened",
+        return problem(CameraState::failed, {device, "it was found but cannot be opened",
                                              "check the udev rule, or unplug it and plug it in"});
-    const ControlInterface control = find_control(libusb_get_device(handle.get()));
-    const int code = libusb_claim_interface(handle.get(), control.number);
-    if (code == LIBUSB_ERROR_BUSY)
+    const device::UsbFunction control = handle->device().function(control_class);
+    const auto claimed = handle->claim(control.interface);
+    if (!claimed && claimed.error().fault == device::UsbFault::busy)
         return problem(CameraState::busy,
                        {device, "another program holds it", "close that program"});
-    if (code != 0)
+    if (!claimed)
         return problem(
             CameraState::failed,
-            {device, fmt::format("it cannot be claimed: {}", libusb_error_name(code)), replug});
-    ControlChannel channel(handle.get(), control, cancelled);
+            {device, fmt::format("it cannot be claimed: {}", claimed.error().name()), replug});
+    ControlChannel channel(*handle, control, cancelled);
     return read_checked(device, channel);
 }
 

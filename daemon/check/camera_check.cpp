@@ -22,29 +22,24 @@ namespace versavis::daemon {
 
 namespace {
 
-/// For the board to be found, and its clock to be known. At half, a board that starts is missed; at
-/// twice, the error of one that is absent comes later.
+/// For the board to be found, and its clock to be known.
 constexpr Duration board_patience = seconds(15);
 
-/// Frames and edges may follow the last pulse by so much. At half, slow readouts count for the next
-/// output; at twice, the check takes twice the time.
+/// Frames and edges may follow the last pulse by so much.
 constexpr Duration settling = milliseconds(700);
 
-/// Pulses at each output: the pattern's, and some at the camera's rate. At half, a tenth of lost
-/// frames may not show; at twice, the check takes twice the time.
+/// Pulses at each output: the pattern's, and some at the camera's rate.
 constexpr std::size_t pulses_at_rate = 10;
 
-/// Boards report one edge in 100 ms of an input whose output sends no pulses. At half, the check
-/// takes twice the time; at twice, every second pulse shows nothing there.
+/// Boards report one edge in 100 ms of an input whose output sends no pulses.
 constexpr double check_rate_hz = 10;
 
 /// The longer of the two exposures: the shorter is a quarter of it. Longer ones leave no room for
-/// readout; shorter ones are hard to tell from the delays of lines.
+/// readout; shorter ones are hard to distinguish from the delays of lines.
 constexpr double longest_exposure_us = 4000;
 constexpr double exposure_of_period = 0.2;
 
-/// By which pulses are longer the second time. At half, sensors that start with a line may hide it;
-/// at twice, it comes near the lengths of exposures.
+/// By which pulses are longer the second time.
 constexpr double least_widening_us = 200;
 
 /// Exchanges that the ring of clocks holds; nobody reads them.
@@ -74,12 +69,12 @@ class Recorder final : public BoardListener {
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
         return true;
     }
-    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& event, HostTime /*received*/) override {
         const std::lock_guard lock(mutex_);
-        if (event.kind == wire::EventKind::stray_edge) records_.strays.push_back(event);
-        if (event.kind == wire::EventKind::trigger_skipped) ++records_.skipped;
-        if (event.kind == wire::EventKind::triggers_skipped) records_.skipped += event.detail;
+        if (event.kind == wire::BoardEventKind::stray_edge) records_.strays.push_back(event);
+        if (event.kind == wire::BoardEventKind::trigger_skipped) ++records_.skipped;
+        if (event.kind == wire::BoardEventKind::triggers_skipped) records_.skipped += event.detail;
     }
 
     bool wait_connected(Duration timeout) {
@@ -478,8 +473,8 @@ class CameraCheck {
     clock::Translator& translator_;
     ClockRecorder& recorder_;
     const std::function<void(const std::string&)>& say_;
-    DescriptionVetting descriptions_{own_program, "/dev/null"};  // nothing is kept
-    DeviceClaims claims_;
+    DescriptionSandbox descriptions_{own_program, "/dev/null"};  // nothing is kept
+    DeviceLocks claims_;
     std::timed_mutex aravis_;
     std::vector<std::unique_ptr<CountedCamera>> cameras_;
     std::uint32_t present_ = 0;  ///< outputs of the board

@@ -7,35 +7,28 @@ namespace versavis::daemon {
 
 namespace {
 
-/// What a stream owes is summed up over so long. At half, a loss of less than 6 % never shows; at
-/// twice, a stall of 0.3 s counts for 20 s together with the next one.
+/// What a stream owes is summed up over so long.
 constexpr Duration memory = seconds(10);
 
 /// What may be owed within the memory: so much time, and so many items of slow streams, which are
-/// counted between two of them. At half, a host that pauses for 0.2 s is degraded; at twice, a
-/// camera that leaves out every fifth frame is told only after 3 s.
+/// counted between two of them.
 constexpr Duration tolerated_stall = milliseconds(300);
 constexpr double tolerated_items = 2.5;
 
-/// After a shortage, full for so long is full again. At half, a stream that loses one frame in
-/// twenty flickers; at twice, health lags behind the cure by six seconds.
+/// After a shortage, full for so long is full again.
 constexpr Duration recovery = seconds(3);
 
-/// The same after a start. At half, the counts are too few to tell; at twice, a start takes half a
-/// second longer to be called good.
+/// The same after a start.
 constexpr Duration first_proof = milliseconds(500);
 
-/// What may be missing within these two: a share, and what counting between two items hides. At
-/// half, a fast stream on a loaded host does not recover; at twice, one that loses every twentieth
-/// item does.
+/// What may be missing within these two: a share, and what counting between two items hides.
 constexpr double tolerated_share = 0.03;
 constexpr double counted_between = 1.5;
 
-/// The rate that is told is that of so long. At half, it jumps by an item more; at twice, it lags.
+/// The rate in the status is that of so long.
 constexpr Duration rate_window = seconds(2);
 
-/// No window is shorter than so many periods: fewer items tell nothing. At half, one late frame of
-/// a slow camera is a shortage; at twice, a dead slow camera is told so three periods later.
+/// No window is shorter than so many periods: fewer items show nothing.
 constexpr int least_periods = 3;
 
 double in_seconds(Duration duration) { return static_cast<double>(duration.ns) * 1e-9; }

@@ -13,50 +13,41 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A start may take so long, and so many periods on top, before what is missing is a fault. At
-/// half, slow starts of cameras without a clock show as faults; at twice, a fault from the start on
-/// is named five seconds later.
+/// A start may take so long, and so many periods on top, before what is missing is a fault.
 constexpr Duration start_patience = seconds(4);
 constexpr int start_periods = 20;
 
-/// The board answers ten times a second. At half, a loaded host is taken for a silent board; at
-/// twice, a dead board is named half a second later.
+/// The board answers ten times a second.
 constexpr Duration board_silence = milliseconds(1000);
 
-/// Of the frames or triggers lately, what is more than chance. At half, a single one can be a
-/// cause; at twice, a cause of one in seven is missed.
+/// Of the frames or triggers lately, what is more than chance.
 constexpr double telling_share = 0.08;
 
 /// Of them all, but for what was on its way when it began.
 constexpr double nearly_all = 0.9;
 
-/// Records that take so long after the exposure come too late for pairing. At half, a slow link is
-/// blamed; at twice, a late one is not named.
+/// Records that take so long after the exposure come too late for pairing.
 constexpr Duration late_record = milliseconds(200);
 
 /// An exposure that leaves the camera less of its period than this share cannot keep the rate: it
-/// reads out, too. At half, such cameras are called slow; at twice, long exposures are blamed.
+/// reads out, too.
 constexpr double shortest_rest = 0.05;
 
-/// What two measures of one exposure may differ by: edges of slow lines. At half, opto-couplers are
-/// missed; at twice, a late start of the camera is called inverted.
+/// What two measures of one exposure may differ by: edges of slow lines.
 constexpr Duration edge_delay = microseconds(300);
 
-/// The largest packets that pass every network. Half: none sends such; twice: many do not pass.
+/// The largest packets that pass every network.
 constexpr std::uint32_t common_packet = 1500;
 
-/// Without a frame, whole or not, for so long and so many periods, a camera sends none. At half, a
-/// host that pauses makes one; at twice, another cause is named first.
+/// Without a frame, whole or not, for so long and so many periods, a camera sends none.
 constexpr Duration quiet_time = milliseconds(300);
 constexpr int quiet_periods = 5;
 
-/// A camera that restarts is back within so long, mostly. At half, its trigger cable is blamed
-/// meanwhile; at twice, a cable that broke is named six seconds later.
+/// A camera that restarts is back within so long, mostly.
 constexpr Duration restart_time = seconds(6);
 
 /// On top of the longest pause between two triggers, and of the link's delay, no record for so long
-/// is no trigger. At half, a start that is asked for again is one; at twice, a board that sends
-/// none is named a second later.
+/// is no trigger.
 constexpr Duration record_patience = milliseconds(1500);
 
 struct CameraView {
@@ -74,8 +65,8 @@ struct CameraView {
     }
     Duration period() const { return period_of(it.configuration); }
     Duration exposure() const {
-        const Duration told = it.pipeline.told_exposure;
-        return told.ns != 0 ? told : it.pipeline.exposure;
+        const Duration commanded = it.pipeline.commanded_exposure;
+        return commanded.ns != 0 ? commanded : it.pipeline.exposure;
     }
     /// Triggers of which frames are here, and records still on a slow link.
     std::uint64_t on_link() const {
@@ -165,7 +156,7 @@ bool exposes_too_long(const CameraView& camera) {
 /// The line rises where the exposure ends.
 bool strobe_inverted(const CameraView& camera) {
     const Duration latency = from_us(camera.it.configuration.latency_us);
-    const Duration exposure = camera.it.pipeline.told_exposure;
+    const Duration exposure = camera.it.pipeline.commanded_exposure;
     const Duration late = camera.it.pipeline.start_delay - latency - exposure;
     return camera.triggered() && camera.strobe() && exposure > edge_delay &&
            some(camera.it.recent.unmeasured + camera.refused(EventReason::wrong_exposure),
@@ -184,7 +175,7 @@ std::string not_exposing_hint(const CameraView& camera) {
     const Duration quiet = camera.all.now - camera.it.pipeline.last_sign;
     if (camera.it.delivery.ever && quiet < restart_time)
         return fmt::format(
-            "it has not answered a trigger for {:.1f} s, and may be restarting: if it stays away, "
+            "no response to triggers for {:.1f} s; it may be restarting: if it does not return, "
             "check its power",
             static_cast<double>(quiet.ns) * 1e-9);
     return fmt::format(
@@ -256,8 +247,8 @@ std::string ids_hint(const CameraView& camera) {
             "firmware",
             camera.frames(), answers.block_id);
     return fmt::format(
-        "of the last {} frames {} repeat the block id of the one before, and ids began again {} "
-        "times: these frames are withheld; update the camera's firmware",
+        "of the last {} frames, {} repeat the previous block id, and ids restarted {} times: these "
+        "frames are withheld; update the camera's firmware",
         camera.frames(), answers.ids_repeated, answers.ids_restarted);
 }
 
@@ -265,8 +256,8 @@ std::string clock_hint(const CameraView& camera) {
     const double rate = camera.it.pipeline.answers.clock_rate;
     if (rate == 1) return "";
     return fmt::format(
-        "its clock runs {:.4g} times as fast as it says, so frames are paired by their arrival: "
-        "set camera_clock = false, or update its firmware",
+        "its clock runs at {:.4g} times its stated rate, so frames are paired by arrival: set "
+        "camera_clock = false, or update its firmware",
         rate);
 }
 
@@ -320,26 +311,25 @@ std::string unproved_hint(const CameraView& c) {
     const std::uint64_t proved = c.it.recent.published - c.it.recent.suspect;
     if (proved == 0)
         return fmt::format(
-            "none of the last {} frames was proved, for they do not follow the triggers of output "
-            "{}: are trigger cables swapped? check TriggerSource",
+            "none of the last {} frames was proved: they do not follow the triggers of output {}; "
+            "are trigger cables swapped? check TriggerSource",
             c.frames(), c.it.configuration.output);
     return fmt::format(
-        "only {} of the last {} frames were proved: others, or the board's records, are late or "
+        "only {} of the last {} frames were proved: frames or the board's records are late or "
         "lost; lower the load of the host, or check network and cables",
         std::min(proved, c.frames()), c.frames());
 }
 
 /// Of exposures that the board does not see.
 std::string unseen_hint(const CameraView& c) {
-    const Duration exposure = c.it.pipeline.told_exposure;
+    const Duration exposure = c.it.pipeline.commanded_exposure;
     const double glitch_us = c.it.configuration.glitch_us;
     if (exposure.ns > 0 && exposure < from_us(glitch_us))
         return fmt::format(
-            "frames come, but the board takes their exposures of {:.1f} us for a disturbance of "
-            "the "
-            "line: lower 'glitch_us', which is {:g} us, or expose for longer",
+            "frames arrive, but the board filters out their exposures of {:.1f} us as glitches: "
+            "lower 'glitch_us' (now {:g} us), or expose for longer",
             static_cast<double>(exposure.ns) * 1e-3, glitch_us);
-    return "frames come, but their exposures are not being measured: check the exposure line, "
+    return "frames arrive, but their exposures are not measured: check the exposure line, "
            "'strobe_line' and 'max_exposure_us', or set strobe = \"none\"";
 }
 
@@ -363,8 +353,8 @@ constexpr Rule camera_rules[] = {
     {Fault::block_ids, numbers_anew,
      [](const CameraView& /*c*/) {
          return std::string(
-             "its block ids begin again and again, and it is reopened each time: update its "
-             "firmware, and check its power");
+             "its block ids keep restarting, and it is reopened each time: update its firmware, "
+             "and check its power");
      }},
     {Fault::camera_lease, leased, own_hint},
     {Fault::camera_busy, in<CameraState::busy>, own_hint},
@@ -429,7 +419,7 @@ constexpr Rule camera_rules[] = {
     {Fault::packet_loss, lost_packets,
      [](const CameraView& c) {
          return fmt::format(
-             "{} lost packets on the way: check cable and switch, raise "
+             "{} lost packets in transit: check cable and switch, raise "
              "net.core.rmem_max, or lower rate or size",
              count_of(c.refused(EventReason::frame_incomplete), c.frames()));
      }},
@@ -439,8 +429,8 @@ constexpr Rule camera_rules[] = {
      },
      [](const CameraView& c) {
          return fmt::format(
-             "{} were not of the size that the camera announced: does another "
-             "program set it? restart the service after a change",
+             "{} did not have the announced size: does another program control the camera? restart "
+             "the service after a change",
              count_of(c.refused(EventReason::wrong_size), c.frames()));
      }},
     {Fault::no_buffer, [](const CameraView& c) { return !c.full() && c.it.recent.no_buffer > 0; },
@@ -469,15 +459,15 @@ constexpr Rule camera_rules[] = {
     {Fault::late_records, late_records,
      [](const CameraView& c) {
          return fmt::format(
-             "the board's records come {} ms after their exposure, too late to "
-             "prove frames: lower the load of the host and of the USB",
+             "the board's records arrive {} ms after the exposure, too late to prove frames: lower "
+             "the load of host and USB",
              c.it.pipeline.record_delay.ns / 1'000'000);
      }},
     {Fault::exposure_too_long, exposes_too_long,
      [](const CameraView& c) {
          return fmt::format(
-             "it exposes {} us of a period of {} us, so triggers come while it is "
-             "busy ({}): lower ExposureTime or 'rate_hz'",
+             "it exposes for {} us of the {} us period, so triggers arrive while it is busy ({}): "
+             "lower ExposureTime or 'rate_hz'",
              c.exposure().ns / 1000, c.period().ns / 1000, rates(c));
      }},
     {Fault::strobe_inverted, strobe_inverted,
@@ -486,7 +476,7 @@ constexpr Rule camera_rules[] = {
              "{}: the exposure line rises {} us after the trigger, where the exposure of {} us "
              "ends: its polarity is wrong; change 'strobe' to \"{}\"",
              c.it.pipeline.edges.line.empty() ? c.it.name : c.it.pipeline.edges.line,
-             c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.told_exposure.ns / 1000,
+             c.it.pipeline.start_delay.ns / 1000, c.it.pipeline.commanded_exposure.ns / 1000,
              c.it.configuration.strobe == Strobe::active_high ? "active_low" : "active_high");
      }},
     {Fault::line_delays, line_leads,
@@ -523,15 +513,15 @@ constexpr Rule camera_rules[] = {
      },
      [](const CameraView& c) {
          return fmt::format(
-             "the camera delivers {}: it cannot do more; lower 'rate_hz', its "
-             "exposure or its size",
+             "delivers {}: the camera ignores triggers at this rate; lower 'rate_hz', the exposure "
+             "time or the image size",
              rates(c));
      }},
     {Fault::no_frames, frames_missing, missing_hint},
     {Fault::strobe_missing, strobe_missing, unseen_hint},
     {Fault::too_slow, [](const CameraView& c) { return !c.full(); },
      [](const CameraView& c) {
-         return fmt::format("{} are delivered: 'versavis tail events' says what is missing",
+         return fmt::format("{} are delivered: 'versavis tail events' shows what is missing",
                             rates(c));
      }},
 };
@@ -559,7 +549,7 @@ bool answered_by_nobody(std::int64_t answer) {
 }
 
 Fault fault_of(const ImuFailure& failure) {
-    if (failure.kind == wire::EventKind::imu_silent) return Fault::imu_silent;
+    if (failure.kind == wire::BoardEventKind::imu_silent) return Fault::imu_silent;
     if (failure.step == imu_step_running) return Fault::imu_failed;
     return answered_by_nobody(failure.answer) ? Fault::imu_missing : Fault::imu_wrong;
 }
@@ -570,8 +560,8 @@ std::string board_remark(const Status& status) {
     if (!board.hint.empty()) return board.hint;
     if (board.unkept) return unkept_configuration;
     if (board.health.sync_state == wire::SyncState::lost)
-        return "the pulses of the sync input do not fit the grid, which runs on by itself: check "
-               "their cable, and that 'sync_rate_hz' is that of the board which sends them";
+        return "the sync input's pulses do not fit the grid, which runs on without them: check the "
+               "cable, and that 'sync_rate_hz' matches the sending board";
     if (firmware_outdated(status))
         return fmt::format(
             "its firmware, {}, is older than this service, {}: stop the service, "
@@ -648,18 +638,17 @@ std::string describe_failure(const ImuReport& imu) {
                 imu.failure.answer, imu.model);
         case Fault::imu_wrong:
             return fmt::format(
-                "another part than the {} answers (0x{:X} in step {} of its set-up): correct "
+                "a part other than the {} answers (0x{:X} in step {} of its set-up): correct "
                 "'model', or plug in the right one",
                 imu.model, imu.failure.answer, imu.failure.step);
         case Fault::imu_silent:
             return fmt::format(
-                "the {} says nothing: check its power, and its data-ready or serial "
-                "line",
+                "the {} sends nothing: check its power, and its data-ready or serial line",
                 imu.model);
         default:
             return fmt::format(
-                "the {} fails while it samples, and is set up again: check its "
-                "power and the length of its cable",
+                "the {} failed while sampling and is being set up again: check its power and the "
+                "length of its cable",
                 imu.model);
     }
 }
@@ -670,14 +659,14 @@ Diagnosis diagnose_board(const Status& status) {
     const bool known = board.connections > 0;
     const bool quiet = known && status.clock.since_contact > board_silence;
     const std::string silence =
-        fmt::format("nothing came from it for {:.1f} s: check its cable and power",
+        fmt::format("silent for {:.1f} s: check its cable and power",
                     static_cast<double>(status.clock.since_contact.ns) * 1e-9);
     if (!status.board_needed) return {};
     switch (board.state) {
         case BoardState::absent: return conclude(Fault::board_gone, board.hint, known, in_time);
         case BoardState::handshake:
             return conclude(quiet ? Fault::board_silent : Fault::starting,
-                            quiet ? silence : "it is there, and is being asked who it is", quiet,
+                            quiet ? silence : "found; waiting for its identification", quiet,
                             in_time);
         case BoardState::incompatible:
         case BoardState::refused: return conclude(Fault::board_refuses, board.hint, true, in_time);
@@ -685,10 +674,11 @@ Diagnosis diagnose_board(const Status& status) {
     }
     if (quiet) return conclude(Fault::board_silent, silence, known, in_time);
     if (board.health.stamp_test == wire::StampTest::failed)
-        return conclude(Fault::board_stamps,
-                        "its test of its own stamps fails, so that none is measured: disconnect "
-                        "what is at GPIO18, power it off and on, else replace it",
-                        true, in_time);
+        return conclude(
+            Fault::board_stamps,
+            "its stamp self-test fails, so no exposure is measured: disconnect anything at GPIO18 "
+            "and power it off and on; if that does not help, replace it",
+            true, in_time);
     return conclude(Fault::none, board_remark(status), known, in_time);
 }
 
@@ -709,8 +699,7 @@ Diagnosis diagnose_clock(const Status& status) {
                             "the board's clock is not known yet: it takes a few exchanges", false,
                             in_time);
         case ClockState::converging:
-            return conclude(Fault::starting, "the estimate is not yet as good as it will be", false,
-                            in_time);
+            return conclude(Fault::starting, "the estimate is still converging", false, in_time);
         case ClockState::holdover:
             return conclude(Fault::clock_holdover,
                             "no exchanges for seconds, sigma grows: check the board's cable and "
@@ -718,8 +707,8 @@ Diagnosis diagnose_clock(const Status& status) {
                             true, in_time);
         case ClockState::step:
             return conclude(Fault::clock_step,
-                            "messages contradict the estimate, which begins anew if that lasts: "
-                            "was a clock set, or the host suspended?",
+                            "messages contradict the estimate, which restarts if that lasts: was a "
+                            "clock set, or the host suspended?",
                             true, in_time);
     }
     return {};

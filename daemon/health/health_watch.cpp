@@ -7,30 +7,27 @@ namespace versavis::daemon {
 
 namespace {
 
-/// What happened within so long, and so many periods, is recent: causes are told by it. At half,
-/// there are too few frames to tell all from some; at twice, a cause is named a second later.
+/// What happened within so long, and so many periods, is recent: causes follow from it.
 constexpr Duration recent_window = seconds(1);
 constexpr int recent_periods = 4;
 
-/// A slow start has a trigger a second or less: so many are recent, but for those this old. At
-/// half, two frames of each trigger look like swapped cables then; at twice, what has ended is told
-/// for twice as long.
+/// A slow start has a trigger a second or less: so many are recent, but for those this old.
 constexpr std::uint64_t least_triggers = 4;
 constexpr Duration longest_window = seconds(8);
 
-bool tells(const ImuReport& /*before*/, const ImuReport& /*newest*/) { return true; }
+bool suffices(const ImuReport& /*before*/, const ImuReport& /*newest*/) { return true; }
 
-bool tells(const PipelineReport& before, const PipelineReport& newest) {
+bool suffices(const PipelineReport& before, const PipelineReport& newest) {
     return newest.triggers == 0 || newest.triggers - before.triggers >= least_triggers;
 }
 
-/// The newest report that is as old as the window and tells enough, or the oldest.
+/// The newest report that is as old as the window and suffices, or the oldest.
 template <class Report>
 Report one_window_ago(std::deque<std::pair<HostTime, Report>>& reports, const Report& newest,
                       Duration window, HostTime now) {
     reports.emplace_back(now, newest);
     while (reports.size() > 2 && reports[1].first <= now - window &&
-           (reports[1].first <= now - longest_window || tells(reports[1].second, newest)))
+           (reports[1].first <= now - longest_window || suffices(reports[1].second, newest)))
         reports.pop_front();
     return reports.front().second;
 }
@@ -56,8 +53,7 @@ ImuReport difference(ImuReport now, const ImuReport& before) {
     return now;
 }
 
-/// A camera without frames is opened anew, and answers within this time. At half, a slow one is
-/// called silent meanwhile; at twice, the trigger cable of a dead one is blamed a second longer.
+/// A camera without frames is opened anew, and answers within this time.
 constexpr Duration reopening = milliseconds(1500);
 
 /// Why it has none is still what is wrong meanwhile.

@@ -10,17 +10,16 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Between documents. At half, a status costs twice the CPU; at twice, trouble shows a second late.
+/// Between documents.
 constexpr Duration interval = milliseconds(500);
 
-/// Room for one document at first: some 30 cameras and IMUs. At half, large rigs need a second ring
-/// as soon as they start; at twice, it takes 512 KiB more.
+/// Room for one document at first: some 30 cameras and IMUs.
 constexpr std::uint64_t first_document_size = 64 * 1024;
 
-/// Documents kept: a reader may take four seconds over one. At half, it has two; at twice, eight.
+/// Documents kept: a reader may take four seconds over one.
 constexpr std::uint32_t slots = 8;
 
-/// Uncertainty of "now" as a stamp. It tells readers no more than that this is no measurement.
+/// Uncertainty of "now" as a stamp. To readers it only means that this is no measurement.
 constexpr Duration stamp_sigma = microseconds(1);
 
 Expected<ring::Writer> make_ring(const ring::Place& place, std::uint64_t size) {

@@ -8,33 +8,27 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Exposures that show which triggers the camera takes. At half, chance looks like every second
-/// one; at twice, the cause is named a second later.
+/// Exposures that show which triggers the camera takes.
 constexpr std::size_t takes_kept = 9;
 
-/// Frames of which the first half must show the same rate of the clock as the second. At half, a
-/// burst of late frames looks like a rate; at twice, such a camera is paired a second later.
+/// Frames of which the first half must show the same rate of the clock as the second.
 constexpr std::size_t times_kept = 33;
 
-/// A clock that seems faster than this does not count nanoseconds. At half, a backlog that drains
-/// looks like one; at twice, units of 0.4 ns are not named.
+/// A clock that seems faster than this does not count nanoseconds.
 constexpr double fastest_rate = 1.5;
 
 /// The same for one that seems slower. Frames that queue make an honest clock seem slow, down to
-/// the inverse of the load of their link. At half, units of 8 ns are not named; at twice, a link
-/// that carries 40 % of the frames makes an honest clock suspect.
+/// the inverse of the load of their link.
 constexpr double slowest_rate = 0.2;
 
-/// How far the two halves may differ. At half, ordinary lateness of fast cameras hides the rate; at
-/// twice, a step of the clock looks like one.
+/// How far the two halves may differ.
 constexpr double same_rate = 0.05;
 
 /// A line that rises so shortly before the next trigger, and within this part of the period, leads.
-/// At half, longer pre-delays are not named; at twice, cameras that start late are.
 constexpr Duration longest_lead = milliseconds(5);
 constexpr std::int64_t lead_part = 8;
 
-/// Records in a row that show it. At half, two late triggers do; at twice, it takes a second more.
+/// Records in a row that show it.
 constexpr int leads_to_believe = 5;
 
 /// Ids this far behind the one before began anew; less far, the frames changed places.
@@ -106,7 +100,7 @@ void AnswerWatch::measure_clock() {
     if (whole > fastest_rate || whole < slowest_rate) report_.clock_rate = whole;
 }
 
-void AnswerWatch::begin_anew() {
+void AnswerWatch::restart() {
     takes_.clear();
     times_.clear();
     leads_ = 0;

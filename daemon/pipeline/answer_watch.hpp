@@ -33,7 +33,7 @@ class AnswerWatch {
     void arrived(const pairing::Arrival& arrival);
 
     /// A new stream of the camera, or a new life of the board. What was counted stays.
-    void begin_anew();
+    void restart();
 
     const AnswerReport& report() const { return report_; }
 

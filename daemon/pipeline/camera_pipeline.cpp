@@ -12,17 +12,14 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Slots that hold published frames while all others wait for proof or are being received. At half,
-/// a reader loses a frame while it copies it; at twice, fewer frames can wait for proof.
+/// Slots that hold published frames while all others wait for proof or are being received.
 constexpr std::uint32_t slots_for_readers = 2;
 
-/// Pulses by which the board's start pattern may last longer than its length says. At half, a
-/// pattern could be asked for again before it ended; at twice, a lost start costs two pulses more.
+/// Pulses by which the board's start pattern may last longer than its length says.
 constexpr int pattern_margin = 2;
 
 /// Majority of records that agree, after nothing was known, until those that do not are doubted
-/// rather than they themselves. At half, one lie at the beginning makes the truth wait until it is
-/// a step; at twice, lies soon after make more searches.
+/// rather than they themselves.
 constexpr int records_to_confirm = 3;
 
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
@@ -65,7 +62,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       events_(events),
       frames_(configuration),
       evidence_(translator),
-      witness_(ExposureHistory(configuration), records_to_confirm),
+      validator_(ExposureHistory(configuration), records_to_confirm),
       completion_(configuration),
       check_(configuration),
       answers_(period_of(configuration)),
@@ -74,14 +71,14 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
 
-/// What pairing is told goes through here, so that the recording is complete.
-void CameraPipeline::tell(const pairing::Evidence& evidence) {
+/// All that pairing gets goes through here, so that the recording is complete.
+void CameraPipeline::feed(const pairing::Evidence& evidence) {
     evidence_.record(evidence);
     pairing::apply(pairing_, evidence);
 }
 
-void CameraPipeline::begin_anew() {
-    tell(pairing::Reset{});
+void CameraPipeline::restart_pairing() {
+    feed(pairing::Reset{});
     middles_.clear();  // of numbers that may come again
 }
 
@@ -90,9 +87,9 @@ void CameraPipeline::pair_without_clock() {
     limits_.camera_clock = false;
     event_lengths_ = {};  // by the same clock
     if (!triggered()) return;
-    begin_anew();
+    restart_pairing();
     pairing_.set_limits(limits_);
-    tell(limits_);
+    feed(limits_);
     log_later(LogLevel::warning,
               fmt::format("its clock runs {:.4g} times as fast as it says: frames are "
                           "paired without it",
@@ -116,8 +113,8 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     }
     {
         const std::lock_guard lock(mutex_);
-        witness_.forget();
-        begin_anew();
+        validator_.forget();
+        restart_pairing();
     }
     auto ring = frames_.make_ring(place, payload_size);
     if (!ring) return Unexpected(ring.error());
@@ -126,9 +123,9 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     if (*ring) before = frames_.use(std::move(**ring));
     limits_.camera_clock = configuration_.camera_clock && has_clock;
     limits_.stamped = stamp_instant;
-    answers_.begin_anew();
+    answers_.restart();
     pairing_.set_limits(limits_);
-    tell(limits_);
+    feed(limits_);
     report_.last_proof = host_now();
     return {};
 }
@@ -151,7 +148,7 @@ void CameraPipeline::abandon(std::uint32_t slot, EventReason reason, std::uint64
     count_refusal(reason);
     report_.last_sign = host_now();
     triggers_.answered();
-    if (triggered()) tell(pairing::Shortfall{block_id, reason});
+    if (triggered()) feed(pairing::Shortfall{block_id, reason});
     journal(EventKind::frame_without_trigger, reason, static_cast<std::int64_t>(block_id));
 }
 
@@ -162,14 +159,14 @@ void CameraPipeline::add(const pairing::Arrival& arrival) {
     triggers_.answered();
     answers_.arrived(arrival);
     if (limits_.camera_clock && answers_.report().clock_rate != 1) pair_without_clock();
-    pairing::Arrival told = completed(arrival);
+    pairing::Arrival whole = completed(arrival);
     if (triggered()) {
         chunk_exposures_[arrival.slot] = arrival.exposure;
-        told.exposure = check_.for_pairing(arrival.exposure);
-        return tell(told);
+        whole.exposure = check_.for_pairing(arrival.exposure);
+        return feed(whole);
     }
     ++report_.published;
-    frames_.publish_arrived(told, translator_.translate(arrival.arrived, {}), false);
+    frames_.publish_arrived(whole, translator_.translate(arrival.arrived, {}), false);
 }
 
 /// With what the camera's registers say where the frame does not.
@@ -189,7 +186,7 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     const std::lock_guard lock(mutex_);
     report_.last_record = received;
     if (const auto doubted = doubt(record, received)) {
-        note(record, *doubted);
+        count_rejected(record, *doubted);
         return std::nullopt;
     }
     ++report_.triggers;
@@ -209,23 +206,24 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
     ExposureCompletion::place_on_host(exposure, record, stamp->host);
     exposure.recorded = received;
     report_.record_delay = host_now() - exposure.end_on_host;
-    tell(exposure);
+    feed(exposure);
     return stamp;
 }
 
-std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTime received) {
+std::optional<Implausibility> CameraPipeline::doubt(const wire::Exposure& record,
+                                                    HostTime received) {
     if (const auto doubt = contradicts_itself(record, configuration_)) return doubt;
     const clock::ClockContact contact = translator_.contact();
     follow_clock(contact.life);
     const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
     const auto arrival = contradicts_arrival(newest, received, translator_);
-    const WitnessedExposure exposure{record, check_.told_at(received)};
-    const auto doubt = witness_.judge(exposure, contact.exchanges, arrival);
-    if (witness_.overturned()) begin_anew();  // which of them lied, nobody can tell
+    const ExposureObservation exposure{record, check_.reported_at(received)};
+    const auto doubt = validator_.judge(exposure, contact.exchanges, arrival);
+    if (validator_.overturned()) restart_pairing();  // which of them lied is unknown
     if (!doubt) translator_.clock_continues();
-    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+    if (!doubt || arrival || contact.contradicted || !validator_.stepped(contact.exchanges))
         return doubt;
-    witness_.adopt(exposure);
+    validator_.adopt(exposure);
     adopt_step(record, *doubt);
     return std::nullopt;
 }
@@ -233,17 +231,17 @@ std::optional<Doubt> CameraPipeline::doubt(const wire::Exposure& record, HostTim
 /// What pairing knows of the board's time is void when the estimate of that time is.
 void CameraPipeline::follow_clock(std::uint32_t life) {
     const auto before = std::exchange(clock_life_, life);
-    if (before && before != life) begin_anew();
+    if (before && before != life) restart_pairing();
 }
 
-void CameraPipeline::adopt_step(const wire::Exposure& record, const Doubt& doubt) {
-    begin_anew();
+void CameraPipeline::adopt_step(const wire::Exposure& record, const Implausibility& doubt) {
+    restart_pairing();
     translator_.begin_epoch();
     events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
                  BoardTime{record.trigger_ns}, doubt.expected});
 }
 
-void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
+void CameraPipeline::count_rejected(const wire::Exposure& record, const Implausibility& doubt) {
     ++report_.records_doubted;
     events_.add({EventKind::message_doubted,
                  doubt.reason,
@@ -253,12 +251,12 @@ void CameraPipeline::note(const wire::Exposure& record, const Doubt& doubt) {
                  {},
                  doubt.expected});
     // Two accounts of one exposure: neither is believed.
-    if (witness_.believed().disputes_newest(record)) middles_.erase(record.trigger);
+    if (validator_.believed().disputes_newest(record)) middles_.erase(record.trigger);
 }
 
 void CameraPipeline::triggers_skipped(std::uint64_t count) {
     const std::lock_guard lock(mutex_);
-    witness_.believed().triggers_skipped(count);
+    validator_.believed().triggers_skipped(count);
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
@@ -308,7 +306,7 @@ void CameraPipeline::add(const CameraEvent& event) {
 
 void CameraPipeline::note_missed_trigger() {
     ++report_.triggers_missed;
-    if (std::exchange(missed_said_, true)) return;
+    if (std::exchange(missed_logged_, true)) return;
     log_later(LogLevel::warning,
               "the camera reports that it missed a trigger: exposure and readout may be "
               "longer than the period");
@@ -323,7 +321,7 @@ void CameraPipeline::note_ptp(bool lost) {
 }
 
 void CameraPipeline::log_later(LogLevel level, std::string text) {
-    unsaid_.push_back({level, std::move(text)});
+    deferred_log_.push_back({level, std::move(text)});
 }
 
 void CameraPipeline::note_chunk_lag() {
@@ -390,8 +388,8 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
-    witness_.forget();
-    begin_anew();
+    validator_.forget();
+    restart_pairing();
     triggers_.answered();
 }
 
@@ -399,7 +397,7 @@ std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
     std::vector<Line> lines;
     const auto wanted = [&] {
         const std::lock_guard lock(mutex_);
-        lines.swap(unsaid_);
+        lines.swap(deferred_log_);
         return advance_locked(now);
     }();
     for (const auto& [level, text] : lines) log(level, configuration_.name, "{}", text);
@@ -410,7 +408,7 @@ std::optional<pairing::Start> CameraPipeline::advance_locked(HostTime now) {
     frames_.heartbeat(now);
     if (!triggered()) return std::nullopt;
     evidence_.heartbeat(now);
-    if (pairing_.due(now)) tell(pairing::Advance{now});
+    if (pairing_.due(now)) feed(pairing::Advance{now});
     if (triggers_.overdue(now)) return pairing_.first_start();
     return pairing_.wanted_start(now);
 }
@@ -422,22 +420,22 @@ pairing::Start CameraPipeline::first_start() {
 
 void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
     const std::lock_guard lock(mutex_);
-    witness_.believed().forget_grid();
-    tell(pairing::StartRequest{start, now});
+    validator_.believed().forget_grid();
+    feed(pairing::StartRequest{start, now});
     triggers_.asked(now);
 }
 
-void CameraPipeline::starved(std::uint64_t frames) {
+void CameraPipeline::buffer_underrun(std::uint64_t frames) {
     const std::lock_guard lock(mutex_);
     report_.no_buffer += frames;
     for (std::uint64_t i = 0; i < frames && triggered(); ++i)
-        tell(pairing::Shortfall{0, EventReason::no_buffer});
+        feed(pairing::Shortfall{0, EventReason::no_buffer});
 }
 
 void CameraPipeline::set_camera_exposure(Duration exposure, HostTime since) {
     const std::lock_guard lock(mutex_);
     check_.set_camera_exposure(exposure, since);
-    report_.told_exposure = exposure;
+    report_.commanded_exposure = exposure;
 }
 
 void CameraPipeline::read_exposure(Duration exposure, HostTime at) {
@@ -453,7 +451,7 @@ bool CameraPipeline::wants_exposure_readings() {
 void CameraPipeline::set_line_delays(const LineDelays& lines) {
     const std::lock_guard lock(mutex_);
     event_lengths_ = {};
-    missed_said_ = false;
+    missed_logged_ = false;
     report_.ptp_lost = false;
     completion_.set_line_delays(lines);
     check_.set_line_delays(lines);
@@ -474,7 +472,7 @@ PipelineReport CameraPipeline::report() {
     report_.pairing = pairing_.state();
     report_.stamp_instant = pairing_.stamped();
     report_.exposure = check_.measured();
-    report_.camera_exposure = check_.told();
+    report_.camera_exposure = check_.reported();
     report_.exposure_contradicted = check_.contradicted();
     report_.lines = completion_.line_delays();
     report_.edges = check_.edges();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From arrivals and exposures of one camera to stamped frames: pairing, told by both sides.
+// From arrivals and exposures of one camera to stamped frames.
 #pragma once
 
 #include <array>
@@ -16,13 +16,13 @@
 #include "engine/pairing/recording.hpp"
 #include "event_lengths.hpp"
 #include "plausibility/exposure_check.hpp"
-#include "plausibility/exposure_witness.hpp"
+#include "plausibility/exposure_validator.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/evidence_recorder.hpp"
 #include "publish/exposure_completion.hpp"
 #include "publish/frame_publisher.hpp"
 #include "settings/configuration.hpp"
-#include "trigger_watch.hpp"
+#include "start_watchdog.hpp"
 
 namespace versavis::daemon {
 
@@ -49,11 +49,11 @@ struct PipelineReport {
     std::uint64_t slips = 0;
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
     std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
-    Duration record_delay;   ///< end of the newest exposure to the arrival of its record
-    Duration start_delay;    ///< trigger to the start that its record has; 0: it has none
-    Duration told_exposure;  ///< as the camera was told, or tells; 0: it varies
-    HostTime last_record;    ///< the board's record of an exposure arrived, doubted or not
-    HostTime last_sign;      ///< a frame arrived, whole or not
+    Duration record_delay;        ///< end of the newest exposure to the arrival of its record
+    Duration start_delay;         ///< trigger to the start that its record has; 0: it has none
+    Duration commanded_exposure;  ///< set in the camera, or read from it; 0: it varies
+    HostTime last_record;         ///< the board's record of an exposure arrived, doubted or not
+    HostTime last_sign;           ///< a frame arrived, whole or not
     HostTime last_frame;
     HostTime last_proof;       ///< a frame was proved, or the camera was begun anew
     Duration exposure;         ///< measured, of the newest frame; 0: unknown
@@ -82,7 +82,7 @@ class CameraPipeline final : private pairing::Outcome {
     void abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id);
 
     /// Frames that found no slot to go to.
-    void starved(std::uint64_t frames);
+    void buffer_underrun(std::uint64_t frames);
 
     /// What the camera says that it exposes from now on, about; 0: it changes by itself.
     void set_camera_exposure(Duration exposure, HostTime since);
@@ -148,12 +148,12 @@ class CameraPipeline final : private pairing::Outcome {
     void locked(const pairing::Exposure& first) override;
     void slipped(const pairing::Arrival& at) override;
 
-    void tell(const pairing::Evidence& evidence);
-    void begin_anew();
+    void feed(const pairing::Evidence& evidence);
+    void restart_pairing();
     void pair_without_clock();
-    std::optional<Doubt> doubt(const wire::Exposure& record, HostTime received);
-    void note(const wire::Exposure& record, const Doubt& doubt);
-    void adopt_step(const wire::Exposure& record, const Doubt& doubt);
+    std::optional<Implausibility> doubt(const wire::Exposure& record, HostTime received);
+    void count_rejected(const wire::Exposure& record, const Implausibility& doubt);
+    void adopt_step(const wire::Exposure& record, const Implausibility& doubt);
     void follow_clock(std::uint32_t life);
     std::optional<pairing::Start> advance_locked(HostTime now);
     pairing::Arrival completed(pairing::Arrival arrival) const;
@@ -175,16 +175,16 @@ class CameraPipeline final : private pairing::Outcome {
     std::mutex mutex_;
     FramePublisher frames_;
     EvidenceRecorder evidence_;
-    ExposureWitness witness_;
+    ExposureValidator validator_;
     std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
     ExposureCompletion completion_;
     ExposureCheck check_;
     AnswerWatch answers_;
     EventLengths event_lengths_;
     SensorState sensor_;
-    bool missed_said_ = false;               ///< in the log, of this stream
+    bool missed_logged_ = false;             ///< in the log, of this stream
     std::vector<Duration> chunk_exposures_;  ///< by slot; 0: the frame has none
-    TriggerWatch triggers_;
+    StartWatchdog triggers_;
     pairing::Limits limits_;
     pairing::Pairing pairing_;
     /// By trigger: the middle of each exposure that pairing holds, and of the last that it used,
@@ -192,7 +192,7 @@ class CameraPipeline final : private pairing::Outcome {
     std::map<std::uint64_t, clock::Stamp> middles_;
     std::uint64_t last_used_ = 0;  ///< trigger
     PipelineReport report_;
-    std::vector<Line> unsaid_;  ///< see log_later()
+    std::vector<Line> deferred_log_;  ///< see log_later()
 };
 
 }  // namespace versavis::daemon

@@ -29,8 +29,7 @@ class EventLengths {
  private:
     static constexpr std::uint64_t wrap = 65535;
 
-    /// More than frames wait for their pair. At half, frames of fast cameras that come late have
-    /// lost theirs; at twice, nothing changes.
+    /// More than frames wait for their pair.
     static constexpr std::size_t remembered = 64;
 
     struct Entry {

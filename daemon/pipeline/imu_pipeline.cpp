@@ -8,17 +8,14 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A part keeps its rate within this part of the configured one. At half, parts that are an eighth
-/// slower are doubted at their first samples; at twice, the second sample may be half a period off.
+/// A part keeps its rate within this part of the configured one.
 constexpr std::int64_t rate_parts = 4;
 
-/// Over lost samples a part's pace may wander by one part in so many. At half, the first sample
-/// after a second's gap may be off by 0.2 ms; at twice, parts that warm up are doubted after a gap.
+/// Over lost samples a part's pace may wander by one part in so many.
 constexpr std::int64_t wander_parts = 10'000;
 
 /// Majority of samples that agree, after the clock or the board began anew, until one is published:
-/// the first have no neighbours. At half, a lie that lasts 20 samples from the first on passes; at
-/// twice, each beginning costs 32 samples more.
+/// the first have no neighbours.
 constexpr int samples_to_confirm = 32;
 
 PulseHistory history(const ImuConfiguration& configuration) {
@@ -26,12 +23,10 @@ PulseHistory history(const ImuConfiguration& configuration) {
     return {period, period / rate_parts, wander_parts};
 }
 
-/// The board tries a failed part once a second: so many equal failures make one more line. At half,
-/// a log has 12 lines an hour of it; at twice, 3.
+/// The board tries a failed part once a second: so many equal failures make one more line.
 constexpr std::uint64_t failures_per_line = 600;
 
-/// A failure that did not come for so long is a new one. At half, a part that fails twice a minute
-/// fills the log; at twice, one that fails every two minutes does not show there.
+/// A failure that did not come for so long is a new one.
 constexpr Duration forgotten_after = seconds(60);
 
 }  // namespace
@@ -54,18 +49,18 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
 
 void ImuPipeline::board_restarted() {
     const std::lock_guard lock(mutex_);
-    begin_anew();
+    restart();
 }
 
-void ImuPipeline::begin_anew() {
+void ImuPipeline::restart() {
     last_number_.reset();
     witness_.forget();
 }
 
-bool ImuPipeline::tell(const wire::Event& event, HostTime now) {
+bool ImuPipeline::note_state(const wire::Event& event, HostTime now) {
     const std::lock_guard lock(mutex_);
     ImuFailure& last = report_.failure;
-    report_.working = event.kind == wire::EventKind::imu_ready;
+    report_.working = event.kind == wire::BoardEventKind::imu_ready;
     if (report_.working) return last.times <= 1;
     const bool again = last.kind == event.kind && last.step == event.detail &&
                        last.answer == event.value && now - last.last < forgotten_after;
@@ -99,10 +94,10 @@ std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
     return *last_number_ + static_cast<std::uint64_t>(std::int64_t{step});
 }
 
-std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
+std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
     // No line, no age.
     if ((sample.flags & wire::imu_accel_stamped) != 0 && !accel_ready_)
-        return Doubt{EventReason::implausible_flags, sample.flags, 0};
+        return Implausibility{EventReason::implausible_flags, sample.flags, 0};
     const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
     const clock::ClockContact contact = translator_.contact();
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
@@ -119,7 +114,8 @@ std::optional<Doubt> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime 
     return std::nullopt;
 }
 
-void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt) {
+void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample,
+                          const Implausibility& doubt) {
     JournalEntry entry{kind, doubt.reason, port_, report_.name, doubt.said, {}, doubt.expected};
     if (kind == EventKind::stream_stepped) entry.board_time = BoardTime{sample.time_ns};
     events_.add(entry);

@@ -7,17 +7,17 @@
 
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
+#include "plausibility/majority_filter.hpp"
 #include "plausibility/pulse_history.hpp"
-#include "plausibility/witness.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/stamp_guard.hpp"
 #include "settings/configuration.hpp"
 
 namespace versavis::daemon {
 
-/// The last failure of a part that the board told of.
+/// The last failure of a part that the board reported.
 struct ImuFailure {
-    wire::EventKind kind = wire::EventKind::imu_failed;
+    wire::BoardEventKind kind = wire::BoardEventKind::imu_failed;
     std::uint16_t step = 0;  ///< of its set-up, or imu_step_running
     std::int64_t answer = 0;
     std::uint64_t times = 0;  ///< in a row; 0: none
@@ -53,17 +53,17 @@ class ImuPipeline {
     bool add(const wire::ImuSample& sample, HostTime received);
     void board_restarted();
 
-    /// The part was set up, or failed. True: that is new, or is due to be told once more.
-    bool tell(const wire::Event& event, HostTime now);
+    /// The part was set up, or failed. True: that is new, or is due to be logged again.
+    bool note_state(const wire::Event& event, HostTime now);
     void heartbeat(HostTime now);
     ImuReport report();
     /// IMU port of the board.
     std::uint8_t port() const { return port_; }
 
  private:
-    void begin_anew();
-    std::optional<Doubt> doubt(const wire::ImuSample& sample, HostTime received);
-    void journal(EventKind kind, const wire::ImuSample& sample, const Doubt& doubt);
+    void restart();
+    std::optional<Implausibility> doubt(const wire::ImuSample& sample, HostTime received);
+    void journal(EventKind kind, const wire::ImuSample& sample, const Implausibility& doubt);
     std::uint64_t extended(std::uint32_t number) const;
     void publish(const wire::ImuSample& sample, std::uint64_t number, const clock::Stamp& stamp);
 
@@ -75,7 +75,7 @@ class ImuPipeline {
     ring::Writer ring_;
     clock::Translator& translator_;
     EventJournal& events_;
-    Witness<PulseHistory> witness_;
+    MajorityFilter<PulseHistory> witness_;
     StampGuard guard_;
     std::optional<std::uint64_t> last_number_;
     ImuReport report_;

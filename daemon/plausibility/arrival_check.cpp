@@ -6,22 +6,19 @@ namespace versavis::daemon {
 namespace {
 
 /// What a message may be ahead of the host by, beside the error of the estimate: a first estimate
-/// over a slow link may be off by so much. At half, the first records of slow links are doubted; at
-/// twice, a time that has not come may be 2 ms ahead.
+/// over a slow link may be off by so much.
 constexpr Duration ahead_slack = milliseconds(1);
 
-/// Sigmas of the estimate on top. At half, one honest message in 400 could be doubted were it not
-/// for its delay; at twice, poor estimates let larger lies pass.
+/// Sigmas of the estimate on top.
 constexpr std::int64_t ahead_sigmas = 6;
 
-/// A board holds messages no longer than this while nobody reads. At half, what a stalled host
-/// reads late is doubted; at twice, stale numbers may be used.
+/// A board holds messages no longer than this while nobody reads.
 constexpr Duration oldest = seconds(10);
 
 }  // namespace
 
-std::optional<Doubt> contradicts_arrival(BoardTime at, HostTime received,
-                                         const clock::Translator& translator) {
+std::optional<Implausibility> contradicts_arrival(BoardTime at, HostTime received,
+                                                  const clock::Translator& translator) {
     const auto estimate = translator.to_host(at);
     if (!estimate) return std::nullopt;
     const Duration age = received - estimate->time;
@@ -30,8 +27,9 @@ std::optional<Doubt> contradicts_arrival(BoardTime at, HostTime received,
     if (!present) return std::nullopt;
     const Duration uncertainty = present->sigma * ahead_sigmas;
     if (age < -(ahead_slack + uncertainty))
-        return Doubt{EventReason::not_yet, at.ns, (at + age).ns};
-    if (age > oldest + uncertainty) return Doubt{EventReason::too_old, at.ns, (at + age).ns};
+        return Implausibility{EventReason::not_yet, at.ns, (at + age).ns};
+    if (age > oldest + uncertainty)
+        return Implausibility{EventReason::too_old, at.ns, (at + age).ns};
     return std::nullopt;
 }
 

@@ -4,14 +4,14 @@
 
 #include <optional>
 
-#include "doubt.hpp"
 #include "engine/clock/translator.hpp"
+#include "implausibility.hpp"
 
 namespace versavis::daemon {
 
-/// `at`: the newest instant that the message tells of. None also while the board's clock is
+/// `at`: the newest instant in the message. None also while the board's clock is
 /// unknown.
-std::optional<Doubt> contradicts_arrival(BoardTime at, HostTime received,
-                                         const clock::Translator& translator);
+std::optional<Implausibility> contradicts_arrival(BoardTime at, HostTime received,
+                                                  const clock::Translator& translator);
 
 }  // namespace versavis::daemon

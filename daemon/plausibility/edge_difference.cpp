@@ -11,20 +11,16 @@ namespace versavis::daemon {
 namespace {
 
 /// How far a camera's exposure time is off the true one: it counts rows, and some leave out a fixed
-/// part. At half, cameras with long rows seem to have slow lines; at twice, slow lines go unnoticed
-/// below 0.12 ms.
+/// part.
 constexpr Duration exposure_rounding = microseconds(20);
 
-/// Frames before anything is said. At half, an exposure that just changed is named a fault; at
-/// twice, it is said later.
+/// Frames before anything is said.
 constexpr unsigned frames_to_tell = 8;
 
-/// A difference is a contradiction beyond so many sigma. At half, one line in ten is named without
-/// a cause; at twice, slow pull-ups are found only when they take a millisecond.
+/// A difference is a contradiction beyond so many sigma.
 constexpr double significant_sigmas = 3;
 
-/// Slowest edge of a line: makers and pull-ups stay below. At half, the slowest lines are refused;
-/// at twice, signals other than the exposure pass for slow lines.
+/// Slowest edge of a line: makers and pull-ups stay below.
 constexpr Duration slowest_edge = milliseconds(1);
 
 /// Standard deviation of normal noise by the median of its absolute deviations, and that of the
@@ -50,7 +46,7 @@ void EdgeDifference::set_line_delays(const LineDelays& lines) {
     next_ = 0;
     agreed_ = rivals_ = 0;
     corrected_ = false;
-    surplus_ = SteadyValue({}, insignificant());
+    surplus_ = RunningEstimate({}, insignificant());
 }
 
 /// What may as well be the sigma of the delays, and the rounding of the camera's account. No honest
@@ -73,7 +69,7 @@ void EdgeDifference::learn(Duration surplus, Duration start_delay) {
 /// begins late, but not before its trigger. What is neither is another signal than the exposure.
 void EdgeDifference::dispute(Duration surplus, Duration start_delay) {
     if (rivals_ == 0 || absolute(surplus - rival_.value()) > insignificant()) {
-        rival_ = SteadyValue(insignificant());
+        rival_ = RunningEstimate(insignificant());
         rivals_ = 0;
     }
     rival_.learn(surplus);

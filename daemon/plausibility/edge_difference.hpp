@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <string>
 
+#include "running_estimate.hpp"
 #include "settings/line_delays.hpp"
-#include "steady_value.hpp"
 
 namespace versavis::daemon {
 
@@ -60,9 +60,7 @@ class EdgeDifference {
     EdgeReport report() const;
 
  private:
-    /// Frames in a row, none of which is explained, that agree on another difference. At half, a
-    /// few wrong records would be taken for a slow line; at twice, a slow line costs the frames of
-    /// a longer start.
+    /// Frames in a row, none of which is explained, that agree on another difference.
     static constexpr unsigned frames_to_learn = 8;
 
     Duration insignificant() const;
@@ -71,8 +69,8 @@ class EdgeDifference {
     EdgeReport report_;
     std::array<std::int64_t, 32> surplus_ns_{};  ///< the newest, in no order
     std::size_t next_ = 0;
-    SteadyValue surplus_{Duration{}};
-    SteadyValue rival_{Duration{}};
+    RunningEstimate surplus_{Duration{}};
+    RunningEstimate rival_{Duration{}};
     unsigned agreed_ = 0;  ///< frames that were explained
     unsigned rivals_ = 0;  ///< frames in a row that were not, but agree with each other
     bool corrected_ = false;

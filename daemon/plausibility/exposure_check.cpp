@@ -9,22 +9,18 @@ namespace versavis::daemon {
 
 namespace {
 
-/// How long a new exposure takes to hold in slow cameras. At half, a camera that takes it late is
-/// said to be miswired; at twice, a miswired one is found half a second later.
+/// How long a new exposure takes to hold in slow cameras.
 constexpr Duration exposure_settling = milliseconds(500);
 
-/// Frames that may still have the old exposure: those in the camera's queue. At half, cameras with
-/// deep queues are said to be miswired after each change; at twice, the check starts later.
+/// Frames that may still have the old exposure: those in the camera's queue.
 constexpr int settling_frames = 5;
 
 /// Sigma of the middle of an exposure of whose length nothing but its line is known: six sigma are
-/// more than half of the slowest edge. At half they are not; at twice, such a camera's stamps look
-/// worse than any known line makes them.
+/// more than half of the slowest edge.
 constexpr Duration unwitnessed_end = microseconds(100);
 
 /// By how much a camera's events and its register may differ about one exposure: a part of it, and
-/// no less than the time. At half, sensors that expose for whole rows seem to contradict
-/// themselves; at twice, half of so much more is unseen in a stamp without exposure line.
+/// no less than the time.
 constexpr std::int64_t part_of_length = 50;
 constexpr Duration least_difference = microseconds(20);
 
@@ -86,7 +82,7 @@ bool ExposureCheck::wants_readings() const {
     return !(by_frame && shown) && (varies_ || contradicted_);
 }
 
-Duration ExposureCheck::told_at(HostTime at) const {
+Duration ExposureCheck::reported_at(HostTime at) const {
     const auto range = settings_.at(at);
     return range && range->width().ns == 0 ? range->longest : Duration{};
 }
@@ -158,14 +154,14 @@ ExposureVerdict ExposureCheck::by_camera(const FrameAccount& frame,
     if (!range || length + difference < range->shortest || length - difference > range->longest)
         return {};
     source_ = ExposureSource::event;
-    told_ = length;
+    reported_ = length;
     return {false, {}, length};
 }
 
 ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const FrameAccount& frame,
                                      const pairing::Exposure& exposure, Duration start_delay) {
     contradicted_ = false;
-    told_ = {};
+    reported_ = {};
     source_ = ExposureSource::none;
     const Measured before = std::exchange(newest_, {});
     if (exposure.kind == StampKind::trigger_edge) return by_camera(frame, exposure);
@@ -174,7 +170,7 @@ ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const Fram
     const Account account = account_of(before, frame, start_delay);
     if (account.source == ExposureSource::none) return unwitnessed(before);
     source_ = account.source;
-    told_ = account.range.longest;
+    reported_ = account.range.longest;
     const Duration excess = this->excess(account.range);
     const bool off = certain() && excess > edges_.tolerance();
     // A setting that is off may be an old one: readings decide.

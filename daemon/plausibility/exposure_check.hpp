@@ -9,8 +9,7 @@
 
 namespace versavis::daemon {
 
-/// Between readings of an exposure that the camera changes by itself. At half, twice the control
-/// packets; at twice, sigma grows while it changes.
+/// Between readings of an exposure that the camera changes by itself.
 constexpr Duration exposure_reading_interval = milliseconds(200);
 
 /// Where the camera's account of an exposure comes from.
@@ -62,10 +61,10 @@ class ExposureCheck {
                           const pairing::Exposure& exposure, Duration start_delay);
 
     /// What the camera keeps to at that time; 0: it varies, is unknown, or may just have changed.
-    Duration told_at(HostTime at) const;
+    Duration reported_at(HostTime at) const;
 
     Duration measured() const { return newest_.length; }  ///< of the newest frame; 0: unknown
-    Duration told() const { return told_; }               ///< by the camera; 0: unknown
+    Duration reported() const { return reported_; }       ///< by the camera; 0: unknown
     bool contradicted() const { return contradicted_; }
     ExposureSource source() const { return source_; }
     EdgeReport edges() const { return edges_.report(); }
@@ -82,8 +81,7 @@ class ExposureCheck {
         LengthRange range;
     };
 
-    /// Frames in a row whose length fits the neighbour's chunk but not their own. At half, two
-    /// wrong records that follow each other would do; at twice, five more frames are withheld.
+    /// Frames in a row whose length fits the neighbour's chunk but not their own.
     static constexpr int votes_to_shift = 5;
 
     void follow_lag(const Measured& before, Duration chunk);
@@ -99,7 +97,7 @@ class ExposureCheck {
     bool varies_ = true;  ///< the camera changes it by itself
     EdgeDifference edges_;
     Measured newest_;
-    Duration told_;
+    Duration reported_;
     ExposureSource source_ = ExposureSource::none;
     bool contradicted_ = false;
     bool lags_ = false;  ///< chunks are of the frame before

@@ -7,16 +7,14 @@ namespace versavis::daemon {
 
 namespace {
 
-/// More packets in a row are not lost: a link carries some 20,000 in the longest silence before
-/// the board is greeted anew. At half, such a gap counts as an error; at twice, more wrong numbers
-/// pass for losses.
+/// More packets in a row are not lost: a link carries some 20,000 in the longest silence before the
+/// board is greeted anew.
 constexpr std::uint32_t largest_loss = 32768;
 
-/// No board runs for 36 years. At half, none does either; at twice, differences of three such
-/// times could overflow.
+/// No board runs for 36 years.
 constexpr std::int64_t latest_ns = std::int64_t{1} << 60U;
 
-/// The year 2200. At half, labels end in 2085; at twice, they do not fit int64 in nanoseconds.
+/// The year 2200.
 constexpr std::int64_t latest_label_s = 7'258'118'400;
 
 constexpr std::uint32_t camera_parts = (1U << wire::camera_count) - 1U;
@@ -54,10 +52,10 @@ bool possible(const wire::ImuSample& message) {
 bool possible(const wire::Event& message) {
     if (!in_life(message.time_ns)) return false;
     switch (message.kind) {
-        case wire::EventKind::utc_label:
+        case wire::BoardEventKind::utc_label:
             return message.value >= 0 && message.value <= latest_label_s;
-        case wire::EventKind::triggers_skipped: return message.detail > 0;
-        case wire::EventKind::stored: return message.value == 0 || message.value == 1;
+        case wire::BoardEventKind::triggers_skipped: return message.detail > 0;
+        case wire::BoardEventKind::stored: return message.value == 0 || message.value == 1;
         default: return true;
     }
 }

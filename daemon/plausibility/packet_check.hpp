@@ -9,7 +9,7 @@
 
 namespace versavis::daemon {
 
-/// What the numbers of packets tell, of one life of the board.
+/// What the numbers of packets show, of one life of the board.
 class SequenceWatch {
  public:
     /// The next packet follows this one, whatever its number.

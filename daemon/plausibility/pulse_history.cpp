@@ -5,17 +5,17 @@
 
 namespace versavis::daemon {
 
-std::optional<Doubt> PulseHistory::doubt(const Pulse& pulse) const {
+std::optional<Implausibility> PulseHistory::doubt(const Pulse& pulse) const {
     if (!newest_) return std::nullopt;
     const auto pulses = static_cast<std::int32_t>(pulse.number - newest_->number);
     if (pulses <= 0)
-        return Doubt{EventReason::implausible_number, pulse.number, newest_->number + 1};
+        return Implausibility{EventReason::implausible_number, pulse.number, newest_->number + 1};
     const Duration off = pulse.at - newest_->at - pace_.value() * pulses;
     const Duration wander = (pace_.value() / wander_parts_ + pace_.uncertainty()) * (pulses - 1);
     // Further off it might as well be the pulse beside that.
     const Duration furthest = pace_.value() / 2;
     if (absolute(off) <= std::min(pace_.tolerance() + wander, furthest)) return std::nullopt;
-    return Doubt{EventReason::implausible_time, pulse.at.ns, (pulse.at - off).ns};
+    return Implausibility{EventReason::implausible_time, pulse.at.ns, (pulse.at - off).ns};
 }
 
 void PulseHistory::learn(const Pulse& pulse) {

@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <optional>
 
-#include "doubt.hpp"
-#include "steady_value.hpp"
+#include "implausibility.hpp"
+#include "running_estimate.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {
 
-/// One of them, as a message of the board tells it.
+/// One of them, as in a message of the board.
 struct Pulse {
     std::uint32_t number = 0;  ///< of all that were due, modulo 2^32
     BoardTime at;
@@ -25,7 +25,7 @@ class PulseHistory {
     PulseHistory(Duration period, Duration tolerance, std::int64_t wander_parts)
         : pace_(period, tolerance), wander_parts_(wander_parts) {}
 
-    std::optional<Doubt> doubt(const Pulse& pulse) const;
+    std::optional<Implausibility> doubt(const Pulse& pulse) const;
     void learn(const Pulse& pulse);
     bool repeats(const Pulse& pulse) const {
         return newest_ && newest_->number == pulse.number && newest_->at == pulse.at;
@@ -33,7 +33,7 @@ class PulseHistory {
     void rebase() { newest_.reset(); }
 
  private:
-    SteadyValue pace_;
+    RunningEstimate pace_;
     std::int64_t wander_parts_;
     std::optional<Pulse> newest_;
 };

@@ -7,8 +7,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Between readings of the output clock in the recording. At half, the ring holds less of the rest;
-/// at twice, a slewed clock is interpolated over two seconds.
+/// Between readings of the output clock in the recording.
 constexpr Duration output_interval = seconds(1);
 
 }  // namespace
@@ -38,20 +37,21 @@ void ClockRecorder::tick(HostTime now) {
     if (relation.epoch != epoch_ || relation.host >= next_output_) tell_output(relation);
 }
 
-/// `told`: none for now. A step of the output clock precedes the first item that is stamped by it.
-void ClockRecorder::publish(const clock::ClockItem& item, std::optional<HostTime> told) {
+/// `recorded_at`: none for now. A step of the output clock precedes the first item that is stamped
+/// by it.
+void ClockRecorder::publish(const clock::ClockItem& item, std::optional<HostTime> recorded_at) {
     const clock::OutputRelation relation = translator_.output_now();
     if (relation.epoch != epoch_) tell_output(relation);
-    const HostTime at = told.value_or(relation.host);
+    const HostTime at = recorded_at.value_or(relation.host);
     ring_.publish({at.ns + relation.minus_host.ns}, pack(clock::to_metadata(item)));
 }
 
 void ClockRecorder::tell_output(const clock::OutputRelation& relation) {
     epoch_ = relation.epoch;
     next_output_ = relation.host + output_interval;
-    const clock::RecordedOutput told{relation.epoch, relation.host, relation.minus_host,
-                                     relation.uncertainty};
-    ring_.publish({relation.host.ns + relation.minus_host.ns}, pack(clock::to_metadata(told)));
+    const clock::RecordedOutput output{relation.epoch, relation.host, relation.minus_host,
+                                       relation.uncertainty};
+    ring_.publish({relation.host.ns + relation.minus_host.ns}, pack(clock::to_metadata(output)));
 }
 
 std::uint64_t ClockRecorder::items() {

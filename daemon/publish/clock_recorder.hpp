@@ -27,21 +27,21 @@ class ClockRecorder {
     /// A message of the board that was not asked for.
     void one_way(const clock::OneWay& message);
 
-    /// Once a second the output clock is told, and heartbeats more often; call it every 50 ms or
-    /// so.
+    /// Once a second the output clock is recorded, and heartbeats more often; call it every 50 ms
+    /// or so.
     void tick(HostTime now);
 
     std::uint64_t items();
 
  private:
-    void publish(const clock::ClockItem& item, std::optional<HostTime> told = {});
+    void publish(const clock::ClockItem& item, std::optional<HostTime> recorded_at = {});
     void tell_output(const clock::OutputRelation& relation);
 
     std::mutex mutex_;
     ring::Writer ring_;
     clock::Translator& translator_;
     std::uint32_t nonce_ = 0;
-    std::optional<std::uint32_t> epoch_;  ///< that the output clock was last told of
+    std::optional<std::uint32_t> epoch_;  ///< of the last record of the output clock
     HostTime next_output_;
 };
 

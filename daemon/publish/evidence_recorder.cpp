@@ -7,8 +7,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Items that the ring keeps: 2 MiB, three minutes of a camera at 30 Hz. At half, a slip is
-/// overwritten before anybody looked; at twice, each camera takes 2 MiB more.
+/// Items that the ring keeps: 2 MiB, three minutes of a camera at 30 Hz.
 constexpr std::uint32_t evidence_items = 16384;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The ring of all that a camera's pairing is told, so that the pairing can be done again elsewhere.
+// The ring of all that a camera's pairing gets, so that the pairing can be done again elsewhere.
 #pragma once
 
 #include <filesystem>

@@ -7,8 +7,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// How far the camera's own latency is off when nobody measured it. At half, sigma of such stamps
-/// could be too small for a slow camera; at twice, it hides how good short exposures are.
+/// How far the camera's own latency is off when nobody measured it.
 constexpr Duration unmeasured_delay = microseconds(100);
 
 /// False: start and end follow from the trigger, or from the exposure line of the master.

@@ -11,8 +11,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Least descriptors of a ring: a reader that sleeps still learns how many frames it lost. At half
-/// it would learn of 32; at twice each ring takes 8 KiB more.
+/// Least descriptors of a ring: a reader that sleeps still learns how many frames it lost.
 constexpr std::uint32_t descriptor_floor = 64;
 
 FrameMetadata describe(const pairing::Exposure& exposure) {

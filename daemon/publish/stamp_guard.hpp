@@ -50,11 +50,9 @@ class StampGuard {
     bool stuck() const { return refused_ >= refusals_to_doubt; }
 
  private:
-    /// Sigmas that a stamp may be held by. At half, an estimate that settles costs items; at twice,
-    /// stamps are published that are known to be off by six sigma.
+    /// Sigmas that a stamp may be held by.
     static constexpr std::int64_t most_sigmas = 3;
 
-    /// At half, a single wild stamp begins an epoch; at twice, it costs three items more.
     static constexpr int refusals_to_doubt = 3;
 
     static bool explained(Duration hold, std::uint32_t sigma_ns) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "board_parts.hpp"
+#include "keys.hpp"
 #include "wire/limits.hpp"
 
 namespace versavis::daemon {
@@ -20,8 +21,7 @@ constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
 /// The same with its rate in milli-hertz.
 constexpr std::int64_t millihertz_ns = 1'000'000'000'000;
 
-/// Longest that 32 bits of nanoseconds hold. At half, phases of slow cameras do not fit; twice does
-/// not fit.
+/// Longest that 32 bits of nanoseconds hold.
 constexpr std::int64_t longest_ns = 4'000'000'000;
 
 std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
@@ -76,42 +76,10 @@ std::int64_t longest_test_pulse_ns(const wire::Configuration& board) {
     return uhz_ns / board.cameras[test - wire::test_camera0].rate_uhz / 2;
 }
 
-/// A key of the file, and what one of its unit is on the board; 0: it holds names.
-struct Words {
-    const char* key;
-    double board_units;
-};
-
-Words words(wire::ConfigurationField field) {
-    using Field = wire::ConfigurationField;
-    switch (field) {
-        case Field::rate: return {"rate_hz", 1e6};
-        case Field::pulse: return {"pulse_us", 1e3};
-        case Field::latency: return {"latency_us", 1e3};
-        case Field::gap: return {"gap_us", 1e3};
-        case Field::exposure: return {"exposure_us", 1e3};
-        case Field::max_exposure: return {"max_exposure_us", 1e3};
-        case Field::phase: return {"phase_us", 1e3};
-        case Field::imu_kind: return {"model", 0};
-        case Field::imu_rate: return {"rate_hz", 1e3};
-        case Field::master: return {"master", 0};
-        case Field::imu_filter: return {"filter", 1};
-        case Field::imu_options: return {"data_ready", 0};
-        case Field::cameras: return {"cameras", 0};
-        case Field::lead: return {"lead_us", 1e3};
-        case Field::max_on: return {"max_on_us", 1e3};
-        case Field::duty: return {"duty_percent", 1e4};
-        case Field::inputs: return {"inputs", 0};
-        case Field::test: return {"test", 0};
-        case Field::sync_rate: return {"sync_rate_hz", 1e6};
-        case Field::port_options: return {"imu_output' or 'nmea", 0};
-        case Field::nmea_baud: return {"nmea_baud", 1};
-        case Field::glitch: return {"glitch_us", 10};
-        case Field::test_rate: return {"test_rate_hz", 1e3};
-        case Field::test_output: return {"test_output", 0};
-        case Field::present: return {"a part", 0};
-    }
-    return {"an unknown key", 0};
+/// One field is of two keys.
+BoardKey key_of(wire::ConfigurationField field) {
+    if (field == wire::ConfigurationField::port_options) return {"imu_output' or 'nmea"};
+    return find_key(field).value_or(BoardKey{"an unknown key"});
 }
 
 /// The table that is refused; null: the file has none.
@@ -154,12 +122,11 @@ std::string named(const Configuration& configuration, wire::ConfigurationField f
     return imu == nullptr ? "" : imu->name;
 }
 
-/// Most names that a field can hold. At half, some that are allowed are not told; at twice, nothing
-/// is gained.
+/// Most names that a field can hold.
 constexpr std::int64_t most_names = 16;
 
 std::string allowed(const Configuration& configuration, const wire::Refusal& refusal) {
-    const auto [key, board_units] = words(refusal.field);
+    const auto [key, board_units] = key_of(refusal.field);
     if (refusal.minimum > refusal.maximum) return "no value";
     if (board_units != 0)
         return fmt::format("{:.10g} to {}", static_cast<double>(refusal.minimum) / board_units,
@@ -175,14 +142,14 @@ std::string allowed(const Configuration& configuration, const wire::Refusal& ref
 /// The first of the options that the board does not take, by its key.
 std::string describe_options(const wire::Refusal& refusal, const TomlEntry& entry) {
     const std::int64_t refused = refusal.value & ~refusal.maximum;
-    const auto told = [&](const char* key, const char* value) {
+    const auto refused_by_key = [&](const char* key, const char* value) {
         return fmt::format("{} is {}: the board does not take that of this part, as it is wired",
                            entry.reference(key), value);
     };
-    if ((refused & wire::imu_accel_ready) != 0) return told("accel_ready", "true");
-    if ((refused & wire::imu_i2c) != 0) return told("bus", "\"i2c\"");
-    if ((refused & wire::imu_i2c_second) != 0) return told("i2c_address", "the second");
-    return told("data_ready", "true");
+    if ((refused & wire::imu_accel_ready) != 0) return refused_by_key("accel_ready", "true");
+    if ((refused & wire::imu_i2c) != 0) return refused_by_key("bus", "\"i2c\"");
+    if ((refused & wire::imu_i2c_second) != 0) return refused_by_key("i2c_address", "the second");
+    return refused_by_key("data_ready", "true");
 }
 
 }  // namespace
@@ -240,7 +207,7 @@ wire::Configuration board_configuration(const Configuration& configuration) {
 std::string describe(const Configuration& configuration, const wire::Refusal& refusal) {
     if (refusal.field == wire::ConfigurationField::present)
         return describe_missing(configuration, refusal);
-    const auto [key, board_units] = words(refusal.field);
+    const auto [key, board_units] = key_of(refusal.field);
     const std::string name = named(configuration, refusal.field, refusal.value);
     const std::string value = board_units != 0
                                   ? quantity(key, static_cast<double>(refusal.value) / board_units)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The configuration as the board is told it, and the board's refusals in the words of the file.
+// The configuration as the board gets it, and the board's refusals in the words of the file.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace versavis::daemon {
 
-/// What the board is told.
+/// What is sent to the board.
 wire::Configuration board_configuration(const Configuration& configuration);
 
 /// Place, table and key that the board refuses, its value and what is allowed, in the unit of the

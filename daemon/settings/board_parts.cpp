@@ -199,15 +199,11 @@ std::vector<Need> needs_of(const Configuration& configuration, std::uint32_t pre
     return needs.take();
 }
 
-std::string text(const char* padded, std::size_t capacity) {
-    return {padded, strnlen(padded, capacity)};
-}
-
-/// With what tells it from others.
+/// With what distinguishes it from others.
 std::string name_of(const wire::BoardHello& board) {
     std::vector<std::string> facts;
-    if (board.firmware[0] != 0) facts.push_back(text(board.firmware, sizeof board.firmware));
-    if (board.serial[0] != 0) facts.push_back("serial " + text(board.serial, sizeof board.serial));
+    if (board.firmware[0] != 0) facts.push_back(board::text(board.firmware));
+    if (board.serial[0] != 0) facts.push_back("serial " + board::text(board.serial));
     return facts.empty() ? "the board" : fmt::format("the board ({})", fmt::join(facts, ", "));
 }
 
@@ -244,16 +240,16 @@ std::string describe_missing(const Configuration& configuration, const wire::Ref
 }
 
 std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
-    const auto told = [](const TomlEntry& entry, const char* key, const char* what) {
+    const auto lacks = [](const TomlEntry& entry, const char* key, const char* what) {
         return fmt::format(
             "{} is true: the board's firmware does not {}; flash a newer one, or set "
             "{} = false",
             entry.reference(key), what, key);
     };
     if (configuration.clock.align && !has(capabilities, wire::capability_host_grid))
-        return told(configuration.clock.entry, "align", "let the host place its grid");
+        return lacks(configuration.clock.entry, "align", "let the host place its grid");
     if (configuration.ports.nmea && !has(capabilities, wire::capability_nmea))
-        return told(configuration.ports.entry, "nmea", "read NMEA");
+        return lacks(configuration.ports.entry, "nmea", "read NMEA");
     return "";
 }
 

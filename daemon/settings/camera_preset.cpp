@@ -30,8 +30,7 @@ bool fits(const std::vector<std::string>& parts, const std::string& text) {
            });
 }
 
-/// Slowest edge of a line that a preset may state. At half, the slowest known lines still fit; at
-/// twice, a figure in nanoseconds by mistake is taken for microseconds more often.
+/// Slowest edge of a line that a preset may state.
 constexpr double slowest_edge_us = 1000;
 
 std::optional<EdgeDelay> read_edge(TableReader& reader, std::string_view key) {
@@ -55,8 +54,7 @@ PresetLine read_line(TableReader& reader) {
     return line;
 }
 
-/// Most microseconds that a unit of a chunk may have: a second. At half, still all known units; at
-/// twice, a period in milliseconds by mistake is taken for a unit.
+/// Most microseconds that a unit of a chunk may have: a second.
 constexpr double longest_unit_us = 1e6;
 
 PresetStep read_step(TableReader& reader) {

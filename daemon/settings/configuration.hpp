@@ -22,7 +22,7 @@
 
 namespace versavis::daemon {
 
-/// The ring of what the pairing of a camera was told is named after the camera.
+/// The ring of all that the pairing of a camera gets is named after the camera.
 inline const std::string evidence_suffix = "-evidence";
 
 // Each table knows its place in the file, for what is found out after reading, and by the board.
@@ -126,7 +126,7 @@ constexpr unsigned second_i2c_address = 0x69;
 struct ImuConfiguration {
     TomlEntry entry;
     std::string name = "imu0";
-    const imu::ImuModel* model = nullptr;
+    const imu::ImuModel* model = imu::find_model(imu::model_names().front());
     ImuBus bus = ImuBus::spi;  ///< of a part on port 0
     unsigned i2c_address = first_i2c_address;
     double rate_hz = 200;

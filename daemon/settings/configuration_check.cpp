@@ -19,8 +19,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A slow start sends one pulse a second: a frame must come before the next. At half, slow cameras
-/// cannot start; at twice, a frame could be of either pulse.
+/// A slow start sends one pulse a second: a frame must come before the next.
 constexpr double longest_arrival_without_clock_ms = 900;
 
 constexpr double fastest_on_grid_hz = wire::limits::fastest_imu_without_data_ready_millihertz / 1e3;
@@ -66,13 +65,13 @@ std::string at_line(const TomlEntry& entry) {
     return fmt::format("{} in line {}", entry.title, entry.place.line);
 }
 
-/// Each that agrees with one before it: told with the first of them.
-template <class Entry, class Same, class Tell>
-void find_repeated(const std::vector<Entry>& entries, Same same, Tell tell) {
+/// Reports each that agrees with one before it, with the first of them.
+template <class Entry, class Same, class Report>
+void find_repeated(const std::vector<Entry>& entries, Same same, Report report) {
     for (auto second = entries.begin(); second != entries.end(); ++second) {
         const auto first =
             std::find_if(entries.begin(), second, [&](const Entry& e) { return same(e, *second); });
-        if (first != second) tell(*first, *second);
+        if (first != second) report(*first, *second);
     }
 }
 
@@ -301,6 +300,16 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
               "with 'latency_us' and 'gap_us' it must end before the next trigger", slower);
         limit("exposure_us", camera.exposure_us, camera.max_exposure_us, "'max_exposure_us'",
               "lower it, or raise 'max_exposure_us'");
+    }
+}
+
+void check_line_delays(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras) {
+        const bool rising = camera.entry.has("strobe_rising_us");
+        if (rising != camera.entry.has("strobe_falling_us"))
+            findings.add(camera.entry, rising ? "strobe_rising_us" : "strobe_falling_us",
+                         "the delays of both edges of the exposure line are needed",
+                         "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
     }
 }
 
@@ -535,12 +544,27 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
                        "lower it");
 }
 
-constexpr void (*rules[])(const Configuration&, Findings&){
-    check_that_it_serves, check_instance,      check_link,          check_pps,
-    check_names,          check_devices,       check_outputs,       check_masters,
-    check_camera_times,   check_glitch,        check_auto_exposure, check_presets,
-    check_imus,           check_illumination,  check_inputs,        check_uart_and_imu_output,
-    check_test_rate,      check_pulse_outputs, check_history,       check_receive};
+constexpr void (*rules[])(const Configuration&, Findings&){check_that_it_serves,
+                                                           check_instance,
+                                                           check_link,
+                                                           check_pps,
+                                                           check_names,
+                                                           check_devices,
+                                                           check_outputs,
+                                                           check_masters,
+                                                           check_camera_times,
+                                                           check_line_delays,
+                                                           check_glitch,
+                                                           check_auto_exposure,
+                                                           check_presets,
+                                                           check_imus,
+                                                           check_illumination,
+                                                           check_inputs,
+                                                           check_uart_and_imu_output,
+                                                           check_test_rate,
+                                                           check_pulse_outputs,
+                                                           check_history,
+                                                           check_receive};
 
 }  // namespace
 

@@ -9,13 +9,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Sigma of an edge of an isolated line, or of one that nobody knows: makers state 1 to 110 us. At
-/// half, the stamps of the slowest outputs are further off than they say; at twice, those of most
-/// are better than they say.
+/// Sigma of an edge of an isolated line, or of one that nobody knows: makers state 1 to 110 us.
 constexpr Duration unknown_isolated = microseconds(40);
 
 /// The same for a line without isolation: makers state less than 2.5 us, a weak pull-up adds some.
-/// At half, a weak pull-up is not covered; at twice, good lines look worse than they are.
 constexpr Duration unknown_direct = microseconds(3);
 
 const PresetLine* find_line(const CameraPreset& preset, const std::string& name) {

@@ -11,25 +11,25 @@ namespace {
 
 constexpr Nanoseconds health_interval = 1'000'000'000;
 
-/// Of the watchdog's second. At half, an idle board wakes more often; at twice, one slow poll is
+/// Of the watchdog's second. If lower, an idle board wakes more often; if higher, one slow poll is
 /// enough for it to bite.
 constexpr Nanoseconds feed_interval = 200'000'000;
 
-/// The output hardware makes progress, or the watchdog bites. At half, a long pulse train may look
-/// stuck; at twice, pulses stay away for longer.
+/// The output hardware makes progress, or the watchdog bites. If lower, a long pulse train may look
+/// stuck; if higher, pulses stay away for longer.
 constexpr Nanoseconds stuck_limit = 500'000'000;
 
 /// Of the grid: pulse trains need not restart for less.
 constexpr Nanoseconds unseen_step = 1'000;
 
-/// For exposures, before a new configuration. At half, records of long exposures are cut; at twice,
-/// a line that is stuck delays a configuration for longer.
+/// For exposures, before a new configuration. If lower, records of long exposures are cut; if
+/// higher, a line that is stuck delays a configuration for longer.
 constexpr Nanoseconds longest_wait = 200'000'000;
 
 /// Between stray edges that are reported; all are counted.
 constexpr Nanoseconds stray_interval = 100'000'000;
 
-/// Bounds the work of one poll. At half, bytes of the host wait longer; at twice, polls take
+/// Bounds the work of one poll. If lower, bytes of the host wait longer; if higher, polls take
 /// longer.
 constexpr unsigned packets_a_poll = 4;
 
@@ -45,12 +45,12 @@ unsigned test_output(const wire::PortConfiguration& ports) {
                                                    : ports.test_output - wire::test_at_camera0;
 }
 
-/// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. At half,
-/// contacts that bounce count double; at twice, nothing changes.
+/// Pulses of PPS and sync that follow closer are echoes; the fastest sync comes at 10 Hz. If lower,
+/// contacts that bounce count double.
 constexpr EchoFilter pps_echo(1'000'000);
 
-/// Of the auxiliary inputs. At half, contacts that bounce count double; at twice, pulses of 20 kHz
-/// are lost.
+/// Of the auxiliary inputs. If lower, contacts that bounce count double; if higher, pulses of 20
+/// kHz are lost.
 constexpr EchoFilter aux_echo(10'000);
 
 }  // namespace
@@ -88,12 +88,12 @@ void Board::poll() {
     if (configuring_) poll_configuration(began);
     poll_link();
     const Nanoseconds now = hal_.clock.now();
-    const bool timed = stirred_ || now >= timers_;
+    const bool timed = dirty_ || now >= timers_;
     if (timed) {
         poll_cameras(now);
         poll_outputs(now);
     }
-    stirred_ = configuring_ || outputs_blocked_;
+    dirty_ = configuring_ || outputs_blocked_;
     poll_imus(now);
     poll_nmea();
     poll_storage(now);
@@ -151,7 +151,7 @@ void Board::poll_link() {
     for (unsigned i = 0; i < packets_a_poll; ++i) {
         const std::size_t size = hal_.link.read(bytes, received);
         if (size == 0) return;
-        stirred_ = true;
+        dirty_ = true;
         decoder_.feed(bytes, size, [&](const wire::Packet& packet) { handle(packet, received); });
     }
     more_ = true;
@@ -188,8 +188,8 @@ void Board::handle(const wire::Packet& packet, Nanoseconds received) {
 }
 
 void Board::greet(const wire::HostHello& hello) {
-    // A board of another major version still identifies itself, so that the host can tell the user
-    // what to update.
+    // A board of another major version still identifies itself, so that the host can report what to
+    // update.
     greeted_ = true;
     if (configuring_) begin_trains(hal_.clock.now());
     configuring_ = false;
@@ -339,7 +339,7 @@ void Board::begin_trains(Nanoseconds now) {
         test_.begin(output_test, spi_imu_.grid(), board_clock_, ports.pulse_ns, now);
 }
 
-/// Whatever is placed on the grid is placed anew.
+/// Everything on the grid is placed again.
 void Board::grid_moved() {
     for (CameraChannel& camera : cameras_) camera.grid_moved();
     sync_.moved();
@@ -459,7 +459,8 @@ void Board::moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds le
     // The gate closes as soon as it can, which is no sooner than the port can.
     if (!late || (gate && !level)) return;
     ++health_.late_outputs;
-    event(wire::EventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked, 0);
+    event(wire::BoardEventKind::output_late, static_cast<std::uint8_t>(output), asked, left - asked,
+          0);
 }
 
 void Board::poll_configuration(Nanoseconds now) {
@@ -481,7 +482,7 @@ void Board::poll_storage(Nanoseconds now) {
     const Persist::Outcome outcome = hal_.persist.take_outcome();
     if (outcome == Persist::Outcome::busy) return;
     storing_ = false;
-    event(wire::EventKind::stored, 0, now, outcome == Persist::Outcome::stored ? 1 : 0, 0);
+    event(wire::BoardEventKind::stored, 0, now, outcome == Persist::Outcome::stored ? 1 : 0, 0);
 }
 
 void Board::poll_imus(Nanoseconds now) {
@@ -530,9 +531,9 @@ void Board::exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds
         outputs_.pulse(start + duration / 2, output_test, true, configuration_.ports.pulse_ns);
 }
 
-void Board::event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
-                  std::uint16_t detail) {
-    if (kind == wire::EventKind::stray_edge) {
+void Board::event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at,
+                  std::int64_t value, std::uint16_t detail) {
+    if (kind == wire::BoardEventKind::stray_edge) {
         // A floating line makes many; all are counted, some are reported.
         ++health_.stray_edges;
         if (at < next_stray_) return;

@@ -25,6 +25,9 @@ struct Identity {
     char serial[sizeof wire::BoardHello::serial];
 };
 
+/// The whole board as one object: it takes edges, packets and IMU replies from the port, and hands
+/// out triggers, light, pulses and messages. The port's main loop owns it and calls poll() and
+/// next_wake(), never from an interrupt. All parts below are members, so none of them needs a lock.
 class Board final : private ChannelReports, private RefusalSink, private OutputMoves {
  public:
     Board(const Hal& hal, const Identity& identity);
@@ -39,7 +42,7 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
 
  private:
     void exposure(const wire::Exposure& record) override;
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+    void event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
                std::uint16_t detail) override;
     void exposure_planned(std::uint8_t camera, Nanoseconds start, Nanoseconds duration) override;
     void refuse(const wire::Refusal& refusal) override;
@@ -90,9 +93,9 @@ class Board final : private ChannelReports, private RefusalSink, private OutputM
     bool greeted_ = false;
     bool storing_ = false;
     bool outputs_blocked_ = false;
-    bool more_ = false;          ///< to do at once
-    bool stirred_ = true;        ///< cameras, light and outputs may have something to do
-    std::uint8_t bouncing_ = 0;  ///< exposure lines that have not settled
+    bool more_ = false;           ///< to do at once
+    bool dirty_ = true;           ///< cameras, light and outputs may have work to do
+    std::uint8_t unsettled_ = 0;  ///< exposure lines that have not settled
     std::uint8_t refused_ = 0;
     std::uint8_t exposing_ = 0;  ///< cameras whose exposure line is active
     std::uint8_t masters_ = 0;   ///< cameras that slaves follow

@@ -11,7 +11,7 @@ constexpr Nanoseconds sync_tolerance = 2000;  // 500 ppm: two crystals differ by
 constexpr std::uint32_t default_nmea_baud = 9'600;
 constexpr Nanoseconds uhz_ns = 1'000'000'000'000'000;
 
-/// Bounds the work of one poll. At half, a burst of edges takes more polls; at twice, other work
+/// Bounds the work of one poll. If lower, a burst of edges takes more polls; if higher, other work
 /// waits longer.
 constexpr unsigned edges_a_poll = 24;
 
@@ -30,13 +30,13 @@ void Board::poll_edges(Nanoseconds now) {
             edges_lost(all_lines);
             spi_imu_.edges_lost();
             health_.lost_edges += lost;
-            event(wire::EventKind::edge_overflow, 0, now, lost, 0);
+            event(wire::BoardEventKind::edge_overflow, 0, now, lost, 0);
         } else if (noise_.take(edge)) {
             take_edge(edge, now);
         } else {
             ++health_.noisy_inputs;
             if (edge.input < camera_count) edges_lost(1U << edge.input);
-            event(wire::EventKind::input_noisy, edge.input, edge.at, 0, 0);
+            event(wire::BoardEventKind::input_noisy, edge.input, edge.at, 0, 0);
         }
     }
     Nanoseconds settled = edge.at;
@@ -44,7 +44,7 @@ void Board::poll_edges(Nanoseconds now) {
         more_ = true;
     else
         settled = hal_.edges.settled();
-    if (bouncing_ != 0)
+    if (unsettled_ != 0)
         settle_exposures(settled);
     else if (settled > settled_)
         settled_ = settled;
@@ -61,7 +61,7 @@ void Board::edges_lost(std::uint32_t lines) {
     }
     light_.edges_lost(lines);
     exposing_ = static_cast<std::uint8_t>(exposing_ & ~lines);
-    stirred_ = true;
+    dirty_ = true;
 }
 
 void Board::take_edge(const Edge& edge, Nanoseconds now) {
@@ -77,7 +77,7 @@ void Board::take_edge(const Edge& edge, Nanoseconds now) {
         const auto input = static_cast<wire::PulseInput>(edge.input - input_pulse);
         const bool falling = (configuration_.ports.falling >> input & 1U) != 0;
         if (edge.level == falling) return;
-        stirred_ = true;
+        dirty_ = true;
         if (echoes_[input].take(edge.at))
             take_pulse(input, edge.at);
         else
@@ -95,12 +95,12 @@ void Board::take_exposure_edge(const Edge& edge) {
             edges_lost(all_lines);
     }
     camera.edge(edge.at, edge.level);
-    stirred_ = true;
+    dirty_ = true;
     const bool exposing = camera.exposing(edge.level);
     light_.edge(edge.input, exposing);
     const auto bit = static_cast<std::uint8_t>(1U << edge.input);
     exposing_ = static_cast<std::uint8_t>(exposing ? exposing_ | bit : exposing_ & ~bit);
-    bouncing_ = static_cast<std::uint8_t>(bouncing_ | bit);
+    unsettled_ = static_cast<std::uint8_t>(unsettled_ | bit);
     if (!exposing) switch_slaves();
 }
 
@@ -111,8 +111,8 @@ void Board::settle_exposures(Nanoseconds known) {
     Nanoseconds settled = known;
     for (;; settled = known) {
         unsigned first = camera_count;
-        for (unsigned i = 0; bouncing_ >> i != 0; ++i) {
-            if ((bouncing_ >> i & 1U) == 0) continue;
+        for (unsigned i = 0; unsettled_ >> i != 0; ++i) {
+            if ((unsettled_ >> i & 1U) == 0) continue;
             const Nanoseconds at = cameras_[i].settled(known);
             if (at > settled || (at == settled && cameras_[i].is_slave())) continue;
             settled = at;
@@ -124,7 +124,7 @@ void Board::settle_exposures(Nanoseconds known) {
         edge.input = static_cast<std::uint8_t>(first);
         const bool counts = cameras_[first].take_edge(known, edge.at, edge.level);
         if (cameras_[first].is_bouncing()) break;
-        bouncing_ = static_cast<std::uint8_t>(bouncing_ & ~(1U << first));
+        unsettled_ = static_cast<std::uint8_t>(unsettled_ & ~(1U << first));
         if (counts) judge_exposure_edge(edge);
     }
     if (settled > settled_) settled_ = settled;
@@ -132,7 +132,7 @@ void Board::settle_exposures(Nanoseconds known) {
 
 void Board::judge_exposure_edge(const Edge& edge) {
     CameraChannel& master = cameras_[edge.input];
-    stirred_ = true;
+    dirty_ = true;
     master.exposure_edge(edge.at, edge.level);
     if ((masters_ >> edge.input & 1U) == 0) return;
     for (CameraChannel& slave : cameras_)
@@ -146,14 +146,14 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
         case wire::pulse_pps:
             pps_.pulse(at);
             nmea_.pulse(at);
-            return event(wire::EventKind::pps, 0, at, number, 0);
+            return event(wire::BoardEventKind::pps, 0, at, number, 0);
         case wire::pulse_aux0:
         case wire::pulse_aux1:
-            return event(wire::EventKind::aux_pulse,
+            return event(wire::BoardEventKind::aux_pulse,
                          static_cast<std::uint8_t>(input - wire::pulse_aux0), at, number, 0);
         case wire::pulse_sync: break;
     }
-    event(wire::EventKind::sync_pulse, 0, at, number, 0);
+    event(wire::BoardEventKind::sync_pulse, 0, at, number, 0);
     const Nanoseconds since = at - last_sync_;
     last_sync_ = at;
     if (on_sync_.cameras == 0 || configuring_) return follow_sync(at);
@@ -173,9 +173,10 @@ void Board::take_pulse(wire::PulseInput input, Nanoseconds at) {
 
 void Board::follow_sync(Nanoseconds at) {
     const GridClock::SyncPulse pulse = grid_clock_.sync_pulse(at, any_running());
-    if (pulse.what == GridClock::Sync::lost) event(wire::EventKind::sync_lost, 0, at, pulse.off, 0);
+    if (pulse.what == GridClock::Sync::lost)
+        event(wire::BoardEventKind::sync_lost, 0, at, pulse.off, 0);
     if (pulse.what == GridClock::Sync::taken)
-        event(wire::EventKind::sync_taken, 0, at, pulse.off, 0);
+        event(wire::BoardEventKind::sync_taken, 0, at, pulse.off, 0);
     if (pulse.what == GridClock::Sync::followed || pulse.what == GridClock::Sync::taken)
         grid_moved();
 }
@@ -197,7 +198,7 @@ void Board::poll_nmea() {
             const Nanoseconds at =
                 received - static_cast<Nanoseconds>(size - 1 - i) * nmea_.byte_duration();
             if (nmea_.take(bytes[i], at, label))
-                event(wire::EventKind::utc_label, 0, label.pulse, label.utc_s, 0);
+                event(wire::BoardEventKind::utc_label, 0, label.pulse, label.utc_s, 0);
         }
 }
 

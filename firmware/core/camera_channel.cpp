@@ -5,17 +5,17 @@ namespace versavis::firmware {
 
 namespace {
 
-/// From the command to the first grid point, at least. At half, two cameras that are started by two
-/// commands may begin at different grid points more often; at twice, starts take longer.
+/// From the command to the first grid point, at least. If lower, two cameras that are started by
+/// two commands may begin at different grid points more often; if higher, starts take longer.
 constexpr Nanoseconds start_delay = 5'000'000;
 
-/// A start of exposure is waited for one period, but at least and at most this long. At half, slow
-/// cameras are given up; at twice, a record waits longer.
+/// A start of exposure is waited for one period, but at least and at most this long. If lower, slow
+/// cameras are given up; if higher, a record waits longer.
 constexpr Nanoseconds start_timeout_floor = 2'000'000;
 constexpr Nanoseconds start_timeout_limit = 50'000'000;
 
-/// A trigger that is later than this, or than a sixteenth of the period, is skipped. At half, a
-/// slow poll skips triggers; at twice, exposures lie further from their grid points.
+/// A trigger that is later than this, or than a sixteenth of the period, is skipped. If lower, a
+/// slow poll skips triggers; if higher, exposures lie further from their grid points.
 constexpr Nanoseconds latest_trigger = 1'000'000;
 
 /// Most that the detail of an event can count.
@@ -151,7 +151,7 @@ void CameraChannel::decide(Nanoseconds now, Nanoseconds settled) {
 
 void CameraChannel::skip(wire::SkipReason reason) {
     ++skipped_;
-    reports_.event(wire::EventKind::trigger_skipped, camera_, trigger_at_,
+    reports_.event(wire::BoardEventKind::trigger_skipped, camera_, trigger_at_,
                    static_cast<std::int64_t>(grid_.tick()), static_cast<std::uint16_t>(reason));
 }
 
@@ -163,7 +163,7 @@ void CameraChannel::skip_late(Nanoseconds late_by) {
         skip(wire::SkipReason::late);
     } else if (skipped > 0) {
         skipped_ += static_cast<std::uint32_t>(skipped);
-        reports_.event(wire::EventKind::triggers_skipped, camera_, trigger_at_,
+        reports_.event(wire::BoardEventKind::triggers_skipped, camera_, trigger_at_,
                        static_cast<std::int64_t>(grid_.tick()),
                        static_cast<std::uint16_t>(skipped));
     }
@@ -244,16 +244,16 @@ void CameraChannel::edges_lost() {
 }
 
 void CameraChannel::poll(Nanoseconds now, Nanoseconds settled) {
-    if (!stirred_ && settled < expiry_ && now < decide_at_) return;
+    if (!dirty_ && settled < expiry_ && now < decide_at_) return;
     // A pulse that has not left yet causes no exposure.
     if (!outputs_.is_overdue(camera_, settled)) tracker_.expire(settled);
     for (unsigned i = 0; i < decisions_a_poll && decide_at_ <= now; ++i) decide(now, settled);
     expiry_ = tracker_.next_deadline();
-    stirred_ = false;
+    dirty_ = false;
 }
 
 Nanoseconds CameraChannel::next_wake(Nanoseconds lag) const {
-    const Nanoseconds expiry = stirred_ ? tracker_.next_deadline() : expiry_;
+    const Nanoseconds expiry = dirty_ ? tracker_.next_deadline() : expiry_;
     const Nanoseconds wake = min(expiry, filter_.next_wake());
     return min(decide_at_, wake == never ? never : wake + lag);
 }

@@ -12,6 +12,9 @@
 
 namespace versavis::firmware {
 
+/// Decides each trigger of one camera, with its exposure compensation, start pattern and slave
+/// routing, and turns the edges of its exposure line into records. Part of Board, called from
+/// Board::poll() only.
 class CameraChannel {
  public:
     CameraChannel(std::uint8_t camera, const GridClock& clock, OutputQueue& outputs,
@@ -27,7 +30,7 @@ class CameraChannel {
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds lead);
 
     /// Begins triggering at the first grid point that can be met after `now`; flags:
-    /// wire::StartFlag. A running channel begins its pattern anew.
+    /// wire::StartFlag. A running channel restarts its pattern.
     void start(Nanoseconds now, std::uint8_t flags);
 
     /// Pulses that were already decided are still sent and recorded.
@@ -92,13 +95,13 @@ class CameraChannel {
     std::uint32_t take_glitches() { return filter_.take_left_out(); }
 
  private:
-    /// At half, a start pattern at 1 kHz takes more polls; at twice, a poll takes longer.
+    /// If lower, a start pattern at 1 kHz takes more polls.
     static constexpr unsigned decisions_a_poll = 2;
 
     Nanoseconds period() const { return grid_.period(); }
     /// To change it.
     ExposureTracker& tracker() {
-        stirred_ = true;
+        dirty_ = true;
         return tracker_;
     }
     Nanoseconds expected_exposure() const;
@@ -118,7 +121,7 @@ class CameraChannel {
     std::uint8_t start_flags_ = 0;
     bool running_ = false;
     bool uncounted_ = false;  ///< pulses of this slave may have been missed
-    bool stirred_ = true;     ///< the tracker changed since `expiry_` was asked for
+    bool dirty_ = true;       ///< the tracker changed since `expiry_` was asked for
     const GridClock& clock_;
     OutputQueue& outputs_;
     ChannelReports& reports_;

@@ -41,8 +41,8 @@ class EdgeOrder {
     void clear() { count_ = 0; }
 
  private:
-    /// Three cameras begin and end within one bounce, and one of them once more. At half, bounces
-    /// cost records; at twice, nothing changes.
+    /// Three cameras begin and end within one bounce, and one of them once more. If lower, bounces
+    /// cost records.
     static constexpr unsigned capacity = 8;
 
     unsigned count_ = 0;

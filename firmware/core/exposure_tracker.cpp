@@ -18,14 +18,14 @@ void ExposureTracker::configure(const wire::CameraConfiguration& configuration,
 }
 
 void ExposureTracker::add(const wire::Exposure& record, Nanoseconds expected) {
-    flights_[count_++] = {record, expected};
+    pending_[count_++] = {record, expected};
 }
 
 void ExposureTracker::moved(Nanoseconds asked, Nanoseconds left, bool late) {
     for (std::size_t i = 0; i < count_; ++i) {
-        if (flights_[i].record.trigger_ns != asked) continue;
-        flights_[i].record.trigger_ns = left;
-        if (late) flights_[i].record.flags |= wire::exposure_late;
+        if (pending_[i].record.trigger_ns != asked) continue;
+        pending_[i].record.trigger_ns = left;
+        if (late) pending_[i].record.flags |= wire::exposure_late;
     }
 }
 
@@ -43,24 +43,24 @@ void ExposureTracker::start_edge(Nanoseconds at) {
     const Nanoseconds soonest = latency > certain_latency ? latency / 2 : 0;
     std::size_t found = count_;
     for (std::size_t i = 0; i < count_; ++i)
-        if (flights_[i].record.trigger_ns + soonest <= at && !started(flights_[i])) found = i;
+        if (pending_[i].record.trigger_ns + soonest <= at && !started(pending_[i])) found = i;
     if (found == count_) {
         edges_lost();  // if the line rose twice, an end in between was missed
-        return reports_.event(wire::EventKind::stray_edge, camera_, at, 1);
+        return reports_.event(wire::BoardEventKind::stray_edge, camera_, at, 1);
     }
     // The line has only one level: whatever still waits before this trigger was ignored, or its end
     // edge was lost.
     for (; found > 0; --found)
-        finish_first(started(flights_[0]) ? wire::exposure_no_end : wire::exposure_no_start);
-    flights_[0].record.start_ns = at;
+        finish_first(started(pending_[0]) ? wire::exposure_no_end : wire::exposure_no_start);
+    pending_[0].record.start_ns = at;
 }
 
 ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
-    if (count_ == 0 || !started(flights_[0])) {
-        reports_.event(wire::EventKind::stray_edge, camera_, at, 0);
+    if (count_ == 0 || !started(pending_[0])) {
+        reports_.event(wire::BoardEventKind::stray_edge, camera_, at, 0);
         return {};
     }
-    wire::Exposure& record = flights_[0].record;
+    wire::Exposure& record = pending_[0].record;
     record.end_ns = at;
     const Completed completed{record.trigger, at - record.start_ns};
     const bool overlong = completed.duration > period_;
@@ -70,15 +70,15 @@ ExposureTracker::Completed ExposureTracker::end_edge(Nanoseconds at) {
 }
 
 void ExposureTracker::edges_lost() {
-    if (count_ > 0 && started(flights_[0])) finish_first(wire::exposure_no_end);
+    if (count_ > 0 && started(pending_[0])) finish_first(wire::exposure_no_end);
 }
 
 Nanoseconds ExposureTracker::busy_until(Nanoseconds settled) const {
     if (count_ == 0) return last_end_;
-    const Flight& first = flights_[0];
+    const PendingExposure& first = pending_[0];
     if (started(first) && first.record.start_ns + first.expected < settled)
         return never / 2;  // overdue: it may last any length of time
-    const Flight& newest = flights_[count_ - 1];
+    const PendingExposure& newest = pending_[count_ - 1];
     const Nanoseconds start = started(newest)
                                   ? newest.record.start_ns
                                   : newest.record.trigger_ns + configuration_.latency_ns;
@@ -88,28 +88,28 @@ Nanoseconds ExposureTracker::busy_until(Nanoseconds settled) const {
 std::uint64_t ExposureTracker::tick_at(Nanoseconds at) const {
     std::uint64_t tick = last_tick_;
     for (std::size_t i = 0; i < count_; ++i)
-        if (flights_[i].record.trigger_ns <= at) tick = flights_[i].record.tick;
+        if (pending_[i].record.trigger_ns <= at) tick = pending_[i].record.tick;
     return tick;
 }
 
-Nanoseconds ExposureTracker::deadline(const Flight& flight) const {
+Nanoseconds ExposureTracker::deadline(const PendingExposure& exposure) const {
     if (has(wire::camera_no_strobe))
-        return flight.record.trigger_ns + configuration_.latency_ns + flight.expected;
-    if (started(flight)) return flight.record.start_ns + configuration_.max_exposure_ns;
-    return flight.record.trigger_ns + configuration_.latency_ns + patience_;
+        return exposure.record.trigger_ns + configuration_.latency_ns + exposure.expected;
+    if (started(exposure)) return exposure.record.start_ns + configuration_.max_exposure_ns;
+    return exposure.record.trigger_ns + configuration_.latency_ns + patience_;
 }
 
 Nanoseconds ExposureTracker::next_deadline() const {
-    return count_ == 0 ? never : deadline(flights_[0]);
+    return count_ == 0 ? never : deadline(pending_[0]);
 }
 
 void ExposureTracker::expire(Nanoseconds settled) {
-    while (count_ > 0 && deadline(flights_[0]) <= settled) {
+    while (count_ > 0 && deadline(pending_[0]) <= settled) {
         if (has(wire::camera_no_strobe)) {
-            predict_edges(flights_[0]);
+            predict_edges(pending_[0]);
             finish_first(wire::exposure_predicted);
-        } else if (started(flights_[0])) {
-            const Nanoseconds given_up = deadline(flights_[0]);
+        } else if (started(pending_[0])) {
+            const Nanoseconds given_up = deadline(pending_[0]);
             finish_first(wire::exposure_no_end | wire::exposure_overlong);
             last_end_ = given_up;
         } else {
@@ -120,25 +120,25 @@ void ExposureTracker::expire(Nanoseconds settled) {
 
 void ExposureTracker::give_up() {
     while (count_ > 0) {
-        if (has(wire::camera_no_strobe)) predict_edges(flights_[0]);
+        if (has(wire::camera_no_strobe)) predict_edges(pending_[0]);
         finish_first(has(wire::camera_no_strobe) ? wire::exposure_predicted
-                     : started(flights_[0])      ? wire::exposure_no_end
+                     : started(pending_[0])      ? wire::exposure_no_end
                                                  : wire::exposure_no_start);
     }
 }
 
-void ExposureTracker::predict_edges(Flight& flight) const {
-    flight.record.start_ns = flight.record.trigger_ns + configuration_.latency_ns;
-    flight.record.end_ns = flight.record.start_ns + flight.expected;
+void ExposureTracker::predict_edges(PendingExposure& exposure) const {
+    exposure.record.start_ns = exposure.record.trigger_ns + configuration_.latency_ns;
+    exposure.record.end_ns = exposure.record.start_ns + exposure.expected;
 }
 
 void ExposureTracker::finish_first(std::uint16_t flags) {
-    wire::Exposure record = flights_[0].record;
+    wire::Exposure record = pending_[0].record;
     record.flags = static_cast<std::uint16_t>(record.flags | flags);
     if (record.end_ns != wire::no_time) last_end_ = record.end_ns;
     last_tick_ = record.tick;
     --count_;
-    for (std::size_t i = 0; i < count_; ++i) flights_[i] = flights_[i + 1];
+    for (std::size_t i = 0; i < count_; ++i) pending_[i] = pending_[i + 1];
     reports_.exposure(record);
 }
 

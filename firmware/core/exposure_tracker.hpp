@@ -10,6 +10,8 @@
 
 namespace versavis::firmware {
 
+/// Matches the edges of an exposure line to the triggers that were sent, and reports one record for
+/// each trigger, in order. Part of CameraChannel, called from Board::poll() only.
 class ExposureTracker {
  public:
     ExposureTracker(std::uint8_t camera, ChannelReports& reports)
@@ -18,7 +20,7 @@ class ExposureTracker {
     /// `patience`: how long after it was expected a start may still come.
     void configure(const wire::CameraConfiguration& configuration, Nanoseconds patience);
 
-    bool full() const { return count_ == max_flights; }
+    bool full() const { return count_ == max_pending; }
     bool empty() const { return count_ == 0; }
 
     /// A trigger that was sent, or is set to leave; times increase.
@@ -57,18 +59,20 @@ class ExposureTracker {
 
  private:
     /// A trigger whose record is not complete.
-    struct Flight {
+    struct PendingExposure {
         wire::Exposure record;
         Nanoseconds expected;  ///< duration
     };
-    static constexpr std::size_t max_flights = 4;
+    static constexpr std::size_t max_pending = 4;
 
     bool has(wire::CameraFlag flag) const { return (configuration_.flags & flag) != 0; }
-    bool started(const Flight& flight) const { return flight.record.start_ns != wire::no_time; }
-    Nanoseconds deadline(const Flight& flight) const;
+    bool started(const PendingExposure& exposure) const {
+        return exposure.record.start_ns != wire::no_time;
+    }
+    Nanoseconds deadline(const PendingExposure& exposure) const;
     void start_edge(Nanoseconds at);
     Completed end_edge(Nanoseconds at);
-    void predict_edges(Flight& flight) const;
+    void predict_edges(PendingExposure& exposure) const;
     void finish_first(std::uint16_t flags);
 
     std::uint8_t camera_;
@@ -79,7 +83,7 @@ class ExposureTracker {
     Nanoseconds last_end_ = -never;  ///< when the newest finished exposure ended, or was given up
     std::uint64_t last_tick_ = 0;    ///< of the newest finished record
     std::size_t count_ = 0;
-    Flight flights_[max_flights];  ///< only the first can have started
+    PendingExposure pending_[max_pending];  ///< only the first can have started
 };
 
 }  // namespace versavis::firmware

@@ -7,24 +7,24 @@ namespace {
 
 constexpr Nanoseconds billion = 1'000'000'000;
 
-/// One part in this many (500 ppm): no two crystals differ by more. At half, false pulses pass more
-/// easily; at twice, bad crystals are never followed.
+/// One part in this many (500 ppm): no two crystals differ by more. If lower, false pulses pass
+/// more easily; if higher, bad crystals are never followed.
 constexpr std::int64_t largest_pace = 2'000;
 
-/// One part in this many (50 ppm), of two crystals that warm up. At half, false pulses pass more
-/// easily; at twice, a gap in the pulses loses the sender sooner.
+/// One part in this many (50 ppm), of two crystals that warm up. If lower, false pulses pass more
+/// easily; if higher, a gap in the pulses loses the sender sooner.
 constexpr std::int64_t largest_change = 20'000;
 
-/// In periods, before the pace is known. At half, a lost first pulse is not forgiven; at twice, the
-/// tolerance is that much wider.
+/// In periods, before the pace is known. If lower, a lost first pulse is not forgiven; if higher,
+/// the tolerance is that much wider.
 constexpr Nanoseconds longest_first_gap = 4;
 
-/// The grid goes to a sender that began anew by 1000 ppm. At half, it takes twice as long; at
-/// twice, a line cannot hold it.
+/// The grid slews to a restarted sender by 1000 ppm. If higher, cameras in a chain could not follow
+/// it.
 constexpr std::int64_t sync_slew_ppb = 1'000'000;
 
-/// In periods. At half, a few lost pulses are told as the loss of the sender; at twice, it is told
-/// late.
+/// In periods. If lower, a few lost pulses are reported as the loss of the sender; if higher, it is
+/// reported late.
 constexpr Nanoseconds longest_silence = 10;
 
 /// Whole seconds, to the nearest.
@@ -97,19 +97,19 @@ GridClock::SyncPulse GridClock::sync_pulse(Nanoseconds at, bool running) {
         line_ = line;
     pace_known_ = fits_ = true;
     newest_pulse_ = at;
-    rival_.clear();
+    candidate_.clear();
     return {Sync::followed, off};
 }
 
 GridClock::SyncPulse GridClock::take_rival(Nanoseconds at, Nanoseconds off, bool running) {
-    if (!rival_.add(at, period_, largest_pace)) {
+    if (!candidate_.add(at, period_, largest_pace)) {
         const bool first = fits_;
         fits_ = false;
         return {first ? Sync::lost : Sync::ignored, off};
     }
     // Its pulses lie on the multiples of its period that are nearest.
-    const Nanoseconds nominal = rival_.periods() * period_;
-    const std::int64_t pace = (at - rival_.first() - nominal) * 1'000'000 / (nominal / 1000);
+    const Nanoseconds nominal = candidate_.periods() * period_;
+    const std::int64_t pace = (at - candidate_.first() - nominal) * 1'000'000 / (nominal / 1000);
     const Nanoseconds half_later = grid_time(at) + period_ / 2;
     const Nanoseconds past = half_later % period_;
     const Nanoseconds nearest = half_later - (past < 0 ? past + period_ : past);
@@ -123,7 +123,7 @@ GridClock::SyncPulse GridClock::take_rival(Nanoseconds at, Nanoseconds off, bool
     }
     pace_known_ = fits_ = true;
     newest_pulse_ = at;
-    rival_.clear();
+    candidate_.clear();
     return {Sync::taken, moves};
 }
 

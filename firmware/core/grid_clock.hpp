@@ -4,7 +4,7 @@
 #pragma once
 
 #include "base/hal.hpp"
-#include "pulse_rival.hpp"
+#include "candidate_pulse_train.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {
@@ -94,7 +94,7 @@ class GridClock {
     bool pace_known_ = false;
     bool fits_ = true;              ///< the newest sync pulse did
     Nanoseconds newest_pulse_ = 0;  ///< of those that fit
-    PulseRival rival_;
+    CandidatePulseTrain candidate_;
 };
 
 }  // namespace versavis::firmware

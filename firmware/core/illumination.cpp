@@ -56,7 +56,7 @@ void Illumination::plan(std::uint8_t camera, Nanoseconds start, Nanoseconds dura
                         bool has_strobe, Nanoseconds now) {
     if (!lights(camera)) return;
     if (plan_count_ == max_plans)
-        return reports_.event(wire::EventKind::illumination_limited, camera, start, duration);
+        return reports_.event(wire::BoardEventKind::illumination_limited, camera, start, duration);
     const Nanoseconds on = start - configuration_.lead_ns;
     const Nanoseconds lead_off = start + (has_strobe ? lead_overlap : duration);
     std::size_t i = plan_count_++;
@@ -116,7 +116,7 @@ void Illumination::open_next(Nanoseconds now) {
 void Illumination::open_gate(Nanoseconds on) {
     const Nanoseconds allowed = budget(on);
     if (allowed < shortest_light + configuration_.lead_ns) {
-        reports_.event(wire::EventKind::illumination_limited, output_light_gate, on, 0);
+        reports_.event(wire::BoardEventKind::illumination_limited, output_light_gate, on, 0);
         --plan_count_;  // it stays dark
         for (std::size_t i = 0; i < plan_count_; ++i) plans_[i] = plans_[i + 1];
         return;
@@ -134,7 +134,7 @@ void Illumination::close_gate(Nanoseconds now) {
         min(gate_off_, max(outputs_.rest(output_light_gate, false, now), gate_on_));
     const Nanoseconds unused = gate_off_ - closed;
     last_off_ = closed;
-    saved_ += unused - earned(unused);  // what a late end cost is already taken off
+    saved_ += unused - earned(unused);  // what a late end cost is already subtracted
     saved_at_ = closed;
     gate_off_ = never;
 }
@@ -154,7 +154,7 @@ void Illumination::poll(Nanoseconds now, Nanoseconds settled) {
         for (std::size_t i = 0; i < plan_count_; ++i)
             wanted = wanted || (plans_[i].on < gate_off_ && plans_[i].lead_off > gate_off_);
         if (wanted) {
-            reports_.event(wire::EventKind::illumination_limited, output_light_gate, gate_off_,
+            reports_.event(wire::BoardEventKind::illumination_limited, output_light_gate, gate_off_,
                            gate_off_ - gate_on_);
             dark_until_ = gate_off_ + configuration_.max_on_ns / 10;
         }

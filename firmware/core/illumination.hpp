@@ -8,6 +8,8 @@
 
 namespace versavis::firmware {
 
+/// Plans when the light's gate opens and closes, from the planned and the actual exposures, within
+/// the limits on on-time and duty. Part of Board, called from Board::poll() only.
 class Illumination {
  public:
     Illumination(OutputQueue& outputs, ChannelReports& reports);
@@ -68,7 +70,7 @@ class Illumination {
     Nanoseconds awaited_until_ = 0;       ///< exposures of this light that should have begun
     Nanoseconds gate_off_ = never;        ///< never: the gate is closed
     Nanoseconds dark_until_ = INT64_MIN;  ///< after the limit was reached
-    Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last told to close
+    Nanoseconds last_off_ = INT64_MIN;    ///< when the gate was last commanded to close
     Nanoseconds saved_ = 0;               ///< on-time that may be spent, as of saved_at_
     Nanoseconds saved_at_ = 0;
     Plan plans_[max_plans] = {};

@@ -46,12 +46,12 @@ class NoiseGuard {
 
  private:
     static constexpr Nanoseconds window = 10'000'000;
-    /// Edges within a window. A camera at 1 kHz makes 20, a LiDAR at 5 kHz 100. At half, the latter
-    /// is noise; at twice, noise takes twice the time.
+    /// Edges within a window. A camera at 1 kHz makes 20, a LiDAR at 5 kHz 100. If lower, the
+    /// latter is noise; if higher, noise takes more time.
     static constexpr std::uint16_t most_changes = 128;
-    /// 8 kHz makes 80. At half, that is noise; at twice, noise takes twice the time.
+    /// 8 kHz makes 80. If lower, that is noise; if higher, noise takes more time.
     static constexpr std::uint16_t most_ready = 160;
-    /// At half, a floating input takes twice the time; at twice, an input that recovered waits.
+    /// If lower, a floating input takes more time; if higher, an input that recovered waits.
     static constexpr Nanoseconds silence = 1'000'000'000;
 
     EdgeStream& edges_;

@@ -10,7 +10,7 @@
 
 namespace versavis::firmware {
 
-/// Who is told of edges that left at another instant than set() said.
+/// Receives the edges that left at another instant than set() said.
 struct OutputMoves {
     virtual void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) = 0;
 
@@ -18,10 +18,12 @@ struct OutputMoves {
     ~OutputMoves() = default;
 };
 
+/// Sorts the edges of all outputs by time and hands the port those that are due soon. Part of
+/// Board, called from Board::poll() only; after a commit the port sends the words by interrupts.
 class OutputQueue {
  public:
-    /// Edges due within this time go to the hardware and can no longer be changed. At half, a port
-    /// that fills its hardware every 250 us has little room for a slow poll; at twice, exposures
+    /// Edges due within this time go to the hardware and can no longer be changed. If lower, a port
+    /// that fills its hardware every 250 us has little room for a slow poll; if higher, exposures
     /// are expected from older measurements.
     static constexpr Nanoseconds horizon = 1'000'000;
 
@@ -97,14 +99,13 @@ class OutputQueue {
         std::uint8_t output;
         bool level;
     };
-    /// When the first edge is that close, it is time to commit. At half, a slow poll makes it late;
-    /// at twice, pulse trains need twice as many polls.
+    /// When the first edge is that close, it is time to commit. If lower, a slow poll makes it
+    /// late; if higher, pulse trains need more polls.
     static constexpr Nanoseconds refill = 500'000;
-    /// Bounds the work of one poll. At half, a fast pulse train takes two polls; at twice, a poll
-    /// takes longer.
+    /// Bounds the work of one poll. If lower, a fast pulse train takes two polls.
     static constexpr unsigned words_a_commit = 16;
     /// Edges of pulses that may wait at an output: what 10 kHz needs for the furthest that a pulse
-    /// train looks ahead. At half, such a train falls short; at twice, memory is wasted.
+    /// train looks ahead. If lower, such a train falls short; if higher, memory is wasted.
     static constexpr std::uint8_t pulse_room = 24;
     /// One light and the end of another.
     static constexpr std::uint8_t gate_room = 4;

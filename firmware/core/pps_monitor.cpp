@@ -7,15 +7,15 @@ namespace {
 
 constexpr Nanoseconds second = 1'000'000'000;
 
-/// Pulses this far apart are not compared. At half, a receiver that loses its sky for 5 s starts
-/// over; at twice, a false pulse is believed for longer.
+/// Pulses this far apart are not compared. If lower, a receiver that loses its sky for 5 s starts
+/// over; if higher, a false pulse is accepted for longer.
 constexpr Nanoseconds longest_gap = 10 * second;
 
-/// One part in this many (200 ppm): no crystal is off by more. At half, a pulse beside the true one
-/// passes more easily; at twice, a bad crystal is never measured.
+/// One part in this many (200 ppm): no crystal is off by more. If lower, a pulse beside the true
+/// one passes more easily; if higher, a bad crystal is never measured.
 constexpr Nanoseconds tolerance = 5'000;
 
-/// At half, the slope of a single second is believed; at twice, the state is late.
+/// If lower, the slope of a single second is trusted; if higher, the state is late.
 constexpr std::size_t pulses_to_trust = 4;
 
 /// To the nearest. All pulses lie within 64 ms of whole seconds from the oldest.
@@ -34,7 +34,7 @@ void PpsMonitor::add(Nanoseconds at) {
         for (std::size_t i = 0; i < count_; ++i) pulses_[i] = pulses_[i + 1];
     }
     pulses_[count_++] = at;
-    rival_.clear();
+    candidate_.clear();
 }
 
 void PpsMonitor::pulse(Nanoseconds at) {
@@ -45,7 +45,7 @@ void PpsMonitor::pulse(Nanoseconds at) {
     const Nanoseconds allowed = seconds * (second / tolerance);
     if (seconds == 0 || off > allowed || -off > allowed) {
         // Noise, or a new phase: a source that keeps its pulses there is followed.
-        if (rival_.add(at, second, tolerance)) begin(at);
+        if (candidate_.add(at, second, tolerance)) begin(at);
         return;
     }
     add(at);

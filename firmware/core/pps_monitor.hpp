@@ -3,7 +3,7 @@
 #pragma once
 
 #include "base/hal.hpp"
-#include "pulse_rival.hpp"
+#include "candidate_pulse_train.hpp"
 #include "wire/messages.hpp"
 
 namespace versavis::firmware {
@@ -25,7 +25,7 @@ class PpsMonitor {
     void add(Nanoseconds at);
 
     std::size_t count_ = 0;
-    PulseRival rival_;
+    CandidatePulseTrain candidate_;
     Nanoseconds pulses_[capacity];  ///< oldest first; whole seconds apart
 };
 

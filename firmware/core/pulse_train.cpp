@@ -5,15 +5,14 @@ namespace versavis::firmware {
 
 namespace {
 
-/// A pulse is decided this long before it leaves, at most: many at once where they are fast. At
-/// half, words for other outputs overtake it; at twice, the room of the output does not hold
-/// it.
+/// A pulse is decided this long before it leaves, at most: many at once where they are fast. If
+/// lower, words for other outputs overtake it; if higher, the room of the output does not hold it.
 constexpr Nanoseconds furthest = 1'200'000;
 static_assert(furthest > OutputQueue::horizon);
-/// At half, a slow poll leaves pulses out; at twice, fast trains take more polls.
+/// If lower, a slow poll leaves pulses out; if higher, fast trains take more polls.
 constexpr Nanoseconds wake_ahead = 700'000;
-/// What is decided later than that may leave late. At half, a port with a horizon of its own
-/// makes it late; at twice, pulses are left out that would be on time.
+/// What is decided later than that may leave late. If lower, a port with a horizon of its own makes
+/// it late; if higher, pulses are left out that would be on time.
 constexpr Nanoseconds soonest = 400'000;
 
 }  // namespace
@@ -29,7 +28,7 @@ void PulseTrain::begin(unsigned output, const Grid& grid, const GridClock& clock
 
 void PulseTrain::poll(Nanoseconds now) {
     if (clock_ == nullptr || at_ > now + furthest) return;
-    // A late pulse would be taken for one on time: it is left out.
+    // A late pulse would look like one on time, so it is left out.
     if (at_ < now + soonest) skip(now);
     while (at_ <= now + furthest && outputs_.has_room(output_)) {
         outputs_.pulse(at_, output_, true, width_);

@@ -8,6 +8,8 @@
 
 namespace versavis::firmware {
 
+/// Decides the pulses of one output, one at each point of a grid, a little ahead. Part of Board,
+/// called from Board::poll() only.
 class PulseTrain {
  public:
     explicit PulseTrain(OutputQueue& outputs) : outputs_(outputs) {}

@@ -58,7 +58,7 @@ class Transmitter {
     void begin();
 
     /// Of a clock answer, the time of sending is filled in when it is handed to the link, and a
-    /// second message says when it really left; of a sample, its age when it leaves.
+    /// second message reports when it really left; of a sample, its age when it leaves.
     template <class Message>
     void send(const Message& message) {
         constexpr unsigned queue = queue_of(Message::type);
@@ -73,8 +73,8 @@ class Transmitter {
     std::uint32_t take_high_water();
 
  private:
-    /// Bounds the work of one poll: four packets of USB. At half, a poll more is needed for a
-    /// burst; at twice, a poll takes longer.
+    /// Bounds the work of one poll: four packets of USB. If lower, a poll more is needed for a
+    /// burst.
     static constexpr std::size_t bytes_a_pump = 256;
 
     struct Waiting {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Who answers at which address, for processor and DMA. Each access is aligned and has somebody who
-// answers and is not in reset; everything else is a fault. Of registers, only bits are written that
-// the chip lets through.
+// Which block answers at which address, for processor and DMA. Each access must be aligned and go
+// to a block that is not in reset; everything else is a fault. In registers, only bits that are
+// writable on the chip are written.
 import { ram_begin, ram_size } from './chip.mjs';
 import { fault, hex } from './fault.mjs';
 import { RegisterMasks } from './registers.mjs';
@@ -30,7 +30,7 @@ function aliased(alias, before, value) {
 }
 
 export class Bus {
-    /// `where` tells the present place in the program, for errors.
+    /// `where` gives the present place in the program, for errors.
     constructor(where) {
         this.where = where;
         this.ram = new Uint8Array(ram_size).fill(junk);
@@ -41,7 +41,7 @@ export class Bus {
     }
 
     /// `block` has read(offset) and write(offset, value, raw): `value` is what the register becomes
-    /// through an alias, `raw` what was written. `is_held()` tells whether it is in reset.
+    /// through an alias, `raw` what was written. `is_held()`: whether it is in reset.
     add(name, begin, block, is_held = () => false, has_aliases = true) {
         const masks = new RegisterMasks(begin, block.also_written);
         this.blocks.set(begin >>> block_bits, { name, block, is_held, has_aliases, masks });

@@ -8,7 +8,7 @@ export const clk_sys_hz = 125_000_000;
 const xosc_hz = 12_000_000;
 const usb_hz = 48_000_000;
 
-// How long a PLL takes to lock. Twice: only a slower start.
+// How long a PLL takes to lock.
 const lock_cycles = 2500;
 
 // From the end of a block's reset until it answers. The chip takes a few cycles of the block's

@@ -8,7 +8,6 @@ const channel_count = 12;
 const channel_stride = 0x40;
 
 // From a request to its transfer: the request is synchronised, then read and write go through.
-// Twice delays each paced word by 32 ns.
 const start_cycles = 4;
 // What a transfer keeps the path from the next, and what each side at slow registers adds.
 const transfer_cycles = 1;
@@ -79,7 +78,8 @@ class Channel {
 }
 
 export class Dma {
-    /// `requests` has, by number, a function that tells whether the peripheral wants a transfer.
+    /// `requests` has, by number, a function that returns whether the peripheral requests a
+    /// transfer.
     constructor(clock, bus, interrupts, requests) {
         this.clock = clock;
         this.bus = bus;

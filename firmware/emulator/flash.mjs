@@ -320,10 +320,10 @@ export class QspiIo {
 
     give(number) {
         this.controls.fill(number);
-        this.tell();
+        this.notify();
     }
 
-    tell() {
+    notify() {
         const is_connected = this.controls.every((c) => (c & function_mask) === function_xip);
         this.ssi.write_select(this.controls[select_pin], is_connected);
     }
@@ -337,6 +337,6 @@ export class QspiIo {
         if (offset >= 8 * qspi_pins)
             fault(`IO_QSPI's register ${hex(offset)} is not modelled (write)`);
         this.controls[offset >>> 3] = value;
-        this.tell();
+        this.notify();
     }
 }

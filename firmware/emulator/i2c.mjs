@@ -33,7 +33,7 @@ const interrupt = {
 const abort_no_address = 1 << 0;
 const abort_no_data = 1 << 3;
 
-// The chip adds so many cycles to the counts of each half period.
+// The chip adds this many cycles to the counts of each half period.
 const high_extra = 8;
 const low_extra = 1;
 const bits_per_byte = 9; // with the acknowledgement

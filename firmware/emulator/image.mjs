@@ -72,8 +72,8 @@ export class Image {
         return found;
     }
 
-    /// Functions by the index of the half-word in RAM; -1 before the first. One that does not tell
-    /// its size reaches to the next.
+    /// Functions by the index of the half-word in RAM; -1 before the first. One without a size
+    /// extends to the next.
     function_map() {
         const functions = this.symbols
             .filter((symbol) => symbol.is_function)

@@ -6,7 +6,7 @@ import { fault, hex } from './fault.mjs';
 
 const program_counter = 15;
 
-// Who executes an instruction: rp2040js 1.4.1 as it is, or who puts it right.
+// What executes an instruction: rp2040js 1.4.1 as it is, or a correction.
 const as_emulated = 0;
 const adcs = 1; // V is wrong when the carry overflows
 const sbcs = 2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A whole RP2040 on one clock, in cycles of 8 ns, on the instructions of rp2040js: runs the real
-// firmware's image, tells what it does with its pins and on USB, and stops with a Fault where the
+// firmware's image, reports what it does with its pins and on USB, and stops with a Fault where the
 // chip would misbehave. Every run of the same program with the same inputs is the same.
 //
 //   const machine = new Machine({ flash });   // bytes of an .elf, a .uf2, or of the flash itself

@@ -8,7 +8,7 @@ import { PinPath } from './pin_path.mjs';
 export const pin_count = 30;
 const all_pins = 2 ** pin_count - 1;
 
-// PIO and SIO see an input so many cycles after it changed.
+// PIO and SIO see an input this many cycles after it changed.
 const synchroniser_cycles = 2;
 
 // Pads after reset: input on, pull-down, 4 mA, Schmitt trigger.
@@ -22,7 +22,7 @@ const pad_pull_down = 0x04;
 const function_null = 31;
 export const pin_function = { spi: 1, uart: 2, i2c: 3, pwm: 4, sio: 5, pio0: 6, pio1: 7 };
 
-// So many changes of the inputs are remembered. The readers look back two cycles; a state machine
+// Number of remembered changes of the inputs. The readers look back two cycles; a state machine
 // whose loop was skipped looks back one iteration, over pins that did not change meanwhile.
 const history_size = 16;
 
@@ -55,7 +55,7 @@ export class Pins {
         this.interrupts = interrupts;
         this.sources = new Map(); // by function: objects with `out` and `enable`
         this.listeners = []; // of inputs: (changed, time)
-        this.pad_listeners = []; // of levels and of who drives
+        this.pad_listeners = []; // of levels and drivers
         this.watched = 0;
         this.log = [];
         this.external = 0;
@@ -128,8 +128,8 @@ export class Pins {
         return (this.selected.get(number) & ~this.output_disable & mask) !== 0;
     }
 
-    /// Works the levels out anew, because a source, a pad or a multiplexer changed. They hold from
-    /// the end of this cycle.
+    /// Recomputes the levels after a source, a pad or a multiplexer changed. They hold from the end
+    /// of this cycle.
     drive() {
         let out = 0;
         let enable = 0;

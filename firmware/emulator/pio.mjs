@@ -61,7 +61,7 @@ export class Pio {
         this.drives = true;
     }
 
-    /// Whoever writes these pins round and round is no longer alone with them.
+    /// A machine that writes these pins in a loop no longer has them to itself.
     disturb(writer, mask) {
         writer.is_pure = false;
         for (const machine of this.machines) {

@@ -749,7 +749,7 @@ export class StateMachine {
             limit === never ? never : this.cycle_of(this.park_index + limit * this.park_ticks);
     }
 
-    /// Puts the parked machine where it is after so many rounds.
+    /// Puts the parked machine where it is after this many rounds.
     move_to(rounds) {
         this.parked = false;
         this.x = (this.x - rounds * this.x_taken) >>> 0;

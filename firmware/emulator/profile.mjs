@@ -33,7 +33,7 @@ export class Profile {
         if (this.measured) ++this.calls[called];
     }
 
-    /// After the instruction at `address`, of which so many cycles are the core's.
+    /// After the instruction at `address`; this many of its cycles are the core's.
     step(address, cycles, core) {
         if (this.measured && cycles > 0) {
             this.now += cycles;

@@ -45,7 +45,7 @@ function expand([name, ...numbers], begin) {
 export const register_pages = parse(register_facts);
 
 /// Which registers a block has, and which bits of them are written or cleared, by offset in words.
-/// `more` has by offset bits where a write does something that the vendor's table does not tell.
+/// `more` has by offset bits where a write does something that the vendor's table omits.
 export class RegisterMasks {
     constructor(begin, more = {}) {
         const page = page_of(begin);

@@ -5,7 +5,7 @@ import { pin_count } from './pins.mjs';
 
 const all_pins = 2 ** pin_count - 1;
 
-// The divider has its result so many cycles after its last operand; a program that reads earlier
+// The divider has its result this many cycles after its last operand; a program that reads earlier
 // gets a wrong one on the chip, so it is a fault.
 const divider_cycles = 8;
 

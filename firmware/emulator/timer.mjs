@@ -9,7 +9,7 @@ const alarm_count = 4;
 const low_range = 2 ** 32;
 
 export class Timer {
-    /// `tick` tells whether the watchdog's tick runs at 1 MHz.
+    /// `tick`: whether the watchdog's tick runs at 1 MHz.
     constructor(clock, interrupts, tick) {
         this.clock = clock;
         this.interrupts = interrupts;

@@ -8,7 +8,7 @@ import { fault, hex } from './fault.mjs';
 import { pin_function, pins_that } from './pins.mjs';
 
 const deep = 32;
-// The receive timeout's interrupt comes after so many bits without a character.
+// The receive timeout's interrupt comes after this many bits without a character.
 const timeout_bits = 32;
 // By how much the speeds may differ so that ten bits are still read right.
 const tolerance = 0.04;

@@ -61,7 +61,7 @@ export class UsbDevice {
         this.view = new DataView(this.memory.buffer);
         // Writing these bits clears the interrupts of their changes.
         this.also_written = { 0x50: suspended | connected };
-        this.host = undefined; // told by on_attach(is_attached) and on_armed()
+        this.host = undefined; // reported by on_attach(is_attached) and on_armed()
         this.written_at = new Float64Array(2 * endpoint_count).fill(-settle_cycles);
         this.reset();
     }
@@ -293,7 +293,7 @@ export class UsbDevice {
     }
 
     /// Erratum E15, which only a reset of the controller ends. What else it does then is not
-    /// documented: 'deaf', it does not even count frames; 'failed', it does, and tells of an error;
+    /// documented: 'deaf', it does not even count frames; 'failed', it does, and reports an error;
     /// 'mute', nothing shows it.
     hang(kind) {
         this.hung = kind;
@@ -369,8 +369,8 @@ export class UsbDevice {
     }
 
     nak(endpoint, is_in) {
-        const told = endpoint !== 0 && (this.endpoint_control(endpoint, is_in) & (1 << 16)) !== 0;
-        if (told) {
+        const asked = endpoint !== 0 && (this.endpoint_control(endpoint, is_in) & (1 << 16)) !== 0;
+        if (asked) {
             this.stalls_or_naks |= 1 << (2 * endpoint + (is_in ? 0 : 1));
             this.update_line();
         }
@@ -394,7 +394,7 @@ export class UsbDevice {
             return 'nak';
         }
         if (((word & data1) !== 0) !== is_data1) {
-            this.status |= sequence_error; // taken for a repetition: acknowledged, not delivered
+            this.status |= sequence_error; // seen as a repetition: acknowledged, not delivered
             this.update_line();
             return 'ack';
         }

@@ -149,7 +149,7 @@ export class UsbHost {
         if (this.device.is_attached) this.begin();
     }
 
-    /// Sets the device up anew, as after an error.
+    /// Sets the device up again, as after an error.
     reset() {
         this.lose();
         this.state = 'attached';
@@ -256,11 +256,11 @@ export class UsbHost {
     /// The device wants to know of NAKs: each has its effect.
     tells_naks() {
         const { device, endpoints } = this;
-        const told = 1 << 16;
+        const report_bit = 1 << 16;
         return (
             ((device.endpoint_control(endpoints.bulk_in, true) |
                 device.endpoint_control(endpoints.bulk_out, false)) &
-                told) !==
+                report_bit) !==
             0
         );
     }
@@ -372,7 +372,7 @@ export class UsbHost {
         this.is_held = true;
     }
 
-    /// The bus is free after so many bits. Slots begin anew after a success.
+    /// The bus is free after so many bits. Slots start over after a success.
     release(bits, moved) {
         this.busy_until = this.clock.now + cycles_of_bits(bits + gap_bits);
         if (moved) this.slot_base = this.busy_until;

@@ -12,8 +12,8 @@ import { Fault } from './fault.mjs';
 import { Machine } from './machine.mjs';
 
 const cycles_per_ms = 125_000;
-/// Between looks at the peer. At half, it takes more time than the board; at twice, a request waits
-/// for a millisecond more.
+/// Between looks at the peer. If lower, it takes more time than the board; if higher, a request
+/// waits for a millisecond more.
 const slice_ms = 1;
 /// A board that is so far behind lets the time go.
 const patience_ms = 20;
@@ -85,7 +85,7 @@ class UsbRedirect {
         this.host = machine.usb;
         this.socket = socket;
         this.received = Buffer.alloc(0);
-        this.waiting = []; // messages that came while the device was set up anew
+        this.waiting = []; // messages that arrived while the device was set up again
         this.reads = []; // of the bulk endpoint: {id, header, wanted, got}
         this.writes = []; // {id, header, packets}
         this.connected = false;

@@ -71,7 +71,7 @@ class NativeBoard final : public VirtualBoard,
     std::vector<std::uint16_t> read_imu_output(std::span<const std::uint16_t> words);
 
     static constexpr Nanoseconds routing_latency = 50;
-    /// At half, a part that stretches its clock is given up; at twice, it is more than the HAL
+    /// If lower, a part that stretches its clock is given up; if higher, it is more than the HAL
     /// says.
     static constexpr Nanoseconds i2c_patience = 10'000'000;
     static constexpr Nanoseconds watchdog_limit = 1'000'000'000;

@@ -13,7 +13,7 @@ void start_crystal() {
     constexpr std::uint32_t range_to_15_mhz = 0xAA0;
     constexpr std::uint32_t enable = 0xFAB000;
     constexpr std::uint32_t stable = 1U << 31U;
-    // In steps of 256 cycles: 1 ms. At half, a slow crystal may be read as steady too early.
+    // In steps of 256 cycles: 1 ms. If lower, a slow crystal may be read as steady too early.
     crystal().startup = crystal_mhz * 1000 / 256;
     crystal().control = enable | range_to_15_mhz;
     while ((crystal().status & stable) == 0) {

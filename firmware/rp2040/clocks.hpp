@@ -7,8 +7,8 @@
 
 namespace versavis::rp2040 {
 
-/// Of the processor and the state machines. At half, stamps are twice as coarse; at twice, the chip
-/// is beyond its limits.
+/// Of the processor and the state machines. If lower, stamps are coarser; if higher, the chip is
+/// beyond its limits.
 inline constexpr std::uint32_t clock_hz = 125'000'000;
 inline constexpr std::uint32_t cycle_ns = 1'000'000'000 / clock_hz;
 

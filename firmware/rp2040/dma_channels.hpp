@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Who uses which channel of the direct memory access.
+// Use of the DMA channels.
 #pragma once
 
 namespace versavis::rp2040 {

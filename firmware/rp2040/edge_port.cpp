@@ -9,20 +9,20 @@ namespace versavis::rp2040 {
 
 namespace {
 
-/// Words that a channel writes until the other one goes on. At half, twice as many interrupts; at
-/// twice, a test takes twice as long to get there.
+/// Words that a channel writes until the other one goes on. If lower, more interrupts; if higher, a
+/// test takes longer to get there.
 constexpr std::uint32_t run = 1U << 16U;
 
-/// An edge through the loop may be stamped so far off. At half, good ones are; at twice, a stamp
-/// that is off by a sample is not noticed.
+/// Largest error of the stamp of a loop edge. If lower, good stamps fail; if higher, a stamp that
+/// is off by a sample is not noticed.
 constexpr std::int32_t loop_tolerance = 48;
 
-/// An edge through the loop that has not come by then does not come. At half, one may be under way;
-/// at twice, a fault is found out later.
+/// An edge through the loop that has not come by then does not come. If lower, one may be under
+/// way; if higher, a fault is found out later.
 constexpr std::int32_t loop_patience = 100'000;
 
-/// So many edges have to come back before stamps are trusted. At half, edges that are off by
-/// another time may be right by chance; at twice, a start takes twice as long.
+/// Edges that must come back before stamps are trusted. If lower, edges that are off by another
+/// time may be right by chance; if higher, a start takes longer.
 constexpr unsigned loops_to_trust = 8;
 
 constexpr std::uint32_t pin_bit(unsigned pin) { return 1U << (pin - first_input); }

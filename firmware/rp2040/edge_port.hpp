@@ -9,6 +9,8 @@
 
 namespace versavis::rp2040 {
 
+/// Turns the watcher's words into stamped edges for the core. The main loop takes them; changed()
+/// and count_run() are called from interrupts.
 class EdgePort final : public firmware::EdgeStream {
  public:
     EdgePort(BoardClock& clock, LoopSignal& loop) : clock_(clock), loop_(loop) {
@@ -35,7 +37,7 @@ class EdgePort final : public firmware::EdgeStream {
     /// fits. False: the next change causes an interrupt.
     bool wants_attention();
 
-    /// Inputs have changed since that was last asked, which the interrupt may have told already.
+    /// Inputs have changed since the last call; the interrupt may have reported it already.
     bool has_changed() const { return (pio(0).flags >> watcher::flag & 1U) != 0; }
 
     /// When a data-ready input rose for the last time that is known; never: it did not.
@@ -43,8 +45,8 @@ class EdgePort final : public firmware::EdgeStream {
 
     static constexpr unsigned capacity = 512;
 
-    /// After that time an edge is in the ring for certain, whatever else the channels do. At half,
-    /// it may not be; at twice, all edges are known a microsecond later.
+    /// After that time an edge is in the ring for certain, whatever else the channels do. If lower,
+    /// it may not be; if higher, all edges are known a microsecond later.
     static constexpr Nanoseconds known_after = 1'000;
 
  private:

@@ -18,7 +18,7 @@ constexpr std::uint8_t status_busy = 1;
 
 constexpr unsigned command_size = 4;  ///< and its address
 
-/// Bytes in the FIFOs at once. At half, slower; at twice, beyond their depth of 16.
+/// Bytes in the FIFOs at once; their depth is 16.
 constexpr std::size_t in_flight = 8;
 
 void select_chip(bool selected) {

@@ -22,12 +22,11 @@ constexpr std::size_t word_size = 2;
 /// Of the board's clock.
 constexpr Nanoseconds clock_step = 1'000;
 
-/// An I2C transfer that has not ended by then is given up. At half, a part that stretches its clock
-/// is; at twice, it is more than the HAL says.
+/// An I2C transfer that has not ended by then is given up. If lower, a part that stretches its
+/// clock is; if higher, it is more than the HAL says.
 constexpr Nanoseconds i2c_patience = 9'000'000;
 
-/// An alarm that lies so far ahead is not missed. At half, it may be; at twice, what is due begins
-/// a microsecond later.
+/// An alarm this far ahead is not missed.
 constexpr std::uint32_t alarm_margin_us = 2;
 
 constexpr std::uint32_t alarm_bit = 1U << 1U;
@@ -347,7 +346,7 @@ void ImuBusPort::end_transfer() {
     pause_from(ended);
     if (++index_ == job_.count) {
         state_ = State::done;
-        return attention_.ask();
+        return wake_flag_.ask();
     }
     prepare();
     begin_when_free();

@@ -2,15 +2,17 @@
 // Jobs of the IMU's buses: they begin at an edge or at a time, and go on by interrupts.
 #pragma once
 
-#include "attention.hpp"
 #include "edge_port.hpp"
+#include "wake_flag.hpp"
 
 namespace versavis::rp2040 {
 
+/// Runs one job at a time on SPI or I2C. The main loop arms it and takes the reply; from its start
+/// to its end it runs in interrupts.
 class ImuBusPort final : public firmware::ImuBus {
  public:
-    ImuBusPort(BoardClock& clock, EdgePort& edges, Attention& attention)
-        : clock_(clock), edges_(edges), attention_(attention) {}
+    ImuBusPort(BoardClock& clock, EdgePort& edges, WakeFlag& wake_flag)
+        : clock_(clock), edges_(edges), wake_flag_(wake_flag) {}
 
     void set_up();
 
@@ -55,7 +57,7 @@ class ImuBusPort final : public firmware::ImuBus {
 
     BoardClock& clock_;
     EdgePort& edges_;
-    Attention& attention_;
+    WakeFlag& wake_flag_;
     volatile State state_ = State::idle;
     volatile I2cAsks i2c_asks_ = I2cAsks::nothing;  ///< by an interrupt that is more urgent
     volatile bool in_gap_ = false;                  ///< between two words of a transfer

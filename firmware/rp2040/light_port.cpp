@@ -5,11 +5,11 @@ namespace versavis::rp2040 {
 
 namespace {
 
-/// What was told last shows within that time.
+/// The last command takes effect within that time.
 constexpr std::uint32_t shown_after_us = 450;
 
-/// Light that is still wanted while it is configured anew ends by itself within that time. At half,
-/// light that is about to end is cut; at twice, a configuration takes 1 ms more.
+/// Light that is still wanted during a new configuration ends by itself within that time. If lower,
+/// light that is about to end is cut; if higher, a configuration takes 1 ms more.
 constexpr std::uint32_t patience_us = 1'000;
 
 /// From the look at the cycle counter to when a machine that slept shows its next state but one.
@@ -56,7 +56,7 @@ void LightPort::load(const light::Following& following) {
     round_cycles_ = following.round_cycles;
 }
 
-/// The state lasts for so much longer.
+/// The state lasts that much longer.
 void LightPort::last(std::int32_t cycles) {
     behind_ += cycles;
     left_ -= cycles;

@@ -25,7 +25,7 @@ class LightPort {
     /// For all that comes of one word of the sequencer.
     bool has_room() const { return machine_.waiting() <= fifo - 2; }
 
-    /// The sequencer's next word comes so much after the one before.
+    /// Time from one word of the sequencer to the next.
     void pass(std::uint32_t cycles) {
         if (state_ != State::asleep) last(static_cast<std::int32_t>(cycles));
     }
@@ -40,8 +40,7 @@ class LightPort {
 
  private:
     static constexpr unsigned fifo = 8;
-    /// Less is not worth a word. At half, twice as many; at twice, the machine may be without one
-    /// for a moment.
+    /// Less is not worth a word. If higher, the machine may be without one for a moment.
     static constexpr std::int32_t shortest_extension = 10'000 / cycle_ns;
 
     void load(const light::Following& following);
@@ -58,7 +57,7 @@ class LightPort {
     std::int32_t behind_ = 0;         ///< cycles for which the machine has no word yet
     std::int32_t left_ = 0;           ///< cycles until it is cut
     std::int32_t limit_ = 0;          ///< in cycles
-    std::uint32_t dark_from_us_ = 0;  ///< when it was told to sleep, by the timer
+    std::uint32_t dark_from_us_ = 0;  ///< when it was commanded to sleep, by the timer
     std::uint32_t round_cycles_ = 1;  ///< of `follows`
     bool has_cameras_ = false;
 };

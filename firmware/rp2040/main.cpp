@@ -26,22 +26,22 @@ struct NoImuOutput final : firmware::ImuOutput {
 
 constexpr std::uint32_t present = wire::present_all & ~std::uint32_t{wire::present_imu_output};
 
-/// What the core and the bus keep up with. At half, fast IMUs are refused; at twice, samples are
+/// What the core and the bus keep up with. If lower, fast IMUs are refused; if higher, samples are
 /// lost.
 constexpr std::uint32_t fastest_imu_millihertz = 4'000'000;
 
 struct Ports {
     BoardClock clock;
-    Attention attention;
+    WakeFlag wake_flag;
     LoopSignal loop;
     LightPort light{clock};
-    OutputPort outputs{clock, attention, light, loop};
+    OutputPort outputs{clock, wake_flag, light, loop};
     EdgePort edges{clock, loop};
     RoutingPort routing{clock, outputs, edges, light};
-    ImuBusPort imu_bus{clock, edges, attention};
-    UartPort uart{clock, attention};
+    ImuBusPort imu_bus{clock, edges, wake_flag};
+    UartPort uart{clock, wake_flag};
     NoImuOutput imu_output;
-    UsbLink link{clock, attention};
+    UsbLink link{clock, wake_flag};
     UsbDevice usb{link};
     FlashChip flash;
     SettingsStore store{flash};
@@ -144,13 +144,13 @@ bool set_alarm(Ports& all, Nanoseconds next) {
 /// Until the core is to be polled.
 void sleep(Ports& all) {
     for (;;) {
-        if (all.edges.wants_attention()) return Attention::wake();
+        if (all.edges.wants_attention()) return WakeFlag::wake();
         {
             // An interrupt that comes from here on ends the sleep, and is taken after it.
             const InterruptsOff undisturbed;
-            if (all.attention.asked()) return Attention::wake();
+            if (all.wake_flag.asked()) return WakeFlag::wake();
             if (all.edges.has_changed()) continue;
-            if (!all.store.is_storing()) Attention::sleep_after_interrupts();
+            if (!all.store.is_storing()) WakeFlag::sleep_after_interrupts();
             __asm__ volatile("wfi" ::: "memory");
         }
         all.store.work();
@@ -179,7 +179,7 @@ void firmware_main() {
     auto& board = *new (board_storage) firmware::Board(all.hal(), identity);
     all.usb.begin(serial);
     for (;;) {
-        all.attention.forget();
+        all.wake_flag.forget();
         board.poll();
         if (set_alarm(all, board.next_wake())) sleep(all);
     }
@@ -189,14 +189,14 @@ void on_commit_time() { ports().outputs.commit(); }
 void on_bus_time() { ports().imu_bus.time_reached(); }
 void on_wake_time() {
     timer().raw_interrupts = 1U << 2U;
-    ports().attention.ask();
+    ports().wake_flag.ask();
 }
 void on_usb_watch() { ports().usb.watch(); }
 void on_usb() { ports().usb.note(); }
 void on_usb_work() { ports().usb.work(); }
 void on_change() {
     ports().edges.changed();
-    Attention::wake();
+    WakeFlag::wake();
 }
 void on_ring_end() { ports().edges.count_run(); }
 void on_bus_dma() { ports().imu_bus.transferred(); }

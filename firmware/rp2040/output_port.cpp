@@ -8,17 +8,17 @@ namespace versavis::rp2040 {
 
 namespace {
 
-/// How often words are sent. At half, it takes twice the processor's time; at twice, the sequencer
-/// runs dry, as it does after an interrupt that is held up for 50 us.
+/// How often words are sent. If lower, it takes more processor time; if higher, the sequencer runs
+/// dry, as it does after an interrupt that is held up for 50 us.
 constexpr std::uint32_t commit_interval_us = 330;
 
-/// How far ahead they are sent: a word leaves no sooner after it was pushed. At half, the sequencer
-/// runs dry; at twice, the core comes too late.
+/// How far ahead they are sent: a word leaves no sooner after it was pushed. If lower, the
+/// sequencer runs dry; if higher, the core comes too late.
 constexpr Nanoseconds ahead = 380'000;
 
-/// Within that time after a word has left, its room in the sequencer's FIFO is taken again. At
-/// half, an interrupt that is held up makes words late without telling; at twice, more of eight
-/// words that are close together are moved.
+/// Within that time after a word has left, its room in the sequencer's FIFO is taken again. If
+/// lower, a delayed interrupt makes words late unnoticed; if higher, more of eight words that are
+/// close together are moved.
 constexpr Nanoseconds refill = 5'000;
 
 constexpr std::uint32_t ahead_cycles = ahead / cycle_ns;
@@ -30,17 +30,17 @@ std::int32_t from(std::uint32_t cycle, std::uint32_t to) {
     return static_cast<std::int32_t>(to - cycle);
 }
 
-/// After so many commits, 21 ms, the main loop runs, whatever else. At half, it takes twice the
-/// processor's time; at twice, edges may be too old for their counts. A power of two: the processor
+/// After this many commits, 21 ms, the main loop runs in any case. If lower, it takes more
+/// processor time; if higher, edges may be too old for their counts. A power of two: the processor
 /// has no instruction that divides.
 constexpr unsigned commits_per_wake = 64;
 
-/// After so many an edge goes through the loop: once a second. At half, twice the stamps to look
-/// at; at twice, a fault is found out a second later.
+/// After this many commits an edge goes through the loop: once a second. If lower, more stamps to
+/// look at; if higher, a fault is found out a second later.
 constexpr unsigned commits_per_loop = 3'000;
 
-/// The same until stamps are proved. At half, twice the work while they cannot be; at twice, a
-/// start takes twice as long.
+/// The same until stamps are proved. If lower, more work while they cannot be; if higher, a start
+/// takes longer.
 constexpr unsigned commits_per_loop_at_start = 3;
 
 constexpr bool is_set(std::uint32_t signals, std::uint8_t signal) {
@@ -99,14 +99,14 @@ OutputPort::Levels OutputPort::levels_of(std::uint32_t signals) {
     send(front().cycle, front().levels);
     first_ = (first_ + 1) % capacity;
     size_ = size_ - 1;
-    if (wants_room_) attention_.ask();
+    if (wants_room_) wake_flag_.ask();
     wants_room_ = false;
 }
 
 void OutputPort::commit() {
     timer().raw_interrupts = 1;
     timer().alarms[0] = timer().low + commit_interval_us;
-    if (++commits_ % commits_per_wake == 0) Attention::wake();
+    if (++commits_ % commits_per_wake == 0) WakeFlag::wake();
     if (machine_.starved()) restart_at_once();  // the times of all words after are unknown
     const std::uint32_t until = clock_.low_cycles() + ahead_cycles;
     std::uint32_t waits_for = 0;

@@ -2,22 +2,24 @@
 // Output words at their times: a queue in memory, of which the sequencer gets what is due soon.
 #pragma once
 
-#include "attention.hpp"
 #include "board_clock.hpp"
 #include "light_port.hpp"
 #include "loop_signal.hpp"
 #include "state_machine.hpp"
+#include "wake_flag.hpp"
 
 namespace versavis::rp2040 {
 
+/// Queues the core's output words and feeds the sequencer. The main loop pushes; commit() runs in
+/// the interrupt of a timer.
 class OutputPort final : public firmware::OutputSchedule {
  public:
     static constexpr unsigned grain_bits = 3;
     static_assert(1U << grain_bits == cycle_ns);
     static constexpr Nanoseconds step = sequencer::shortest_cycles * cycle_ns;
 
-    OutputPort(BoardClock& clock, Attention& attention, LightPort& light, LoopSignal& loop)
-        : clock_(clock), attention_(attention), light_(light), loop_(loop) {}
+    OutputPort(BoardClock& clock, WakeFlag& wake_flag, LightPort& light, LoopSignal& loop)
+        : clock_(clock), wake_flag_(wake_flag), light_(light), loop_(loop) {}
 
     /// The sequencer is ready to start, and its first word with it.
     void set_up();
@@ -50,7 +52,7 @@ class OutputPort final : public firmware::OutputSchedule {
     const Word& front() const { return words_[first_]; }
 
     BoardClock& clock_;
-    Attention& attention_;
+    WakeFlag& wake_flag_;
     LightPort& light_;
     LoopSignal& loop_;
     StateMachine machine_{0, sequencer::machine};

@@ -45,7 +45,7 @@ constexpr Code in(From from, unsigned bits) { return word(2, static_cast<unsigne
 constexpr Code out(To to, unsigned bits) { return word(3, static_cast<unsigned>(to), bits); }
 /// Waits for a word.
 constexpr Code pull() { return word(4, 5, 0); }
-/// Without a word, what X holds is taken for one.
+/// Without a word, the contents of X count as one.
 constexpr Code pull_or_x() { return word(4, 4, 0); }
 constexpr Code mov(To to, From from) {
     return word(5, static_cast<unsigned>(to), static_cast<unsigned>(from));

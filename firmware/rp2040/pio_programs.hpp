@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the state machines do: send words at their times, stamp changes of inputs, drive the light,
-// and make outputs copies of inputs. None of them has to tell another anything.
+// and make outputs copies of inputs. None of them communicates with another.
 #pragma once
 
 #include <array>

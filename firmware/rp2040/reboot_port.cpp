@@ -24,7 +24,7 @@ template <class Function>
 Function rom_function(char first, char second) {
     using Find = void* (*)(const std::uint16_t*, std::uint32_t);
     const auto half_word = [](std::uintptr_t at) {
-        // The ROM begins at 0, which the compiler takes for no address.
+        // The ROM begins at 0, which the compiler treats as no address.
         __asm__("" : "+r"(at));
         return *reinterpret_cast<const volatile std::uint16_t*>(at);
     };

@@ -6,11 +6,11 @@
 
 namespace versavis::rp2040 {
 
-/// From one word to the next, in the lower 32 bits of board time in nanoseconds. A word tells the
-/// lower bits of its count only: the clock says which of the instants with such a count it was.
+/// From one word to the next, in the lower 32 bits of board time in nanoseconds. A word has only
+/// the lower bits of its count: the clock shows which of the instants with such a count it was.
 class SampleClock {
  public:
-    /// A sample was less than so much before it is looked at.
+    /// Largest age of a sample when it is read.
     static constexpr std::uint32_t oldest = 40'000'000;
 
     /// The next word, with this count. `now` is of a clock that knows whole microseconds.
@@ -46,8 +46,8 @@ class SampleClock {
     /// After that time the counts are the same again.
     static constexpr std::int32_t wrap_ns = most_counts * count_ns;
     static_assert(oldest < wrap_ns);
-    /// Sample and clock may disagree by so much. At half, a word that has just come seems to be of
-    /// 50 ms before; at twice, a word has to be looked at 2 us earlier.
+    /// Largest disagreement of sample and clock. If lower, a word that has just come seems to be of
+    /// 50 ms before; if higher, a word has to be looked at 2 us earlier.
     static constexpr std::int32_t clock_step = 2'000;
 
     std::int32_t before(std::uint32_t now) const { return static_cast<std::int32_t>(now - at_); }

@@ -10,8 +10,7 @@ namespace versavis::rp2040 {
 
 namespace {
 
-/// Bytes that one step writes or reads. At half, twice as many steps of a millisecond; at twice, a
-/// step holds the core up for 40 us.
+/// Bytes that one step writes or reads. If higher, a step holds the core up for 40 us.
 constexpr std::size_t chunk = 32;
 static_assert(wire::flash_page % chunk == 0);
 

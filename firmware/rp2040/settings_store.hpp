@@ -7,6 +7,8 @@
 
 namespace versavis::rp2040 {
 
+/// Stores the configuration step by step, so that nothing else waits for the flash. Called from the
+/// main loop only.
 class SettingsStore final : public firmware::Persist {
  public:
     static constexpr std::size_t capacity = 1024;

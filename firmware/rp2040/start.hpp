@@ -20,7 +20,7 @@ void on_i2c();
 
 namespace versavis::rp2040 {
 
-/// As if power had come back, but for the reason that is told.
+/// As after power-up, except for the reported reason.
 [[noreturn]] void restart_at_once();
 
 }  // namespace versavis::rp2040

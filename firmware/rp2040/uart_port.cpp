@@ -68,7 +68,7 @@ void UartPort::moved() {
     if (arrived_ != before) {
         chunk_[ended_ % chunks] = {clock_.now(), arrived_};
         ended_ = ended_ + 1;
-        attention_.ask();
+        wake_flag_.ask();
     }
     uart0().interrupt_clear = uart_received | uart_paused | uart_wants_more;
     send();

@@ -2,14 +2,15 @@
 // The serial line: bytes with the time at which they came, in both directions by interrupts.
 #pragma once
 
-#include "attention.hpp"
 #include "board_clock.hpp"
+#include "wake_flag.hpp"
 
 namespace versavis::rp2040 {
 
+/// Buffers between the core, in the main loop, and the UART's interrupt.
 class UartPort final : public firmware::ImuUart {
  public:
-    UartPort(BoardClock& clock, Attention& attention) : clock_(clock), attention_(attention) {}
+    UartPort(BoardClock& clock, WakeFlag& wake_flag) : clock_(clock), wake_flag_(wake_flag) {}
 
     void set_up();
 
@@ -33,7 +34,7 @@ class UartPort final : public firmware::ImuUart {
     void send();
 
     BoardClock& clock_;
-    Attention& attention_;
+    WakeFlag& wake_flag_;
     volatile std::uint32_t arrived_ = 0;  ///< bytes, modulo 2^32
     volatile std::uint32_t read_ = 0;
     volatile std::uint32_t ended_ = 0;  ///< chunks

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the board says of itself on USB: a serial line of class CDC-ACM.
+// The board's USB descriptors: a serial line of class CDC-ACM.
 #pragma once
 
 #include <cstdint>

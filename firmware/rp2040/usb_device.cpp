@@ -40,21 +40,21 @@ constexpr std::uint32_t status_errors = 0xFU << 24U | 1U << 31U;
 
 constexpr std::uint32_t pull_up = 1U << 16U;
 
-/// Between looks at the controller, and how long the board stays off the bus. At half, a hub may
-/// not notice; at twice, the link is away for longer.
+/// Between looks at the controller, and how long the board stays off the bus. If lower, a hub may
+/// not notice; if higher, the link is away for longer.
 constexpr std::uint32_t watch_us = 100'000;
-/// What looks in a row must say against the controller. At half, a host that is busy at its start
-/// is too slow; at twice, the link is away for longer.
+/// Bad checks in a row before the controller is reset. If lower, a host that is busy at its start
+/// is too slow; if higher, the link is away for longer.
 constexpr unsigned patience = 20;
 constexpr unsigned is_certain = 4;
 constexpr unsigned is_likely = 1;
-/// Frames come each millisecond; after 3 ms without a bus is suspended. At half, that may not be
-/// known; at twice, nothing changes.
+/// Frames come each millisecond; after 3 ms without a bus is suspended. If lower, that may not be
+/// known.
 constexpr std::uint32_t deaf_after_us = 10'000;
 
 /// Erratum E15: a hub may corrupt what ends close to the next frame, and the controller then hangs.
-/// No packet is offered in the rest of a frame. At half, the link is half as fast; later, a packet
-/// (53 us) and the wait for the host come too close to the end.
+/// No packet is offered in the rest of a frame. If lower, the link is slower; later, a packet (53
+/// us) and the wait for the host come too close to the end.
 constexpr std::uint32_t late_us = 800;
 constexpr std::uint32_t frame_us = 1000;
 
@@ -197,9 +197,10 @@ void UsbDevice::watch() {
     detached_ = true;
 }
 
-/// Of a hang, which the controller does not tell. Nor does it show what the host asks for: a packet
-/// that waits may be one that nobody wants. But
-/// - a bus that is not suspended has frames: who hears none is deaf (erratum E5, too);
+/// Evidence of a hang, which the controller does not report. Nor does it show what the host asks
+/// for: a packet that waits may be one that nobody wants. But
+/// - a bus that is not suspended has frames: a controller that hears none is deaf (erratum E5,
+///   too);
 /// - after a reset, a host has a request;
 /// - a packet that failed is asked for again at once.
 unsigned UsbDevice::evidence() {

@@ -6,6 +6,8 @@
 
 namespace versavis::rp2040 {
 
+/// Enumerates the board and moves packets between the endpoints and UsbLink. After begin() it runs
+/// in interrupts only.
 class UsbDevice {
  public:
     explicit UsbDevice(UsbLink& link) : link_(link) {}

@@ -11,7 +11,7 @@ namespace {
 
 /// From the last byte of a packet until its acknowledgement is known, at most: the host's
 /// turn-around of 2 to 8 bits, 19 bits of handshake, and the interrupt. What the host had by then,
-/// it had so much earlier.
+/// it had that much earlier.
 constexpr Nanoseconds acknowledged_after = 3'000;
 
 /// The same for a packet of the host, whose acknowledgement the board sends.
@@ -78,7 +78,7 @@ std::size_t UsbLink::fill(std::uint8_t* packet) {
     taken_ = taken_ + size;
     if (was_full_ && written_ - taken_ < capacity / 2) {
         was_full_ = false;
-        attention_.ask();
+        wake_flag_.ask();
     }
     return size;
 }
@@ -89,7 +89,7 @@ void UsbLink::sent(std::size_t size, std::uint32_t at_us) {
     watching_ = false;
     departed_at_ = clock_.at(at_us) - acknowledged_after;
     departed_ = true;
-    attention_.ask();
+    wake_flag_.ask();
 }
 
 void UsbLink::receive(const std::uint8_t* data, std::size_t size, std::uint32_t at_us) {
@@ -98,7 +98,7 @@ void UsbLink::receive(const std::uint8_t* data, std::size_t size, std::uint32_t 
     packet.size = size;
     packet.at = clock_.at(at_us) - received_before;
     received_ = received_ + 1;
-    attention_.ask();
+    wake_flag_.ask();
 }
 
 void UsbLink::forget(std::uint32_t in_flight) {

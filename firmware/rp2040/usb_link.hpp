@@ -2,16 +2,17 @@
 // Bytes between the core and the bulk endpoints of USB.
 #pragma once
 
-#include "attention.hpp"
 #include "board_clock.hpp"
+#include "wake_flag.hpp"
 
 namespace versavis::rp2040 {
 
+/// Buffers between the core, in the main loop, and UsbDevice, in its interrupt.
 class UsbLink final : public firmware::ByteLink {
  public:
     static constexpr std::size_t packet_size = firmware::link_packet_size;
 
-    UsbLink(BoardClock& clock, Attention& attention) : clock_(clock), attention_(attention) {}
+    UsbLink(BoardClock& clock, WakeFlag& wake_flag) : clock_(clock), wake_flag_(wake_flag) {}
 
     // The core's side.
     std::size_t free_space() override;
@@ -39,12 +40,12 @@ class UsbLink final : public firmware::ByteLink {
         Nanoseconds at;
     };
     static constexpr unsigned packets = 4;
-    /// For the host. At half, a poll sends less than a start has to say; at twice, the core writes
-    /// for longer in one poll.
+    /// For the host. If lower, a poll sends less than a start has to say; if higher, the core
+    /// writes for longer in one poll.
     static constexpr std::uint32_t capacity = 1024;
 
     BoardClock& clock_;
-    Attention& attention_;
+    WakeFlag& wake_flag_;
     volatile std::uint32_t written_ = 0;  ///< bytes, modulo 2^32
     volatile std::uint32_t taken_ = 0;    ///< into packets
     volatile std::uint32_t sent_count_ = 0;

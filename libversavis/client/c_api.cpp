@@ -54,7 +54,7 @@ ring::Payload* held(const versavis_item& item) {
     if (item.held[5] == 0) return nullptr;
     return std::launder(reinterpret_cast<ring::Payload*>(const_cast<std::uint64_t*>(item.held)));
 }
-static_assert(sizeof(ring::Payload) <= 5 * sizeof(std::uint64_t), "the last word tells that it is");
+static_assert(sizeof(ring::Payload) <= 5 * sizeof(std::uint64_t), "the last word marks it as held");
 
 void describe(versavis_error* error, const std::string& text) {
     if (error == nullptr) return;
@@ -206,7 +206,7 @@ const char* versavis_result_text(int result) {
         case VERSAVIS_LOST: return "items were overwritten before they were read";
         case VERSAVIS_RESTARTED: return "the service was restarted";
         case VERSAVIS_GONE: return "the service is gone; waiting for it";
-        case VERSAVIS_OVERTAKEN: return "the writer needed the memory: what was read is void";
+        case VERSAVIS_OVERTAKEN: return "the writer reused the memory: discard what was read";
         case VERSAVIS_ERROR: return "failed; versavis_error says why";
         case VERSAVIS_NO_MEMORY: return "no memory";
         case VERSAVIS_INVALID: return "an argument is missing, out of range, or of another kind";
@@ -217,7 +217,7 @@ const char* versavis_result_text(int result) {
 int versavis_open(const char* instance, const char* stream, const versavis_options* options,
                   versavis_stream** opened, versavis_error* error) {
     if (stream == nullptr || opened == nullptr)
-        return invalid(error, "versavis_open: the stream's name, or where to put it, is NULL");
+        return invalid(error, "versavis_open: name or stream is NULL");
     *opened = nullptr;
     return guarded(error, [&]() -> int {
         const auto how = translate(instance, options);
@@ -364,7 +364,7 @@ int versavis_imu_window_open(const char* instance, const char* stream,
                              const versavis_options* options, versavis_imu_window** opened,
                              versavis_error* error) {
     if (stream == nullptr || opened == nullptr)
-        return invalid(error, "versavis_imu_window_open: the name, or where to put it, is NULL");
+        return invalid(error, "versavis_imu_window_open: name or window is NULL");
     *opened = nullptr;
     return guarded(error, [&]() -> int {
         const auto how = translate(instance, options);

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::int64_t second_ns = 1'000'000'000;
 
-// How long a kernel without futex_waitv sleeps on one word of several. Half: twice the wake-ups of
-// an idle program. Twice: items of the other streams are seen up to 2 ms late.
+// How long a kernel without futex_waitv sleeps on one word of several. If lower, more wake-ups of
+// an idle program; if higher, items of the other streams are seen later.
 constexpr std::int64_t blind_sleep_ns = 1'000'000;
 
 /// Kernels before 5.16 do not know of several words, and some containers do not let it through.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Sleeping on words in shared memory, and waking who sleeps there, in any process.
-// std::atomic::wait and notify would reach this process only.
+// Sleeps on words in shared memory, and wakes sleepers in any process. std::atomic::wait and notify
+// reach this process only.
 #pragma once
 
 #include <atomic>
@@ -11,8 +11,8 @@
 namespace versavis::ring {
 
 /// A sleeper looks again after this long in any case: a process with a read-only mapping can move
-/// sleepers to another word, and a killed writer wakes nobody. Half: twice the idle wake-ups.
-/// Twice: a death is told after 40 ms instead of 20.
+/// sleepers to another word, and a killed writer wakes nobody. If lower, more idle wake-ups; if
+/// higher, a death is reported later.
 constexpr std::int64_t longest_sleep_ns = 20'000'000;
 
 /// Wakes up to `count` sleepers on `word`, and says how many.

@@ -9,12 +9,12 @@ namespace versavis {
 
 namespace {
 
-// Samples kept at most. Half: a minute at 1 kHz. Twice: 40 MB when nobody asks for them.
+// Samples kept at most: two minutes at 1 kHz, in 20 MB.
 constexpr std::size_t most_samples = 131072;
 
-// Losses that one look bears: who keeps up has none, a slow one has one or two. Half: a reader that
-// is overtaken while it catches up looks once more. Twice: a damaged ring, where each look finds
-// another loss, is given up later.
+// Losses tolerated in one look: a reader that keeps up has none, a slow one has one or two. If
+// lower, a reader that is overtaken while it catches up looks once more; if higher, a damaged ring,
+// where each look finds another loss, is given up later.
 constexpr int most_losses = 16;
 
 }  // namespace

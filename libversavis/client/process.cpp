@@ -15,14 +15,13 @@ namespace versavis::ring {
 
 namespace {
 
-// A writer whose heart has not beaten for this long is not taken for alive. Half: a service that
-// beats once a second and is held up for half of one looks dead. Twice: readers in another pid
-// namespace wait for 6 s before they are told of a death.
+// A writer whose heartbeat is older than this is considered dead. If lower, a service that is
+// delayed looks dead; if higher, readers in another pid namespace notice a death later.
 constexpr std::int64_t heartbeat_limit_ns = 3'000'000'000;
 
-// From this age of the heartbeat on, the writer's start is looked at as well as its number, which
-// costs some 20 us. Half: idle readers of services that beat every 50 ms pay for it. Twice: what is
-// left of a killed process, until its parent looks, passes for alive for 0.2 s.
+// From this age of the heartbeat on, the writer's start time is checked as well as its process id,
+// which costs some 20 us. If lower, idle readers pay for it, since services update it every 50 ms;
+// if higher, a zombie passes for alive for longer.
 constexpr std::int64_t doubtful_ns = 100'000'000;
 
 bool can_be_judged(const Constants& constants) {
@@ -49,17 +48,17 @@ std::uint64_t start_in(const std::string& line) {
 
 }  // namespace
 
-Presence quick_presence(const Constants& constants) {
-    if (!can_be_judged(constants)) return Presence::unknown;
+Liveness quick_liveness(const Constants& constants) {
+    if (!can_be_judged(constants)) return Liveness::unknown;
     const auto pid = static_cast<pid_t>(constants.writer_pid);
-    return ::kill(pid, 0) != 0 && errno == ESRCH ? Presence::dead : Presence::there;
+    return ::kill(pid, 0) != 0 && errno == ESRCH ? Liveness::dead : Liveness::alive;
 }
 
-Presence presence(const Constants& constants) {
-    if (const Presence quick = quick_presence(constants); quick != Presence::there) return quick;
+Liveness liveness(const Constants& constants) {
+    if (const Liveness quick = quick_liveness(constants); quick != Liveness::alive) return quick;
     const std::string line = stat_of(constants.writer_pid);
-    if (line.empty()) return Presence::unknown;  // /proc may hide other users' processes
-    return start_in(line) == constants.writer_start_ticks ? Presence::there : Presence::dead;
+    if (line.empty()) return Liveness::unknown;  // /proc may hide other users' processes
+    return start_in(line) == constants.writer_start_ticks ? Liveness::alive : Liveness::dead;
 }
 
 std::uint64_t start_ticks_of(std::uint32_t pid) { return start_in(stat_of(pid)); }
@@ -95,16 +94,16 @@ bool Pulse::beats(HostTime heartbeat, HostTime now) {
 
 bool writer_lives(const Mapping& mapping, Pulse& pulse) {
     const Header& header = mapping.header();
-    // SYNC 6: acquire here, release in supersede() and end(): whoever sees the segment ended also
-    // sees its last item in a second look. Without it that item could go unread.
+    // SYNC 6: acquire here, release in supersede() and end(): a reader that sees the segment ended
+    // also sees its last item in a second look. Otherwise that item could go unread.
     const auto state = header.state.load(std::memory_order_acquire);
     if (state != static_cast<std::uint32_t>(WriterState::live)) return false;
     const HostTime now = host_now();
     const HostTime heartbeat{header.heartbeat_ns.load(std::memory_order_relaxed)};
     const bool doubtful = heartbeat.ns < now.ns - doubtful_ns;
     const Constants& constants = mapping.constants();
-    const Presence seen = doubtful ? presence(constants) : quick_presence(constants);
-    return pulse.beats(heartbeat, now) && seen != Presence::dead;
+    const Liveness seen = doubtful ? liveness(constants) : quick_liveness(constants);
+    return pulse.beats(heartbeat, now) && seen != Liveness::dead;
 }
 
 }  // namespace versavis::ring

@@ -10,18 +10,17 @@
 
 namespace versavis::ring {
 
-enum class Presence {
-    there,
+enum class Liveness {
+    alive,
     dead,
     unknown,  ///< it is of another pid namespace, or hidden from this process
 };
 
 /// By process id alone: one system call.
-Presence quick_presence(const Constants& constants);
+Liveness quick_liveness(const Constants& constants);
 
-/// By process id and start: the remains of a process, and another one of its number, are told from
-/// it. Reads a file of /proc.
-Presence presence(const Constants& constants);
+/// By process id and start time: detects zombies and a reused process id. Reads a file of /proc.
+Liveness liveness(const Constants& constants);
 
 /// Field 22 of /proc/<pid>/stat; 0: there is no such process, or only its remains. With the process
 /// id it identifies a process until reboot.
@@ -34,7 +33,7 @@ std::uint64_t own_pid_namespace();
 /// True when this process made the segment.
 bool is_own(const Constants& constants);
 
-/// Whether a writer's heart beats: it is asked again and again, by one reader.
+/// Whether a writer updates its heartbeat: one reader asks repeatedly.
 class Pulse {
  public:
     /// True when the heartbeat is young. One that is far off this process's clock, as that of a

@@ -17,12 +17,12 @@ namespace versavis::ring {
 
 namespace {
 
-// How often a reader looks whether the writer lives. Half: a reader that polls spends more on it.
-// Twice: it is told of a death 20 ms later than it could be.
+// How often a reader checks whether the writer is alive. If lower, a polling reader spends more on
+// it; if higher, it notices a death later.
 constexpr std::int64_t look_period_ns = 10'000'000;
 
-// Before a successor that could not be followed is tried again. Half: one that never can be costs
-// twice as much. Twice: a reader that had no descriptor left is blind for 2 s.
+// Before a successor that could not be opened is tried again. If lower, one that never can be costs
+// more; if higher, a reader that had no descriptor left is blind for longer.
 constexpr Duration retry_period = seconds(1);
 
 /// A few ns to read, and some ms coarse.
@@ -52,7 +52,7 @@ std::int64_t ahead_of(std::uint64_t number, std::uint64_t sequence) {
 
 bool is(const Received& received, Pause why) { return !received && received.error().why == why; }
 
-/// Nothing that could be told at once, unless it is the first time.
+/// Nothing to return at once, unless it is the first time.
 bool is_quiet(const Received& received) {
     return is(received, Pause::nothing) || is(received, Pause::gone);
 }
@@ -75,9 +75,9 @@ struct Reader::Contact {
     Pulse pulse;
     std::int64_t looked_ns{};  ///< coarse clock
     bool alive{};
-    bool told_gone = false;        ///< by the last look
+    bool reported_gone = false;    ///< by the last look
     std::uint64_t read = 0;        ///< number behind that of the item that was handed out last
-    std::unique_ptr<Watch> watch;  ///< once fd() was asked for
+    std::unique_ptr<Watch> watch;  ///< once fd() was called
 
     void refuse(FileId successor) {
         refused_ = successor;
@@ -141,7 +141,7 @@ bool Reader::writer_alive() {
     return contact_->alive;
 }
 
-/// As last seen; looked at anew when that is some time ago, or it was dead.
+/// As last seen; checked again when that is some time ago, or it was dead.
 bool Reader::writer_seen() {
     const auto live = static_cast<std::uint32_t>(WriterState::live);
     const bool ended = mapping_->header().state.load(std::memory_order_relaxed) != live;
@@ -154,8 +154,8 @@ Reader::Look Reader::read(std::uint64_t number, Item& item) const {
     // The item's second cache line comes along with the first, not after it.
     __builtin_prefetch(&descriptor.metadata.back());
     // SYNC 2: acquire here, release in Writer::write_descriptor(): the descriptor's words, the
-    // payload and the slot's generation are at least as new as this item. Without it the words of
-    // the item that lay here before could be taken for this one's.
+    // payload and the slot's generation are at least as new as this item. Otherwise the words of
+    // the previous item in this place could pass for this one's.
     const auto ahead = ahead_of(number, descriptor.sequence.load(std::memory_order_acquire));
     if (ahead < 0) return Look::not_yet;
     if (ahead != 0) return Look::overwritten;
@@ -248,7 +248,7 @@ Received Reader::look() {
         received = take();  // published since the last look
         if (is(received, Pause::nothing)) received = hand_over();
     }
-    contact_->told_gone = is(received, Pause::gone);
+    contact_->reported_gone = is(received, Pause::gone);
     return received;
 }
 
@@ -261,7 +261,7 @@ Received Reader::hand_over() {
     const Constants& before = mapping_->constants();
     // Of another kind it is another stream: its items would be read as what they are not.
     if (now.generation == before.generation || now.kind != before.kind) return pause(Pause::gone);
-    // A writer that was taken for dead may have published once more before it was replaced.
+    // A writer considered dead may have published once more before it was replaced.
     auto last = take();
     if (!is(last, Pause::nothing)) return last;
     mapping_ = std::move(*successor);
@@ -301,10 +301,10 @@ FutexWord Reader::wake_word() const {
 }
 
 WatchTarget Reader::target(std::uint32_t seen) const {
-    return {mapping_, path_, seen, contact_->told_gone, contact_->refused(), contact_->pulse};
+    return {mapping_, path_, seen, contact_->reported_gone, contact_->refused(), contact_->pulse};
 }
 
-/// True when next() has something new to tell.
+/// True when next() has something new to return.
 bool Reader::ready() {
     const auto not_there = [this] {
         const auto& sequence = mapping_->descriptor(next_).sequence;
@@ -312,7 +312,7 @@ bool Reader::ready() {
     };
     if (!not_there()) return true;
     if (writer_seen()) return false;
-    if (!contact_->told_gone || !not_there()) return true;
+    if (!contact_->reported_gone || !not_there()) return true;
     return has_successor(path_, mapping_->name(), contact_->refused());
 }
 
@@ -330,9 +330,9 @@ Received Reader::next(Duration timeout) {
     for (;;) {
         const auto mapping = mapping_;  // a successor may take its place
         const FutexWord word = wake_word();
-        const bool told = contact_->told_gone;
+        const bool reported = contact_->reported_gone;
         auto received = next();
-        const bool ends = contact_->told_gone && !told;
+        const bool ends = contact_->reported_gone && !reported;
         if (!is_quiet(received) || ends) return received;
         const Duration left = left_until(deadline);
         if (left == Duration{}) return received;

@@ -15,8 +15,8 @@ namespace versavis::ring {
 
 namespace {
 
-/// A service hands a segment over at once. Half: one that is held up by load looks stuck. Twice: a
-/// program that looks for its streams is held up by a service that is stopped for 2 s each.
+/// A service passes a segment on at once. If lower, one that is slowed by load looks stuck; if
+/// higher, a stopped service delays a program for longer for each of its streams.
 constexpr timeval patience{1, 0};
 
 constexpr int seals = F_SEAL_SEAL | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE;
@@ -31,7 +31,7 @@ Unexpected<> not_handed(const std::filesystem::path& path) {
     return failure(path.string(),
                    "was not handed over by the service: " +
                        std::error_code(errno, std::generic_category()).message(),
-                   "does it still run? try again");
+                   "is it still running? try again");
 }
 
 /// The descriptor that came with a byte, which says nothing and is not read; none: errno says why.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A sealed segment: memory without a name, which nobody can cut short under its readers. The socket
-// that has the stream's name hands it to whoever may connect.
+// A sealed segment: anonymous memory that nobody can truncate under its readers. The socket with
+// the stream's name passes it to every client that may connect.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,12 @@
 
 namespace versavis::ring {
 
-/// True when nobody, its maker included, can change the file's size, or map it for writing anew.
+/// True when nobody, its creator included, can change the file's size or map it for writing again.
 bool is_sealed(int file);
 
 /// From the socket, open with O_PATH, of the user who must be its peer. Waits for a second at most.
-/// Errors: nobody there, another user, or what came is not sealed. `path` is for messages.
+/// Errors: nobody is listening, the peer is another user, or the received file is not sealed.
+/// `path` is for messages.
 Expected<FileDescriptor> fetch_sealed(int socket, const std::filesystem::path& path,
                                       std::uint32_t owner);
 

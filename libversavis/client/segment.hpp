@@ -35,7 +35,7 @@ struct Constants {
     bool has_attributes;  ///< its slots have
 };
 
-/// Device and inode: tells a segment from its successor of the same name.
+/// Device and inode: distinguishes a segment from its successor of the same name.
 using FileId = std::pair<std::uint64_t, std::uint64_t>;
 
 /// Of the file that has this name now; zeros: none has.
@@ -52,7 +52,8 @@ class Mapping {
  public:
     enum class Access { read_only, read_write };
 
-    /// Maps and checks `path`; every offset is checked to lie inside the file. Whose it is, is not.
+    /// Maps and checks `path`; every offset is checked to lie inside the file. Ownership is not
+    /// checked.
     static Expected<Mapping> open(const std::filesystem::path& path, Access access);
 
     /// The same of a file that is open; `path` is for messages.

@@ -15,13 +15,13 @@ namespace versavis {
 
 namespace {
 
-// Sets that may wait for frames. Half: with one camera far behind, sets of the last 3 s at 20 Hz.
-// Twice: items of so many more are held, which costs little, and most are overwritten anyway.
+// Sets that may wait for frames: 6 s at 20 Hz, with one camera far behind. More cost little, but
+// most of their items are overwritten anyway.
 constexpr std::size_t most_pending = 128;
 
-// Between two looks at the IMU at most, whether or not a set waits for its samples. Half: a reader
-// whose cameras are slow wakes up twice as often. Twice: a ring of less than 0.2 s of samples is
-// overtaken.
+// Between two looks at the IMU at most, whether or not a set waits for its samples. If lower, a
+// reader whose cameras are slow wakes up more often; if higher, a ring of less than 0.2 s of
+// samples is overtaken.
 constexpr Duration unwatched = milliseconds(100);
 
 // Losses of a camera that one look bears, as in ImuWindow.
@@ -79,7 +79,7 @@ struct SetReader::State {
     std::optional<HostTime> next_deadline() const;
 };
 
-/// What is to be told: a restart once for all streams.
+/// The pause to report: a restart once for all streams.
 std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64_t life_now) {
     if (why.why != Pause::restarted || life_now == life) return std::nullopt;
     life = life_now;
@@ -91,7 +91,7 @@ std::optional<NoItem> SetReader::State::restarted(const NoItem& why, std::uint64
     return why;
 }
 
-/// What is to be told: the end of the first camera that ends, until one of them goes on.
+/// The pause to report: the end of the first camera that ends, until one of them continues.
 std::optional<NoItem> SetReader::State::gone(const NoItem& why, std::size_t camera) {
     if (why.why != Pause::gone) return std::nullopt;
     const bool is_first = !any_ended();
@@ -113,8 +113,8 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
         }
         report.lost += frame.error().lost;
         if (frame.error().why == Pause::lost) ++losses;
-        if (auto told = restarted(frame.error(), cameras[camera].reader().life())) return told;
-        if (auto told = gone(frame.error(), camera)) return told;
+        if (auto pause = restarted(frame.error(), cameras[camera].reader().life())) return pause;
+        if (auto pause = gone(frame.error(), camera)) return pause;
         if (frame.error().why == Pause::nothing || frame.error().why == Pause::gone) break;
     }
     return std::nullopt;
@@ -122,7 +122,7 @@ std::optional<NoItem> SetReader::State::collect(std::size_t camera) {
 
 std::optional<NoItem> SetReader::State::collect() {
     for (std::size_t camera = 0; camera < cameras.size(); ++camera)
-        if (auto told = collect(camera)) return told;
+        if (auto pause = collect(camera)) return pause;
     if (!imu) return std::nullopt;
     const auto collected = imu->collect();
     return collected ? std::nullopt : restarted(collected.error(), imu->reader().life());
@@ -242,7 +242,7 @@ SetReader::~SetReader() = default;
 Expected<FrameSet, NoItem> SetReader::next(Duration timeout) {
     const HostTime deadline = deadline_after(timeout);
     for (bool is_last = false;;) {
-        if (const auto told = state_->collect()) return Unexpected<NoItem>(*told);
+        if (const auto pause = state_->collect()) return Unexpected<NoItem>(*pause);
         if (auto set = state_->ready()) return std::move(*set);
         const auto give_up = state_->next_deadline();
         state_->waiting.set_deadline(give_up);

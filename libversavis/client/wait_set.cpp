@@ -16,9 +16,9 @@ using ring::FutexWord;
 struct WaitSet::State {
     std::vector<ring::Reader*> readers;
     std::vector<FutexWord> words;
-    std::size_t turn = 0;  ///< who is asked first
+    std::size_t turn = 0;  ///< the one that is asked first
     std::optional<HostTime> deadline;
-    std::unique_ptr<ring::Watch> watch;  ///< once fd() was asked for
+    std::unique_ptr<ring::Watch> watch;  ///< once fd() was called
 };
 
 WaitSet::WaitSet() : state_(std::make_unique<State>()) {}
@@ -28,7 +28,7 @@ WaitSet::~WaitSet() = default;
 
 Expected<> WaitSet::add(ring::Reader& reader) {
     if (state_->readers.size() + 1 >= ring::most_futex_words)
-        return failure(reader.name(), "is one stream too many to wait for",
+        return failure(reader.name(), "is one stream more than a WaitSet can hold",
                        "use a second WaitSet in another thread");
     state_->readers.push_back(&reader);
     return {};

@@ -92,7 +92,7 @@ void Watch::run() {
     }
 }
 
-/// Returns when something happened, or the watch was armed anew.
+/// Returns when something happened, or the watch was armed again.
 void Watch::keep(std::uint32_t version, Watched watched) const {
     std::vector<FutexWord> words{{&version_, version}};
     for (const WatchTarget& target : watched.targets)

@@ -23,7 +23,7 @@ struct WatchTarget {
     std::shared_ptr<const Mapping> mapping;
     std::filesystem::path path;
     std::uint32_t seen{};  ///< value of `wake` before the reader looked, and found nothing
-    bool gone{};           ///< it has told that the writer is gone: only a successor is news
+    bool gone{};           ///< it has reported that the writer is gone: only a successor is news
     FileId refused{};      ///< a file of this name that is no successor
     Pulse pulse{};         ///< what the reader knows of the writer's heart
 };
@@ -31,9 +31,11 @@ struct WatchTarget {
 /// True when there is a file of this name that its reader does not know.
 bool has_successor(const std::filesystem::path& path, FileId known, FileId refused);
 
+/// Serves the file descriptor of a reader. The reader's thread calls everything but run(), which is
+/// the thread that sleeps on the futexes; `mutex_` guards what they share.
 class Watch {
  public:
-    /// Errors: no descriptor or thread to be had.
+    /// Errors: no descriptor or thread available.
     static Expected<std::unique_ptr<Watch>> start();
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;

@@ -250,8 +250,8 @@ VERSAVIS_EXPORT void versavis_wait_set_free(versavis_wait_set *set);
 VERSAVIS_EXPORT int versavis_wait_set_add(versavis_wait_set *set, versavis_stream *stream,
                                           versavis_error *error);
 
-/* Sleeps until versavis_next of one of the streams has something to tell. Its number, in the order
- * in which they were added; -1: nothing within timeout; less: an error. */
+/* Sleeps until versavis_next of one of the streams has something to return. Returns its number, in
+ * the order in which they were added; -1: nothing within timeout; less: an error. */
 VERSAVIS_EXPORT int versavis_wait_set_wait(versavis_wait_set *set, int64_t timeout);
 
 /* Readable when versavis_wait_set_wait may find something, until it returns -1. */

@@ -153,7 +153,7 @@ struct ImuSample {
         departure_ns;  ///< from time_ns to when this packet began to leave the board; 0: unknown
 };
 
-enum class EventKind : std::uint8_t {
+enum class BoardEventKind : std::uint8_t {
     trigger_skipped = 1,  ///< detail: SkipReason; value: the grid tick that got no pulse
     stray_edge = 2,       ///< an exposure edge that belongs to no trigger; value: level
     output_late = 3,      ///< an output edge left too late; source: output; value: ns late
@@ -184,9 +184,9 @@ enum class SkipReason : std::uint16_t {
 
 struct Event {
     static constexpr Type type = Type::event;
-    EventKind kind;
+    BoardEventKind kind;
     std::uint8_t source;     ///< camera, IMU or input number
-    std::uint16_t detail;    ///< see EventKind
+    std::uint16_t detail;    ///< see BoardEventKind
     std::uint32_t sequence;  ///< events since boot
     std::int64_t time_ns;
     std::int64_t value;
@@ -206,7 +206,7 @@ struct ClockAnswer {
     std::int64_t sent_ns;      ///< this answer, stamped as it was handed to the link
 };
 
-/// Follows the answer, from boards whose link can tell when it really left.
+/// Follows the answer, from boards whose link knows when it really left.
 struct ClockFollowUp {
     static constexpr Type type = Type::clock_follow_up;
     std::uint32_t id;  ///< of the request

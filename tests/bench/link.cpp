@@ -56,7 +56,7 @@ class Work final : public BoardListener {
     bool imu_sample(const wire::ImuSample& sample, HostTime received) override {
         return imu_.add(sample, received);
     }
-    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 
     bool connected() const { return connected_; }
@@ -132,7 +132,7 @@ struct Idle final : BoardListener {
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
         return true;
     }
-    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
     Work& work;
 };

@@ -250,9 +250,9 @@ TEXT = """\
 # Evaluation on the virtual rig
 
 `./dev evaluate` wrote this file and its pictures, from recordings of the [virtual rig](user/rig.md)
-that `versavis evaluate` looked at as it looks at recordings of real cameras
-([how to](user/evaluate.md), [how it works](design/evaluation.md)). Beside each figure stands that
-of the published system where there is one (F. Tschopp et al., VersaVIS, Sensors 20(5), 2020).
+that `versavis evaluate` processed like recordings of real cameras ([how to](user/evaluate.md), [how
+it works](design/evaluation.md)). Figures of the published system, where there are any, are beside
+them (F. Tschopp et al., VersaVIS, Sensors 20(5), 2020).
 
 ## Camera to camera
 Two cameras at 10 Hz look at the published LED board, one of them upside down.
@@ -264,10 +264,10 @@ Two cameras at 10 Hz look at the published LED board, one of them upside down.
 {led_rows}
 
 In the third line the exposure line of the second camera is {line[0]} us late to rise and {line[1]}
-us late to fall, as an opto-isolated output is, and the service does not know. Its stamps are late
-by {middle:g} us then: it exposes so much earlier than they say, and that is what the pictures must
-show. The last line is the same with `strobe_rising_us` and `strobe_falling_us` set, as a preset
-does for cameras that it knows.
+us late to fall, like an opto-isolated output, and the service does not know it. Its stamps are late
+by {middle:g} us: it exposes that much earlier than they say, and the pictures must
+show this. The last line is the same with `strobe_rising_us` and `strobe_falling_us` set, as a
+preset does for cameras that it knows.
 
 ## Camera to IMU
 Offset between camera and IMU, from {seconds:g} s of hand-like motion (0.6 rad/s rms about each
@@ -287,11 +287,11 @@ without data-ready, 0.610 ms.
 {off_rows}
 
 The published offsets are 0.9 to 1.2 ms larger in all lines: that is the bandwidth of the sensor
-element, which no data sheet tells and the rig does not have. Exposure time has no influence, there
+element, which data sheets omit and the rig does not model. Exposure time has no influence, there
 as here.
 
 ### Corrected
-What the service does unless told otherwise: expected is 0.
+The service's default: expected is 0.
 
 | B | expected | N | 1 ms | 3 ms | 5 ms | automatic |
 |---|---|---|---|---|---|---|
@@ -303,23 +303,23 @@ With the data-ready line wired (`data_ready = true`), where no sample is older t
 |---|---|---|---|---|---|---|
 {paced_rows}
 
-| | N | rms error, us | rms of the sigma told, us |
+| | N | rms error, us | rms of the stated sigma, us |
 |---|---|---|---|
 {error_rows}
 
 ## Clock
 Board time to host time, over the rig's link ({clock_span}), in us; the second pulses of a GNSS
-receiver, which the estimate does not use here, tell the true error.
+receiver, which the estimate does not use here, show the true error.
 
 | | rms | p99 | published |
 |---|---|---|---|
 {clock_rows}
 
 ## What a simulation cannot show
-- Delays of real shutters, LEDs, drivers and cables. What the rig has of them is in its scenario;
-  what nobody put there is not found here.
+- Delays of real shutters, LEDs, drivers and cables. The rig has only those in its scenario, so
+  others are not found here.
 - The bandwidth of the sensor element, vibration, saturation, and an IMU's true noise.
-- Lenses, rolling shutters, blur by defocus, and worlds that are near.
+- Lenses, rolling shutters, blur by defocus, and near scenes.
 - USB: the rig's link is a socket. Asymmetric delays of a host controller shift all stamps alike,
   cameras and IMU by the same amount.
 """

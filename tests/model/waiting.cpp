@@ -344,7 +344,7 @@ Model succession(const Twist& twist, Ending ending, Reading reading) {
     return model;
 }
 
-/// Of Crowd: the word that readers sleep on, and what its writer and its thread share.
+/// Of WaiterWaker: the word that readers sleep on, and what its writer and its thread share.
 struct CrowdWords {
     int wake = 0;
     int calls = 0;
@@ -353,7 +353,7 @@ struct CrowdWords {
 
 constexpr int at_once = 1;  ///< readers that the writer wakes by itself
 
-/// As Crowd::wake().
+/// As WaiterWaker::wake().
 void wake_crowd(Program& writer, const Twist& twist, const CrowdWords& words) {
     const bool early = twist("the crowd is woken before the word changes");
     const std::string item = std::to_string(writer.length());
@@ -374,7 +374,7 @@ void wake_crowd(Program& writer, const Twist& twist, const CrowdWords& words) {
     if (early) writer.add(words.wake, 1, release);
 }
 
-/// As Crowd::run().
+/// As WaiterWaker::run().
 Program helper(const Twist& twist, const CrowdWords& words) {
     Program thread("helper");
     const int most = twist("the helper wakes one") ? 1 : everybody;

@@ -146,7 +146,7 @@ TEST_CASE("hostile cameras: one whose numbers begin again a little back is reope
     Stack stack({"renumbered", 158, 1, 20, "", fault("restart_ids", 60), ""});
     stack.start_rig();
     stack.start_service();
-    const HostTime found = since(stack, "its frames are numbered anew");
+    const HostTime found = since(stack, "its frame numbers started over");
     stack.wait_for_status([](const auto& s) {
         return streams(s["cameras"][0]) && s["cameras"][0]["connections"] == 2;
     });
@@ -193,7 +193,7 @@ TEST_CASE("hostile cameras: what a killed service left behind is waited for, and
     const HostTime killed = host_now();
     stack.start_service();
     stack.wait_for_status([&](const auto& s) { return s["started_ns"] > killed.ns && healthy(s); });
-    CHECK_THAT(stack.service().output(), Catch::Contains("it is still held"));
+    CHECK_THAT(stack.service().output(), Catch::Contains("it is still locked"));
     CHECK_THAT(stack.service().output(), !Catch::Contains("close that program"));
 }
 

@@ -74,7 +74,7 @@ TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one"
     CHECK(bench.pairing.first_start() == Start::slow);
     CHECK(bench.pairing.stamped() == Instant::end);
     // A grid of four times the period: by the one before, each record would be off, and frames
-    // that come 100 ms after their exposures would wait for more records. Two frames may wait.
+    // that come 100 ms after the exposures would wait for more records. Two frames may wait.
     limits = Bench::made();
     limits.period = period * 4;
     limits.frames_held = 5;

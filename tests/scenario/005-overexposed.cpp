@@ -27,6 +27,6 @@ TEST_CASE("005-overexposed: an exposure longer than the period costs triggers, n
     const wire::Exposure& too_long = world.record(0, 40);
     CHECK(too_long.end_ns == wire::no_time);
     CHECK((too_long.flags & wire::exposure_overlong) != 0);
-    CHECK(world.inbox().events_of(wire::EventKind::trigger_skipped).size() >= 3);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::trigger_skipped).size() >= 3);
     CHECK(world.grid_error(world.record(0, 60)) == 0);
 }

@@ -35,5 +35,5 @@ TEST_CASE("008-readout: no trigger is sent into the read-out of a camera") {
     world.run(30 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::trigger_skipped).size() > 20);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::trigger_skipped).size() > 20);
 }

@@ -57,7 +57,7 @@ TEST_CASE("011-microseconds: a chip's counter of them wraps after 71.6 minutes, 
     world.finish();
     CHECK(world.judge() == "");
     CHECK(world.inbox().exposures[0].size() >= 4'499);
-    CHECK(world.inbox().events_of(wire::EventKind::pps).size() >= 4'499);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::pps).size() >= 4'499);
     for (const wire::Exposure& record : world.inbox().exposures[0])
         if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
 }

@@ -21,7 +21,7 @@ TEST_CASE("017-illumination: light leads each exposure and lasts through the uni
     world.run(60 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::illumination_limited).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::illumination_limited).empty());
     // Dark in between: on only for the exposures and their leads.
     Nanoseconds on = 0;
     for (const Interval& interval : world.lights()) on += interval.off - interval.on;

@@ -16,7 +16,7 @@ TEST_CASE("018-strobe-stuck: a line that stays active leaves no light on") {
     world.run(10 * second);
     world.finish();
     CHECK(world.judge() == "");  // never longer than 10 ms, nor more than a fifth of the time
-    CHECK_FALSE(world.inbox().events_of(wire::EventKind::illumination_limited).empty());
+    CHECK_FALSE(world.inbox().events_of(wire::BoardEventKind::illumination_limited).empty());
     // Afterwards the light works again.
     const TruePulse& later = world.camera(0).pulses()[100];
     CHECK(std::any_of(world.lights().begin(), world.lights().end(), [&](const Interval& interval) {

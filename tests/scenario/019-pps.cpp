@@ -14,7 +14,7 @@ TEST_CASE(
     world.run(60 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::pps).size() >= 60);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::pps).size() >= 60);
     const wire::Health& health = world.inbox().healths.back();
     CHECK(health.pps_state == wire::PpsState::good);
     CHECK(std::abs(health.pps_error_ppb - ppm * 1000) <= 1 + world.rounding());
@@ -38,7 +38,7 @@ TEST_CASE("019-pps-noise: a pulse between pulses, and echoes of each, disturb no
         REQUIRE(std::abs(health.pps_error_ppb - 12'000) <= world.rounding());
     }
     CHECK(world.inbox().healths.back().glitches == 25);
-    CHECK(world.inbox().events_of(wire::EventKind::pps).size() == 32);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::pps).size() == 32);
 }
 
 TEST_CASE("019-pps-lost: pulses that stop are no frequency, those of another phase are one soon") {

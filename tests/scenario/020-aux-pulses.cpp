@@ -15,5 +15,5 @@ TEST_CASE(
     world.run(30 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::aux_pulse).size() >= 30'000);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::aux_pulse).size() >= 30'000);
 }

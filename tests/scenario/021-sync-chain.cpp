@@ -38,7 +38,7 @@ TEST_CASE("021-sync-chain: two boards with crystals of their own expose together
         const Nanoseconds target = on_second(first.now());
         if (target > second_board.now() + ms) second_board.run(target - ms - second_board.now());
     }
-    CHECK(second_board.inbox().events_of(wire::EventKind::sync_pulse).size() >= 118);
+    CHECK(second_board.inbox().events_of(wire::BoardEventKind::sync_pulse).size() >= 118);
     std::size_t together = 0;
     for (const unsigned camera : {0U, 1U}) {
         const auto& theirs = first.camera(camera).pulses();

@@ -48,8 +48,8 @@ TEST_CASE(
           std::lround(part.true_rate_hz * 1000));
     world.run(5 * second);
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 1);
-    CHECK(world.inbox().events_of(wire::EventKind::imu_failed).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_failed).empty());
     const auto& samples = world.inbox().samples[0];
     CHECK(static_cast<double>(samples.size()) == Approx(4.4 * part.true_rate_hz).epsilon(0.08));
     for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -63,7 +63,7 @@ TEST_CASE(
     CHECK(world.inbox().healths.back().imu_errors[1] >= 3);
     part.mute(true);
     world.run(3 * second);
-    CHECK_FALSE(world.inbox().events_of(wire::EventKind::imu_silent).empty());
+    CHECK_FALSE(world.inbox().events_of(wire::BoardEventKind::imu_silent).empty());
     const std::size_t before = world.inbox().samples[1].size();
     part.mute(false);
     world.run(4 * second);

@@ -55,12 +55,12 @@ TEST_CASE(
     world.run(2 * second);
     part.unplug(true);
     world.run(3 * second);
-    const auto silent = world.inbox().events_of(wire::EventKind::imu_silent).size();
-    const auto failed = world.inbox().events_of(wire::EventKind::imu_failed).size();
+    const auto silent = world.inbox().events_of(wire::BoardEventKind::imu_silent).size();
+    const auto failed = world.inbox().events_of(wire::BoardEventKind::imu_failed).size();
     CHECK(silent + failed >= 2);
     part.unplug(false);
     world.run(3 * second);
-    CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 2);
     world.finish();
     world.drops_allowed = true;  // the time without it has no samples
     CHECK(world.judge() == "");
@@ -76,7 +76,7 @@ TEST_CASE(
         wire::ImuKind::adis16448b, 200, true);
     REQUIRE(world.begin());
     world.run(10 * second);
-    const auto failures = world.inbox().events_of(wire::EventKind::imu_failed);
+    const auto failures = world.inbox().events_of(wire::BoardEventKind::imu_failed);
     CHECK(failures.size() >= 8);
     CHECK(failures.size() <= 11);
     CHECK(failures[0].value == 16445);
@@ -99,11 +99,11 @@ TEST_CASE(
         const auto& samples = world.inbox().samples[0];
         for (std::size_t i = before + 3; i < samples.size(); ++i)
             REQUIRE((samples[i].flags & wire::imu_check_failed) != 0);
-        CHECK_FALSE(world.inbox().events_of(wire::EventKind::imu_failed).empty());
+        CHECK_FALSE(world.inbox().events_of(wire::BoardEventKind::imu_failed).empty());
         world.set_dead_bus(std::nullopt);
         world.run(3 * second);
         CHECK(samples.size() > before + 250);
-        CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
+        CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 2);
         world.drops_allowed = true;  // the time without it has no samples
         // On the board's grid the judge does not know when the part took its data before it was set
         // up again.
@@ -124,7 +124,7 @@ TEST_CASE("025-brown-out: a part that lost its settings is found out and set up 
         world.run(2 * second);
         world.spi_imu().brown_out(world.now());
         world.run(3 * second);
-        CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 2);
+        CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 2);
         const std::size_t before = world.inbox().samples[0].size();
         world.run(second);
         const std::size_t rate = world.inbox().samples[0].size() - before;

@@ -15,7 +15,7 @@ TEST_CASE("026-imu-bus-stuck: a transfer that never ends holds up nothing else")
     world.run(3 * second);
     world.board().set_imu_bus_stuck(true);
     world.run(5 * second);
-    CHECK(world.inbox().events_of(wire::EventKind::imu_silent).size() >= 3);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_silent).size() >= 3);
     CHECK(world.inbox().healths.size() >= 7);
     world.board().set_imu_bus_stuck(false);
     const std::size_t before = world.inbox().samples[0].size();

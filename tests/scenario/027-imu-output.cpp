@@ -69,7 +69,7 @@ TEST_CASE(
     world.connect();
     REQUIRE(world.configure());
     world.run(second);
-    const auto stored = world.inbox().events_of(wire::EventKind::stored);
+    const auto stored = world.inbox().events_of(wire::BoardEventKind::stored);
     REQUIRE(stored.size() == 1);
     CHECK(stored[0].value == 1);
     world.reboot(wire::ResetCause::power_on);
@@ -97,7 +97,7 @@ TEST_CASE("027-power-fails: what was stored before is in force until the new one
     world.run(500 * ms);
     world.configuration.imus[0].rate_millihertz = 1'000'000;
     REQUIRE(world.configure());
-    CHECK(world.inbox().events_of(wire::EventKind::stored).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::stored).size() == 1);
     const bool in_time = GENERATE(false, true);
     world.run(in_time ? 500 * ms : 300 * ms);
     world.reboot(wire::ResetCause::power_on);

@@ -12,7 +12,7 @@ TEST_CASE("028-unconnected: edges at an input that nothing is configured for cos
     world.run(5 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::input_noisy).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::input_noisy).empty());
     CHECK(world.inbox().healths.back().lost_edges == 0);
 }
 
@@ -30,7 +30,7 @@ TEST_CASE(
                     4500 * ms);
     world.run(10 * second);
     world.finish();
-    const auto noisy = world.inbox().events_of(wire::EventKind::input_noisy);
+    const auto noisy = world.inbox().events_of(wire::BoardEventKind::input_noisy);
     REQUIRE(noisy.size() == 3);  // once a second while it lasts
     CHECK(noisy[0].source == firmware::input_pulse + unsigned{wire::pulse_aux0});
     CHECK(world.inbox().healths.back().noisy_inputs == 3);
@@ -55,8 +55,8 @@ TEST_CASE(
             if (record.trigger > 1) REQUIRE(world.grid_error(record) == 0);
     CHECK(world.inbox().healths.back().stray_edges > 100);
     // Reported ten times a second; all are counted.
-    CHECK(world.inbox().events_of(wire::EventKind::stray_edge).size() <= 30);
-    CHECK(world.inbox().events_of(wire::EventKind::input_noisy).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::stray_edge).size() <= 30);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::input_noisy).size() == 1);
     for (const wire::Exposure& record : world.inbox().exposures[1])
         if (record.trigger_ns > from + 1100 * ms)
             REQUIRE((record.flags & wire::exposure_no_start) != 0);

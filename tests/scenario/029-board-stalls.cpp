@@ -22,11 +22,12 @@ TEST_CASE(
     world.finish();
     CHECK(world.judge() == "");  // each record is true, each grid point accounted for
     std::size_t skipped = 0;
-    for (const wire::Event& event : world.inbox().events_of(wire::EventKind::trigger_skipped)) {
+    for (const wire::Event& event :
+         world.inbox().events_of(wire::BoardEventKind::trigger_skipped)) {
         CHECK(event.detail == static_cast<std::uint16_t>(wire::SkipReason::late));
         ++skipped;
     }
-    for (const wire::Event& event : world.inbox().events_of(wire::EventKind::triggers_skipped))
+    for (const wire::Event& event : world.inbox().events_of(wire::BoardEventKind::triggers_skipped))
         skipped += event.detail;
     if (stall > 20 * ms) CHECK(skipped > 100);
     world.run(second);

@@ -20,7 +20,7 @@ TEST_CASE("030-host-restarts: a new hello stops the cameras, numbers go on, samp
     CHECK(world.inbox().hellos.size() == 20);
     CHECK(world.inbox().hellos.front().board_time_ns < world.inbox().hellos.back().board_time_ns);
     // The part is set up once: sending the same settings again does not disturb it.
-    CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 1);
     CHECK(world.judge() == "");
 }
 

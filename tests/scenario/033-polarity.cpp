@@ -20,7 +20,7 @@ TEST_CASE("033-polarity: each combination of trigger and strobe polarity, pulse 
     world.run(20 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK(world.inbox().events_of(wire::EventKind::output_late).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::output_late).empty());
     for (unsigned camera = 0; camera < 4; ++camera) {
         CHECK(world.camera(camera).pulses().size() >= 399);
         for (const wire::Exposure& record : world.inbox().exposures[camera])

@@ -240,7 +240,7 @@ TEST_CASE("035-light-without-strobe: at its limit there is a pause, and an event
     world.run(2 * second);
     world.finish();
     CHECK(world.judge() == "");
-    CHECK_FALSE(world.inbox().events_of(wire::EventKind::illumination_limited).empty());
+    CHECK_FALSE(world.inbox().events_of(wire::BoardEventKind::illumination_limited).empty());
     for (std::size_t i = 1; i < world.lights().size(); ++i)
         CHECK(world.lights()[i].on - world.lights()[i - 1].off >= ms);
 }

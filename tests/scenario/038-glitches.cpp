@@ -53,7 +53,7 @@ TEST_CASE("038-busy-inputs: noise just below the limit is no reason to lose anyt
                     3 * second);
     world.run(4 * second);
     world.finish();
-    CHECK(world.inbox().events_of(wire::EventKind::input_noisy).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::input_noisy).empty());
     CHECK(world.inbox().healths.back().lost_edges == 0);
     world.configuration.ports.inputs = 0;
     for (unsigned camera = 0; camera < 4; ++camera)

@@ -8,8 +8,8 @@ namespace {
 
 /// Triggers that were skipped, by the events about them.
 std::size_t skipped(World& world) {
-    std::size_t count = world.inbox().events_of(wire::EventKind::trigger_skipped).size();
-    for (const wire::Event& event : world.inbox().events_of(wire::EventKind::triggers_skipped))
+    std::size_t count = world.inbox().events_of(wire::BoardEventKind::trigger_skipped).size();
+    for (const wire::Event& event : world.inbox().events_of(wire::BoardEventKind::triggers_skipped))
         count += event.detail;
     return count;
 }

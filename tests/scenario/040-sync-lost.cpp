@@ -49,8 +49,8 @@ TEST_CASE("040-sync-gap: a sender that drifted while it was silent is followed a
     world.pulses(from, 1e9 + 20'500);
     world.run(30 * second);
     CHECK(world.state() == wire::SyncState::followed);
-    REQUIRE(world.inbox().events_of(wire::EventKind::sync_lost).size() == 1);
-    REQUIRE(world.inbox().events_of(wire::EventKind::sync_taken).size() == 1);
+    REQUIRE(world.inbox().events_of(wire::BoardEventKind::sync_lost).size() == 1);
+    REQUIRE(world.inbox().events_of(wire::BoardEventKind::sync_taken).size() == 1);
     std::vector<wire::Exposure> records = world.inbox().exposures[0];
     std::vector<Nanoseconds> pulses;
     for (int n = 15; n < 28; ++n) pulses.push_back(from + n * (second + 20'500));
@@ -65,10 +65,10 @@ TEST_CASE("040-sync-began-anew: a sender with another phase is told, and the gri
     world.pulses(from, 1e9 - 3'000);
     world.run(250 * second);
     CHECK(world.state() == wire::SyncState::followed);
-    const auto lost = world.inbox().events_of(wire::EventKind::sync_lost);
+    const auto lost = world.inbox().events_of(wire::BoardEventKind::sync_lost);
     REQUIRE(lost.size() == 1);
     CHECK(world.is_stamp(lost[0].time_ns, from));
-    const auto taken = world.inbox().events_of(wire::EventKind::sync_taken);
+    const auto taken = world.inbox().events_of(wire::BoardEventKind::sync_taken);
     REQUIRE(taken.size() == 1);
     CHECK(std::abs(taken[0].value) > 100 * ms);
     // No interval is off by more than the slew and the crystals explain.

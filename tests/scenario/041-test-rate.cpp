@@ -30,7 +30,7 @@ TEST_CASE("041-test-rate: pulses at a rate of their own, at any output that noth
         const auto expected = static_cast<Nanoseconds>(i) * second / rate_hz;
         REQUIRE(std::abs(since - expected) <= 1 + 2 * world.rounding());
     }
-    CHECK(world.inbox().events_of(wire::EventKind::output_late).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::output_late).empty());
 }
 
 TEST_CASE("041-test-rate-refused: an output in use, a rate or a width that does not fit") {

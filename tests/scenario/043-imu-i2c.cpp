@@ -46,7 +46,7 @@ TEST_CASE(
         const unsigned told = world.is_slow() ? sample.flags & wire::imu_overrun : 0U;
         REQUIRE((sample.flags & ~wire::imu_repeated) == (wire::imu_stamped | told));
     }
-    CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 1);
     CHECK(world.inbox().healths.back().imu_errors[0] == 0);
     CHECK(on_grid(world));
 }
@@ -59,7 +59,7 @@ TEST_CASE(
     world.add_camera(0);
     REQUIRE(world.begin());
     world.run(5 * second);
-    const auto silent = world.inbox().events_of(wire::EventKind::imu_silent);
+    const auto silent = world.inbox().events_of(wire::BoardEventKind::imu_silent);
     CHECK(silent.size() >= 4);
     CHECK(silent.size() <= 6);
     CHECK(silent[0].detail == 0);  // the first step
@@ -67,7 +67,7 @@ TEST_CASE(
     part.wire_i2c(first_address);
     world.run(2 * second);
     world.finish();
-    CHECK(world.inbox().events_of(wire::EventKind::imu_ready).size() == 1);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 1);
     CHECK(world.inbox().samples[0].size() > 800);
     world.drops_allowed = true;  // the time without it has no samples
     CHECK(world.judge() == "");
@@ -95,7 +95,7 @@ TEST_CASE(
     CHECK(samples.size() > before + 1800);
     CHECK(std::any_of(samples.begin() + static_cast<std::ptrdiff_t>(before), samples.end(),
                       [](const auto& sample) { return (sample.flags & wire::imu_overrun) != 0; }));
-    const bool told = !world.inbox().events_of(wire::EventKind::imu_silent).empty();
+    const bool told = !world.inbox().events_of(wire::BoardEventKind::imu_silent).empty();
     CHECK(told == (length > second));  // a short one restarts nothing
     world.drops_allowed = true;        // the time without it has no samples
     CHECK(world.judge() == "");
@@ -109,7 +109,7 @@ TEST_CASE("043-imu-i2c-unplugged: a part that comes off is told and set up again
     world.run(2 * second);
     part.unplug(true);
     world.run(3 * second);
-    CHECK(world.inbox().events_of(wire::EventKind::imu_silent).size() >= 2);
+    CHECK(world.inbox().events_of(wire::BoardEventKind::imu_silent).size() >= 2);
     part.brown_out(world.now());
     part.unplug(false);
     const std::size_t before = world.inbox().samples[0].size();

@@ -242,8 +242,8 @@ TEST_CASE("cameras: block ids that begin again and again are named") {
     stack.start_rig();
     stack.start_service();
     const auto status = stack.wait_for_status([](const auto& s) {
-        return s["cameras"][0]["hint"].template get<std::string>().find(
-                   "ids begin again and again") != std::string::npos;
+        return s["cameras"][0]["hint"].template get<std::string>().find("ids keep restarting") !=
+               std::string::npos;
     });
     CHECK(status["cameras"][0]["fault"] == "block_ids");
     judge(stack, 4);
@@ -548,7 +548,7 @@ TEST_CASE("cameras: an address in no network of this host is unreachable") {
     const auto status = stack.wait_for_status(
         [](const auto& s) { return s["cameras"][0]["state"] == "unreachable"; });
     CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
-               Catch::Contains("not in any network of this host"));
+               Catch::Contains("in the subnet of its address"));
 }
 
 TEST_CASE("cameras: frames say gain and temperature as far as the camera tells") {

@@ -237,7 +237,7 @@ TEST_CASE("end to end: the service is killed and started again while a reader wa
     read_until(stream, [](const auto& item) { return item.found == test::Found::gone; });
     std::string output;
     CHECK(stack.tool({"status"}, &output) == 69);
-    CHECK_THAT(output, Catch::Contains("died or is hanging"));
+    CHECK_THAT(output, Catch::Contains("died or hangs"));
     stack.start_service();
     read_until(stream, [](const auto& item) { return item.found == test::Found::restarted; });
     const auto frame = read_until(stream, is_item);
@@ -435,7 +435,7 @@ TEST_CASE("end to end: without a board the service says so and waits, it also st
     CHECK_THAT(status["board"]["hint"].template get<std::string>(),
                Catch::Contains("is the board's process"));
     CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(),
-               Catch::Contains("no such camera"));
+               Catch::Contains("no camera answers to this name"));
     CHECK(stack.service().terminate() == 0);
 }
 

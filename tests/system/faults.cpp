@@ -61,7 +61,7 @@ const std::vector<Case> cases{
      "kind = 'drop_frame'\ncount = 80"},
     {"frames are cut", "cam0", "camera_misconfigured", "announced were", true,
      "kind = 'half_frame'\ncount = 4"},
-    {"records come late", "cam0", "late_records", "ms after their exposure", true,
+    {"records come late", "cam0", "late_records", "ms after the exposure", true,
      "kind = 'late_records'\nseconds = 4"},
     {"the exposure is longer than the period", "cam0", "exposure_too_long", "60000 us", false, "",
      "exposure_us = 60000"},
@@ -71,14 +71,14 @@ const std::vector<Case> cases{
      "shortest_period_us = 80000", "trigger = 'free'"},
     {"every frame of a free camera is incomplete", "cam0", "packet_size", "packet_size = 1500",
      true, "kind = 'block_large'\ncount = 80", "", "trigger = 'free'"},
-    {"the camera is absent", "cam0", "camera_absent", "no such camera", false, "", "", "", "",
-     "127.0.99.99"},
-    {"the camera is in another network", "cam0", "camera_unreachable", "not in any network", false,
+    {"the camera is absent", "cam0", "camera_absent", "no camera answers to this name", false, "",
+     "", "", "", "127.0.99.99"},
+    {"the camera is in another network", "cam0", "camera_unreachable", "in the subnet of", false,
      "", "", "", "", "203.0.113.9"},
     {"another program has the camera", "cam0", "camera_busy", "another program", false, "", "", "",
      "", nullptr, Scene::stranger},
-    {"the service was killed and holds its own camera", "cam0", "camera_lease", "still held", true,
-     "", "", "", "", nullptr, Scene::restarted, starting},
+    {"the service was killed and holds its own camera", "cam0", "camera_lease", "still locked",
+     true, "", "", "", "", nullptr, Scene::restarted, starting},
     {"the camera lacks a feature", "cam0", "camera_misconfigured", "PixelFormat", false, "", "",
      "[camera.features]\nPixelFormat = 'Mono12'"},
     {"the camera is mute", "cam0", "camera_absent", "cable, power", true,
@@ -102,7 +102,7 @@ const std::vector<Case> cases{
      true, "kind = 'board_gone'\nseconds = 4"},
     {"the board is gone, says the IMU", "imu0", "board_gone", "no samples", true,
      "kind = 'board_gone'\nseconds = 4"},
-    {"the board falls silent", "board", "board_silent", "came from it for", true,
+    {"the board falls silent", "board", "board_silent", "silent for", true,
      "kind = 'board_mute'\nseconds = 4"},
     {"the board falls silent, says the clock", "clock", "board_silent", "board's hint", true,
      "kind = 'board_mute'\nseconds = 5"},
@@ -112,7 +112,7 @@ const std::vector<Case> cases{
      "kind = 'imu_missing'\nseconds = 5"},
     {"another IMU is plugged in", "imu0", "imu_wrong", "another part", false, "", "", "",
      "model = 'adis16460'"},
-    {"the IMU is silent", "imu0", "imu_silent", "says nothing", true,
+    {"the IMU is silent", "imu0", "imu_silent", "sends nothing", true,
      "kind = 'imu_stuck'\nseconds = 5"},
     {"the IMU's cable is noisy", "imu0", "imu_faulty", "failed their check", true,
      "kind = 'imu_noisy'\nseconds = 5"},
@@ -197,7 +197,7 @@ std::string run(const Case& c, unsigned number) {
                (*device)["since_ns"].get<std::int64_t>() <= status["host_time_ns"];
     };
     if (const std::string wrong = wait_until(stack, as_expected, seconds(30)); !wrong.empty())
-        return "not told: " + wrong;
+        return "not reported: " + wrong;
     if (!c.ends) return "";
     const std::string wrong = wait_until(stack, well, seconds(30));
     return wrong.empty() ? "" : "never well again: " + wrong;
@@ -268,7 +268,8 @@ TEST_CASE("faults: who reads the stream of an absent camera is told that it is a
     stack.wait_for_status([](const json& s) { return s["cameras"][0]["state"] == "absent"; });
     std::string output;
     CHECK(stack.tool({"tail", "cam0"}, &output) == 69);
-    CHECK_THAT(output, Catch::Contains("absent") && Catch::Contains("no such camera"));
+    CHECK_THAT(output,
+               Catch::Contains("absent") && Catch::Contains("no camera answers to this name"));
     CHECK(stack.tool({"snapshot", "cam0", "-o", stack.log_path("x.png")}, &output) == 69);
     CHECK_THAT(output, Catch::Contains("absent"));
     CHECK(stack.tool({"tail", "cam7"}, &output) == 69);

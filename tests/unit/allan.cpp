@@ -178,7 +178,7 @@ TEST_CASE("allan: motion is told with its time", "[allan]") {
     for (std::size_t i = 0; i < 100; ++i) imu.gyro[1][8250 + i] += i % 40 < 20 ? 0.1F : -0.1F;
     const auto result = evaluate_allan(imu);
     REQUIRE_FALSE(result);
-    CHECK_THAT(result.error().message(), Contains("moved 41 s after the begin"));
+    CHECK_THAT(result.error().message(), Contains("moved 41 s after the start"));
 }
 
 TEST_CASE("allan: a few samples are refused", "[allan]") {

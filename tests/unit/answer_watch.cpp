@@ -54,7 +54,7 @@ TEST_CASE("answer_watch: which triggers the camera takes, by its exposure line")
         CHECK(bench.watch.report().every == every);
         CHECK(bench.watch.report().shortest == milliseconds(50) * every);
         CHECK(bench.watch.report().ignored == 9 * (every - 1));
-        bench.watch.begin_anew();
+        bench.watch.restart();
         CHECK(bench.watch.report().every == 1);
         CHECK(bench.watch.report().shortest.ns == 0);
         CHECK(bench.watch.report().ignored == 9 * (every - 1));
@@ -128,6 +128,6 @@ TEST_CASE("answer_watch: an exposure line that rises before its trigger leads") 
     CHECK(bench.watch.report().lead.ns == 0);
     for (int i = 0; i < 9; ++i) bench.leading_trigger(milliseconds(4));
     CHECK(bench.watch.report().lead == milliseconds(4));
-    bench.watch.begin_anew();
+    bench.watch.restart();
     CHECK(bench.watch.report().lead.ns == 0);
 }

@@ -245,7 +245,8 @@ TEST_CASE("board: health counts what both IMUs did, and what the cameras skipped
     bench.configure();
     bench.run(20 * second);
     const std::uint32_t uart = bench.health().imu_restarts;
-    for (const auto& event : bench.events(wire::EventKind::imu_silent)) CHECK(event.source == 1);
+    for (const auto& event : bench.events(wire::BoardEventKind::imu_silent))
+        CHECK(event.source == 1);
     CHECK(uart > 0);
     CHECK(uart < 100);
     bench.configuration.imus[1] = {};

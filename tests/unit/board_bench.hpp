@@ -217,7 +217,7 @@ struct Bench {
         });
         return out;
     }
-    std::vector<wire::Event> events(wire::EventKind kind) const {
+    std::vector<wire::Event> events(wire::BoardEventKind kind) const {
         std::vector<wire::Event> out = all<wire::Event>();
         out.erase(std::remove_if(out.begin(), out.end(),
                                  [kind](const wire::Event& event) { return event.kind != kind; }),

@@ -340,7 +340,7 @@ class Simulation {
     /// Each pulse has its number. Events that are too many for the link are left out.
     void judge_events(Findings& findings) const {
         for (const wire::Event& event : events_) {
-            if (event.kind != wire::EventKind::aux_pulse) continue;
+            if (event.kind != wire::BoardEventKind::aux_pulse) continue;
             const auto number = static_cast<std::size_t>(event.value);
             const bool right =
                 lossy_ ? std::any_of(aux_.begin(), aux_.end(),

@@ -13,7 +13,7 @@ TEST_CASE("board_event: each kind of the wire has one of its own in the ring") {
     constexpr int kinds_on_the_wire = 17;
     for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {
         wire::Event event{};
-        event.kind = static_cast<wire::EventKind>(kind);
+        event.kind = static_cast<wire::BoardEventKind>(kind);
         event.source = 2;
         event.value = 77;
         event.time_ns = 5;
@@ -32,7 +32,7 @@ TEST_CASE("board_event: each kind of the wire has one of its own in the ring") {
 TEST_CASE("board_event: what only a newer board knows is nothing") {
     for (const int kind : {0, 18, 255}) {
         wire::Event event{};
-        event.kind = static_cast<wire::EventKind>(kind);
+        event.kind = static_cast<wire::BoardEventKind>(kind);
         CHECK_FALSE(journal_entry(event));
     }
 }
@@ -40,7 +40,7 @@ TEST_CASE("board_event: what only a newer board knows is nothing") {
 TEST_CASE("board_event: a skipped trigger says why, and whose it is") {
     const auto reason = [](wire::SkipReason of) {
         wire::Event event{};
-        event.kind = wire::EventKind::trigger_skipped;
+        event.kind = wire::BoardEventKind::trigger_skipped;
         event.detail = static_cast<std::uint16_t>(of);
         return journal_entry(event)->reason;
     };
@@ -48,14 +48,14 @@ TEST_CASE("board_event: a skipped trigger says why, and whose it is") {
     CHECK(reason(wire::SkipReason::late) == EventReason::too_late);
     CHECK(reason(wire::SkipReason::full) == EventReason::queue_full);
     CHECK(reason(static_cast<wire::SkipReason>(99)) == EventReason::none);
-    CHECK(source_of(wire::EventKind::trigger_skipped) == EventSource::camera);
-    CHECK(source_of(wire::EventKind::imu_silent) == EventSource::imu);
-    CHECK(source_of(wire::EventKind::pps) == EventSource::board);
+    CHECK(source_of(wire::BoardEventKind::trigger_skipped) == EventSource::camera);
+    CHECK(source_of(wire::BoardEventKind::imu_silent) == EventSource::imu);
+    CHECK(source_of(wire::BoardEventKind::pps) == EventSource::board);
 }
 
 TEST_CASE("board_event: a run of skipped triggers counts as that many") {
     wire::Event event{};
-    event.kind = wire::EventKind::triggers_skipped;
+    event.kind = wire::BoardEventKind::triggers_skipped;
     event.source = 2;
     event.detail = 65535;
     event.value = 1000;
@@ -66,35 +66,35 @@ TEST_CASE("board_event: a run of skipped triggers counts as that many") {
     CHECK(entry->count == 65535);
     CHECK(entry->value == 1000);
     CHECK(source_of(event.kind) == EventSource::camera);
-    event.kind = wire::EventKind::trigger_skipped;
+    event.kind = wire::BoardEventKind::trigger_skipped;
     event.detail = static_cast<std::uint16_t>(wire::SkipReason::full);
     CHECK(skipped_triggers(event) == 1);
     CHECK(journal_entry(event)->count == 0);
-    event.kind = wire::EventKind::imu_failed;
+    event.kind = wire::BoardEventKind::imu_failed;
     CHECK(skipped_triggers(event) == 0);
 }
 
 TEST_CASE("board_event: sync and storage are told in the log, with what to do") {
     wire::Event event{};
-    event.kind = wire::EventKind::sync_lost;
+    event.kind = wire::BoardEventKind::sync_lost;
     event.value = -1'234'567;
     auto told = remark(event);
     REQUIRE(told);
     CHECK(told->level == LogLevel::warning);
     CHECK_THAT(told->text, Catch::Contains("-1234.567 us off the grid") &&
                                Catch::Contains("check its cable, and that 'sync_rate_hz'"));
-    event.kind = wire::EventKind::sync_taken;
+    event.kind = wire::BoardEventKind::sync_taken;
     told = remark(event);
     REQUIRE(told);
     CHECK(told->level == LogLevel::info);
     CHECK_THAT(told->text, Catch::Contains("moves by -1234.567 us"));
-    event.kind = wire::EventKind::stored;
+    event.kind = wire::BoardEventKind::stored;
     event.value = 1;
     CHECK(remark(event)->level == LogLevel::info);
     event.value = 0;
     CHECK(remark(event)->level == LogLevel::warning);
     CHECK_THAT(remark(event)->text, Catch::Contains("could not keep its configuration") &&
                                         Catch::Contains("restart the service to try again"));
-    event.kind = wire::EventKind::pps;
+    event.kind = wire::BoardEventKind::pps;
     CHECK_FALSE(remark(event));
 }

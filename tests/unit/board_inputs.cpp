@@ -76,18 +76,18 @@ TEST_CASE("board_inputs: each pulse is an event, with the number of its input") 
         bench.poll(at + ms);
     }
     struct Told {
-        wire::EventKind kind;
+        wire::BoardEventKind kind;
         std::uint8_t source;
         std::int64_t number;
         Nanoseconds at;
     };
-    const Told expected[] = {{wire::EventKind::pps, 0, 1, 2 * ms},
-                             {wire::EventKind::aux_pulse, 0, 1, 5 * ms},
-                             {wire::EventKind::aux_pulse, 1, 1, 8 * ms + 100 * us},
-                             {wire::EventKind::sync_pulse, 0, 1, 11 * ms},
-                             {wire::EventKind::pps, 0, 2, 14 * ms},
-                             {wire::EventKind::aux_pulse, 1, 2, 17 * ms + 100 * us},
-                             {wire::EventKind::aux_pulse, 1, 3, 20 * ms + 100 * us}};
+    const Told expected[] = {{wire::BoardEventKind::pps, 0, 1, 2 * ms},
+                             {wire::BoardEventKind::aux_pulse, 0, 1, 5 * ms},
+                             {wire::BoardEventKind::aux_pulse, 1, 1, 8 * ms + 100 * us},
+                             {wire::BoardEventKind::sync_pulse, 0, 1, 11 * ms},
+                             {wire::BoardEventKind::pps, 0, 2, 14 * ms},
+                             {wire::BoardEventKind::aux_pulse, 1, 2, 17 * ms + 100 * us},
+                             {wire::BoardEventKind::aux_pulse, 1, 3, 20 * ms + 100 * us}};
     const auto events = bench.all<wire::Event>();
     REQUIRE(events.size() == std::size(expected));
     for (std::size_t i = 0; i < events.size(); ++i) {
@@ -182,7 +182,7 @@ TEST_CASE("board_inputs: where edges were lost, no start is paired with an end")
         if (ended) world.poll(world.began + 4 * ms + 50 * us);
         world.port.lost = 3;
         world.poll(world.began + 5 * ms);
-        const auto events = world.events(wire::EventKind::edge_overflow);
+        const auto events = world.events(wire::BoardEventKind::edge_overflow);
         REQUIRE(events.size() == 1);
         CHECK(events[0].source == 0);
         CHECK(events[0].value == 3);
@@ -354,7 +354,7 @@ TEST_CASE("board_inputs: a noisy input is told, and spoils the exposures only of
         for (int i = 0; i < 165; ++i)
             world.edge(input, world.began + 20 * us + i * 2 * us, i % 2 != 0);
         world.run(world.began + 3 * ms);
-        const auto events = world.events(wire::EventKind::input_noisy);
+        const auto events = world.events(wire::BoardEventKind::input_noisy);
         REQUIRE(events.size() == 1);
         CHECK(events[0].source == input);
         CHECK(events[0].value == 0);
@@ -459,14 +459,14 @@ TEST_CASE("board_inputs: sync pulses that no longer fit the grid are told, and t
         bench.edge(sync_in, at);
         bench.run(at + ms);
     }
-    CHECK(bench.events(wire::EventKind::sync_lost).empty());
+    CHECK(bench.events(wire::BoardEventKind::sync_lost).empty());
     at += 10 * ms;
     for (int i = 0; i < 3; ++i, at += second) {
         bench.edge(sync_in, at);
         bench.run(at + ms);
     }
-    const auto lost = bench.events(wire::EventKind::sync_lost);
-    const auto taken = bench.events(wire::EventKind::sync_taken);
+    const auto lost = bench.events(wire::BoardEventKind::sync_lost);
+    const auto taken = bench.events(wire::BoardEventKind::sync_taken);
     REQUIRE(lost.size() == 1);
     REQUIRE(taken.size() == 1);
     CHECK(lost[0].source == 0);
@@ -495,7 +495,7 @@ TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse be
         bench.edge(pps, pulse);
         bench.edge(pps, pulse + 4 * bench.port.uart.byte);
         bench.poll(200 * ms);
-        const auto labels = bench.events(wire::EventKind::utc_label);
+        const auto labels = bench.events(wire::BoardEventKind::utc_label);
         REQUIRE(labels.size() == 1);
         CHECK(labels[0].source == 0);
         CHECK(labels[0].time_ns == pulse);
@@ -527,7 +527,7 @@ TEST_CASE(
             bench.edge(pps, begins + late);
             bench.poll(500 * ms);
             bench.poll();
-            const auto labels = bench.events(wire::EventKind::utc_label);
+            const auto labels = bench.events(wire::BoardEventKind::utc_label);
             REQUIRE(labels.size() == 1);
             CHECK(labels[0].time_ns == (late == 0 ? begins : 100 * ms));
         }

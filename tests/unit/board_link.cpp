@@ -198,7 +198,7 @@ class Listener final : public BoardListener {
         count(&Counts::samples);
         return true;
     }
-    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 
     Counts counts() {

@@ -22,7 +22,7 @@ TEST_CASE("board: a light that ends as soon as the port can is not late") {
     REQUIRE(world.begin());
     world.run(second);
     REQUIRE(world.lights().size() >= 19);
-    CHECK(world.inbox().events_of(wire::EventKind::output_late).empty());
+    CHECK(world.inbox().events_of(wire::BoardEventKind::output_late).empty());
 }
 
 TEST_CASE("board: samples are served at the second port where the configuration says so") {
@@ -56,7 +56,7 @@ TEST_CASE("board: light that went out late counts for as long as it was on") {
             bench.poll(trigger + 3'400 * us);
             bench.run(trigger + 49 * ms + 900 * us);
         }
-        return bench.events(wire::EventKind::illumination_limited).size();
+        return bench.events(wire::BoardEventKind::illumination_limited).size();
     };
     CHECK(limited(0) == 0);
     CHECK(limited(800 * us) > 10);

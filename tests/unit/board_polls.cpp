@@ -100,7 +100,7 @@ TEST_CASE("board: an output that is late is told, counted, and moves the record 
         bench.port.late = 100 * us;  // the pulse begins when it should end
         bench.send(wire::Start{8, 0, {}});
         bench.run(60 * ms);
-        const auto late = bench.events(wire::EventKind::output_late);
+        const auto late = bench.events(wire::BoardEventKind::output_late);
         REQUIRE(late.size() == 2);  // both edges
         CHECK(late[0].source == 3);
         CHECK(late[0].time_ns == 48 * ms);
@@ -113,7 +113,7 @@ TEST_CASE("board: an output that is late is told, counted, and moves the record 
         CHECK(records[0].trigger_ns == 48'100 * us);
         CHECK((records[0].flags & wire::exposure_late) != 0);
         const std::uint32_t counted = bench.health().late_outputs;
-        CHECK(counted == bench.events(wire::EventKind::output_late).size());
+        CHECK(counted == bench.events(wire::BoardEventKind::output_late).size());
     }
 }
 
@@ -131,7 +131,7 @@ TEST_CASE("board: an output that leaves later by rounding is not late, and its r
     REQUIRE(records.size() == 1);
     CHECK(records[0].trigger_ns == 48 * ms + 1);
     CHECK((records[0].flags & wire::exposure_late) == 0);
-    CHECK(bench.events(wire::EventKind::output_late).empty());
+    CHECK(bench.events(wire::BoardEventKind::output_late).empty());
     CHECK(bench.health().late_outputs == 0);
 }
 
@@ -211,7 +211,7 @@ TEST_CASE("board: stray edges are all counted, and told ten times a second") {
         bench.poll(at + ms);
     }
     std::vector<Nanoseconds> told;
-    const auto events = bench.events(wire::EventKind::stray_edge);
+    const auto events = bench.events(wire::BoardEventKind::stray_edge);
     for (const wire::Event& event : events) told.push_back(event.time_ns);
     CHECK(told == std::vector<Nanoseconds>{10 * ms, 110 * ms, 210 * ms});
     for (std::size_t i = 0; i < events.size(); ++i) CHECK(events[i].sequence == i);

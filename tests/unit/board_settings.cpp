@@ -52,16 +52,16 @@ TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
         for (std::size_t i = 1; i + 1 < line.size(); ++i)
             sum ^= static_cast<unsigned char>(line[i]);
         line += {"0123456789ABCDEF"[sum >> 4U], "0123456789ABCDEF"[sum & 15U], '\r', '\n'};
-        const std::size_t before = world.inbox().events_of(wire::EventKind::pps).size();
-        while (world.inbox().events_of(wire::EventKind::pps).size() == before) world.run(ms);
-        pulses.push_back(world.inbox().events_of(wire::EventKind::pps).back().time_ns);
+        const std::size_t before = world.inbox().events_of(wire::BoardEventKind::pps).size();
+        while (world.inbox().events_of(wire::BoardEventKind::pps).size() == before) world.run(ms);
+        pulses.push_back(world.inbox().events_of(wire::BoardEventKind::pps).back().time_ns);
         // It begins 200 ms after the pulse, and is told of as a whole.
         const auto lasts = static_cast<Nanoseconds>(line.size()) * 10 * second / 9600;
         const std::vector<std::uint8_t> bytes(line.begin(), line.end());
         world.board().uart_receive(bytes, pulses.back() + 200 * ms + lasts);
         world.run(500 * ms);
     }
-    const auto labels = world.inbox().events_of(wire::EventKind::utc_label);
+    const auto labels = world.inbox().events_of(wire::BoardEventKind::utc_label);
     REQUIRE(labels.size() == 2);
     for (std::size_t i = 0; i < 2; ++i) {
         CHECK(labels[i].time_ns == pulses[i]);
@@ -289,13 +289,13 @@ TEST_CASE("board: a configuration that is to be kept is stored, and told when it
         bench.configure();
         CHECK(bench.port.stored == bytes_of(bench.configuration));
         bench.run(bench.port.time + 300 * ms);
-        const std::size_t before = bench.events(wire::EventKind::stored).size();
+        const std::size_t before = bench.events(wire::BoardEventKind::stored).size();
         CHECK(before == (safe ? 0 : 1));
         bench.port.outcome = safe ? Persist::Outcome::stored : Persist::Outcome::failed;
         const Nanoseconds at = bench.port.time + ms;
         bench.poll(at);
         bench.run(at + second);
-        const auto events = bench.events(wire::EventKind::stored);
+        const auto events = bench.events(wire::BoardEventKind::stored);
         REQUIRE(events.size() == before + 1);
         CHECK(events.back().source == 0);
         CHECK(events.back().value == (safe ? 1 : 0));

@@ -258,7 +258,7 @@ TEST_CASE("camera_channel: a trigger waits for the end of the exposure, and the 
         CHECK(bench.channel.skipped() == (fits ? 0 : 1));
         if (fits) continue;
         CHECK(bench.reports.events ==
-              std::vector<Event>{{wire::EventKind::trigger_skipped, 2, 76 * ms, 2, 0}});
+              std::vector<Event>{{wire::BoardEventKind::trigger_skipped, 2, 76 * ms, 2, 0}});
         bench.run(130 * ms);
         CHECK(bench.reports.planned.size() == 2);
         CHECK(bench.reports.planned[1].first == 126 * ms);
@@ -290,7 +290,7 @@ TEST_CASE("camera_channel: no trigger is sent that nobody can keep") {
     CHECK(bench.reports.planned.size() == 4);
     REQUIRE_FALSE(bench.reports.events.empty());
     CHECK(bench.reports.events[0] ==
-          Event{wire::EventKind::trigger_skipped, 2, 19 * ms - 50 * us, 19, 2});
+          Event{wire::BoardEventKind::trigger_skipped, 2, 19 * ms - 50 * us, 19, 2});
 }
 
 TEST_CASE("camera_channel: a trigger that the outputs have no room for is skipped") {
@@ -303,7 +303,7 @@ TEST_CASE("camera_channel: a trigger that the outputs have no room for is skippe
         CHECK(bench.channel.skipped() == (edges == 22 ? 0 : 1));
         if (edges == 23)
             CHECK(bench.reports.events ==
-                  std::vector<Event>{{wire::EventKind::trigger_skipped, 2, 48 * ms, 1, 2}});
+                  std::vector<Event>{{wire::BoardEventKind::trigger_skipped, 2, 48 * ms, 1, 2}});
     }
 }
 
@@ -332,7 +332,7 @@ TEST_CASE("camera_channel: a late trigger is sent within a sixteenth of the peri
                       (wire::exposure_measured | wire::exposure_late));
             } else {
                 REQUIRE_FALSE(bench.reports.events.empty());
-                CHECK(bench.reports.events[0].kind == wire::EventKind::trigger_skipped);
+                CHECK(bench.reports.events[0].kind == wire::BoardEventKind::trigger_skipped);
                 CHECK(bench.reports.events[0].at == trigger);
                 CHECK(std::abs(bench.reports.events[0].value - tick) <= 1);
                 CHECK(bench.reports.events[0].detail == 1);
@@ -343,7 +343,7 @@ TEST_CASE("camera_channel: a late trigger is sent within a sixteenth of the peri
 
 TEST_CASE("camera_channel: triggers in a row that were too late are told together") {
     using Events = std::vector<Event>;
-    const auto kind = wire::EventKind::triggers_skipped;
+    const auto kind = wire::BoardEventKind::triggers_skipped;
     struct Case {
         Nanoseconds late;  ///< beyond what is still sent
         Events events;
@@ -352,13 +352,13 @@ TEST_CASE("camera_channel: triggers in a row that were too late are told togethe
     const Nanoseconds trigger = 48 * ms;
     const Nanoseconds period = 50 * ms;
     for (const Case& made :
-         {Case{period - 1, {{wire::EventKind::trigger_skipped, 2, trigger, 1, 1}}, 1},
+         {Case{period - 1, {{wire::BoardEventKind::trigger_skipped, 2, trigger, 1, 1}}, 1},
           Case{period + 1, {{kind, 2, trigger, 1, 2}}, 2},
           Case{2 * period - 1, {{kind, 2, trigger, 1, 2}}, 2},
           Case{65'534 * period + 1, {{kind, 2, trigger, 1, 65'535}}, 65'535},
           Case{65'535 * period + 1,
                {{kind, 2, trigger, 1, 65'535},
-                {wire::EventKind::trigger_skipped, 2, trigger + 65'535 * period, 65'536, 1}},
+                {wire::BoardEventKind::trigger_skipped, 2, trigger + 65'535 * period, 65'536, 1}},
                65'536},
           Case{69'999 * period + 1,
                {{kind, 2, trigger, 1, 65'535}, {kind, 2, trigger + 65'535 * period, 65'536, 4'465}},
@@ -396,8 +396,8 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
                 REQUIRE(bench.reports.events.size() == (skipped > 0 ? 1 : 0));
                 if (skipped == 0) continue;
                 const Event& told = bench.reports.events[0];
-                REQUIRE(told.kind == (single ? wire::EventKind::trigger_skipped
-                                             : wire::EventKind::triggers_skipped));
+                REQUIRE(told.kind == (single ? wire::BoardEventKind::trigger_skipped
+                                             : wire::BoardEventKind::triggers_skipped));
                 REQUIRE(told.value == since + 1);
                 REQUIRE(told.detail == static_cast<int>(single ? 1 : skipped));
             }
@@ -483,7 +483,7 @@ TEST_CASE("camera_channel: an exposure from before an announcement does not over
     bench.channel.exposure_edge(90 * ms, false);
     CHECK(bench.next_trigger() == 147 * ms);
     CHECK(bench.reports.events ==
-          std::vector<Event>{{wire::EventKind::stray_edge, 2, 90 * ms, 0, 0}});
+          std::vector<Event>{{wire::BoardEventKind::stray_edge, 2, 90 * ms, 0, 0}});
 }
 
 TEST_CASE("camera_channel: before any trigger, an edge says nothing about exposures") {

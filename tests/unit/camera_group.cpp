@@ -21,7 +21,7 @@ class NoBoard final : public BoardListener {
     bool imu_sample(const wire::ImuSample& /*sample*/, HostTime /*received*/) override {
         return true;
     }
-    void exchange_doubted(const Doubt& /*doubt*/) override {}
+    void exchange_doubted(const Implausibility& /*doubt*/) override {}
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 };
 

@@ -103,7 +103,7 @@ TEST_CASE("clock_evaluation: exchanges that ended before they began tell nothing
     }
     const auto found = evaluate_clock(wrong);
     REQUIRE_FALSE(found);
-    CHECK_THAT(found.error().message(), Contains("none took any time"));
+    CHECK_THAT(found.error().message(), Contains("none has a positive round trip"));
 }
 
 TEST_CASE("clock_evaluation: nothing to judge is told") {
@@ -116,7 +116,7 @@ TEST_CASE("clock_evaluation: nothing to judge is told") {
     const auto found = evaluate_clock(twice);
     REQUIRE(found);
     CHECK(found->exchanges == 600);
-    CHECK_THAT(found->notes.front(), Contains("longest of 2 lives"));
+    CHECK_THAT(found->notes.front(), Contains("longest of 2 runs"));
 }
 
 TEST_CASE("clock_evaluation: the output clock between its readings, and not across epochs") {

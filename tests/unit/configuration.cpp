@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "settings/configuration.hpp"
-#include "settings/board_configuration.hpp"
+
+#include "settings/keys.hpp"
+
+#include <fmt/format.h>
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -9,6 +12,7 @@
 #include <sstream>
 
 #include "../support/temporary_directory.hpp"
+#include "settings/board_configuration.hpp"
 
 using namespace versavis;
 using namespace versavis::daemon;
@@ -52,6 +56,44 @@ TEST_CASE("configuration: a file without cameras and IMUs serves nothing, and sa
         CHECK_THAT(errors_of(text), Catch::Contains("nothing to serve; write a table [[camera]]"));
         CHECK_THAT(errors_of(text), Catch::Contains("versavis.toml:1:1: "));
     }
+}
+
+TEST_CASE("configuration: the manual has each key, with its default, range and meaning") {
+    const std::string text = manual();
+    std::size_t at = 0;
+    std::string table;
+    for (const auto& key : daemon::describe_keys()) {
+        if (key.table != table) at = text.find('`' + (table = key.table) + '`', at);
+        const std::string row = fmt::format(
+            "\n| `{}` |{} | {} | {} |\n", key.key,
+            key.default_value.empty() ? "" : ' ' + key.default_value, key.range, key.meaning);
+        INFO(table << row);
+        at = text.find(row, at);
+        REQUIRE(at != std::string::npos);
+    }
+    const auto rows = [&](const std::string& start) {
+        std::size_t count = 0;
+        for (auto next = text.find(start); next != std::string::npos; next = text.find(start, next))
+            ++count, next += start.size();
+        return count;
+    };
+    CHECK(rows("\n| `") == daemon::describe_keys().size());
+}
+
+TEST_CASE("configuration: each field that the board may refuse is of one key") {
+    using Field = wire::ConfigurationField;
+    for (auto field = Field::rate; field <= Field::test_output;
+         field = static_cast<Field>(static_cast<int>(field) + 1)) {
+        INFO(static_cast<int>(field));
+        CHECK(daemon::find_key(field).has_value() == (field != Field::port_options));
+    }
+    CHECK(daemon::find_key(Field::imu_rate)->key == "rate_hz");
+    CHECK(daemon::find_key(Field::imu_rate)->board_units == 1e3);
+    CHECK(daemon::find_key(Field::glitch)->board_units == 10);
+}
+
+TEST_CASE("configuration: an optional key is known when it is mistyped") {
+    CHECK_THAT(errors_of(camera + "chunk = true\n"), Catch::Contains("did you mean 'chunks'?"));
 }
 
 TEST_CASE("configuration: defaults") {

@@ -80,7 +80,7 @@ double overshoot_of(const Draw& draw) {
         DelayEdge edge(Direction::to_host);
         edge.begin(1e5);
         for (std::int64_t slot = 0; slot < 300; ++slot)
-            edge.remember({{slot}, {std::llround(draw(random))}}, [](const Passage& p) {
+            edge.remember({{slot}, {std::llround(draw(random))}}, [](const OffsetSample& p) {
                 return static_cast<double>(p.host_minus_board.ns);
             });
         sum += edge.overshoot_ns() / seeds;
@@ -125,8 +125,9 @@ TEST_CASE("delay_edge: the overshoot is limited, and unknown until there are eno
     std::mt19937_64 random(1);
     const auto remember = [&] {
         const double delay = std::normal_distribution<>(80e3, 10e3)(random);
-        edge.remember({{0}, {std::llround(delay)}},
-                      [](const Passage& p) { return static_cast<double>(p.host_minus_board.ns); });
+        edge.remember({{0}, {std::llround(delay)}}, [](const OffsetSample& p) {
+            return static_cast<double>(p.host_minus_board.ns);
+        });
     };
     for (std::size_t slot = 1; slot < remembered_slots; ++slot) remember();
     CHECK(edge.overshoot_ns() == 0);

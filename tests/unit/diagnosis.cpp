@@ -33,7 +33,7 @@ struct Bench {
             camera.camera.packet_size = 9000;
             camera.pipeline.pairing = pairing::State::locked;
             camera.pipeline.last_sign = camera.pipeline.last_record = now;
-            camera.pipeline.told_exposure = camera.pipeline.exposure = milliseconds(3);
+            camera.pipeline.commanded_exposure = camera.pipeline.exposure = milliseconds(3);
             camera.recent.received = camera.recent.published = camera.recent.triggers = 20;
             camera.delivery = {true, true, false, now - seconds(59), 20};
         }
@@ -143,8 +143,8 @@ TEST_CASE("diagnosis: a camera that cannot be had says why, in its own words") {
 TEST_CASE("diagnosis: a camera that something still holds is no stranger's") {
     Bench bench;
     bench.cam().camera.state = CameraState::opening;
-    bench.cam().camera.hint = "it is still held";
-    check(bench.camera(), Fault::camera_lease, "still held");
+    bench.cam().camera.hint = "it is still locked";
+    check(bench.camera(), Fault::camera_lease, "still locked");
 }
 
 TEST_CASE("diagnosis: without the board, triggered cameras, IMUs and the clock name the board") {
@@ -168,7 +168,7 @@ TEST_CASE("diagnosis: a board that does not answer, or refuses, is the cause as 
     check(bench.board(), Fault::board_silent, "1.2 s");
     check(bench.camera(), Fault::board_silent, "does not answer");
     bench.status.board.state = BoardState::handshake;
-    check(bench.board(), Fault::board_silent, "nothing came from it");
+    check(bench.board(), Fault::board_silent, "silent for");
     bench.status.board.state = BoardState::refused;
     bench.status.board.hint = "output 3 is used twice";
     check(bench.board(), Fault::board_refuses, "used twice");
@@ -306,7 +306,7 @@ TEST_CASE("diagnosis: a slow start's pauses are no camera that does not expose")
     bench.cam().pipeline.last_record = now - milliseconds(860);
     check(bench.camera(), Fault::strobe_missing, "exposure line");
     bench.cam().pipeline.last_record = now;
-    check(bench.camera(), Fault::no_exposure, "not answered a trigger for 0.9 s");
+    check(bench.camera(), Fault::no_exposure, "no response to triggers for 0.9 s");
 }
 
 TEST_CASE("diagnosis: an exposure line that rises before its trigger") {
@@ -323,7 +323,7 @@ TEST_CASE("diagnosis: a board that is being set up is not silent") {
     bench.status.board.state = BoardState::handshake;
     CHECK(bench.board().fault == Fault::starting);
     bench.status.clock.since_contact = milliseconds(1200);
-    check(bench.board(), Fault::board_silent, "nothing came from it for 1.2 s");
+    check(bench.board(), Fault::board_silent, "silent for 1.2 s");
 }
 
 TEST_CASE("diagnosis: late records are told with how late they are") {
@@ -339,7 +339,7 @@ TEST_CASE("diagnosis: an exposure longer than the period, and a rate that the ca
     bench.cam().recent.received = bench.cam().recent.published = 10;
     bench.cam().recent.unmeasured = 10;
     check(bench.camera(), Fault::rate_too_high, "10.0 of 20 Hz");
-    bench.cam().pipeline.told_exposure = milliseconds(60);
+    bench.cam().pipeline.commanded_exposure = milliseconds(60);
     check(bench.camera(), Fault::exposure_too_long, "60000 us");
 }
 
@@ -379,11 +379,11 @@ TEST_CASE("diagnosis: block ids that do not count") {
     check(bench.camera(), Fault::block_ids, "20 frames arrived, all with block id 1");
     answers.ids_repeated = 0;
     answers.ids_restarted = 2;
-    check(bench.camera(), Fault::block_ids, "ids began again 2 times");
+    check(bench.camera(), Fault::block_ids, "ids restarted 2 times");
     bench.cam().camera.renumbers = true;
     bench.cam().camera.state = CameraState::opening;
     bench.cam().camera.hint = "it is being reopened";
-    check(bench.camera(), Fault::block_ids, "again and again, and it is reopened");
+    check(bench.camera(), Fault::block_ids, "keep restarting, and it is reopened");
     bench.cam().camera.state = CameraState::streaming;
     bench.cam().delivery.full = true;  // the fault has ended
     bench.cam().camera.hint.clear();
@@ -394,7 +394,7 @@ TEST_CASE("diagnosis: a clock in another unit is a remark when frames are paired
     Bench bench;
     bench.cam().pipeline.answers.clock_rate = 8;
     CHECK(bench.camera().health == Health::ok);
-    CHECK_THAT(bench.camera().hint, Contains("its clock runs 8 times as fast as it says"));
+    CHECK_THAT(bench.camera().hint, Contains("its clock runs at 8 times its stated rate"));
     bench.refuse(EventReason::unproved, 20);
     check(bench.camera(), Fault::camera_clock, "camera_clock = false");
 }
@@ -406,7 +406,7 @@ TEST_CASE("diagnosis: one that may be restarting is not blamed on its trigger ca
     bench.cam().recent.triggers = bench.cam().recent.unmeasured = 20;
     bench.cam().pipeline.measured = false;
     bench.cam().pipeline.last_sign = now - milliseconds(5900);
-    check(bench.camera(), Fault::no_exposure, "for 5.9 s, and may be restarting");
+    check(bench.camera(), Fault::no_exposure, "for 5.9 s; it may be restarting");
     bench.cam().pipeline.last_sign = now - milliseconds(6100);
     check(bench.camera(), Fault::no_exposure, "trigger cable is on output 0");
 }
@@ -437,9 +437,9 @@ TEST_CASE("diagnosis: cable of the trigger, cable of the strobe, network: which 
     Bench strobe;
     strobe.cam().recent.unmeasured = 20;
     check(strobe.camera(), Fault::strobe_missing, "measured");
-    strobe.cam().pipeline.told_exposure = nanoseconds(4'900);
+    strobe.cam().pipeline.commanded_exposure = nanoseconds(4'900);
     check(strobe.camera(), Fault::strobe_missing,
-          "exposures of 4.9 us for a disturbance of the line: lower 'glitch_us', which is 5 us");
+          "exposures of 4.9 us as glitches: lower 'glitch_us' (now 5 us)");
     Bench network;
     network.cam().delivery.full = false;
     network.cam().pipeline.last_sign = now - seconds(1);
@@ -475,13 +475,13 @@ TEST_CASE("diagnosis: of an IMU: nobody answers, another part does, it is silent
     ImuStatus& imu = bench.status.imus[0];
     imu.delivery.full = false;
     imu.report.working = false;
-    imu.report.failure = {wire::EventKind::imu_failed, 1, 0, 5, now};
+    imu.report.failure = {wire::BoardEventKind::imu_failed, 1, 0, 5, now};
     check(bench.imu(), Fault::imu_missing, "adis16448");
     imu.report.failure.answer = 120;
     check(bench.imu(), Fault::imu_wrong, "0x78");
     imu.report.failure.step = imu_step_running;
     check(bench.imu(), Fault::imu_failed, "set up again");
-    imu.report.failure.kind = wire::EventKind::imu_silent;
+    imu.report.failure.kind = wire::BoardEventKind::imu_silent;
     check(bench.imu(), Fault::imu_silent, "nothing");
     imu.report.failure = {};
     imu.recent.faulty = 100;

@@ -36,7 +36,7 @@ struct Sample {
     }
 };
 
-std::uint64_t left_out(const ExportReport& report, LeftOut reason) {
+std::uint64_t left_out(const ExportReport& report, SkipReason reason) {
     std::uint64_t count = 0;
     for (const auto& item : report.selection.left_out) count += item.reason == reason ? 1 : 0;
     return count;
@@ -48,10 +48,10 @@ TEST_CASE("export: suspect frames, incomplete sets and repeated samples are left
     Sample sample;
     const auto report = export_recording(sample.settings);
     REQUIRE(report);
-    CHECK(left_out(*report, LeftOut::suspect) == 1);
-    CHECK(left_out(*report, LeftOut::incomplete) > 1);
-    CHECK(left_out(*report, LeftOut::outside_imu) > 1);
-    CHECK(left_out(*report, LeftOut::repeated) == 17);
+    CHECK(left_out(*report, SkipReason::suspect) == 1);
+    CHECK(left_out(*report, SkipReason::incomplete) > 1);
+    CHECK(left_out(*report, SkipReason::outside_imu) > 1);
+    CHECK(left_out(*report, SkipReason::repeated) == 17);
     CHECK(sample.lines("left_out.csv") == 1 + report->selection.left_out.size());
     CHECK(sample.lines("mav0/times.txt") == report->selection.sets);
     CHECK(sample.lines("mav0/cam1/stamps.csv") == 1 + report->selection.sets);
@@ -67,8 +67,8 @@ TEST_CASE("export: what was asked for is in") {
     sample.settings.kind = GENERATE(ExportKind::euroc, ExportKind::bag);
     const auto report = export_recording(sample.settings);
     REQUIRE(report);
-    CHECK(left_out(*report, LeftOut::suspect) == 0);
-    CHECK(left_out(*report, LeftOut::incomplete) == 0);
+    CHECK(left_out(*report, SkipReason::suspect) == 0);
+    CHECK(left_out(*report, SkipReason::incomplete) == 0);
     CHECK(report->selection.samples.size() == 170);
 }
 

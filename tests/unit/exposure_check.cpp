@@ -67,7 +67,7 @@ TEST_CASE("exposure_check: a length is held to what is known of the line, whatev
     CHECK(bench.contradicts(microseconds(19200)));
     CHECK(bench.check.contradicted());
     CHECK(bench.check.measured() == microseconds(19200));
-    CHECK(bench.check.told() == milliseconds(19));
+    CHECK(bench.check.reported() == milliseconds(19));
     CHECK(bench.check.source() == ExposureSource::setting);
     for (int i = 0; i < 100; ++i) CHECK_FALSE(bench.contradicts(microseconds(19003)));
     CHECK(bench.contradicts(microseconds(19025)));
@@ -78,17 +78,17 @@ TEST_CASE("exposure_check: while a setting settles, both lengths pass, and sigma
     Bench bench;
     bench.check.set_camera_exposure(milliseconds(2), {});
     for (int i = 0; i < 40; ++i) bench.frame(milliseconds(2));
-    CHECK(bench.check.told_at(bench.now) == milliseconds(2));
+    CHECK(bench.check.reported_at(bench.now) == milliseconds(2));
     bench.check.set_camera_exposure(milliseconds(3), bench.now);
     const ExposureVerdict old = bench.frame(milliseconds(2));
     CHECK_FALSE(old.contradicted);
     CHECK(old.correction.sigma >= microseconds(250));
     CHECK_FALSE(bench.contradicts(milliseconds(3)));
     CHECK(bench.contradicts(microseconds(3100)));
-    CHECK(bench.check.told_at(bench.now).ns == 0);
+    CHECK(bench.check.reported_at(bench.now).ns == 0);
     // Half a second and five periods of 50 ms.
     bench.now = bench.now + milliseconds(750);
-    CHECK(bench.check.told_at(bench.now) == milliseconds(3));
+    CHECK(bench.check.reported_at(bench.now) == milliseconds(3));
     CHECK(bench.contradicts(milliseconds(2)));
     CHECK(bench.sigma(milliseconds(3)) < microseconds(10));
 }
@@ -122,7 +122,7 @@ TEST_CASE(
     CHECK(bench.unseen(milliseconds(3), {}).ns == 0);  // it may be of the frame before
     CHECK(bench.unseen(milliseconds(3), microseconds(3050)) == microseconds(3050));
     CHECK(bench.check.source() == ExposureSource::event);
-    CHECK(bench.check.told() == microseconds(3050));
+    CHECK(bench.check.reported() == microseconds(3050));
     CHECK(bench.unseen(milliseconds(3), microseconds(3070)).ns == 0);
     CHECK(bench.check.source() == ExposureSource::none);
     CHECK(bench.unseen(microseconds(40), microseconds(25)) == microseconds(25));
@@ -265,7 +265,7 @@ TEST_CASE("exposure_check: an exposure that somebody changes is read, and no slo
     }
     CHECK(withheld == 1);
     CHECK(bench.check.edges().correction.ns == 0);
-    CHECK(bench.check.told_at(bench.now) == microseconds(2500));
+    CHECK(bench.check.reported_at(bench.now) == microseconds(2500));
 }
 
 TEST_CASE(

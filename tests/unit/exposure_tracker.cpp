@@ -27,9 +27,9 @@ struct Reports final : ChannelReports {
     std::vector<wire::Exposure> exposures;
     std::vector<Stray> strays;
     void exposure(const wire::Exposure& record) override { exposures.push_back(record); }
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+    void event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
                std::uint16_t detail) override {
-        CHECK(kind == wire::EventKind::stray_edge);
+        CHECK(kind == wire::BoardEventKind::stray_edge);
         CHECK(source == 3);
         CHECK(detail == 0);
         strays.push_back({at, value});

@@ -5,7 +5,7 @@
 
 using namespace versavis;
 using client::FrameSetTable;
-using client::LeftOut;
+using client::SkipReason;
 
 namespace {
 
@@ -34,9 +34,9 @@ TEST_CASE("frame_set_table: sets are of one life, epoch and tick, named by the f
     CHECK(sets[0].name == OutputTime{100});
     CHECK(sets[1].name == OutputTime{400});
     CHECK(sets[1].frames == std::vector<std::size_t>{3, 3});
-    CHECK(table.frames(0)[1].left_out == LeftOut::incomplete);
-    CHECK(table.frames(1)[2].left_out == LeftOut::incomplete);
-    CHECK(table.frames(1)[3].left_out == LeftOut::no);
+    CHECK(table.frames(0)[1].left_out == SkipReason::incomplete);
+    CHECK(table.frames(1)[2].left_out == SkipReason::incomplete);
+    CHECK(table.frames(1)[3].left_out == SkipReason::no);
 }
 
 TEST_CASE("frame_set_table: all stamps of a set lie strictly between the IMU's samples") {
@@ -46,8 +46,8 @@ TEST_CASE("frame_set_table: all stamps of a set lie strictly between the IMU's s
         table.add(1, frame(time + 1, static_cast<std::uint64_t>(time)));
     }
     CHECK(table.pair({100}, {301}).size() == 1);
-    CHECK(table.frames(1)[0].left_out == LeftOut::outside_imu);
-    CHECK(table.frames(0)[2].left_out == LeftOut::outside_imu);
+    CHECK(table.frames(1)[0].left_out == SkipReason::outside_imu);
+    CHECK(table.frames(0)[2].left_out == SkipReason::outside_imu);
 }
 
 TEST_CASE("frame_set_table: names increase, whatever the clock did") {
@@ -57,8 +57,8 @@ TEST_CASE("frame_set_table: names increase, whatever the clock did") {
     table.add(0, frame(90, 3));
     table.add(0, frame(101, 4));
     CHECK(table.pair(first, last).size() == 2);
-    CHECK(table.frames(0)[1].left_out == LeftOut::not_later);
-    CHECK(table.frames(0)[2].left_out == LeftOut::not_later);
+    CHECK(table.frames(0)[1].left_out == SkipReason::not_later);
+    CHECK(table.frames(0)[2].left_out == SkipReason::not_later);
 }
 
 TEST_CASE("frame_set_table: one camera needs no ticks, two cameras do, and each tick counts once") {
@@ -75,7 +75,7 @@ TEST_CASE("frame_set_table: one camera needs no ticks, two cameras do, and each 
     two.add(1, frame(10, 3));
     two.add(1, frame(11, 3));
     CHECK(two.pair(first, last).size() == 1);
-    CHECK(two.frames(0)[0].left_out == LeftOut::incomplete);
-    CHECK(two.frames(0)[2].left_out == LeftOut::incomplete);
-    CHECK(two.frames(1)[2].left_out == LeftOut::incomplete);
+    CHECK(two.frames(0)[0].left_out == SkipReason::incomplete);
+    CHECK(two.frames(0)[2].left_out == SkipReason::incomplete);
+    CHECK(two.frames(1)[2].left_out == SkipReason::incomplete);
 }

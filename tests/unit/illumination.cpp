@@ -43,9 +43,9 @@ struct Limited {
 struct Reports final : ChannelReports {
     std::vector<Limited> all;
     void exposure(const wire::Exposure& /*record*/) override {}
-    void event(wire::EventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
+    void event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
                std::uint16_t /*detail*/) override {
-        CHECK(kind == wire::EventKind::illumination_limited);
+        CHECK(kind == wire::BoardEventKind::illumination_limited);
         all.push_back({source, at, value});
     }
     void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/,

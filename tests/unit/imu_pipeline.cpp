@@ -241,27 +241,27 @@ TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it h
     wire::Event event{};
     HostTime now{100'000'000'000};
     int told = 0;
-    const auto tell = [&](wire::EventKind kind, std::int64_t value) {
+    const auto tell = [&](wire::BoardEventKind kind, std::int64_t value) {
         event.kind = kind;
         event.value = value;
         now = now + seconds(1);
         if (pipeline.tell(event, now)) ++told;
     };
-    for (int i = 0; i < 3600; ++i) tell(wire::EventKind::imu_failed, 120);
+    for (int i = 0; i < 3600; ++i) tell(wire::BoardEventKind::imu_failed, 120);
     CHECK(told == 6);
     CHECK_FALSE(pipeline.report().working);
     CHECK(pipeline.report().failure.times == 3600);
-    tell(wire::EventKind::imu_failed, 0);
+    tell(wire::BoardEventKind::imu_failed, 0);
     CHECK(told == 7);
-    tell(wire::EventKind::imu_ready, 0);
+    tell(wire::BoardEventKind::imu_ready, 0);
     CHECK(told == 8);
     CHECK(pipeline.report().working);
     now = now + seconds(120);
-    tell(wire::EventKind::imu_failed, 0);
+    tell(wire::BoardEventKind::imu_failed, 0);
     CHECK(told == 9);
     for (int i = 0; i < 100; ++i) {  // it comes and goes
-        tell(wire::EventKind::imu_ready, 0);
-        tell(wire::EventKind::imu_failed, 0);
+        tell(wire::BoardEventKind::imu_ready, 0);
+        tell(wire::BoardEventKind::imu_failed, 0);
     }
     CHECK(told <= 11);
 }

@@ -128,7 +128,7 @@ TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too man
     CHECK(world.port.errors() == 58);
     CHECK(world.port.restarts() == 0);
     // Once it is told, they are counted anew.
-    world.port.report_failure(wire::EventKind::imu_failed, 5, 0);
+    world.port.report_failure(wire::BoardEventKind::imu_failed, 5, 0);
     CHECK(world.port.restarts() == 1);
     for (int i = 1; i < 20; ++i) CHECK(world.port.count_error());
     CHECK_FALSE(world.port.count_error());
@@ -145,14 +145,15 @@ TEST_CASE("imu_port: a part's own diagnosis is an error of each sample, and no f
 
 TEST_CASE("imu_port: events tell the port, and after a failure at least one sample is missing") {
     World world;
-    world.port.report_event(wire::EventKind::imu_ready, 7, 100);
-    CHECK(world.reports.events == std::vector<Event>{{wire::EventKind::imu_ready, 1, 7, 100, 0}});
+    world.port.report_event(wire::BoardEventKind::imu_ready, 7, 100);
+    CHECK(world.reports.events ==
+          std::vector<Event>{{wire::BoardEventKind::imu_ready, 1, 7, 100, 0}});
     CHECK(world.next() == Told{0, 0});
-    world.port.report_failure(wire::EventKind::imu_silent, 8, 9);
-    world.port.report_failure(wire::EventKind::imu_failed, 10, 11, 12);
+    world.port.report_failure(wire::BoardEventKind::imu_silent, 8, 9);
+    world.port.report_failure(wire::BoardEventKind::imu_failed, 10, 11, 12);
     CHECK(world.port.restarts() == 2);
     REQUIRE(world.reports.events.size() == 3);
-    CHECK(world.reports.events[1] == Event{wire::EventKind::imu_silent, 1, 8, 9, 0});
-    CHECK(world.reports.events[2] == Event{wire::EventKind::imu_failed, 1, 10, 11, 12});
+    CHECK(world.reports.events[1] == Event{wire::BoardEventKind::imu_silent, 1, 8, 9, 0});
+    CHECK(world.reports.events[2] == Event{wire::BoardEventKind::imu_failed, 1, 10, 11, 12});
     CHECK(world.next() == Told{3, wire::imu_overrun});
 }

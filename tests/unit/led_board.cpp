@@ -75,7 +75,7 @@ TEST_CASE("led_board: levels are the share of the exposure that each LED was on"
     // first and bit 0.
     const LedPicture seen =
         measure_leds(bench.picture(HostTime{3'750'000}, milliseconds(1)), place);
-    REQUIRE(seen.sight == LedSight::good);
+    REQUIRE(seen.state == LedState::good);
     const LedLevels expected{0.75, 0, 0, 0.25, 0.75, 0, 0, 0};
     for (std::size_t i = 0; i < 8; ++i)
         CHECK(seen.levels.at(i) == Approx(expected.at(i)).margin(0.03));
@@ -87,13 +87,13 @@ TEST_CASE("led_board: LEDs that are saturated, or covered, are told") {
     LedBench bright(settings);
     const LedPlace place{40, 150, 280, 165};
     const LedPicture seen = measure_leds(bright.picture(HostTime{1}, milliseconds(1)), place);
-    CHECK(seen.sight == LedSight::saturated);
+    CHECK(seen.state == LedState::saturated);
     CHECK(seen.levels[0] == Approx(1).margin(0.05));
     settings.led_level = 20;  // as dark as the plate
     LedBench dark(settings);
-    CHECK(measure_leds(dark.picture(HostTime{1}, milliseconds(1)), place).sight ==
-          LedSight::hidden);
+    CHECK(measure_leds(dark.picture(HostTime{1}, milliseconds(1)), place).state ==
+          LedState::hidden);
     CHECK(
-        measure_leds(bright.picture(HostTime{2'000'000}, milliseconds(1)), {-90, 0, -9, 0}).sight ==
-        LedSight::hidden);
+        measure_leds(bright.picture(HostTime{2'000'000}, milliseconds(1)), {-90, 0, -9, 0}).state ==
+        LedState::hidden);
 }

@@ -95,7 +95,7 @@ TEST_CASE("led_evaluation: a camera without the board is left out, unless it was
     const auto report = evaluate(cameras, 30, settings);
     REQUIRE(report);
     CHECK(report->cameras.size() == 1);
-    CHECK(report->notes.back() == "cam1: left out, for no LED board is seen");
+    CHECK(report->notes.back() == "cam1: left out, no LED board was found");
     std::vector<Camera> again;
     again.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});
     again.push_back({"cam1", bench(bench_settings(970, {-2000, -2000, -1000, -1000})), {}});

@@ -24,19 +24,19 @@ struct Series {
     unsigned seed = 1;
 };
 
-std::vector<LedShot> shots(const Series& series) {
+std::vector<LedObservation> shots(const Series& series) {
     std::mt19937 random(series.seed);
     std::normal_distribution<> noise(0, series.noise > 0 ? series.noise : 1);
-    std::vector<LedShot> out;
+    std::vector<LedObservation> out;
     for (int i = 0; i < series.frames; ++i) {
-        LedShot shot;
+        LedObservation shot;
         shot.tick = static_cast<std::uint64_t>(i);
         const double stamp_s = series.first_s + i / series.frame_hz;
         shot.time = OutputTime{std::llround(stamp_s * 1e9)};
         shot.exposure = Duration{std::llround(series.exposure_s * 1e9)};
         const double middle_s = (stamp_s + series.late_s) * (1 + series.skew);
         const double start = (middle_s - series.exposure_s / 2) * series.rate_hz;
-        shot.picture.sight = LedSight::good;
+        shot.picture.state = LedState::good;
         shot.picture.levels = led_levels(start - 64 * std::floor(start / 64),
                                          series.exposure_s * series.rate_hz, series.layout);
         if (series.noise > 0)
@@ -46,7 +46,7 @@ std::vector<LedShot> shots(const Series& series) {
     return out;
 }
 
-LedReport report(const LedShots& all, double rate_hz = 970, const LedLayout& layout = {}) {
+LedReport report(const LedObservations& all, double rate_hz = 970, const LedLayout& layout = {}) {
     LedReportSettings settings;
     settings.rate_hz = rate_hz;
     settings.layout = layout;
@@ -124,8 +124,8 @@ TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are to
     series.rate_hz = 1000;
     const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 1000);
     CHECK(made.ok());
-    CHECK(notes(made, "only 16 of 64 counts are ever seen"));
-    CHECK(notes(made, "nor would the direction"));
+    CHECK(notes(made, "only 16 of 64 counts ever occur"));
+    CHECK(notes(made, "so would the wrong direction"));
     // What is blind: sixteen pictures off.
     Series off = series;
     off.late_s = 1.6;
@@ -158,13 +158,13 @@ TEST_CASE("led_report: exposures that are short tell counts alone, those that ar
 
 TEST_CASE("led_report: saturated LEDs tell the count alone, hidden ones nothing") {
     auto bright = shots({});
-    for (LedShot& shot : bright) shot.picture.sight = LedSight::saturated;
+    for (LedObservation& shot : bright) shot.picture.state = LedState::saturated;
     const LedReport made = report({{"cam0", shots({})}, {"cam1", bright}});
     CHECK(made.pairs.at(0).matches == 400);
     CHECK(made.pairs.at(0).split == 0);
     CHECK(notes(made, "cam1: its LEDs are saturated"));
     auto hidden = shots({});
-    for (LedShot& shot : hidden) shot.picture.sight = LedSight::hidden;
+    for (LedObservation& shot : hidden) shot.picture.state = LedState::hidden;
     CHECK(report({{"cam0", shots({})}, {"cam1", hidden}}).pairs.at(0).pairs == 0);
     const auto none = led_report({{"cam1", hidden}}, {});
     REQUIRE_FALSE(none);
@@ -187,7 +187,7 @@ TEST_CASE("led_report: pairs are of one tick, epoch and life, and one camera mak
 
 TEST_CASE("led_report: pictures that were not triggered are in no pair, and that is told") {
     auto arrived = shots({});
-    for (LedShot& shot : arrived) {
+    for (LedObservation& shot : arrived) {
         shot.triggered = false;
         shot.tick = 0;
     }

@@ -54,9 +54,9 @@ TEST_CASE("loop_check: what is wrong with a line is told with what to check") {
     const Case wrong = GENERATE(values<Case>({
         {"a pulse is missing",
          [](SeenEdges& seen) { seen.rising_ns.erase(seen.rising_ns.begin() + 7); },
-         "41 of 42 edges came: check the contacts"},
+         "41 of 42 edges arrived: check the wire's contacts"},
         {"no falling edges", [](SeenEdges& seen) { seen.falling_ns.clear(); },
-         "21 of 40 edges came"},
+         "21 of 40 edges arrived"},
         {"noise",
          [](SeenEdges& seen) {
              seen.rising_ns.insert(seen.rising_ns.begin() + 4, begin + 3 * period + 250'000);

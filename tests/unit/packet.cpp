@@ -81,7 +81,7 @@ TEST_CASE("packet: the test vectors of the document") {
     CHECK(hex(encoded(Start{0b0101, start_pattern, {}}, 0x11223344, 4)) == documented("start"));
     CHECK(hex(encoded(AlignGrid{7'000'000'250, -25'000, 20'000}, 0x11223344, 5)) ==
           documented("align-grid"));
-    CHECK(hex(encoded(Event{EventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
+    CHECK(hex(encoded(Event{BoardEventKind::pps, 0, 0, 17, 5'000'000'123, 3}, 0xA1B2C3D4, 7)) ==
           documented("event"));
     CHECK(hex(encoded(example_configuration(), 0x11223344, 1)) == documented("configuration"));
 }

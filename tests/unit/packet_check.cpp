@@ -95,14 +95,14 @@ TEST_CASE("packet_check: a board has outputs, as many as it says") {
 
 TEST_CASE("packet_check: a sentence of the year 2300 labels nothing") {
     wire::Event event{};
-    event.kind = wire::EventKind::utc_label;
+    event.kind = wire::BoardEventKind::utc_label;
     event.value = 10'413'792'000;  // 2300-01-01
     CHECK_FALSE(possible(event));
     event.value = 1'900'000'000;
     CHECK(possible(event));
     event.value = -1;
     CHECK_FALSE(possible(event));
-    event.kind = wire::EventKind::pps;  // its value is no time
+    event.kind = wire::BoardEventKind::pps;  // its value is no time
     CHECK(possible(event));
 }
 
@@ -118,16 +118,16 @@ TEST_CASE("packet_check: an accelerometer's age comes with its flag only") {
 
 TEST_CASE("packet_check: a run of skipped triggers has some, and storage succeeds or fails") {
     wire::Event event{};
-    event.kind = wire::EventKind::triggers_skipped;
+    event.kind = wire::BoardEventKind::triggers_skipped;
     CHECK_FALSE(possible(event));
     event.detail = 1;
     CHECK(possible(event));
-    event.kind = wire::EventKind::stored;
+    event.kind = wire::BoardEventKind::stored;
     for (const std::int64_t value : {-1, 0, 1, 2}) {
         event.value = value;
         CHECK(possible(event) == (value == 0 || value == 1));
     }
-    event.kind = wire::EventKind::sync_lost;  // its value is a difference
+    event.kind = wire::BoardEventKind::sync_lost;  // its value is a difference
     event.value = -5'000'000;
     CHECK(possible(event));
 }

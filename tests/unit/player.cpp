@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "engine/ring/directory.hpp"
-#include "play/pace.hpp"
+#include "play/playback_clock.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 #include "versavis/ring_path.hpp"
@@ -99,26 +99,26 @@ TEST_CASE("player: an instance that somebody serves is refused") {
 }
 
 TEST_CASE("pace: by the stamps, faster or slower, and jumps are not waited for") {
-    Pace pace(2);
+    PlaybackClock clock(2);
     constexpr HostTime begin{1'000'000'000};
-    CHECK(pace.due({seconds(100).ns}, begin) == begin);
-    CHECK(pace.due({seconds(101).ns}, begin) == begin + milliseconds(500));
-    CHECK(pace.due({seconds(100).ns}, begin + seconds(1)) == begin);
+    CHECK(clock.due({seconds(100).ns}, begin) == begin);
+    CHECK(clock.due({seconds(101).ns}, begin) == begin + milliseconds(500));
+    CHECK(clock.due({seconds(100).ns}, begin + seconds(1)) == begin);
     const HostTime later = begin + seconds(3);
-    CHECK(pace.due({seconds(900).ns}, later) == later);
-    CHECK(pace.due({seconds(902).ns}, later) == later + seconds(1));
-    CHECK(pace.due({seconds(5).ns}, later) == later);
+    CHECK(clock.due({seconds(900).ns}, later) == later);
+    CHECK(clock.due({seconds(902).ns}, later) == later + seconds(1));
+    CHECK(clock.due({seconds(5).ns}, later) == later);
 }
 
 TEST_CASE("pace: who does not set it waits as the others do, but not for what is before or far") {
-    Pace pace(2);
+    PlaybackClock clock(2);
     constexpr HostTime begin{1'000'000'000};
-    CHECK(pace.due_beside({seconds(100).ns}, begin) == begin);
-    CHECK(pace.due({seconds(200).ns}, begin) == begin);
-    CHECK(pace.due_beside({seconds(199).ns}, begin + seconds(1)) == begin + seconds(1));
-    CHECK(pace.due_beside({seconds(204).ns}, begin) == begin + seconds(2));
-    CHECK(pace.due_beside({seconds(500).ns}, begin) == begin);
-    CHECK(pace.due({seconds(202).ns}, begin) == begin + seconds(1));
+    CHECK(clock.due_beside({seconds(100).ns}, begin) == begin);
+    CHECK(clock.due({seconds(200).ns}, begin) == begin);
+    CHECK(clock.due_beside({seconds(199).ns}, begin + seconds(1)) == begin + seconds(1));
+    CHECK(clock.due_beside({seconds(204).ns}, begin) == begin + seconds(2));
+    CHECK(clock.due_beside({seconds(500).ns}, begin) == begin);
+    CHECK(clock.due({seconds(202).ns}, begin) == begin + seconds(1));
 }
 
 TEST_CASE("player: what the clock was told in the minutes before is there at once") {

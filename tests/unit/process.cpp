@@ -43,29 +43,29 @@ TEST_CASE("process: another one, or an earlier one with its number, did not make
 
 TEST_CASE("process: it is there, dead, or cannot be judged from here") {
     CHECK(own_pid_namespace() != 0);
-    CHECK(presence(own_constants()) == Presence::there);
+    CHECK(liveness(own_constants()) == Liveness::alive);
     Constants later = own_constants();
     ++later.writer_start_ticks;
-    CHECK(quick_presence(later) == Presence::there);
-    CHECK(presence(later) == Presence::dead);
+    CHECK(quick_liveness(later) == Liveness::alive);
+    CHECK(liveness(later) == Liveness::dead);
     Constants none = own_constants();
     none.writer_pid = 0x7FFFFFFF;
-    CHECK(quick_presence(none) == Presence::dead);
-    CHECK(presence(none) == Presence::dead);
+    CHECK(quick_liveness(none) == Liveness::dead);
+    CHECK(liveness(none) == Liveness::dead);
     for (const std::uint32_t odd : {0U, 0x80000000U, 0xFFFFFFFFU}) {
         none.writer_pid = odd;
-        CHECK(quick_presence(none) == Presence::unknown);
-        CHECK(presence(none) == Presence::unknown);
+        CHECK(quick_liveness(none) == Liveness::unknown);
+        CHECK(liveness(none) == Liveness::unknown);
     }
     none.writer_pid = 1;  // as a service in a container
-    CHECK(quick_presence(none) == Presence::there);
+    CHECK(quick_liveness(none) == Liveness::alive);
     errno = ESRCH;  // of an earlier call
-    CHECK(quick_presence(later) == Presence::there);
+    CHECK(quick_liveness(later) == Liveness::alive);
     for (const std::uint64_t space : {std::uint64_t{0}, own_pid_namespace() + 1}) {
         Constants elsewhere = later;
         elsewhere.pid_namespace = space;
-        CHECK(quick_presence(elsewhere) == Presence::unknown);
-        CHECK(presence(elsewhere) == Presence::unknown);
+        CHECK(quick_liveness(elsewhere) == Liveness::unknown);
+        CHECK(liveness(elsewhere) == Liveness::unknown);
     }
 }
 
@@ -73,17 +73,17 @@ TEST_CASE("process: one that may not be asked is there, and one that cannot be s
     if (::geteuid() != 0) return;  // only root can become somebody else, or see another /proc
     const Constants own = own_constants();
     CHECK(in_process(
-        [&] { return ::seteuid(12345) == 0 && quick_presence(own) == Presence::there; }));
+        [&] { return ::seteuid(12345) == 0 && quick_liveness(own) == Liveness::alive; }));
     const test::TemporaryDirectory empty;
     CHECK(in_process([&] {
         const Constants seen = own_constants();
-        return ::chroot(empty.path().c_str()) == 0 && presence(seen) == Presence::unknown;
+        return ::chroot(empty.path().c_str()) == 0 && liveness(seen) == Liveness::unknown;
     }));
     CHECK(in_process([&] {
         if (::chroot(empty.path().c_str()) != 0 || own_pid_namespace() != 0) return false;
         Constants unknown = own;
         unknown.pid_namespace = 0;  // as unknown as one's own
-        return quick_presence(unknown) == Presence::unknown;
+        return quick_liveness(unknown) == Liveness::unknown;
     }));
 }
 

@@ -15,7 +15,7 @@ PulseHistory after(std::uint32_t pulses, std::uint32_t first = 0) {
     return history;
 }
 
-EventReason reason(const std::optional<Doubt>& doubt) {
+EventReason reason(const std::optional<Implausibility>& doubt) {
     return doubt ? doubt->reason : EventReason::none;
 }
 

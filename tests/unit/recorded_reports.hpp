@@ -10,7 +10,7 @@
 namespace versavis::test {
 
 struct ReportedEvent {
-    wire::EventKind kind;
+    wire::BoardEventKind kind;
     int source;
     firmware::Nanoseconds at;
     std::int64_t value;
@@ -20,7 +20,7 @@ struct ReportedEvent {
 
 struct RecordedReports final : firmware::ChannelReports {
     void exposure(const wire::Exposure& record) override { exposures.push_back(record); }
-    void event(wire::EventKind kind, std::uint8_t source, firmware::Nanoseconds at,
+    void event(wire::BoardEventKind kind, std::uint8_t source, firmware::Nanoseconds at,
                std::int64_t value, std::uint16_t detail) override {
         events.push_back({kind, source, at, value, detail});
     }

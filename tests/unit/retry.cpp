@@ -13,7 +13,7 @@ TEST_CASE("retry: what somebody has to mend is tried later and later, up to ten 
         last = retry.after(CameraState::misconfigured);
         CHECK(last == milliseconds(ms));
     }
-    retry.begin_anew();
+    retry.restart();
     CHECK(retry.after(CameraState::failed) == milliseconds(500));
 }
 

@@ -269,7 +269,7 @@ TEST_CASE_METHOD(Fixture, "ring: shapes that cannot be are refused") {
         Writer::create(directory.path(), {"huge", StreamKind::frames, 8, 1024, 1ULL << 40U});
     REQUIRE_FALSE(huge);
     CHECK_THAT(huge.error().message(),
-               Catch::Contains("/huge: takes 1073741825 MiB") && Catch::Contains("/dev/shm"));
+               Catch::Contains("/huge: needs 1073741825 MiB") && Catch::Contains("/dev/shm"));
     CHECK(std::filesystem::is_empty(directory.path()));
     std::filesystem::create_directory(directory.path() / "taken");
     CHECK_THAT(Writer::create(directory.path(), {"taken", StreamKind::events, 8}).error().message(),

@@ -203,7 +203,8 @@ TEST_CASE("rotation_offset: motion that is too slow is refused", "[statistics]")
     world.bandwidth_hz = 0.5;
     const Score found = score(world, runs);
     CHECK(found.refused == runs);
-    CHECK_THAT(found.why, Contains("the motion shows the offset only to") && Contains("rad/s^2"));
+    CHECK_THAT(found.why,
+               Contains("the motion determines the offset only to within") && Contains("rad/s^2"));
 }
 
 TEST_CASE("rotation_offset: a rig at rest is refused", "[rotation_offset]") {
@@ -220,7 +221,7 @@ TEST_CASE("rotation_offset: turns about one axis do not show the rotation", "[ro
     CHECK_THAT(found.why, Contains("second axis"));
 }
 
-TEST_CASE("rotation_offset: a motion that repeats fits more than once", "[rotation_offset]") {
+TEST_CASE("rotation_offset: periodic motion fits more than once", "[rotation_offset]") {
     Seen seen;
     const auto rate = [](double s) {
         const double phase = 2 * pi * 5 * s;
@@ -260,7 +261,7 @@ TEST_CASE("rotation_offset: a steady cone shows a delay as a turn about its axis
     shake(seen.frames, 1e-3);
     const auto found = rotation_offset(seen.frames, seen.gyro);
     REQUIRE_FALSE(found);
-    CHECK_THAT(found.error().message(), Contains("offset") && Contains("turn the rig"));
+    CHECK_THAT(found.error().message(), Contains("offset") && Contains("rotate the rig"));
 }
 
 TEST_CASE("rotation_offset: offsets of either sign and far off, a slow gyro and gaps in it",

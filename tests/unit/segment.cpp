@@ -23,7 +23,7 @@
 #include "../support/in_process.hpp"
 #include "../support/temporary_directory.hpp"
 #include "client/process.hpp"
-#include "engine/ring/ending.hpp"
+#include "engine/ring/segment_lifecycle.hpp"
 #include "engine/ring/writer.hpp"
 #include "versavis/time.hpp"
 

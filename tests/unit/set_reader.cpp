@@ -478,8 +478,8 @@ TEST_CASE_METHOD(Rig, "set_reader: too many streams are refused") {
     SetOptions with_imu = options();
     with_imu.imu = "imu";
     CHECK_THAT(SetReader::open(names, with_imu).error().message(),
-               Catch::Contains("imu: is one stream too many"));
+               Catch::Contains("imu: is one stream more than a WaitSet can hold"));
     names.emplace_back("a");
     CHECK_THAT(SetReader::open(names, options()).error().message(),
-               Catch::Contains("a: is one stream too many"));
+               Catch::Contains("a: is one stream more than a WaitSet can hold"));
 }

@@ -17,7 +17,7 @@ constexpr Nanoseconds second = 1'000'000'000;
 constexpr std::uint16_t while_running = 0xFFFF;
 
 struct Event {
-    wire::EventKind kind;
+    wire::BoardEventKind kind;
     Nanoseconds at;
     std::int64_t value;
     std::uint16_t detail;
@@ -29,14 +29,14 @@ struct Event {
 
 struct Reports final : ChannelReports {
     void exposure(const wire::Exposure& /*record*/) override {}
-    void event(wire::EventKind kind, std::uint8_t /*source*/, Nanoseconds at, std::int64_t value,
-               std::uint16_t detail) override {
+    void event(wire::BoardEventKind kind, std::uint8_t /*source*/, Nanoseconds at,
+               std::int64_t value, std::uint16_t detail) override {
         events.push_back({kind, at, value, detail});
     }
     void exposure_planned(std::uint8_t /*camera*/, Nanoseconds /*start*/,
                           Nanoseconds /*duration*/) override {}
 
-    std::size_t count(wire::EventKind kind) const {
+    std::size_t count(wire::BoardEventKind kind) const {
         return static_cast<std::size_t>(
             std::count_if(events.begin(), events.end(),
                           [kind](const Event& event) { return event.kind == kind; }));
@@ -151,7 +151,7 @@ struct Bench {
         bus.run(now);
         step(now + 70 * us);
     }
-    bool is_running() const { return reports.count(wire::EventKind::imu_ready) > 0; }
+    bool is_running() const { return reports.count(wire::BoardEventKind::imu_ready) > 0; }
 
     Reports reports;
     Bus bus;
@@ -235,8 +235,9 @@ TEST_CASE("spi_imu: what goes wrong in set-up is told, with the step, and tried 
             bench.step(asked + us);
         }
         const bool wrong = fault == Fault::wrong;
-        const Event told{wrong ? wire::EventKind::imu_failed : wire::EventKind::imu_silent,
-                         bench.now, 0, fault == Fault::hangs ? while_running : std::uint16_t{1}};
+        const Event told{
+            wrong ? wire::BoardEventKind::imu_failed : wire::BoardEventKind::imu_silent, bench.now,
+            0, fault == Fault::hangs ? while_running : std::uint16_t{1}};
         CHECK(bench.reports.events == std::vector<Event>{told});
         CHECK_FALSE(bench.bus.armed);
         CHECK(bench.imu.restarts() == 1);
@@ -255,7 +256,7 @@ TEST_CASE("spi_imu: a part that is set up says who it is, and must show edges in
         Running world(wire::imu_data_ready, rate);
         const Nanoseconds began = world.now;
         CHECK(world.reports.events ==
-              std::vector<Event>{{wire::EventKind::imu_ready, began, 0x47, 0}});
+              std::vector<Event>{{wire::BoardEventKind::imu_ready, began, 0x47, 0}});
         CHECK(world.bus.job.after == began);
         CHECK(world.bus.job.count == 2);
         CHECK(world.bus.job.pause == 0);
@@ -272,7 +273,7 @@ TEST_CASE("spi_imu: a part that is set up says who it is, and must show edges in
         CHECK(world.reports.events.size() == 1);
         world.step(began + 50 * ms + patience);
         CHECK(world.reports.events.back() ==
-              Event{wire::EventKind::imu_silent, world.now, 0, while_running});
+              Event{wire::BoardEventKind::imu_silent, world.now, 0, while_running});
         CHECK_FALSE(world.bus.armed);
         CHECK(world.imu.next_wake(0) == world.now + second);
         world.step(world.now + second);
@@ -292,7 +293,7 @@ TEST_CASE("spi_imu: a reading that does not end sets the part up again, whatever
     CHECK(world.reports.events.size() == 1);
     world.step();
     CHECK(world.reports.events.back() ==
-          Event{wire::EventKind::imu_silent, began + 25 * ms, 0, while_running});
+          Event{wire::BoardEventKind::imu_silent, began + 25 * ms, 0, while_running});
 }
 
 TEST_CASE("spi_imu: what edges told before the part was set up means nothing") {
@@ -325,11 +326,11 @@ TEST_CASE("spi_imu: edges count as too fast from when the part was set up") {
     REQUIRE(world.is_running());
     const Nanoseconds began = world.now;
     for (Nanoseconds i = 1; i <= 20; ++i) {
-        CHECK(world.reports.count(wire::EventKind::imu_failed) == 0);
+        CHECK(world.reports.count(wire::BoardEventKind::imu_failed) == 0);
         world.imu.ready_edge(began + i * 400 * us, began + i * 400 * us);
         world.step(began + i * 400 * us);
     }
-    CHECK(world.reports.count(wire::EventKind::imu_failed) == 1);
+    CHECK(world.reports.count(wire::BoardEventKind::imu_failed) == 1);
 }
 
 TEST_CASE("spi_imu: neither the newest edge nor its echoes start a reading") {
@@ -525,7 +526,7 @@ TEST_CASE("spi_imu: twenty bad readings in a row set the part up again") {
         REQUIRE(world.reports.events.size() == 2);
         const bool silent = bad == Bad::first_refused || bad == Bad::second_refused;
         CHECK(world.reports.events[1].kind ==
-              (silent ? wire::EventKind::imu_silent : wire::EventKind::imu_failed));
+              (silent ? wire::BoardEventKind::imu_silent : wire::BoardEventKind::imu_failed));
         CHECK(world.reports.events[1].value == 0);
         CHECK(world.reports.events[1].detail == while_running);
         CHECK_FALSE(world.bus.armed);
@@ -549,7 +550,7 @@ TEST_CASE("spi_imu: edges that come too fast set the part up again") {
     CHECK(world.reports.events.size() == 1);
     edges(world, 1, 750 * us - 1);
     CHECK(world.reports.events.back() ==
-          Event{wire::EventKind::imu_failed, world.now + 50 * us, 0, while_running});
+          Event{wire::BoardEventKind::imu_failed, world.now + 50 * us, 0, while_running});
     CHECK_FALSE(world.bus.armed);
 }
 
@@ -847,10 +848,10 @@ TEST_CASE("spi_imu: a reading at a grid point must end in time") {
     CHECK(world.reports.events.size() == 1);
     world.step(due + 25 * ms);
     CHECK(world.reports.events.back() ==
-          Event{wire::EventKind::imu_silent, due + 25 * ms, 0, while_running});
+          Event{wire::BoardEventKind::imu_silent, due + 25 * ms, 0, while_running});
     CHECK(world.imu.next_wake(0) == world.now + second);
     // At least one sample is missing when it is back.
-    while (world.reports.count(wire::EventKind::imu_ready) < 2) world.set_up_once();
+    while (world.reports.count(wire::BoardEventKind::imu_ready) < 2) world.set_up_once();
     const Nanoseconds next = world.imu.grid().next();
     world.step(next - 500 * us);
     world.bus.run(next);
@@ -884,7 +885,7 @@ TEST_CASE("spi_imu: another configuration ends what was going on") {
             CHECK(world.bus.job.transfers[0].bus == ImuTransfer::Bus::spi);
             world.set_up_once();
         }
-        CHECK(world.reports.count(wire::EventKind::imu_ready) == 2);
+        CHECK(world.reports.count(wire::BoardEventKind::imu_ready) == 2);
         CHECK(world.bus.job.transfers[0].bus == ImuTransfer::Bus::spi);
         CHECK(world.bus.job.transfers[1].bus == ImuTransfer::Bus::spi);
     }

@@ -123,7 +123,7 @@ TEST_CASE("status: what a device says of itself cannot break the document") {
 TEST_CASE("status: the text for a person names what is wrong and what to do") {
     Status status = healthy();
     status.cameras[0].diagnosis = {Health::degraded, Fault::camera_absent,
-                                   "no such camera; check its cable", status.now};
+                                   "no camera answers to this name; check its cable", status.now};
     const std::string text = client::status_text(nlohmann::json::parse(to_json(status)));
     CHECK_THAT(text, Catch::Contains("degraded"));
     CHECK_THAT(text, Catch::Contains("check its cable"));

@@ -18,7 +18,7 @@
 
 using namespace versavis;
 using namespace versavis::firmware;
-using wire::EventKind;
+using wire::BoardEventKind;
 
 namespace {
 
@@ -170,7 +170,7 @@ struct World {
         reach(8);
         answer_last();
         REQUIRE(reports.events.size() == 1);
-        REQUIRE(reports.events[0].kind == EventKind::imu_ready);
+        REQUIRE(reports.events[0].kind == BoardEventKind::imu_ready);
         reports.events.clear();
         uart.sent.clear();
         uart.bauds.clear();
@@ -287,7 +287,8 @@ TEST_CASE("vn100: set up step by step, at a baud rate that carries its packets")
         CHECK(world.reports.events.empty());
         world.answer(steps[step]);
     }
-    CHECK(world.reports.events == std::vector<Event>{{EventKind::imu_ready, 1, world.now, 100, 0}});
+    CHECK(world.reports.events ==
+          std::vector<Event>{{BoardEventKind::imu_ready, 1, world.now, 100, 0}});
     CHECK(world.imu.next_wake() ==
           world.now + 100 * ms + 20 * second * 1'000 / Vn100::true_rate(rate));
     world.poll(world.now + ms);
@@ -327,8 +328,8 @@ TEST_CASE("vn100: a command without an answer is silence, and begins anew after 
         world.poll(asked + 300 * ms - 1);
         CHECK(world.reports.events.empty());
         world.poll(asked + 300 * ms);
-        CHECK(world.reports.events ==
-              std::vector<Event>{{EventKind::imu_silent, 1, world.now, 0, static_cast<int>(step)}});
+        CHECK(world.reports.events == std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now,
+                                                          0, static_cast<int>(step)}});
         CHECK(world.imu.restarts() == 1);
         REQUIRE(world.imu.next_wake() == world.now + second);
         const std::size_t sent = world.uart.sent.size();
@@ -368,7 +369,7 @@ TEST_CASE("vn100: a part that changes its baud rate before it answers is asked a
     SECTION("it is silent all the same") {
         world.poll(world.imu.next_wake());
         CHECK(world.reports.events ==
-              std::vector<Event>{{EventKind::imu_silent, 1, world.now, 0, 5}});
+              std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
     }
 }
 
@@ -377,7 +378,8 @@ TEST_CASE("vn100: where the baud rate stays, a part is asked for it once") {
     world.reach(5);
     world.poll(world.imu.next_wake());
     CHECK(world.uart.sent.size() == 6);
-    CHECK(world.reports.events == std::vector<Event>{{EventKind::imu_silent, 1, world.now, 0, 5}});
+    CHECK(world.reports.events ==
+          std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
 }
 
 TEST_CASE("vn100: a new configuration begins at the baud rate of the one before") {
@@ -397,7 +399,7 @@ TEST_CASE("vn100: an error that the part tells is a failure, with its code") {
     World world(200'000);
     world.reach(step);
     world.answer("VNERR,0C");
-    CHECK(world.reports.events == std::vector<Event>{{EventKind::imu_failed, 1, world.now,
+    CHECK(world.reports.events == std::vector<Event>{{BoardEventKind::imu_failed, 1, world.now,
                                                       '0' * 256 + 'C', static_cast<int>(step)}});
     CHECK(world.imu.next_wake() == world.now + second);
     world.answer("VNERR,0C");  // of nothing that was asked
@@ -775,7 +777,7 @@ TEST_CASE("vn100: a part that falls silent is set up again, at the other baud ra
     CHECK(world.reports.events.empty());
     world.poll(end + patience);
     CHECK(world.reports.events ==
-          std::vector<Event>{{EventKind::imu_silent, 1, world.now, 0, 0xFFFF}});
+          std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 0xFFFF}});
     CHECK(world.uart.sent.empty());
     CHECK(world.imu.next_wake() == world.now + second);
     world.send(packet(2 * second), world.now + ms);  // it is not running

@@ -316,7 +316,7 @@ bool is_refused(const Expected<int>& descriptor, const std::string& what) {
     return !descriptor && descriptor.error().message().find(what) != std::string::npos;
 }
 
-/// From here on this process gets no thread: no stack is as large.
+/// From here on this process cannot start a thread: no stack is as large.
 bool forbid_threads() {
     pthread_attr_t attributes;
     ::pthread_attr_init(&attributes);

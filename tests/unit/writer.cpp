@@ -198,7 +198,7 @@ TEST_CASE_METHOD(Memory, "writer: where there is no descriptor, it says so") {
 
 TEST_CASE_METHOD(Memory, "writer: a sealed one without a thread is not made") {
     const test::NoThreads none;
-    CHECK_THAT(refusal(events, true), Contains("gets no thread"));
+    CHECK_THAT(refusal(events, true), Contains("cannot start a thread"));
 }
 
 TEST_CASE_METHOD(Memory, "writer: where nothing can be sealed, it says what to do") {

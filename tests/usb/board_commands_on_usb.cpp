@@ -139,7 +139,7 @@ TEST_CASE("board: the service has it and says what it is; reset and self-test ar
     CHECK(info["nonce"] == status["board"]["nonce"]);
     CHECK(info["port"] == "usb:1-1");
     CHECK(stack.tool({"board", "info"}, &said) == 0);
-    CHECK_THAT(said, Contains("as the service says") && Contains("late outputs"));
+    CHECK_THAT(said, Contains("as reported by the service") && Contains("late outputs"));
     for (const char* command : {"reset", "selftest"}) {
         CHECK(stack.tool({"board", command}, &said) == 69);
         CHECK_THAT(said, Contains("the service 'boardbusy'"));

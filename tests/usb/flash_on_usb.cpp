@@ -140,7 +140,7 @@ TEST_CASE("flash: a wrong file is refused before the board is touched") {
         file[20 * 512 + 100] ^= 1;
         bench.write(file);
         CHECK(bench.flash({"--all"}) == 69);
-        CHECK_THAT(bench.said, Contains("is damaged, or no firmware of VersaVIS"));
+        CHECK_THAT(bench.said, Contains("is damaged, or is not VersaVIS firmware"));
     }
     SECTION("none") {
         bench.file += "x";

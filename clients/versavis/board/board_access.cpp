@@ -18,9 +18,9 @@ constexpr Duration boot_patience = seconds(10);
 /// tenth of a second later.
 constexpr Duration try_interval = milliseconds(100);
 
-Error busy(const FoundBoard& board, const std::string& instance, const UsbError& error) {
+Error busy(const FoundBoard& board, const std::string& instance, const device::UsbError& error) {
     const std::string where = "board at " + board.device.port();
-    if (error.fault != UsbFault::busy) return error.as_error(where, "cannot be opened");
+    if (error.fault != device::UsbFault::busy) return error.as_error(where, "cannot be opened");
     const auto status = read_status(instance);
     if (!status)
         return {where, "another program has it open",
@@ -32,7 +32,8 @@ Error busy(const FoundBoard& board, const std::string& instance, const UsbError&
 }
 
 /// None: it is not there yet, or not ready.
-std::optional<BoardIdentity> identity(const UsbDevice& device, const std::string& instance) {
+std::optional<BoardIdentity> identity(const device::UsbDevice& device,
+                                      const std::string& instance) {
     auto conversation = Conversation::open(device);
     if (conversation) {
         const auto greeting = conversation->greet();
@@ -40,7 +41,7 @@ std::optional<BoardIdentity> identity(const UsbDevice& device, const std::string
         return BoardIdentity{device.port(), greeting->serial(), greeting->firmware(),
                              greeting->nonce};
     }
-    if (conversation.error().fault != UsbFault::busy) return std::nullopt;
+    if (conversation.error().fault != device::UsbFault::busy) return std::nullopt;
     const auto board = board_of_service(instance, device.port());
     if (!board) return std::nullopt;
     return BoardIdentity{device.port(), board->value("serial", ""), board->value("firmware", ""),
@@ -65,7 +66,7 @@ Expected<Conversation> open_board(const FoundBoard& board, const std::string& in
     return std::move(*conversation);
 }
 
-Expected<BoardIdentity> wait_for_hello(const UsbBus& bus, const std::string& port,
+Expected<BoardIdentity> wait_for_hello(const device::UsbBus& bus, const std::string& port,
                                        const std::string& instance,
                                        std::optional<std::uint32_t> stale,
                                        const std::function<bool()>& stop) {
@@ -80,7 +81,7 @@ Expected<BoardIdentity> wait_for_hello(const UsbBus& bus, const std::string& por
     }
     return failure(
         "board at " + port,
-        stop() ? "not waited for any longer"
+        stop() ? "stopped waiting"
                : fmt::format("it has not said hello in {} s", boot_patience.ns / 1'000'000'000),
         "look for it with 'versavis board info'; if it is not there, hold its BOOTSEL "
         "button while you plug it in and flash it again");

@@ -29,7 +29,7 @@ struct BoardIdentity {
 
 /// Waits until the board at this port runs and says who it is, to this program or, if that has it,
 /// to the service. `stale` is the nonce of a life that does not count.
-Expected<BoardIdentity> wait_for_hello(const UsbBus& bus, const std::string& port,
+Expected<BoardIdentity> wait_for_hello(const device::UsbBus& bus, const std::string& port,
                                        const std::string& instance,
                                        std::optional<std::uint32_t> stale,
                                        const std::function<bool()>& stop);

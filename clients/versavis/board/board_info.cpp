@@ -49,7 +49,7 @@ json from_service(const json& board) {
     return info;
 }
 
-json from_hello(const Greeting& greeting) {
+json from_hello(const device::Greeting& greeting) {
     const wire::BoardHello& hello = greeting.hello;
     json info{{"state", greeting.understood ? "running" : "incompatible"},
               {"protocol", fmt::format("{}.{}", hello.major, hello.minor)},
@@ -108,7 +108,7 @@ Expected<json> board_info(const BoardChoice& choice, const std::string& instance
     const auto served = board_of_service(instance, choice.port);
     if (served && (choice.serial.empty() || choice.serial == text(*served, "serial")))
         return from_service(*served);
-    const auto bus = UsbBus::open();
+    const auto bus = device::UsbBus::open();
     if (!bus) return Unexpected(bus.error());
     const auto found = find_board(*bus, choice);
     if (!found) return Unexpected(found.error());
@@ -124,7 +124,7 @@ std::string board_text(const json& info) {
             text(info, "port"));
     std::string out = fmt::format(
         "board    {} at {}, {}\n", text(info, "serial"), text(info, "port"),
-        text(info, "source") == "service" ? "as the service says" : "asked by this program");
+        text(info, "source") == "service" ? "as reported by the service" : "queried directly");
     if (state == "incompatible")
         return out + fmt::format(
                          "firmware of protocol {}, which this program does not speak: "

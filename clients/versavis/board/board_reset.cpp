@@ -30,7 +30,7 @@ Expected<std::optional<std::uint32_t>> end_life(const FoundBoard& board,
 }  // namespace
 
 Expected<BoardIdentity> reset_board(const ResetSettings& settings) {
-    const auto bus = UsbBus::open();
+    const auto bus = device::UsbBus::open();
     if (!bus) return Unexpected(bus.error());
     const auto found = find_board(*bus, settings.board);
     if (!found) return Unexpected(found.error());

@@ -44,15 +44,17 @@ std::string FoundBoard::text() const {
                                         : name);
 }
 
-Expected<std::vector<FoundBoard>> list_boards(const UsbBus& bus) {
+Expected<std::vector<FoundBoard>> list_boards(const device::UsbBus& bus) {
     std::vector<FoundBoard> boards;
-    for (const UsbDevice& device : bus.find(wire::usb_vendor, wire::usb_product)) {
+    for (const device::UsbDevice& device : bus.find(wire::usb_vendor, wire::usb_product)) {
         const auto handle = device.open();
-        boards.push_back({device, false, false, handle ? handle->serial() : ""});
+        boards.push_back({device, false, false, handle ? handle->serial().value_or("") : ""});
     }
-    for (const UsbDevice& device : bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2040))
+    for (const device::UsbDevice& device :
+         bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2040))
         boards.push_back({device, true, false, ""});
-    for (const UsbDevice& device : bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2350))
+    for (const device::UsbDevice& device :
+         bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2350))
         boards.push_back({device, true, true, ""});
     if (!boards.empty()) return boards;
     return failure("USB",
@@ -63,7 +65,7 @@ Expected<std::vector<FoundBoard>> list_boards(const UsbBus& bus) {
                    "there");
 }
 
-Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice) {
+Expected<FoundBoard> find_board(const device::UsbBus& bus, const BoardChoice& choice) {
     const auto all = list_boards(bus);
     if (!all) return Unexpected(all.error());
     std::vector<FoundBoard> fitting;
@@ -80,14 +82,14 @@ Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice) {
     return fitting.front();
 }
 
-std::optional<UsbDevice> wait_for_board(const UsbBus& bus, const std::string& port,
-                                        bool in_boot_loader, Duration timeout,
-                                        const std::function<bool()>& stop) {
+std::optional<device::UsbDevice> wait_for_board(const device::UsbBus& bus, const std::string& port,
+                                                bool in_boot_loader, Duration timeout,
+                                                const std::function<bool()>& stop) {
     const std::uint16_t vendor = in_boot_loader ? wire::boot_loader_vendor : wire::usb_vendor;
     const std::uint16_t product = in_boot_loader ? wire::boot_loader_rp2040 : wire::usb_product;
     const HostTime deadline = host_now() + timeout;
     while (!stop() && host_now() < deadline) {
-        for (const UsbDevice& device : bus.find(vendor, product))
+        for (const device::UsbDevice& device : bus.find(vendor, product))
             if (device.port() == port) return device;
         const timespec pause{0, look_interval.ns};
         nanosleep(&pause, nullptr);

@@ -7,18 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "board/usb_bus.hpp"
+#include "device/usb_bus.hpp"
 
 namespace versavis::client {
 
 /// What the user says of the board; empty: there is only one.
 struct BoardChoice {
     std::string serial;
-    std::string port;  ///< as UsbDevice::port()
+    std::string port;  ///< as device::UsbDevice::port()
 };
 
 struct FoundBoard {
-    UsbDevice device;
+    device::UsbDevice device;
     bool in_boot_loader = false;
     bool is_pico_2 = false;  ///< whose chip the firmware is not for; in its boot loader
     std::string serial;  ///< empty: in its boot loader, which does not know it, or not to be opened
@@ -27,15 +27,15 @@ struct FoundBoard {
 };
 
 /// Error: there is none.
-Expected<std::vector<FoundBoard>> list_boards(const UsbBus& bus);
+Expected<std::vector<FoundBoard>> list_boards(const device::UsbBus& bus);
 
 /// Error: none fits, or more than one, or it is a Pico 2.
-Expected<FoundBoard> find_board(const UsbBus& bus, const BoardChoice& choice);
+Expected<FoundBoard> find_board(const device::UsbBus& bus, const BoardChoice& choice);
 
 /// The board at this port, once it is there and runs, or is in its boot loader. None: not in time,
 /// or `stop` said so.
-std::optional<UsbDevice> wait_for_board(const UsbBus& bus, const std::string& port,
-                                        bool in_boot_loader, Duration timeout,
-                                        const std::function<bool()>& stop);
+std::optional<device::UsbDevice> wait_for_board(const device::UsbBus& bus, const std::string& port,
+                                                bool in_boot_loader, Duration timeout,
+                                                const std::function<bool()>& stop);
 
 }  // namespace versavis::client

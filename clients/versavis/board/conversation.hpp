@@ -3,38 +3,26 @@
 // function, without the service.
 #pragma once
 
-#include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 
-#include "board/usb_bus.hpp"
-#include "wire/packet.hpp"
+#include "device/cdc_port.hpp"
+#include "device/handshake.hpp"
 
 namespace versavis::client {
-
-/// What the board said of itself.
-struct Greeting {
-    wire::BoardHello hello{};  ///< of another protocol version: only its version
-    bool understood = true;    ///< it speaks this protocol
-    std::uint32_t nonce = 0;   ///< another one: it has booted since
-
-    std::string serial() const;
-    /// Name and version; of another protocol version, that.
-    std::string firmware() const;
-};
 
 class Conversation {
  public:
     /// Takes the board for this program. Error: also when another one has it.
-    static UsbExpected<Conversation> open(const UsbDevice& device);
+    static device::UsbExpected<Conversation> open(const device::UsbDevice& device);
 
     /// Stops its cameras, too, as each hello does. Error: it does not answer in time.
-    Expected<Greeting> greet();
+    Expected<device::Greeting> greet();
 
     template <class T>
     Expected<> send(const T& message) {
-        wire::Frame frame{};
-        wire::encode(message, nonce_, sequence_++, frame);
+        const wire::Frame frame = encoder_.encode(message);
         return write({frame.bytes, frame.size});
     }
 
@@ -42,23 +30,19 @@ class Conversation {
     /// was in time.
     Expected<bool> listen(const std::function<bool(const wire::Packet&)>& take, Duration timeout);
 
-    /// Reboots the board into its boot loader in the way of serial ports, by 1200 baud, also when
-    /// its program hangs.
-    void touch();
+    /// See device::CdcPort::touch().
+    void touch() { port_.touch(); }
 
  private:
-    Conversation(UsbHandle handle, int control, UsbFunction data, std::string where);
+    Conversation(device::CdcPort port, std::string where)
+        : port_(std::move(port)), where_(std::move(where)) {}
 
     Expected<> write(std::span<const std::uint8_t> bytes);
-    Expected<> say_hello();
 
-    UsbHandle handle_;
-    int control_;
-    UsbFunction data_;
+    device::CdcPort port_;
     std::string where_;
     wire::Decoder decoder_;
-    std::uint32_t nonce_;
-    std::uint32_t sequence_ = 0;
+    device::Encoder encoder_;
 };
 
 }  // namespace versavis::client

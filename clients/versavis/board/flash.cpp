@@ -37,7 +37,7 @@ class Flasher {
     Flasher(const FlashSettings& settings, const FlashImage& image)
         : settings_(settings), image_(image) {}
 
-    Expected<Flashed> run(const UsbBus& bus, const BoardChoice& choice) {
+    Expected<Flashed> run(const device::UsbBus& bus, const BoardChoice& choice) {
         const HostTime begun = host_now();
         const auto found = find_board(bus, choice);
         if (!found) return Unexpected(found.error());
@@ -53,7 +53,7 @@ class Flasher {
 
  private:
     /// Of a board that runs, once it has rebooted.
-    Expected<UsbDevice> boot_loader_of(const UsbBus& bus, const FoundBoard& found) {
+    Expected<device::UsbDevice> boot_loader_of(const device::UsbBus& bus, const FoundBoard& found) {
         if (found.in_boot_loader) return found.device;
         auto conversation = open_board(found, settings_.instance);
         if (!conversation) return Unexpected(conversation.error());
@@ -77,12 +77,12 @@ class Flasher {
                        "hold its BOOTSEL button while you plug it in, then run this again");
     }
 
-    Expected<> fill(const UsbDevice& device, const Sectors& sectors) {
+    Expected<> fill(const device::UsbDevice& device, const Sectors& sectors) {
         auto boot_loader = Picoboot::open(device);
         if (!boot_loader) return ended(boot_loader.error(), "the board waits in its boot loader");
         if (settings_.stop())
             return ended({"flashing", "stopped", ""},
-                         "nothing was erased: plug the board in anew for its old firmware, if it "
+                         "nothing was erased: reconnect the board for its old firmware, if it "
                          "had one");
         if (auto done = erase_and_write(*boot_loader, sectors); !done)
             return ended(done.error(), half_written);
@@ -93,7 +93,7 @@ class Flasher {
         }
         settings_.progress("starting", 0, 1);
         if (auto done = boot_loader->reboot(); !done)
-            return ended(done.error(), "the new firmware is complete: plug the board in anew");
+            return ended(done.error(), "the new firmware is complete: reconnect the board");
         return {};
     }
 
@@ -136,7 +136,7 @@ class Flasher {
         return {};
     }
 
-    Expected<> meet(const UsbBus& bus) {
+    Expected<> meet(const device::UsbBus& bus) {
         const auto met =
             wait_for_hello(bus, flashed_.port, settings_.instance, std::nullopt, settings_.stop);
         if (!met)
@@ -160,7 +160,7 @@ double seconds_of(Duration took) { return static_cast<double>(took.ns) * 1e-9; }
 Expected<Flashed> flash(const FlashSettings& settings) {
     const auto image = read_uf2(settings.file);
     if (!image) return Unexpected(image.error());
-    const auto bus = UsbBus::open();
+    const auto bus = device::UsbBus::open();
     if (!bus) return Unexpected(bus.error());
     return Flasher(settings, *image).run(*bus, settings.board);
 }
@@ -170,7 +170,7 @@ Expected<std::size_t> flash_all(
     const std::function<void(const FoundBoard&, const Expected<Flashed>&)>& finished) {
     const auto image = read_uf2(settings.file);
     if (!image) return Unexpected(image.error());
-    const auto bus = UsbBus::open();
+    const auto bus = device::UsbBus::open();
     if (!bus) return Unexpected(bus.error());
     const auto boards = list_boards(*bus);
     if (!boards) return Unexpected(boards.error());

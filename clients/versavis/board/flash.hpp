@@ -36,7 +36,7 @@ struct Flashed {
 /// its boot loader, whenever it lost power, and is flashed again.
 Expected<Flashed> flash(const FlashSettings& settings);
 
-/// All boards that are there, one after the other, whatever becomes of each; `finished` is told.
+/// Flash every connected board, one after the other, whatever becomes of each; `finished` is told.
 /// How many there are. Error: none was begun.
 Expected<std::size_t> flash_all(
     const FlashSettings& settings,

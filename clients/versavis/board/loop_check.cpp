@@ -72,7 +72,7 @@ std::string complaint(const SentPulses& sent, const Train& rising, const Train& 
     const std::size_t missing = rising.missing + falling.missing;
     if (rising.edges.size() < sent.count || falling.edges.size() < sent.count || missing > 0)
         return fmt::format(
-            "{} of {} edges came: check the contacts of the wire",
+            "{} of {} edges arrived: check the wire's contacts",
             rising.edges.size() + falling.edges.size(),
             std::max(2 * sent.count, rising.edges.size() + falling.edges.size() + missing));
     if (strays > 0)

@@ -92,13 +92,13 @@ struct Picoboot::Command {
     }
 };
 
-Expected<Picoboot> Picoboot::open(const UsbDevice& device) {
+Expected<Picoboot> Picoboot::open(const device::UsbDevice& device) {
     const std::string where = fmt::format("boot loader at {}", device.port());
     auto handle = device.open();
     if (!handle) return Unexpected(handle.error().as_error(where, "cannot be opened"));
-    const UsbFunction function = handle->function(vendor_class);
+    const device::UsbFunction function = device.function({vendor_class});
     if (!function.complete())
-        return failure(where, "has no PICOBOOT interface", "is it an RP2040? Plug it in anew");
+        return failure(where, "has no PICOBOOT interface", "is it an RP2040? Reconnect it");
     if (auto claimed = handle->claim(function.interface); !claimed)
         return Unexpected(claimed.error().as_error(where, "cannot be claimed"));
     Picoboot boot_loader(std::move(*handle), function, where);
@@ -154,13 +154,13 @@ Expected<> Picoboot::reboot() {
     command.arguments = {0, 0, reboot_delay_ms};  // program counter 0: as after power-up
     auto done = exchange(command, {}, {});
     // It may be gone before its answer was fetched.
-    if (!done && done.error().fault != UsbFault::gone)
+    if (!done && done.error().fault != device::UsbFault::gone)
         return Unexpected(explain(command, done.error()));
     return {};
 }
 
 /// Also aborts what it does with the flash, and returns the drive.
-UsbExpected<> Picoboot::reset() {
+device::UsbExpected<> Picoboot::reset() {
     for (const std::uint8_t endpoint : {function_.endpoint_out, function_.endpoint_in})
         if (auto done = handle_.clear_halt(endpoint); !done) return done;
     auto done =
@@ -179,8 +179,8 @@ Expected<> Picoboot::run(const Command& command, std::span<std::uint8_t> in,
 }
 
 /// Command, data, and an empty packet the other way, which says that it is done.
-UsbExpected<> Picoboot::exchange(const Command& command, std::span<std::uint8_t> in,
-                                 std::span<const std::uint8_t> out) {
+device::UsbExpected<> Picoboot::exchange(const Command& command, std::span<std::uint8_t> in,
+                                         std::span<const std::uint8_t> out) {
     std::array<std::uint8_t, sizeof(Command)> bytes{};
     std::memcpy(bytes.data(), &command, sizeof command);
     if (auto done = handle_.write(function_.endpoint_out, bytes, command_timeout); !done)
@@ -191,7 +191,7 @@ UsbExpected<> Picoboot::exchange(const Command& command, std::span<std::uint8_t>
     for (std::size_t filled = 0; filled < in.size();) {
         auto size = handle_.read(function_.endpoint_in, in.subspan(filled), command_timeout);
         if (!size) return Unexpected(size.error());
-        if (*size == 0) return Unexpected(UsbError{UsbFault::late, 0});
+        if (*size == 0) return Unexpected(device::UsbError{device::UsbFault::late, 0});
         filled += *size;
     }
     if ((command.id & to_host) != 0)
@@ -202,15 +202,15 @@ UsbExpected<> Picoboot::exchange(const Command& command, std::span<std::uint8_t>
     return {};
 }
 
-Error Picoboot::explain(const Command& command, const UsbError& error) {
+Error Picoboot::explain(const Command& command, const device::UsbError& error) {
     const std::string what = "cannot " + command.text();
-    if (error.fault != UsbFault::stalled && error.fault != UsbFault::late)
+    if (error.fault != device::UsbFault::stalled && error.fault != device::UsbFault::late)
         return error.as_error(where_, what);
-    const std::string why = error.fault == UsbFault::stalled
+    const std::string why = error.fault == device::UsbFault::stalled
                                 ? fmt::format("it refuses ({})", reason(command))
                                 : "it does not answer";
     static_cast<void>(reset());
-    return {where_, fmt::format("{}: {}", what, why), "plug the board in anew"};
+    return {where_, fmt::format("{}: {}", what, why), "reconnect the board"};
 }
 
 /// Of a command that stalled.
@@ -221,7 +221,7 @@ std::string Picoboot::reason(const Command& command) {
     Status status{};
     std::memcpy(&status, bytes.data(), sizeof status);
     if (!size || *size != sizeof status || status.token != command.token)
-        return "it does not say why";
+        return "without giving a reason";
     return name_of_status(status.code);
 }
 

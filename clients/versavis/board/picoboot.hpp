@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "board/usb_bus.hpp"
+#include "device/usb_bus.hpp"
 
 namespace versavis::client {
 
@@ -17,7 +17,7 @@ class Picoboot {
  public:
     /// Claims the interface, and the flash for this program alone: the drive that the boot loader
     /// also is goes away.
-    static Expected<Picoboot> open(const UsbDevice& device);
+    static Expected<Picoboot> open(const device::UsbDevice& device);
 
     /// Whole sectors.
     Expected<> erase(std::uint32_t address, std::uint32_t size);
@@ -30,20 +30,20 @@ class Picoboot {
  private:
     struct Command;
 
-    Picoboot(UsbHandle handle, UsbFunction function, std::string where)
+    Picoboot(device::UsbHandle handle, device::UsbFunction function, std::string where)
         : handle_(std::move(handle)), function_(function), where_(std::move(where)) {}
 
     Expected<> take_over();
-    UsbExpected<> reset();
+    device::UsbExpected<> reset();
     Expected<> run(const Command& command, std::span<std::uint8_t> in,
                    std::span<const std::uint8_t> out);
-    UsbExpected<> exchange(const Command& command, std::span<std::uint8_t> in,
-                           std::span<const std::uint8_t> out);
-    Error explain(const Command& command, const UsbError& error);
+    device::UsbExpected<> exchange(const Command& command, std::span<std::uint8_t> in,
+                                   std::span<const std::uint8_t> out);
+    Error explain(const Command& command, const device::UsbError& error);
     std::string reason(const Command& command);
 
-    UsbHandle handle_;
-    UsbFunction function_;
+    device::UsbHandle handle_;
+    device::UsbFunction function_;
     std::string where_;
     std::uint32_t token_ = 0;
 };

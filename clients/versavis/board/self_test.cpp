@@ -48,9 +48,9 @@ std::uint32_t part_of(unsigned output) {
 /// Of an event; none: it is of no pulse input.
 std::optional<unsigned> input_of(const wire::Event& event) {
     switch (event.kind) {
-        case wire::EventKind::pps: return wire::pulse_pps;
-        case wire::EventKind::aux_pulse: return wire::pulse_aux0 + unsigned{event.source & 1U};
-        case wire::EventKind::sync_pulse: return wire::pulse_sync;
+        case wire::BoardEventKind::pps: return wire::pulse_pps;
+        case wire::BoardEventKind::aux_pulse: return wire::pulse_aux0 + unsigned{event.source & 1U};
+        case wire::BoardEventKind::sync_pulse: return wire::pulse_sync;
         default: return std::nullopt;
     }
 }
@@ -203,7 +203,7 @@ void demand(std::vector<TestedLine>& lines, const std::vector<Wire>& wires) {
         if (std::any_of(lines.begin(), lines.end(), there)) continue;
         LoopFinding missing;
         missing.result = LoopResult::failed;
-        missing.hint = "no pulse came: check the wire, then what drives it and what receives it";
+        missing.hint = "no pulse arrived: check the wire, its driver and its receiver";
         // In place of the remark that the output is open.
         std::erase_if(lines, [&](const TestedLine& line) {
             return line.output == wire.output && line.input.empty();
@@ -233,7 +233,7 @@ const char* to_string(LoopResult result) {
 std::string line_text(const TestedLine& line) {
     const LoopFinding& finding = line.finding;
     if (finding.result == LoopResult::open)
-        return fmt::format("{:<8} open    no input hears it: not wired?\n", line.output);
+        return fmt::format("{:<8} open    no input sees it: not wired?\n", line.output);
     std::string text =
         fmt::format("{:<8} {:<7} at {}", line.output, to_string(finding.result), line.input);
     if (finding.period.ns > 0)
@@ -263,7 +263,7 @@ Expected<SelfTest> self_test(const SelfTestSettings& settings, TestBoard& board)
     if (!wires) return Unexpected(wires.error());
     Tester tester(settings, board);
     if (auto done = tester.run(); !done) return Unexpected(done.error());
-    const Greeting& greeting = board.greeting();
+    const device::Greeting& greeting = board.greeting();
     SelfTest test{greeting.serial(), greeting.firmware(), std::move(tester.lines)};
     demand(test.lines, *wires);
     test.passed = passed(test.lines);

@@ -15,7 +15,7 @@ constexpr Duration answer_patience = seconds(1);
 }  // namespace
 
 Expected<TestBoard> TestBoard::open(const BoardChoice& choice, const std::string& instance) {
-    const auto bus = UsbBus::open();
+    const auto bus = device::UsbBus::open();
     if (!bus) return Unexpected(bus.error());
     const auto found = find_board(*bus, choice);
     if (!found) return Unexpected(found.error());

@@ -18,7 +18,7 @@ class TestBoard {
     /// Stops what runs, and waits until it is in force. Errors: refused, no answer.
     Expected<> configure(wire::Configuration configuration);
 
-    const Greeting& greeting() const { return greeting_; }
+    const device::Greeting& greeting() const { return greeting_; }
     bool has(std::uint32_t part) const { return (greeting_.hello.present & part) != 0; }
     std::uint32_t present() const { return greeting_.hello.present; }
 
@@ -28,10 +28,11 @@ class TestBoard {
     Conversation& link() { return link_; }
 
  private:
-    TestBoard(Conversation link, Greeting greeting) : link_(std::move(link)), greeting_(greeting) {}
+    TestBoard(Conversation link, device::Greeting greeting)
+        : link_(std::move(link)), greeting_(greeting) {}
 
     Conversation link_;
-    Greeting greeting_;
+    device::Greeting greeting_;
     std::uint32_t id_ = 0;  ///< of the newest configuration
     std::int64_t configured_ns_ = 0;
 };

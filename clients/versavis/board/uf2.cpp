@@ -68,7 +68,7 @@ struct Problem {
 /// What is wrong with a block by itself, and as the one of this number among so many.
 std::optional<Problem> problem(const Block& block, std::size_t number, std::size_t count) {
     if ((block.flags & flag_family) == 0)
-        return Problem{"names no family of chips", "take a file that is made for the RP2040"};
+        return Problem{"names no chip family", "take a file that is made for the RP2040"};
     if (block.family != family_rp2040)
         return Problem{
             fmt::format("is for chips of family {:#010x}{}, the RP2040 is {:#010x}", block.family,
@@ -169,7 +169,7 @@ Expected<FlashImage> parse_uf2(std::span<const std::uint8_t> bytes, const std::s
         return failure(fmt::format("{}, block 0", file),
                        "the chip would not start this: its boot stage is missing or damaged", cure);
     if (!is_sealed(image))
-        return failure(file, "is damaged, or no firmware of VersaVIS: its check sum is not right",
+        return failure(file, "is damaged, or is not VersaVIS firmware: its checksum is wrong",
                        cure);
     return image;
 }

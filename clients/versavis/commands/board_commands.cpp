@@ -69,12 +69,12 @@ class ProgressLine {
 };
 
 BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
-    : flash_(app.add_subcommand(
-          "flash",
-          "Put new firmware into the board: erase, write and verify it, then wait until it runs. "
-          "The service must not have the board. When interrupted, run it again. Exits 0 if all "
-          "boards that were meant have it (docs/user/board.md)")),
-      board_(app.add_subcommand("board", "The trigger board itself: facts, reset, self-test")),
+    : flash_(
+          app.add_subcommand("flash",
+                             "Flash new firmware to the board: erase, write, verify, then wait "
+                             "until it runs. Stop the service first. If interrupted, run it again. "
+                             "Exits 0 if every selected board was flashed (docs/user/board.md)")),
+      board_(app.add_subcommand("board", "Inspect, reset or self-test the trigger board")),
       stop_(std::move(stop)) {
     board_->require_subcommand(1);
     add_flash();
@@ -85,19 +85,19 @@ BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
 
 void BoardCommands::add_flash() {
     flash_->add_option("file", file_,
-                       "UF2 file (default: the one that was installed, share/versavis/versavis.uf2 "
-                       "below the prefix, or else built with this program)");
+                       "UF2 file (default: share/versavis/versavis.uf2 below the installation "
+                       "prefix, or else the one built with this program)");
     add_choice(*flash_);
-    flash_->add_flag("--all", all_, "All boards that are there, one after the other")
+    flash_->add_flag("--all", all_, "Flash every connected board, one after the other")
         ->excludes("--serial", "--port");
-    flash_->add_flag("--json", json_, "Print the outcome as a JSON object");
+    flash_->add_flag("--json", json_, "Print the result as a JSON object");
 }
 
 void BoardCommands::add_info() {
     info_ = board_->add_subcommand(
         "info",
-        "Show version, serial number, parts and counters of the board. When the service has it, it "
-        "is asked; else the board is, which stops its cameras");
+        "Show version, serial number, parts and counters of the board. If the service has the "
+        "board open, it is asked; otherwise the board itself is queried, which stops its cameras");
     add_choice(*info_);
     info_->add_flag("--json", json_,
                     "Print a JSON object with the keys of `board` in the status document "
@@ -106,9 +106,7 @@ void BoardCommands::add_info() {
 
 void BoardCommands::add_reset() {
     reset_ = board_->add_subcommand(
-        "reset",
-        "Reset the board, or start it out of its boot loader. The service must not have "
-        "it");
+        "reset", "Reset the board, or make it leave its boot loader. Stop the service first");
     add_choice(*reset_);
     reset_->add_flag("--json", json_, "Print a JSON object");
 }
@@ -116,28 +114,27 @@ void BoardCommands::add_reset() {
 void BoardCommands::add_self_test() {
     self_test_ = board_->add_subcommand(
         "selftest",
-        "Send pulses at each output and measure them at the inputs that wires join them to. "
-        "Disconnect cameras and light first. The service must not have the board. Exits 0 if a "
-        "wire was found and all are well, 1 if not (docs/user/board.md)");
+        "Send pulses on each output and measure them at the inputs wired to it. First disconnect "
+        "cameras and light, and stop the service. Exits 0 if at least one wire was found and all "
+        "passed, 1 if not (docs/user/board.md)");
     add_choice(*self_test_);
     self_test_
-        ->add_option("--wire", wires_,
-                     "A wire that must be there, test=aux0 for example; may be repeated")
+        ->add_option("--wire", wires_, "Required loopback wire, e.g. test=aux0; may be repeated")
         ->type_name("OUTPUT=INPUT")
         ->allow_extra_args(false);
     self_test_
         ->add_flag("--bringup", bring_up_,
-                   "Lead through the first power-up of a board: each step says what to "
-                   "connect and what a scope shows, and asks")
+                   "Guide through the first power-up of a board: each step says what to connect "
+                   "and what a scope should show, then asks for the result")
         ->excludes("--wire");
     self_test_->add_flag("--json", json_, "Print a JSON object");
 }
 
 void BoardCommands::add_choice(CLI::App& command) {
     command.add_option("--serial", choice_.serial,
-                       "Serial number of the board, if there are several");
+                       "Serial number of the board, to choose one of several");
     command.add_option("--port", choice_.port,
-                       "Where it is plugged in, usb:1-2 for example, if there are several");
+                       "USB port of the board, e.g. usb:1-2, to choose one of several");
 }
 
 bool BoardCommands::chosen() const { return flash_->parsed() || board_->parsed(); }
@@ -226,7 +223,7 @@ int BoardCommands::lead_through() {
     settings.stop = stop_;
     settings.prepare = [&](const BringUpStep& step) {
         show(step);
-        if (*step.where == '\0') answer("  joined? [Enter] ", stop_);
+        if (*step.where == '\0') answer("  connected? [Enter] ", stop_);
     };
     settings.look = [&](const BringUpStep&) -> std::optional<bool> {
         const auto seen = answer("  as expected? [Y/n] ", stop_);

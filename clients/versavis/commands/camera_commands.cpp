@@ -13,27 +13,30 @@
 namespace versavis::client {
 
 CameraCommands::CameraCommands(CLI::App& app) {
-    auto* camera = app.add_subcommand("camera", "Cameras without the service");
+    auto* camera =
+        app.add_subcommand("camera", "Probe cameras or check their wiring, without the service");
     camera->require_subcommand(1);
     probe_ = camera->add_subcommand(
         "probe",
-        "Set up one camera as the service would and show what it is, what was set, and what stands "
-        "in the way. Exits 0 if it is ready. The service must not use it meanwhile");
-    probe_->add_option("device", device_, "IP or MAC address, serial number, name, or all")
+        "Set up one camera as the service would, and show what it is, what was set and what is "
+        "wrong. Exits 0 if it is ready. The service must not be using it");
+    probe_
+        ->add_option("device", device_,
+                     "IP or MAC address, serial number or name; all: every camera")
         ->required();
     probe_->add_option("--config", configuration_,
-                       "Take the camera's keys from this configuration of the service");
+                       "Use the camera's keys in this configuration file of the service");
     probe_->add_option("--bundle", bundle_,
-                       "Also write description, values of all features, and a draft of a preset to "
-                       "this file, for a report");
+                       "Also write the GenICam description, all feature values and a draft preset "
+                       "to this file, to attach to a report");
     probe_->add_flag("--json", json_, "Print one JSON object per camera");
     check_ = camera->add_subcommand(
         "check",
-        "Prove the wiring of all cameras by pulses at one output after the other: trigger lines, "
-        "exposure lines, polarity, delays, lost triggers, swapped cables. Takes a minute, and "
-        "exits 0 if all is right. The service must not run meanwhile");
+        "Verify the wiring of all cameras by pulsing one output at a time: trigger lines, exposure "
+        "lines, polarity, delays, lost triggers, swapped cables. Takes a minute. Stop the service "
+        "first. Exits 0 if all is right");
     check_->add_option("--config", configuration_,
-                       "Configuration of the service; default: the installed one");
+                       "Configuration file of the service (default: the installed one)");
     check_->add_flag("--json", json_, "Print one JSON object");
 }
 

@@ -50,8 +50,8 @@ void add_estimator(CLI::App& command, EstimatorKind& estimator, bool& fair_start
 }  // namespace
 
 ClockCommands::ClockCommands(CLI::App& app, std::function<bool()> stop)
-    : clock_(app.add_subcommand(
-          "clock", "The board's clock: show its state, record it, estimate it again")) {
+    : clock_(
+          app.add_subcommand("clock", "Show, record or replay the estimate of the board's clock")) {
     clock_->require_subcommand(1);
     record_settings_.stop = std::move(stop);
     add_status();
@@ -70,9 +70,9 @@ void ClockCommands::add_status() {
 }
 
 void ClockCommands::add_record() {
-    record_ =
-        clock_->add_subcommand("record", "Record the stamps by which the clocks are compared");
-    record_->add_option("--seconds", recording_s_, "How long to record (default: until stopped)")
+    record_ = clock_->add_subcommand(
+        "record", "Record the timestamps that compare the board's clock with the host's");
+    record_->add_option("--seconds", recording_s_, "Seconds to record (default: until stopped)")
         ->check(CLI::PositiveNumber);
     record_->add_option("--exchanges", record_settings_.exchanges, "CSV file for the exchanges")
         ->required();
@@ -83,7 +83,7 @@ void ClockCommands::add_record() {
 void ClockCommands::add_replay() {
     replay_ = clock_->add_subcommand(
         "replay",
-        "Redo the translation of board times from recorded exchanges (files: docs/user/clock.md)");
+        "Repeat the board-to-host conversion from recorded exchanges (files: docs/user/clock.md)");
     add_inputs(*replay_, replay_settings_.exchanges, replay_settings_.oneway);
     replay_
         ->add_option("--query", replay_settings_.queries,
@@ -98,7 +98,7 @@ void ClockCommands::add_replay() {
     add_estimator(*replay_, estimator_, fair_start_);
     replay_->add_flag(
         "--smoothed", replay_settings_.smoothed,
-        "Use all messages for each answer, later ones as well (estimator envelope only)");
+        "Use all messages for each answer, including later ones (estimator envelope only)");
 }
 
 void ClockCommands::add_history() {

@@ -73,9 +73,8 @@ Expected<LedEvaluationSettings> led_settings(const std::vector<std::string>& boa
 }  // namespace
 
 EvaluateCommands::EvaluateCommands(CLI::App& app, std::function<bool()> stop)
-    : evaluate_(app.add_subcommand("evaluate",
-                                   "What a recording says about the synchronisation "
-                                   "(docs/user/evaluate.md)")),
+    : evaluate_(app.add_subcommand(
+          "evaluate", "Measure the synchronisation from a recording (docs/user/evaluate.md)")),
       stop_(std::move(stop)),
       sensors_(*evaluate_, stop_) {
     evaluate_->require_subcommand(1);
@@ -85,10 +84,10 @@ EvaluateCommands::EvaluateCommands(CLI::App& app, std::function<bool()> stop)
 void EvaluateCommands::add_leds() {
     leds_ = evaluate_->add_subcommand(
         "leds",
-        "Read the LED timing board in the pictures: pairs of cameras, increments against stamps, "
-        "offsets within a step. Exits 0 if all match, 1 if not");
+        "Read the LED timing board in the frames: compare camera pairs, check increments against "
+        "stamps, measure offsets within a step. Exits 0 if all match, 1 if not");
     leds_->add_option("recording", recording_, "Recording (versavis record)")->required();
-    leds_->add_option("--camera", cameras_, "Only this camera; may be repeated");
+    leds_->add_option("--camera", cameras_, "Evaluate only this camera; may be repeated");
     leds_
         ->add_option("--rate", led_rate_hz_,
                      "Steps of the board per second (default: [ports] test_rate_hz of the "
@@ -96,16 +95,15 @@ void EvaluateCommands::add_leds() {
         ->check(CLI::Range(0.1, 1e6));
     leds_
         ->add_option("--direction", backward_,
-                     "Where the striding LEDs run, seen from the end where they are: forward "
-                     "(default) or backward")
+                     "Direction of the running LEDs: forward (default) or backward")
         ->transform(CLI::CheckedTransformer(
                         std::map<std::string, bool>{{"forward", false}, {"backward", true}})
                         .description("{forward,backward}"))
         ->type_name("NAME");
     leds_
         ->add_option("--bits", high_first_,
-                     "Order of the binary LEDs, seen from the striding ones: low-first (default) "
-                     "or high-first")
+                     "Bit order of the binary LEDs, counted from the running ones: low-first "
+                     "(default) or high-first")
         ->transform(CLI::CheckedTransformer(
                         std::map<std::string, bool>{{"low-first", false}, {"high-first", true}})
                         .description("{low-first,high-first}"))
@@ -113,11 +111,11 @@ void EvaluateCommands::add_leds() {
     leds_
         ->add_option("--board", boards_,
                      "CAMERA=X1,Y1,X2,Y2: centres of the two outermost LEDs in pixels (default: "
-                     "they are looked for); may be repeated")
+                     "detected); may be repeated")
         ->type_name("PLACE");
     leds_
         ->add_option("--exposure", exposures_,
-                     "CAMERA=US: its true exposure (default: as measured); may be repeated")
+                     "CAMERA=US: true exposure time in us (default: as measured); may be repeated")
         ->type_name("TIME");
     leds_->add_flag("--json", json_, "Print the report as one JSON object");
 }

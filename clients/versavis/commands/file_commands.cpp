@@ -74,20 +74,18 @@ FileCommands::FileCommands(CLI::App& app, std::function<bool()> stop) : stop_(st
 void FileCommands::add_info(CLI::App& app) {
     info_ = app.add_subcommand(
         "info",
-        "Show what a recording holds: streams, rates, gaps, attachments, and whether it "
-        "is whole");
+        "Show a recording's streams, rates, gaps and attachments, and whether it is complete");
     info_->add_option("file", file_, "Recording")->required();
     info_->add_flag("--json", json_, "Print a JSON object");
 }
 
 void FileCommands::add_repair(CLI::App& app) {
-    repair_ = app.add_subcommand(
-        "repair",
-        "Make a recording whole that was cut off: up to its last whole chunk. What is cut off is "
-        "kept in FILE.cut");
+    repair_ = app.add_subcommand("repair",
+                                 "Complete a truncated recording after its last complete chunk. "
+                                 "The removed rest is kept in FILE.cut");
     repair_->add_option("file", file_, "Recording")->required();
-    repair_->add_option("-o,--output", output_, "Write a new file, and leave this one alone");
-    repair_->add_flag("--cut", cut_, "End it before the first chunk that is damaged");
+    repair_->add_option("-o,--output", output_, "Write a new file, and leave this one unchanged");
+    repair_->add_flag("--cut", cut_, "End the recording before the first damaged chunk");
     repair_->add_flag("--json", json_, "Print a JSON object");
 }
 
@@ -98,8 +96,7 @@ void FileCommands::add_export(CLI::App& app) {
                                                                     {"lz4", BagCompression::lz4}};
     export_ = app.add_subcommand(
         "export",
-        "Write a recording for others' tools: an EuRoC folder, a ROS 1 bag, or CSV "
-        "(docs/user/export.md)");
+        "Export a recording for other tools: EuRoC folder, ROS 1 bag or CSV (docs/user/export.md)");
     export_->add_option("file", export_settings_.recording, "Recording")->required();
     export_->add_option("directory", export_settings_.directory, "New or empty directory")
         ->required();
@@ -109,21 +106,23 @@ void FileCommands::add_export(CLI::App& app) {
         ->required();
     export_
         ->add_option("--streams", export_settings_.choice.streams,
-                     "Cameras and IMUs, the first camera names the sets (default: all, by name)")
+                     "Cameras and IMUs to export; sets are named by the first camera's stamps "
+                     "(default: all, by name)")
         ->delimiter(',');
     export_->add_flag("--include-suspect", export_settings_.choice.include_suspect,
-                      "Also frames and samples that are suspect, and frames stamped by arrival");
+                      "Include suspect frames and samples, and frames stamped by arrival");
     export_->add_flag("--keep-repeated", export_settings_.choice.keep_repeated,
-                      "Also IMU samples that repeat the one before");
-    export_->add_option("--compression", export_settings_.compression, "Of a bag: none or lz4")
+                      "Include IMU samples that repeat the previous one");
+    export_
+        ->add_option("--compression", export_settings_.compression, "Bag compression: none or lz4")
         ->transform(CLI::CheckedTransformer(compressions).description("{none,lz4}"))
         ->type_name("NAME");
-    export_->add_option("--camchain", export_settings_.camchain,
-                        "Calibration of the cameras, as Kalibr writes it (default: the attachment "
-                        "calibration/camchain.yaml)");
-    export_->add_option("--imu", export_settings_.imu_yaml,
-                        "Noise of the IMU, as Kalibr's imu.yaml (default: the attachment "
-                        "calibration/imu.yaml)");
+    export_->add_option(
+        "--camchain", export_settings_.camchain,
+        "Kalibr's camera calibration (default: the attachment calibration/camchain.yaml)");
+    export_->add_option(
+        "--imu", export_settings_.imu_yaml,
+        "Kalibr's imu.yaml with the IMU's noise (default: the attachment calibration/imu.yaml)");
     export_->add_flag("--json", json_, "Print the report as a JSON object");
 }
 
@@ -131,24 +130,24 @@ void FileCommands::add_play(CLI::App& app) {
     play_ = app.add_subcommand(
         "play",
         "Publish a recording as streams again, paced by its stamps, in the instance 'replay' or "
-        "the one of --instance. Programs read it as they read the service");
+        "that of --instance. Programs read it like the service");
     play_->add_option("file", file_, "Recording")->required();
     play_->add_option("streams", play_settings_.streams, "Streams (default: all)");
-    play_->add_option("--rate", play_settings_.rate, "2: twice as fast as it was")
+    play_->add_option("--rate", play_settings_.rate, "Playback speed factor (2 = twice real time)")
         ->check(CLI::Range(0.001, 1000.0))
         ->capture_default_str();
-    play_->add_flag("--loop", play_settings_.loop, "Again and again, until it is stopped");
+    play_->add_flag("--loop", play_settings_.loop, "Loop until interrupted");
 }
 
 void FileCommands::add_calibration(CLI::App& app) {
-    calibration_ = app.add_subcommand(
-        "calibration",
-        "Turn the time offset between cameras and IMU in Kalibr's camchain-imucam.yaml into a "
-        "value of the configuration");
-    calibration_->add_option("file", file_, "Kalibr's results")->required();
-    auto* recording = calibration_->add_option("--recording", recording_,
-                                               "The recording that was calibrated with");
-    calibration_->add_option("--imu", imu_, "Its IMU, where it has several")->needs(recording);
+    calibration_ = app.add_subcommand("calibration",
+                                      "Convert the time offset between cameras and IMU in Kalibr's "
+                                      "camchain-imucam.yaml to a configuration value");
+    calibration_->add_option("file", file_, "Kalibr's camchain-imucam.yaml")->required();
+    auto* recording =
+        calibration_->add_option("--recording", recording_, "Recording used for the calibration");
+    calibration_->add_option("--imu", imu_, "The calibrated IMU, if the recording has several")
+        ->needs(recording);
     calibration_->add_flag("--json", json_, "Print a JSON object");
 }
 

@@ -13,9 +13,9 @@
 namespace versavis::client {
 
 ProcessCommand::ProcessCommand(CLI::App& app, std::function<bool()> stop)
-    : command_(app.add_subcommand(
-          "process",
-          "Make the stamps of a recording anew: frames paired again, the clock by all messages")),
+    : command_(app.add_subcommand("process",
+                                  "Recompute the timestamps of a recording: pair the frames again, "
+                                  "and smooth the clock over all messages")),
       stop_(std::move(stop)) {
     command_->add_option("recording", file_, "Recording (versavis record)")->required();
     command_->add_option("-o,--output", output_, "File to write")->required();

@@ -120,27 +120,30 @@ std::string to_text(const RecordReport& report, bool json) {
 RecordCommand::RecordCommand(CLI::App& app, std::function<bool()> stop)
     : command_(app.add_subcommand(
           "record",
-          "Record streams into an MCAP file that ROS 2, Foxglove and Lichtblick open. Ends with "
+          "Record streams into an MCAP file that ROS 2, Foxglove and Lichtblick open. Stop with "
           "Ctrl-C. Exits 0, or 1 if items were lost or the disk was full "
           "(docs/user/recording.md)")) {
     settings_.stop = std::move(stop);
-    command_->add_option("stream", settings_.streams, "Streams to record; all if none is named");
+    command_->add_option("stream", settings_.streams, "Streams to record (default: all)");
     command_->add_option("-o,--output", settings_.output,
-                         "File to write; versavis-DATE-TIME.mcap if none is named");
-    command_->add_option("--seconds", seconds_, "End after so many")->check(CLI::PositiveNumber);
+                         "File to write (default: versavis-DATE-TIME.mcap)");
+    command_->add_option("--seconds", seconds_, "Stop after this many seconds")
+        ->check(CLI::PositiveNumber);
     command_->add_option("--split", split_,
-                         "Begin a new file at this size or time, as 2GiB, 10min");
-    command_->add_option("--before", before_s_, "Begin so many seconds ago, as far as the rings go")
+                         "Start a new file at this size or duration, e.g. 2GiB or 10min");
+    command_
+        ->add_option("--before", before_s_,
+                     "Include the last N seconds still held in the ring buffers")
         ->check(CLI::PositiveNumber);
     command_
-        ->add_option("--compress", compress_,
-                     "none, or png: lossless, about half the size, a third of a processor for each "
-                     "camera")
+        ->add_option(
+            "--compress", compress_,
+            "none, or png: lossless, about half the size, costs a third of a CPU core per camera")
         ->check(CLI::IsMember({"none", "png"}))
         ->capture_default_str();
     command_->add_option("--calibration", settings_.calibration,
-                         "Files of Kalibr to keep with it: camchain.yaml, imu.yaml");
-    command_->add_flag("--json", json_, "Print the closing report as a JSON object");
+                         "Kalibr files to attach: camchain.yaml, imu.yaml");
+    command_->add_flag("--json", json_, "Print the final report as a JSON object");
 }
 
 bool RecordCommand::chosen() const { return command_->parsed(); }

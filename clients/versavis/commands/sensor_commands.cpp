@@ -24,9 +24,9 @@ void add_file(CLI::App& command, std::string& file, bool& json) {
 }
 
 void add_part(CLI::App& command, double& from_s, double& to_s) {
-    command.add_option("--from", from_s, "Begin so many seconds after the IMU's first sample")
+    command.add_option("--from", from_s, "Start this many seconds after the IMU's first sample")
         ->check(CLI::NonNegativeNumber);
-    command.add_option("--to", to_s, "End so many seconds after the IMU's first sample")
+    command.add_option("--to", to_s, "End this many seconds after the IMU's first sample")
         ->check(CLI::PositiveNumber);
 }
 
@@ -42,39 +42,37 @@ SensorCommands::SensorCommands(CLI::App& evaluate, std::function<bool()> stop)
 void SensorCommands::add_imu(CLI::App& evaluate) {
     imu_ = evaluate.add_subcommand(
         "imu",
-        "Time offset and rotation between a camera and an IMU, without a target: from how both "
-        "saw the same motion. Exits 65 if the motion does not show them");
+        "Estimate time offset and rotation between a camera and an IMU from their common motion, "
+        "without a target. Exits 65 if the motion does not determine them");
     add_file(*imu_, file_, json_);
     imu_->add_option("--camera", settings_.camera, "Camera (default: the only one)");
     imu_->add_option("--imu", settings_.imu, "IMU (default: the only one)");
     imu_->add_option("--calibration", settings_.calibration,
                      "Kalibr's camchain.yaml (default: as recorded)");
     imu_->add_option("--focal", settings_.focal,
-                     "Focal length in pixels, of a lens without distortion")
+                     "Focal length in pixels, for a lens without distortion")
         ->check(CLI::PositiveNumber);
-    imu_->add_option("--range", range_ms_, "Offsets within +- this are tried, ms")
+    imu_->add_option("--range", range_ms_, "Search offsets within +- this, in ms")
         ->check(CLI::Range(1.0, 5000.0))
         ->capture_default_str();
     add_part(*imu_, settings_.from_s, settings_.to_s);
 }
 
 void SensorCommands::add_allan(CLI::App& evaluate) {
-    allan_ = evaluate.add_subcommand(
-        "allan",
-        "Noise densities and random walks of an IMU at rest. Exits 1 if the recording is too "
-        "short for a random walk");
+    allan_ = evaluate.add_subcommand("allan",
+                                     "Estimate noise densities and random walks of an IMU at rest. "
+                                     "Exits 1 if the recording is too short for a random walk");
     add_file(*allan_, file_, json_);
     allan_->add_option("--imu", settings_.imu, "IMU (default: the only one)");
     allan_->add_option("--yaml", yaml_, "Write Kalibr's imu.yaml to this file");
-    allan_->add_option("--topic", topic_, "The rostopic in it (default: as exported)");
+    allan_->add_option("--topic", topic_, "rostopic in that file (default: as in an export)");
     add_part(*allan_, settings_.from_s, settings_.to_s);
 }
 
 void SensorCommands::add_clock(CLI::App& evaluate) {
-    clock_ = evaluate.add_subcommand(
-        "clock",
-        "How well board time was translated: innovation, residual, and the true error where PPS "
-        "was recorded");
+    clock_ = evaluate.add_subcommand("clock",
+                                     "Assess the board-to-host clock conversion: innovation, "
+                                     "residual, and the true error where PPS was recorded");
     add_file(*clock_, file_, json_);
 }
 

@@ -17,36 +17,34 @@ namespace {
 // Share of the variance of flicker noise in its square: 2 ln 2 / pi (IEEE 952, annex C).
 constexpr double flicker_share = 0.4412712;
 
-// Relative sigma up to which a random walk counts as seen. Half: recordings must be four times as
-// long. Twice: the value says little more than its order of magnitude.
+// Relative sigma up to which a random walk counts as seen. If lower, recordings must be longer; if
+// higher, the value says little more than its order of magnitude.
 constexpr double seen = 0.25;
 
-// A slope of -1/2 +- this is white noise. Half: chance is taken for another noise. Twice: more of a
-// filter's flat shoulder is fitted, and the density comes out too small by twice as much.
+// A slope of -1/2 +- this is white noise. If lower, chance looks like another noise; if higher,
+// more of a filter's flat shoulder is fitted, and the density comes out too small.
 constexpr double slope_tolerance = 0.05;
 
-// Where no slope is so good, the best one will do up to this. Half: noisy parts in short recordings
-// are refused. Twice: a part without white noise gets a density.
+// Where no slope is so good, the best one will do up to this. If lower, noisy parts in short
+// recordings are refused; if higher, a part without white noise gets a density.
 constexpr double worst_slope = 0.2;
 
-// Averaging times that three noises are told apart by. Half: as many as unknowns. Twice: recordings
-// need 4096 samples behind a filter's shoulder.
+// Averaging times needed to separate three noises. If lower, there are no more of them than
+// unknowns; if higher, recordings need 4096 samples behind a filter's shoulder.
 constexpr std::size_t least_points = 6;
 
 // Correlation of deviations at neighbouring octaves widens sigma by this; found from simulated
-// noise, where it makes the errors in sigmas one. Half or twice: so do the sigmas.
+// noise, where it makes the errors in sigmas one.
 constexpr double widening = 1.45;
 
-// A second in which the gyro scatters this many times more than usually is motion. Half: bursts of
-// noise are taken for it. Twice: gentle touches pass.
+// A second in which the gyro scatters this many times more than usually is motion. If lower, bursts
+// of noise are taken for it; if higher, gentle touches pass.
 constexpr double motion_factor = 6;
 
-// Share of samples that may be missing, and are interpolated. Half or twice: a recording with more
-// loss is refused earlier or later; at this share, the density is off by as much at most.
+// Share of samples that may be missing, and are interpolated.
 constexpr double most_missing = 0.001;
 
-// No recording below this shows white noise and a motion. Half: a second or two of each axis
-// remain for the longest averaging. Twice: only refuses more.
+// A shorter recording does not show white noise and motion.
 constexpr double least_duration_s = 10;
 
 double square(double x) { return x * x; }
@@ -195,7 +193,8 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
                                     [](const auto& point) { return point.deviation <= 0; });
     const auto first = silent ? std::nullopt : first_white(axis.points);
     if (!first || axis.points.size() - *first < least_points)
-        return failure("allan", "no white noise is seen: the deviation never falls with tau^-1/2",
+        return failure("allan",
+                       "no white noise is visible: the deviation never falls with tau^-1/2",
                        "record longer at rest, with a part that measures as often as it is read");
     std::vector<AllanPoint> used(axis.points.begin() + static_cast<std::ptrdiff_t>(*first),
                                  axis.points.end());
@@ -210,7 +209,7 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
     }
     if (noises) noises = fit(used);
     if (!noises)
-        return failure("allan", "no white noise is left when the other noises are taken off",
+        return failure("allan", "no white noise remains after subtracting the other noises",
                        "record longer at rest");
     const auto root = [&](int i) {
         const double value = std::sqrt(noises->squares[i]);
@@ -329,7 +328,7 @@ Expected<AllanResult> evaluate_allan(const RestingImu& imu) {
     const auto moved =
         second_of_motion(imu.gyro, static_cast<std::size_t>(std::lround(result.rate_hz)));
     if (moved)
-        return failure(imu.name, fmt::format("it was moved {} s after the begin", *moved),
+        return failure(imu.name, fmt::format("it was moved {} s after the start", *moved),
                        "leave it at rest, or choose a part of the recording by --from and --to");
     auto done = noise_of(imu.gyro, imu, interval, "gyro", result.gyro);
     if (done) done = noise_of(imu.accel, imu, interval, "accelerometer", result.accel);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What `versavis evaluate allan` tells, for people and for scripts.
+// The report of `versavis evaluate allan`, for people and for scripts.
 #pragma once
 
 #include <nlohmann/json.hpp>

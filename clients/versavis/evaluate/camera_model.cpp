@@ -8,8 +8,8 @@ namespace versavis::client {
 
 namespace {
 
-/// Steps towards the point that the lens moved. Half: strong lenses leave some hundredths of a
-/// pixel at the corners. Twice: takes longer, and changes nothing.
+/// Steps towards the point that the lens moved. If lower, strong lenses leave some hundredths of a
+/// pixel at the corners.
 constexpr int steps = 20;
 
 /// Without distortion; both in units of the focal length.

@@ -17,15 +17,15 @@ namespace {
 using namespace clock;
 using nlohmann::json;
 
-// The estimate begins anew with the recording, and is settled after this. Half: its beginning is
-// judged as well. Twice: short recordings have nothing left to judge.
+// The estimate starts with the recording, and is settled after this. If lower, its beginning is
+// judged as well; if higher, short recordings have nothing left to judge.
 constexpr double settling_s = 20;
 
-// Less tells nothing. Half: a handful of exchanges. Twice: only refuses more.
+// A shorter recording has only a handful of exchanges.
 constexpr double least_s = 10;
 
-// How long a reading of the output clock holds after it. It is read once a second. Half: one that
-// came late makes a gap. Twice: a slewed clock is 0.5 us further off.
+// How long a reading of the output clock holds after it. It is read once a second. If lower, one
+// that came late makes a gap; if higher, a slewed clock is 0.5 us further off.
 constexpr Duration reading_holds = seconds(2);
 
 constexpr std::int64_t second_ns = 1'000'000'000;
@@ -76,7 +76,7 @@ class ClockItems {
     explicit ClockItems(RecordedClocks& clocks) : clocks_(clocks) {}
 
     void add(const ClockItem& item) {
-        std::visit([this](const auto& told) { take(told); }, item);
+        std::visit([this](const auto& recorded) { take(recorded); }, item);
     }
 
  private:
@@ -87,24 +87,26 @@ class ClockItems {
         return clocks_.lives.back();
     }
 
-    void take(const RecordedExchange& told) {
-        if (!is_plausible(told.sent.ns) || !is_plausible(told.received.ns) ||
-            !is_plausible(told.answered.ns) || !is_plausible(told.arrived.ns))
+    void take(const RecordedExchange& recorded) {
+        if (!is_plausible(recorded.sent.ns) || !is_plausible(recorded.received.ns) ||
+            !is_plausible(recorded.answered.ns) || !is_plausible(recorded.arrived.ns))
             return;
-        BoardLife& known = life(told.nonce);
+        BoardLife& known = life(recorded.nonce);
         known.stamps.messages.push_back(
-            {told.arrived, Exchange{told.sent, told.received, told.answered, told.arrived}});
+            {recorded.arrived,
+             Exchange{recorded.sent, recorded.received, recorded.answered, recorded.arrived}});
         ++known.exchanges;
     }
-    void take(const RecordedMessage& told) {
-        if (!is_plausible(told.departed.ns) || !is_plausible(told.arrived.ns)) return;
-        life(told.nonce)
-            .stamps.messages.push_back({told.arrived, OneWay{told.departed, told.arrived}});
+    void take(const RecordedMessage& recorded) {
+        if (!is_plausible(recorded.departed.ns) || !is_plausible(recorded.arrived.ns)) return;
+        life(recorded.nonce)
+            .stamps.messages.push_back(
+                {recorded.arrived, OneWay{recorded.departed, recorded.arrived}});
     }
-    void take(const RecordedRestart& told) { life(told.nonce); }
-    void take(const RecordedOutput& told) {
-        if (is_plausible(told.host.ns) && is_plausible(told.minus_host.ns))
-            clocks_.outputs.push_back(told);
+    void take(const RecordedRestart& recorded) { life(recorded.nonce); }
+    void take(const RecordedOutput& recorded) {
+        if (is_plausible(recorded.host.ns) && is_plausible(recorded.minus_host.ns))
+            clocks_.outputs.push_back(recorded);
     }
 
     RecordedClocks& clocks_;
@@ -127,8 +129,9 @@ Expected<> judge_messages(const BoardLife& life, ClockEvaluation& evaluation) {
     const auto estimator = make_estimator(EstimatorKind::envelope);
     const std::vector<ClockPoint> history = clock_history(life.stamps, *estimator);
     if (history.empty())
-        return failure("clock", "no exchange with the board can be true: none took any time",
-                       "record again, and see what 'versavis status' says of the clock");
+        return failure("clock",
+                       "no exchange with the board is valid: none has a positive round trip",
+                       "record again, and check the clock in 'versavis status'");
     evaluation.skew_ppm = history.back().skew_ppm;
     SpreadOf innovation;
     SpreadOf residual;
@@ -252,8 +255,8 @@ Expected<RecordedClocks> read_clocks(const Recording& recording,
                        "record the stream clock, and events for PPS");
     const auto read = recording.glance(streams, [&](const RecordedItem& item) {
         if (item.kind == ring::StreamKind::clock) {
-            const auto told = from_metadata(unpack<ClockMetadata>(item.metadata));
-            if (told) items.add(*told);
+            const auto recorded = from_metadata(unpack<ClockMetadata>(item.metadata));
+            if (recorded) items.add(*recorded);
         } else {
             add_event(item, clocks);
         }
@@ -292,19 +295,19 @@ Expected<ClockEvaluation> evaluate_clock(const RecordedClocks& clocks) {
     evaluation.settled_s = std::min(settling_s, evaluation.duration_s / 2);
     if (evaluation.lives > 1)
         evaluation.notes.push_back(fmt::format(
-            "the board restarted: the longest of {} lives is evaluated", evaluation.lives));
+            "the board restarted: the longest of {} runs is evaluated", evaluation.lives));
     if (auto judged = judge_messages(*longest, evaluation); !judged)
         return Unexpected(judged.error());
     evaluation.labelled = clocks.labelled;
     if (!clocks.pulses.empty()) judge_pulses(clocks, *longest, evaluation);
     if (clocks.pulses.empty())
         evaluation.notes.emplace_back(
-            "without PPS an error that is equal in all messages, as unequal delays of the two "
-            "directions make, is not seen");
+            "without PPS, an error common to all messages, as from unequal delays of the two "
+            "directions, is invisible");
     else if (!clocks.labelled)
         evaluation.notes.emplace_back(
-            "no receiver named the seconds: against PPS, the error of the host's clock counts, "
-            "too");
+            "no receiver named the seconds: the comparison with PPS includes the error of the "
+            "host's clock");
     return evaluation;
 }
 
@@ -331,12 +334,12 @@ std::string to_text(const ClockEvaluation& evaluation) {
         "after {:.0f} s of settling:\n",
         evaluation.exchanges, evaluation.one_way, evaluation.duration_s, evaluation.skew_ppm,
         evaluation.settled_s);
-    text += spread_text("innovation: what a message changed", evaluation.innovation);
+    text += spread_text("innovation: how far a message moved it", evaluation.innovation);
     text += spread_text("residual: middle of an exchange", evaluation.residual);
-    text += spread_text("estimate at the time against smoothed", evaluation.live);
+    text += spread_text("live estimate against smoothed", evaluation.live);
     if (evaluation.pps_published.count > 0) text += "PPS pulses against whole seconds:\n";
     text += spread_text("as published", evaluation.pps_published);
-    text += spread_text("by messages alone, at the time", evaluation.pps_link);
+    text += spread_text("by messages alone, live", evaluation.pps_link);
     text += spread_text("by messages alone, smoothed", evaluation.pps_smoothed);
     for (const std::string& note : evaluation.notes) text += "note: " + note + "\n";
     return text;

@@ -17,7 +17,7 @@
 
 namespace versavis::client {
 
-/// The stamps of one life of the board, whose times compare.
+/// The stamps from one boot of the board: their times are comparable.
 struct BoardLife {
     std::uint32_t nonce = 0;
     ClockRecording stamps;
@@ -26,13 +26,13 @@ struct BoardLife {
 
 struct PpsPulse {
     BoardTime board;
-    HostTime host;  ///< as published: it tells which life of the board it is of
+    HostTime host;  ///< as published: it shows which boot of the board it is from
     OutputTime published;
     Duration sigma;  ///< as published; < 0: unknown
 };
 
-/// Lives of the board overlap in board time, not in host time. Half: a guess of a suspect frame
-/// that is off by seconds is not taken. Twice: restarts within seconds could be mixed up.
+/// Lives of the board overlap in board time, not in host time. If lower, a guess of a suspect frame
+/// that is off by seconds is not taken; if higher, restarts within seconds could be mixed up.
 inline constexpr Duration same_life = seconds(2);
 
 /// What a recording holds of the clocks.
@@ -78,7 +78,7 @@ struct ClockEvaluation {
     std::vector<std::string> notes;
 };
 
-/// Error: no exchange that tells anything, or less than ten seconds.
+/// Error: no usable exchange, or less than ten seconds.
 Expected<ClockEvaluation> evaluate_clock(const RecordedClocks& clocks);
 
 nlohmann::json to_json(const ClockEvaluation& evaluation);

@@ -15,19 +15,18 @@ namespace versavis::client {
 
 namespace {
 
-// Features looked for in each frame. Half: the rotation is 1.4 times as uncertain. Twice: takes
-// nearly twice the time.
+// Features looked for in each frame. If lower, the rotation is less certain.
 constexpr int features = 300;
 
-// Corners weaker than this share of the strongest are left out. Half: more of them slide along
-// edges. Twice: scenes with one bright lamp have too few.
+// Corners weaker than this share of the strongest are left out. If lower, more of them slide along
+// edges; if higher, scenes with one bright lamp have too few.
 constexpr double quality = 0.01;
 
-// Of the frame's width, between features. Half: they crowd on one object. Twice: less than
+// Of the frame's width, between features. If lower, they crowd on one object; if higher, less than
 // `features` fit.
 constexpr double spacing = 0.025;
 
-// Side of the patch that is followed, pixels. Half: more go astray in noise. Twice: four times the
+// Side of the tracked patch, pixels. If lower, more are lost in noise; if higher, it takes more
 // time, and patches at the border are lost.
 constexpr int patch = 21;
 
@@ -35,20 +34,21 @@ constexpr int patch = 21;
 // are lost. One more: gains nothing but time.
 constexpr int levels = 4;
 
-// A feature that does not come back to this many pixels from where it began is astray. Half: noise
-// takes away good ones. Twice: more bad ones must be found by the rotation alone.
+// A feature that does not come back to this many pixels from where it began is astray. If lower,
+// noise takes away good ones; if higher, more bad ones must be found by the rotation alone.
 constexpr float most_return = 0.5F;
 
-// Pixels by which a feature may miss the rotation that the others agree on. Half: what is near, and
-// moves on its own, is left out, but in noise also good ones. Twice: such features pull more.
+// Pixels by which a feature may miss the rotation that the others agree on. If lower, what is near,
+// and moves on its own, is left out, but in noise also good ones; if higher, such features pull
+// more.
 constexpr double most_miss = 2;
 
-// Rotations that are tried, each of two features. Half: if half of the features are wrong, one of
-// 10^12 frames finds no good pair, instead of one of 10^25. Twice: only takes time.
+// Rotations that are tried, each from two features: even if half of the features are wrong, fewer
+// than one in 10^12 frames finds no good pair.
 constexpr int trials = 200;
 
-// Features that must agree, and their share. Half: chance agreements pass in poor scenes. Twice:
-// frames of scenes with few corners are left out.
+// Features that must agree, and their share. If lower, chance agreements pass in poor scenes; if
+// higher, frames of scenes with few corners are left out.
 constexpr std::size_t least_agreeing = 20;
 constexpr double least_share = 0.4;
 
@@ -92,7 +92,7 @@ Agreement consensus(const Bearings& before, const Bearings& now, double miss) {
     for (int trial = 0; trial < trials; ++trial) {
         const std::size_t i = any(random);
         const std::size_t k = any(random);
-        if (before[i].cross(before[k]).norm() < 0.05) continue;  // too close to tell a rotation
+        if (before[i].cross(before[k]).norm() < 0.05) continue;  // too close to show a rotation
         const Eigen::Matrix3d rotation = rotation_of_pair(before, now, i, k);
         std::size_t count = 0;
         for (std::size_t n = 0; n < before.size(); ++n)
@@ -233,7 +233,7 @@ Expected<std::optional<FrameRotation>> FeatureRotation::add(GreyImage image, Out
                                             image.width, image.height));
     if (!tracker_->pyramid.empty() && size != tracker_->size)
         return failure("frame",
-                       fmt::format("is of {} x {} pixels, and those before of {} x {}", size.width,
+                       fmt::format("has {} x {} pixels, and earlier ones {} x {}", size.width,
                                    size.height, tracker_->size.width, tracker_->size.height),
                        "evaluate a recording of one size");
     tracker_->size = size;

@@ -12,6 +12,8 @@
 
 namespace versavis::client {
 
+/// Estimates the camera's rotation from frame to frame by tracking corners. Used by one thread,
+/// which adds the frames in order.
 class FeatureRotation {
  public:
     /// Error: built without OpenCV.

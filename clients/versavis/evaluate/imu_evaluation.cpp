@@ -40,7 +40,7 @@ Expected<CameraModel> model_of(const CalibratedCamera& camera, const std::string
         return failure(where + ", " + camera.key, what,
                        "calibrate as pinhole with radtan or equidistant, or give --focal");
     };
-    if (camera.model != "pinhole") return wrong("the model " + camera.model + " is not known here");
+    if (camera.model != "pinhole") return wrong("the model " + camera.model + " is not supported");
     if (camera.intrinsics.size() != 4) return wrong("a pinhole has four intrinsics");
     CameraModel model{camera.intrinsics[0], camera.intrinsics[1], camera.intrinsics[2],
                       camera.intrinsics[3], Distortion::none,     {}};
@@ -48,7 +48,7 @@ Expected<CameraModel> model_of(const CalibratedCamera& camera, const std::string
     if (camera.distortion == "equidistant") model.distortion = Distortion::equidistant;
     if (model.distortion == Distortion::none) {
         if (camera.distortion.empty() || camera.distortion == "none") return model;
-        return wrong("the distortion " + camera.distortion + " is not known here");
+        return wrong("the distortion " + camera.distortion + " is not supported");
     }
     if (camera.coefficients.size() != 4) return wrong("four coefficients of distortion are needed");
     std::copy(camera.coefficients.begin(), camera.coefficients.end(), model.coefficients.begin());
@@ -145,10 +145,9 @@ void add_notes(const RecordedImu& imu, ImuEvaluation& evaluation) {
         notes.push_back(fmt::format("{} frames are not stamped by a measured middle of exposure",
                                     evaluation.unmeasured));
     if (evaluation.followed * 10 < evaluation.frames * 9)
-        notes.push_back(
-            fmt::format("only {} of {} frames could be followed: too few corners, or "
-                        "too fast",
-                        evaluation.followed, evaluation.frames));
+        notes.push_back(fmt::format(
+            "only {} of {} frames could be tracked: too few corners, or motion too fast",
+            evaluation.followed, evaluation.frames));
 }
 
 json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -159,7 +158,7 @@ Expected<CameraModel> camera_model(const Recording& recording,
                                    const ImuEvaluationSettings& settings,
                                    const FrameMetadata& frame, ImuEvaluation& evaluation) {
     if (settings.focal > 0) {
-        evaluation.notes.emplace_back("the lens counts as free of distortion (--focal)");
+        evaluation.notes.emplace_back("the lens is assumed to be free of distortion (--focal)");
         return CameraModel{settings.focal,           settings.focal,   (frame.width - 1) / 2.0,
                            (frame.height - 1) / 2.0, Distortion::none, {}};
     }
@@ -178,7 +177,7 @@ Expected<CameraModel> camera_model(const Recording& recording,
                        "its rostopic must be " + image_topic(evaluation.camera));
     if (camera->width != 0 && (camera->width != frame.width || camera->height != frame.height))
         return failure(where + ", " + camera->key,
-                       fmt::format("is of {} x {} pixels, the frames are of {} x {}", camera->width,
+                       fmt::format("is for {} x {} pixels, the frames have {} x {}", camera->width,
                                    camera->height, frame.width, frame.height),
                        "calibrate at the size that is recorded");
     evaluation.calibrated_shift_s = camera->time_shift_s;
@@ -238,7 +237,7 @@ std::string to_text(const ImuEvaluation& evaluation) {
         found.outlier_share * 100, evaluation.imu, evaluation.camera, found.offset_s * 1e3,
         found.offset_sigma_s * 1e3);
     if (evaluation.filter_delay.ns != 0)
-        text += fmt::format("  the delay of the IMU's filter, {:.3f} ms, is already taken off\n",
+        text += fmt::format("  the delay of the IMU's filter, {:.3f} ms, is already subtracted\n",
                             static_cast<double>(evaluation.filter_delay.ns) * 1e-6);
     if (evaluation.calibrated_shift_s)
         text += fmt::format("  the calibration says {:+.3f} ms\n",

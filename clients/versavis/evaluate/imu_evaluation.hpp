@@ -32,7 +32,7 @@ struct ImuEvaluation {
     std::uint64_t frames = 0;
     std::uint64_t followed = 0;    ///< frames whose rotation since the one before is known
     std::uint64_t unmeasured = 0;  ///< frames whose stamp is not a measured middle
-    Duration filter_delay;         ///< of the IMU, already taken off its stamps
+    Duration filter_delay;         ///< of the IMU, already subtracted from its stamps
     std::optional<double> calibrated_shift_s;  ///< timeshift_cam_imu of the calibration
     std::vector<std::string> notes;
 };

@@ -13,26 +13,25 @@ namespace versavis::client {
 namespace {
 
 constexpr int gaps = 9;  // between ten LEDs
-/// Light of an LED is summed up within this part of the distance from LED to LED. At half, light
-/// is lost when the place is a little off; at twice, neighbours shine in.
+/// Light of an LED is summed up within this part of the distance from LED to LED. If lower, light
+/// is lost when the place is a little off; if higher, neighbours shine in.
 constexpr double aperture = 0.45;
-/// Dark is what is seen within this part of that distance, in the middle between two LEDs. At
-/// half, noise shows; at twice, LEDs shine in.
+/// Dark is what is seen within this part of that distance, in the middle between two LEDs. If
+/// lower, noise shows; if higher, LEDs shine in.
 constexpr double gap_radius = 0.1;
-/// Brightnesses at which spots are looked for. At half, a dim board before a bright scene may be
-/// missed; at twice, the search takes twice as long.
+/// Brightnesses at which spots are looked for. If lower, a dim board before a bright scene may be
+/// missed.
 constexpr int thresholds = 24;
-/// Spots that are tried in pairs. At half, a scene full of lamps hides the board; at twice, the
-/// search takes four times as long.
+/// Spots that are tried in pairs. If lower, a scene full of lamps hides the board.
 constexpr std::size_t most_spots = 80;
-/// A spot covers at least so many pixels. At half, noise makes spots; at twice, boards below 80
+/// Smallest area of a spot, in pixels. If lower, noise makes spots; if higher, boards below 80
 /// pixels are missed.
 constexpr std::size_t smallest_spot = 5;
-/// Dark gaps are darker than the LEDs by this part of an LED's brightness, at least. At half,
-/// stripes of the scene pass for a board; at twice, a board in daylight does not.
+/// Dark gaps are darker than the LEDs by this part of an LED's brightness, at least. If lower,
+/// stripes of the scene pass for a board; if higher, a board in daylight does not.
 constexpr double least_contrast = 0.3;
-/// One of the outermost LEDs has at least this part of the other's light. At half, a board that is
-/// half covered is read; at twice, one that is seen from the side is not.
+/// One of the outermost LEDs has at least this part of the other's light. If lower, a board that is
+/// half covered is read; if higher, one that is seen from the side is not.
 constexpr double least_balance = 0.4;
 
 struct Point {
@@ -257,14 +256,13 @@ Expected<LedPlace> LedSearch::find(const std::string& stream) const {
             best = place;
         }
     if (clearest == least_contrast)
-        return failure(
-            stream,
-            fmt::format("no LED board is seen in {} pictures: two lights that are always "
-                        "on, with dark gaps and lit LEDs between them",
-                        pictures_),
-            fmt::format("look at one with 'versavis export', and say where the outermost "
-                        "LEDs are: --board {}=X1,Y1,X2,Y2",
-                        stream));
+        return failure(stream,
+                       fmt::format("no LED board was found in {} pictures: two LEDs that are "
+                                   "always on, with dark gaps and lit LEDs between them",
+                                   pictures_),
+                       fmt::format("look at one with 'versavis export', and give the positions of "
+                                   "the outermost LEDs: --board {}=X1,Y1,X2,Y2",
+                                   stream));
     const double dark = median_gap(darkest_, best);
     const double radius = aperture * best.pitch();
     const Point first = centred(darkest_, {best.x1, best.y1}, radius, dark);
@@ -297,7 +295,7 @@ LedPicture measure_leds(const GreyPicture& picture, const LedPlace& place) {
         seen.levels.at(static_cast<std::size_t>(led - 1)) =
             light(led) / (first * (1 - share) + last * share);
     }
-    seen.sight = saturated ? LedSight::saturated : LedSight::good;
+    seen.state = saturated ? LedState::saturated : LedState::good;
     return seen;
 }
 

@@ -24,14 +24,14 @@ struct LedPlace {
 /// those that are always on.
 using LedLevels = std::array<double, 8>;
 
-enum class LedSight {
+enum class LedState {
     good,
     saturated,  ///< levels are no longer in proportion to the time that an LED was on
     hidden,     ///< the two outermost LEDs are not seen
 };
 
 struct LedPicture {
-    LedSight sight = LedSight::hidden;
+    LedState state = LedState::hidden;
     LedLevels levels{};
 };
 

@@ -9,18 +9,18 @@ namespace versavis::client {
 
 namespace {
 
-/// Readings that differ by more than this many steps are different counts. At half, the two ends
-/// of a step that is not split rival each other; at twice, neighbours do not.
+/// Readings that differ by more than this many steps are different counts. If lower, the two ends
+/// of a step that is not split rival each other; if higher, neighbours do not.
 constexpr double other_count = 0.75;
-/// Levels are not better known than this: one LED is brighter than another, light is reflected.
-/// At half, confidence is claimed that no real board bears out; at twice, readings in a bright
-/// room count as ambiguous.
+/// Levels are not better known than this: one LED is brighter than another, light is reflected. If
+/// lower, confidence is claimed that no real board bears out; if higher, readings in a bright room
+/// count as ambiguous.
 constexpr double level_sigma = 0.05;
-/// Below this confidence a reading is ambiguous. At half the doubt, more pictures are left out; at
-/// twice, one in fifty of the least clear ones may be wrong.
+/// Below this confidence a reading is ambiguous: of the least clear ones, one in a hundred may be
+/// wrong.
 constexpr double least_confidence = 0.99;
-/// Levels that differ more from those of any board are of something else. At half, a board in a
-/// bright room is doubted; at twice, a scene passes for one.
+/// Levels that differ more from those of any board are of something else. If lower, a board in a
+/// bright room is doubted; if higher, a scene passes for one.
 constexpr double largest_residual = 0.2;
 
 double squared(const LedLevels& a, const LedLevels& b) {
@@ -30,8 +30,8 @@ double squared(const LedLevels& a, const LedLevels& b) {
 }
 
 /// A picture shows no step when one explains it no better than this, as a sum of squares; less
-/// where exposures are hardly shorter than a step. At half, noise passes for a step at the edge of
-/// the exposure; at twice, steps near it are not used.
+/// where exposures are hardly shorter than a step. If lower, noise passes for a step at the edge of
+/// the exposure; if higher, steps near it are not used.
 constexpr double no_step = 4 * level_sigma * level_sigma;
 
 struct Fit {

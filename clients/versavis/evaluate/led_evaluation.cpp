@@ -82,7 +82,7 @@ Expected<> LedEvaluation::add(const std::string& camera, std::uint64_t life, Out
     const auto picture = grey_picture(camera, frame, pixels);
     if (!picture) return Unexpected(picture.error());
     const auto given = settings_.exposures.find(camera);
-    LedShot shot;
+    LedObservation shot;
     shot.life = life;
     shot.epoch = frame.epoch;
     shot.tick = frame.tick();
@@ -98,7 +98,7 @@ Expected<LedReport> LedEvaluation::report() const {
     auto report = led_report(shots_, settings_.report);
     if (!report) return report;
     for (const auto& [camera, error] : not_found_)
-        report->notes.push_back(camera + ": left out, for no LED board is seen");
+        report->notes.push_back(camera + ": left out, no LED board was found");
     return report;
 }
 

@@ -23,8 +23,8 @@ struct LedEvaluationSettings {
 /// First look() at some frames of each camera, then find(), then add() all.
 class LedEvaluation {
  public:
-    /// Frames of a camera in which the board is looked for. At half, a scene that moves slowly is
-    /// taken for LEDs; at twice, nothing is gained but time.
+    /// Frames of a camera in which the board is looked for. If lower, a scene that moves slowly
+    /// looks like LEDs.
     static constexpr unsigned enough_frames = 40;
 
     explicit LedEvaluation(LedEvaluationSettings settings) : settings_(std::move(settings)) {}
@@ -49,7 +49,7 @@ class LedEvaluation {
     LedEvaluationSettings settings_;
     std::map<std::string, LedSearch> searches_;
     std::map<std::string, Error> not_found_;
-    LedShots shots_;
+    LedObservations shots_;
 };
 
 /// Of the cameras named; none named: of all that see the board. `progress` gets the number of

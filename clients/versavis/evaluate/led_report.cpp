@@ -16,23 +16,23 @@ namespace {
 
 /// Two cameras that are off by less than half a step show the same count.
 constexpr double half_step = 0.5;
-/// Pictures that tell at which end of the row a camera sees the striding LEDs. At half, a few
-/// noisy ones decide; at twice, nothing is gained.
+/// Pictures used to detect at which end of the row a camera sees the running LEDs. If lower, a few
+/// noisy ones decide.
 constexpr std::size_t most_tried = 200;
-/// Readings that a rate is fitted to, at least. At half, noise makes it; at twice, short
+/// Readings that a rate is fitted to, at least. If lower, noise makes it; if higher, short
 /// recordings have none.
 constexpr std::size_t least_fitted = 20;
-/// Pairs of which a confidence interval is told, at least. At half, it is a guess; at twice, short
-/// recordings have none.
+/// Fewest pairs for a confidence interval. If lower, it is a guess; if higher, short recordings
+/// have none.
 constexpr std::size_t least_interval = 10;
-/// The board's clock and that of the stamps differ by less. At half, a bad oscillator is called a
-/// wrong rate; at twice, 970.5 Hz is called 970.
+/// The board's clock and that of the stamps differ by less. If lower, a bad oscillator is called a
+/// wrong rate; if higher, 970.5 Hz is called 970.
 constexpr double most_skew = 5e-4;
-/// This share of wrong increments says that the board is read in a wrong way. At half, a few bad
-/// pictures do; at twice, a wrong order of bits passes for a bad service.
+/// This share of wrong increments says that the board is read in a wrong way. If lower, a few bad
+/// pictures do; if higher, a wrong order of bits passes for a bad service.
 constexpr double doubtful_share = 0.2;
-/// A phase that is known to this is as good as one that a step within the exposure tells, in steps.
-/// At half, exposures of nearly a step have fewer of them; at twice, offsets are off by 10 us.
+/// A phase known to this, in steps, is as good as one from a step within the exposure. If lower,
+/// exposures of nearly a step have fewer of them; if higher, offsets are off by 10 us.
 constexpr double exact = 0.005;
 /// Normal distribution, 95 %.
 constexpr double two_sided = 1.96;
@@ -45,30 +45,30 @@ struct Read {
     bool split = false;   ///< its phase within the step
 };
 
-bool readable(const LedShot& shot, double rate_hz) {
+bool readable(const LedObservation& shot, double rate_hz) {
     const double exposure = s(shot.exposure) * rate_hz;
     return exposure > 0 && exposure <= most_led_steps;
 }
 
-Read read_shot(const LedShot& shot, double rate_hz, const LedLayout& layout) {
+Read read_shot(const LedObservation& shot, double rate_hz, const LedLayout& layout) {
     Read read;
-    if (shot.picture.sight == LedSight::hidden || !readable(shot, rate_hz)) return read;
+    if (shot.picture.state == LedState::hidden || !readable(shot, rate_hz)) return read;
     read.reading = read_leds(shot.picture.levels, s(shot.exposure) * rate_hz, layout);
     read.usable = !read.reading.ambiguous;
     read.split =
-        read.usable && read.reading.half_width < exact && shot.picture.sight == LedSight::good;
+        read.usable && read.reading.half_width < exact && shot.picture.state == LedState::good;
     return read;
 }
 
-std::vector<Read> read_all(const std::vector<LedShot>& shots, double rate_hz,
+std::vector<Read> read_all(const std::vector<LedObservation>& shots, double rate_hz,
                            const LedLayout& layout) {
     std::vector<Read> all;
     all.reserve(shots.size());
-    for (const LedShot& shot : shots) all.push_back(read_shot(shot, rate_hz, layout));
+    for (const LedObservation& shot : shots) all.push_back(read_shot(shot, rate_hz, layout));
     return all;
 }
 
-bool binary_first(const std::vector<LedShot>& shots, double rate_hz, LedLayout layout) {
+bool binary_first(const std::vector<LedObservation>& shots, double rate_hz, LedLayout layout) {
     double residuals[2] = {};
     const std::size_t stride = std::max<std::size_t>(1, shots.size() / most_tried);
     for (const bool reversed : {false, true}) {
@@ -80,8 +80,8 @@ bool binary_first(const std::vector<LedShot>& shots, double rate_hz, LedLayout l
 }
 
 /// Steps that the board made beyond those that the stamps say, from -32 to 32.
-double excess(const LedShot& a, const Read& read_a, const LedShot& b, const Read& read_b,
-              double rate_hz) {
+double excess(const LedObservation& a, const Read& read_a, const LedObservation& b,
+              const Read& read_b, double rate_hz) {
     return wrapped_steps(read_b.reading.phase - read_a.reading.phase - s(b.time - a.time) * rate_hz,
                          std::min(read_a.reading.period, read_b.reading.period));
 }
@@ -90,7 +90,7 @@ bool fits(double excess, const Read& a, const Read& b) {
     return std::abs(excess) < half_step + a.reading.half_width + b.reading.half_width;
 }
 
-bool continuous(const LedShot& a, const LedShot& b) {
+bool continuous(const LedObservation& a, const LedObservation& b) {
     return a.life == b.life && a.epoch == b.epoch;
 }
 
@@ -99,7 +99,7 @@ struct Increments {
     std::size_t wrong = 0;
 };
 
-Increments increments(const std::vector<LedShot>& shots, const std::vector<Read>& reads,
+Increments increments(const std::vector<LedObservation>& shots, const std::vector<Read>& reads,
                       double rate_hz) {
     Increments count;
     for (std::size_t i = 1; i < shots.size(); ++i) {
@@ -118,8 +118,8 @@ struct Line {
     double scatter_s = 0;
 };
 
-std::optional<Line> fit_line(const std::vector<LedShot>& shots, const std::vector<Read>& reads,
-                             double rate_hz) {
+std::optional<Line> fit_line(const std::vector<LedObservation>& shots,
+                             const std::vector<Read>& reads, double rate_hz) {
     std::vector<double> t;
     std::vector<double> beyond;  // steps beyond rate_hz * t
     std::optional<std::size_t> last;
@@ -151,7 +151,7 @@ std::optional<Line> fit_line(const std::vector<LedShot>& shots, const std::vecto
 }
 
 struct Camera {
-    const std::vector<LedShot>* shots = nullptr;
+    const std::vector<LedObservation>* shots = nullptr;
     std::vector<Read> reads;
     LedLayout layout;
 };
@@ -162,15 +162,15 @@ LedCameraReport report_camera(const std::string& name, const Camera& camera, dou
     report.binary_first = camera.layout.binary_first;
     report.pictures = camera.shots->size();
     for (std::size_t i = 0; i < camera.shots->size(); ++i) {
-        const LedShot& shot = (*camera.shots)[i];
+        const LedObservation& shot = (*camera.shots)[i];
         const Read& read = camera.reads[i];
         if (!readable(shot, rate_hz))
             ++report.too_long;
-        else if (shot.picture.sight == LedSight::hidden)
+        else if (shot.picture.state == LedState::hidden)
             ++report.hidden;
         else if (!read.usable)
             ++report.ambiguous;
-        if (shot.picture.sight == LedSight::saturated) ++report.saturated;
+        if (shot.picture.state == LedState::saturated) ++report.saturated;
         if (read.usable) ++report.read;
         if (read.split) ++report.split;
         if (!shot.triggered) ++report.untriggered;
@@ -210,7 +210,7 @@ LedPairReport report_pair(const std::string& first, const Camera& a, const std::
     std::vector<double> offsets_us;
     std::map<std::pair<std::uint64_t, std::pair<std::uint32_t, std::uint64_t>>, std::size_t>
         of_tick;
-    const auto key = [](const LedShot& shot) {
+    const auto key = [](const LedObservation& shot) {
         return std::pair(shot.life, std::pair(shot.epoch, shot.tick));
     };
     for (std::size_t i = 0; i < b.shots->size(); ++i)
@@ -219,10 +219,10 @@ LedPairReport report_pair(const std::string& first, const Camera& a, const std::
         if (!(*a.shots)[i].triggered) continue;
         const auto found = of_tick.find(key((*a.shots)[i]));
         if (found == of_tick.end()) continue;
-        const LedShot& shot_b = (*b.shots)[found->second];
+        const LedObservation& shot_b = (*b.shots)[found->second];
         const Read& read_b = b.reads[found->second];
-        const bool seen = (*a.shots)[i].picture.sight != LedSight::hidden &&
-                          shot_b.picture.sight != LedSight::hidden;
+        const bool seen = (*a.shots)[i].picture.state != LedState::hidden &&
+                          shot_b.picture.state != LedState::hidden;
         if (!seen) continue;
         ++report.pairs;
         if (!a.reads[i].usable || !read_b.usable) {
@@ -272,7 +272,7 @@ std::vector<std::string> fitting_layouts(const std::map<std::string, Camera>& ca
 }
 
 /// The usual time from picture to picture.
-std::optional<double> period_s(const std::vector<LedShot>& shots) {
+std::optional<double> period_s(const std::vector<LedObservation>& shots) {
     std::vector<double> steps;
     for (std::size_t i = 1; i < shots.size(); ++i)
         if (continuous(shots[i - 1], shots[i]))
@@ -295,11 +295,10 @@ void note_blind_spots(LedReport& report, const std::map<std::string, Camera>& ca
             led_period / std::gcd<std::int64_t>(whole % led_period, led_period);
         if (seen >= led_period) continue;
         report.notes.push_back(fmt::format(
-            "{}: at {:.6g} steps from picture to picture only {} of 64 counts are ever seen: an "
-            "error of {} pictures, or of a multiple of that, would not show{}; at 970 Hz all are "
-            "seen",
+            "{}: at {:.6g} steps from picture to picture only {} of 64 counts ever occur: an error "
+            "of a multiple of {} pictures would go unnoticed{}; at 970 Hz all counts occur",
             name, steps, seen, seen,
-            whole % 4 == 0 ? ", nor would the direction of the striding LEDs" : ""));
+            whole % 4 == 0 ? ", and so would the wrong direction of the running LEDs" : ""));
     }
 }
 
@@ -314,10 +313,10 @@ void note_increments(LedReport& report, const std::map<std::string, Camera>& cam
     if (static_cast<double>(wrong) <= doubtful_share * static_cast<double>(all)) return;
     const std::vector<std::string> fitting = fitting_layouts(cameras, report.rate_hz);
     if (fitting.empty())
-        report.notes.push_back(fmt::format(
-            "{} of {} increments contradict the stamps, whatever the order of the LEDs: is it "
-            "--rate {:g}?",
-            wrong, all, settings.rate_hz));
+        report.notes.push_back(
+            fmt::format("{} of {} increments contradict the stamps, whatever the order of the "
+                        "LEDs: is --rate {:g} right?",
+                        wrong, all, settings.rate_hz));
     else
         report.notes.push_back(
             fmt::format("{} of {} increments contradict the stamps with {}; they fit with {}",
@@ -327,28 +326,27 @@ void note_increments(LedReport& report, const std::map<std::string, Camera>& cam
 void note_cameras(LedReport& report) {
     for (const LedCameraReport& camera : report.cameras) {
         if (2 * camera.saturated > camera.pictures)
-            report.notes.push_back(
-                camera.name +
-                ": its LEDs are saturated, so that offsets within a step are not "
-                "told; reduce its gain, or close its iris");
+            report.notes.push_back(camera.name +
+                                   ": its LEDs are saturated, so offsets within a step are not "
+                                   "measured; reduce its gain, or close its iris");
         else if (camera.read > 0 && camera.split == 0)
-            report.notes.push_back(fmt::format(
-                "{}: no step fell into an exposure, so that offsets within a step are not told; "
-                "expose for {:.4g} us, a little more than a step",
-                camera.name, 1.1e6 / report.rate_hz));
+            report.notes.push_back(
+                fmt::format("{}: no step fell into an exposure, so offsets within a step are not "
+                            "measured; expose for {:.4g} us, a little more than a step",
+                            camera.name, 1.1e6 / report.rate_hz));
         if (camera.too_long > 0)
-            report.notes.push_back(fmt::format(
-                "{}: {} exposures are unknown or last more than {:g} steps; expose shorter, or say "
-                "--exposure {}=US",
-                camera.name, camera.too_long, most_led_steps, camera.name));
+            report.notes.push_back(
+                fmt::format("{}: {} exposures are unknown or last more than {:g} steps; expose "
+                            "shorter, or pass --exposure {}=US",
+                            camera.name, camera.too_long, most_led_steps, camera.name));
         if (camera.untriggered > 0)
             report.notes.push_back(fmt::format(
                 "{}: {} pictures were not triggered: they have no tick, and are in no pair",
                 camera.name, camera.untriggered));
         if (camera.rate_hz > 0 && std::abs(camera.rate_hz / report.rate_hz - 1) > most_skew)
-            report.notes.push_back(
-                fmt::format("{}: by its stamps the board makes {:.3f} steps per second, not {:g}",
-                            camera.name, camera.rate_hz, report.rate_hz));
+            report.notes.push_back(fmt::format(
+                "{}: according to its stamps, the board makes {:.3f} steps per second, not {:g}",
+                camera.name, camera.rate_hz, report.rate_hz));
     }
     if (report.pairs.empty())
         report.notes.emplace_back("only one camera sees the board: there are no pairs");
@@ -374,7 +372,7 @@ Error nothing_read(const LedReport& report) {
                 fmt::format("expose for at most {:.4g} us, three steps",
                             most_led_steps * 1e6 / report.rate_hz)};
     if (hidden >= ambiguous)
-        return {"", counts, "say where the outermost LEDs are: --board CAMERA=X1,Y1,X2,Y2"};
+        return {"", counts, "give the positions of the outermost LEDs: --board CAMERA=X1,Y1,X2,Y2"};
     return {"", counts, "see docs/user/evaluate.md for the board that is expected"};
 }
 
@@ -395,7 +393,7 @@ bool LedReport::ok() const {
     return !pairs.empty() && increments_fit && pairs_match;
 }
 
-Expected<LedReport> led_report(const LedShots& shots, const LedReportSettings& settings) {
+Expected<LedReport> led_report(const LedObservations& shots, const LedReportSettings& settings) {
     LedReport report;
     report.rate_hz = settings.rate_hz;
     std::map<std::string, Camera> cameras;
@@ -422,7 +420,7 @@ Expected<LedReport> led_report(const LedShots& shots, const LedReportSettings& s
 
 std::string to_text(const LedReport& report) {
     std::string text = fmt::format("LED board at {:g} steps per second: {}\n", report.rate_hz,
-                                   report.ok() ? "all pairs match" : "NOT all is well");
+                                   report.ok() ? "all pairs match" : "NOT all match");
     for (const LedCameraReport& c : report.cameras)
         text += fmt::format(
             "  {}: {} pictures, {} read, {} ambiguous, {} hidden, {} saturated; {} increments, {} "
@@ -436,7 +434,7 @@ std::string to_text(const LedReport& report) {
             p.first, p.second, p.pairs, p.matches, p.modulo_32, p.mismatches, p.ambiguous);
         if (std::isfinite(p.interval_us))
             text += fmt::format(
-                "; {} exposes {:+.1f} us (+-{:.1f}, 95 %) after what its stamps say, single pairs "
+                "; {} exposes {:+.1f} us (+-{:.1f}, 95 %) later than its stamps say, single pairs "
                 "+-{:.1f} us",
                 p.second, p.offset_us, p.interval_us, p.deviation_us);
         text += "\n";
@@ -468,9 +466,9 @@ nlohmann::json to_json(const LedReport& report) {
              {"rate_hz", c.rate_hz > 0 ? nlohmann::json(c.rate_hz) : nlohmann::json()},
              {"binary_first", c.binary_first}});
     for (const LedPairReport& p : report.pairs) {
-        const bool told = std::isfinite(p.interval_us);
-        const auto number = [told](double value) {
-            return told ? nlohmann::json(value) : nlohmann::json();
+        const bool finite = std::isfinite(p.interval_us);
+        const auto number = [finite](double value) {
+            return finite ? nlohmann::json(value) : nlohmann::json();
         };
         document["pairs"].push_back({{"first", p.first},
                                      {"second", p.second},

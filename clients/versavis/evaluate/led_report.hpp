@@ -17,7 +17,7 @@
 namespace versavis::client {
 
 /// A picture, and what the service published of it.
-struct LedShot {
+struct LedObservation {
     std::uint64_t life = 0;
     std::uint32_t epoch = 0;
     std::uint64_t tick = 0;
@@ -46,7 +46,7 @@ struct LedCameraReport {
     std::size_t increments = 0;
     std::size_t wrong_increments = 0;  ///< do not fit the stamps
     double scatter_us = 0;             ///< RMS of readings against stamps, where they are split
-    double rate_hz = 0;  ///< steps per second of the stamps' clock; 0: too few to tell
+    double rate_hz = 0;  ///< steps per second of the stamps' clock; 0: too few readings
     bool binary_first = false;
 };
 
@@ -55,7 +55,7 @@ struct LedPairReport {
     std::string second;
     std::size_t pairs = 0;
     std::size_t matches = 0;
-    std::size_t modulo_32 = 0;  ///< of these, where a count cannot be told from that 32 later
+    std::size_t modulo_32 = 0;  ///< of these, where a count may as well be 32 later
     std::size_t mismatches = 0;
     std::size_t ambiguous = 0;
     std::size_t split = 0;    ///< pairs that are read to parts of a step
@@ -76,10 +76,10 @@ struct LedReport {
 };
 
 /// Shots of each camera, in the order of their stamps.
-using LedShots = std::map<std::string, std::vector<LedShot>>;
+using LedObservations = std::map<std::string, std::vector<LedObservation>>;
 
 /// Error: no camera, or no picture could be read, with the reason.
-Expected<LedReport> led_report(const LedShots& shots, const LedReportSettings& settings);
+Expected<LedReport> led_report(const LedObservations& shots, const LedReportSettings& settings);
 
 std::string to_text(const LedReport& report);
 nlohmann::json to_json(const LedReport& report);

@@ -50,8 +50,9 @@ Expected<std::string> find_stream(const Recording& recording, ring::StreamKind k
         return failure(name, "is no " + what + " of this recording", "it has " + all);
     }
     if (names.size() == 1) return names.front();
-    return failure("recording", fmt::format("has several: {}", all),
-                   fmt::format("choose by --{}", kind == ring::StreamKind::imu ? "imu" : "camera"));
+    return failure(
+        "recording", fmt::format("has several: {}", all),
+        fmt::format("choose one with --{}", kind == ring::StreamKind::imu ? "imu" : "camera"));
 }
 
 Expected<RecordedImu> read_imu(const Recording& recording, const std::string& name, double from_s,

@@ -19,7 +19,7 @@ struct RecordedImu {
     RestingImu samples;
     std::uint64_t life = 0;  ///< of the service, and its epoch: those with most samples
     std::uint32_t epoch = 0;
-    Duration filter_delay;        ///< already taken off the times
+    Duration filter_delay;        ///< already subtracted from the times
     std::uint64_t elsewhere = 0;  ///< samples of other epochs
     std::uint64_t faulty = 0;     ///< the sensor itself reported an error
     std::uint64_t repeated = 0;   ///< left out: they say nothing new

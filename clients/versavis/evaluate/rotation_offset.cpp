@@ -18,52 +18,52 @@ using Jacobian = Eigen::Matrix<double, 3, 7>;
 
 constexpr int offset_at = 3;
 
-// Rotations between frames that are needed. Half: seven unknowns are hardly checked. Twice: five
-// seconds at 20 Hz are refused.
+// Rotations between frames that are needed. If lower, seven unknowns are hardly checked; if higher,
+// five seconds at 20 Hz are refused.
 constexpr std::size_t least_rotations = 50;
 
-// Residuals up to so many sigmas count in full (Huber): one of ten exceeds it. Half: a third of the
-// information is lost. Twice: outliers pull four times as hard in square.
+// Residuals up to this many sigmas count in full (Huber): one of ten exceeds it. If lower, a third
+// of the information is lost; if higher, outliers pull harder.
 constexpr double huber = 2.5;
 
 // Median length of three normal components.
 constexpr double median_length = 1.538;
 
-// Steps between the offsets that are tried. Half: takes twice the time. Twice: the valley of a
-// motion of 10 Hz lies between two of them.
+// Steps between the offsets that are tried. If higher, the valley of a motion of 10 Hz lies between
+// two of them.
 constexpr double scan_step_s = 0.005;
 
-// Valleys that are followed to their bottom. Half: of a shaken rig the right one may be left out.
-// Twice: takes twice the time.
+// Valleys that are followed to their bottom. If lower, of a shaken rig the right one may be left
+// out.
 constexpr std::size_t valleys_followed = 6;
 
-// Steps of Gauss and Newton; it is over after 3 to 6. Half: the last digits are missing after a
-// start far off. Twice: nothing changes.
+// Steps of Gauss and Newton; it is over after 3 to 6. If lower, the last digits are missing after a
+// start far off.
 constexpr int most_steps = 15;
 
-// Neighbours whose errors may be correlated with a rotation's. Half: what lasts as a parallax does
-// is not seen in full. Twice: the sigma scatters more.
+// Neighbours whose errors may be correlated with a rotation's. If lower, what lasts as a parallax
+// does is not seen in full; if higher, the sigma scatters more.
 constexpr std::size_t correlated = 8;
 
-// An offset that is not known better is no result. Half: slow motion is refused that is right
-// within its sigma. Twice: the model is not straight over its sigma any more, and sigma too small.
+// An offset that is not known better is no result. If lower, slow motion is refused that is right
+// within its sigma; if higher, the model is not straight over its sigma any more, and sigma too
+// small.
 constexpr double worst_sigma_s = 3e-3;
 
-// The same for the rotation, rad. Half or twice: turns about nearly one axis are refused sooner or
-// later; the offset hardly depends on it.
+// The same for the rotation, rad.
 constexpr double worst_rotation = 0.1;
 
-// Another offset must fit worse by this in sigmas, squared. Half: a motion that nearly repeats
-// passes more often. Twice: a short recording is refused more often.
+// Another offset must fit worse by this in sigmas, squared. If lower, a motion that nearly repeats
+// passes more often; if higher, a short recording is refused more often.
 constexpr double clearly_worse = 25;
 
-// A gap of the gyro of so many intervals is not bridged. Half: each lost sample takes a frame with
-// it. Twice: rotations are wrong by the motion within.
+// Gyro gaps of this many intervals are not bridged. If lower, each lost sample takes a frame with
+// it; if higher, rotations are wrong by the motion within.
 constexpr double longest_gap = 3;
 
-// A rotation counts at most as if its sigma were so many times less than usual: what features tell
-// of themselves leaves out what they have in common. Half: good axes lose half of their say. Twice:
-// a few lucky frames outweigh the others.
+// A rotation counts at most as if its sigma were this many times smaller than usual: the sigma of
+// features leaves out errors that they have in common. If lower, good axes lose half of their say;
+// if higher, a few lucky frames outweigh the others.
 constexpr double most_weight = 4;
 
 double seconds_of(Duration d) { return static_cast<double>(d.ns) * 1e-9; }
@@ -372,14 +372,16 @@ Expected<> check(const Problem& problem, const Solution& best, const Matrix7& va
     const std::string motion = motion_text(problem, best.state);
     if (!(sigma <= worst_sigma_s))
         return Unexpected(not_excited(
-            fmt::format("the motion shows the offset only to {:.1f} ms", sigma * 1e3), motion,
-            "turn the rig to and fro about all axes, once a second or faster, by some 30 degrees"));
+            fmt::format("the motion determines the offset only to within {:.1f} ms", sigma * 1e3),
+            motion,
+            "rotate the rig back and forth about all axes, once a second or faster, by some 30 "
+            "degrees"));
     const double rotation = std::sqrt(variances.diagonal().head<3>().maxCoeff());
     if (!(rotation <= worst_rotation))
-        return Unexpected(
-            not_excited(fmt::format("the motion shows the rotation only to {:.0f} degrees",
-                                    std::min(rotation, M_PI) * 180 / M_PI),
-                        motion, "turn the rig about a second axis, too"));
+        return Unexpected(not_excited(
+            fmt::format("the motion determines the rotation only to within {:.0f} degrees",
+                        std::min(rotation, M_PI) * 180 / M_PI),
+            motion, "rotate the rig about a second axis, too"));
     const double cost = huber_cost(best.at, best.scale);
     for (const Solution& other : others) {
         const double apart = std::abs(other.state.offset - best.state.offset);
@@ -388,7 +390,7 @@ Expected<> check(const Problem& problem, const Solution& best, const Matrix7& va
             return Unexpected(not_excited(
                 fmt::format("offsets of {:.1f} ms and of {:.1f} ms fit nearly as well",
                             best.state.offset * 1e3, other.state.offset * 1e3),
-                motion, "turn the rig irregularly: a motion that repeats fits more than once"));
+                motion, "rotate the rig irregularly: periodic motion fits more than once"));
     }
     return {};
 }
@@ -433,7 +435,7 @@ Expected<RotationOffset> rotation_offset(const std::vector<FrameRotation>& frame
     if (solutions.empty())
         return failure("camera and IMU",
                        fmt::format("no offset within {:.0f} ms fits", range * 1e3),
-                       "try a longer --range, and check that camera and IMU are on one rig");
+                       "try a larger --range, and check that camera and IMU are on one rig");
     std::size_t best = 0;
     for (std::size_t i = 1; i < solutions.size(); ++i)
         if (solutions[i].scale < solutions[best].scale) best = i;

@@ -16,8 +16,8 @@ namespace {
 constexpr std::string_view magic = "#ROSBAG V2.0\n";
 constexpr std::size_t bag_header_size = 4096;  ///< the format fixes it
 
-/// A chunk ends when it has so many bytes; ROS itself takes as many. At half there are more index
-/// records, at twice a reader that wants one message decompresses more.
+/// A chunk ends at this size, which ROS itself uses. If lower, there are more index records; if
+/// higher, a reader that wants one message decompresses more.
 constexpr std::size_t chunk_threshold = 768 << 10U;
 
 enum class Op : std::uint8_t {
@@ -109,8 +109,8 @@ Expected<> BagWriter::write(std::uint32_t connection, std::int64_t time_ns,
     if (!chunk_.empty() && chunk_.size() + size > chunk_threshold)
         if (auto ended = end_chunk(); !ended) return ended;
     Connection& its = connections_.at(connection);
-    if (!its.told) put(chunk_, as_bytes(its.record));
-    its.told = true;
+    if (!its.listed) put(chunk_, as_bytes(its.record));
+    its.listed = true;
     const std::uint64_t time = bag_time(time_ns);
     index_[connection].push_back({time, static_cast<std::uint32_t>(chunk_.size())});
     put(chunk_,
@@ -179,11 +179,11 @@ Expected<> BagWriter::end_chunk() {
 Expected<> BagWriter::finish() {
     if (auto ended = end_chunk(); !ended) return ended;
     const std::uint64_t index = at_;
-    std::uint32_t told = 0;
+    std::uint32_t listed = 0;
     for (const Connection& connection : connections_) {
-        if (!connection.told) continue;  // it had no message
+        if (!connection.listed) continue;  // it had no message
         if (auto written = append(connection.record); !written) return written;
-        ++told;
+        ++listed;
     }
     for (const ChunkInfo& chunk : chunks_) {
         std::string list;
@@ -194,7 +194,7 @@ Expected<> BagWriter::finish() {
             field("count", raw(static_cast<std::uint32_t>(chunk.messages.size())));
         if (auto written = append(record(Op::chunk_info, fields, list)); !written) return written;
     }
-    const std::string head = bag_header(index, told, static_cast<std::uint32_t>(chunks_.size()));
+    const std::string head = bag_header(index, listed, static_cast<std::uint32_t>(chunks_.size()));
     if (::pwrite(file_.get(), head.data(), head.size(), 0) != static_cast<ssize_t>(head.size()))
         return not_written(path_);
     return sync_file(file_, path_);

@@ -43,7 +43,7 @@ class BagWriter {
  private:
     struct Connection {
         std::string record;
-        bool told = false;  ///< in a chunk
+        bool listed = false;  ///< in a chunk
     };
     struct Entry {
         std::uint64_t time;  ///< seconds in the lower half, nanoseconds in the upper

@@ -28,11 +28,11 @@ constexpr std::uint64_t progress_step = 4096;
 std::string json_line(const RecordedItem& item) {
     json line{{"number", item.number}, {"time_ns", item.time.ns}};
     if (item.kind == ring::StreamKind::evidence) {
-        const auto told = pairing::from_metadata(unpack<pairing::EvidenceMetadata>(item.metadata));
-        line.update(told ? to_json(*told) : json{{"evidence", "unknown"}});
+        const auto input = pairing::from_metadata(unpack<pairing::EvidenceMetadata>(item.metadata));
+        line.update(input ? to_json(*input) : json{{"evidence", "unknown"}});
     } else if (item.kind == ring::StreamKind::clock) {
-        const auto told = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
-        line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
+        const auto input = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
+        line.update(input ? to_json(*input) : json{{"clock", "unknown"}});
     } else {
         line["status"] = parse_shallow_json(
             {reinterpret_cast<const char*>(item.payload.data()), item.payload.size()});

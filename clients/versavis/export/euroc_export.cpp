@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "export/metadata_csv.hpp"
-#include "export/png_crew.hpp"
+#include "export/png_encoder_pool.hpp"
 #include "posix/file.hpp"
 
 namespace versavis::client {
@@ -62,7 +62,7 @@ std::string euroc_distortion(const std::string& kalibr) {
 std::string camera_yaml(const SelectedCamera& camera, const ExportFormat& format,
                         const std::optional<CalibratedCamera>& calibrated) {
     std::string text = fmt::format(
-        "%YAML:1.0\n# What is not known is not here.\nsensor_type: camera\n"
+        "%YAML:1.0\n# Unknown values are left out.\nsensor_type: camera\n"
         "comment: \"stream {}, pixels {}\"\n",
         camera.name, format.encoding);
     if (calibrated && calibrated->from_imu) text += transform_lines(inverse(*calibrated->from_imu));
@@ -79,7 +79,7 @@ std::string camera_yaml(const SelectedCamera& camera, const ExportFormat& format
 std::string imu_yaml(const SelectedImu& imu, const std::optional<ImuNoise>& noise) {
     constexpr Transform identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     std::string text = fmt::format(
-        "%YAML:1.0\n# What is not known is not here. The body is the IMU.\nsensor_type: imu\n"
+        "%YAML:1.0\n# Unknown values are left out. The body is the IMU.\nsensor_type: imu\n"
         "comment: \"stream {}\"\n{}rate_hz: {:.6g}\n",
         imu.name, transform_lines(identity), imu.rate_hz);
     if (noise)
@@ -247,7 +247,7 @@ class EurocExport {
     const fs::path mav_;
     const ExportWatch& watch_;
     std::vector<NewFile> files_;
-    PngCrew crew_;
+    PngEncoderPool crew_;
     std::uint64_t frames_ = 0;
     std::vector<std::uint64_t> without_exposure_;  ///< frames of each camera
 };

@@ -65,7 +65,7 @@ Places places_in(const std::vector<CalibratedCamera>& chain, const Selection& se
             chain.size(), places.size()));
         return {};
     }
-    report.notes.emplace_back("cameras of the camchain are taken in their order");
+    report.notes.emplace_back("cameras of the camchain are matched by their order");
     for (std::size_t i = 0; i < places.size(); ++i) places[i] = i;
     return places;
 }
@@ -175,17 +175,16 @@ void note_peculiarities(const std::vector<ExportFormat>& formats, ExportKind kin
     for (std::size_t i = 0; i < formats.size(); ++i) {
         const auto& camera = selection.cameras[i];
         if (formats[i].shift != 0)
-            report.notes.push_back(
-                fmt::format("{}: words of {} are shifted left by {} bits, to the scale of 16 bits",
-                            camera.name, pixel_format_name(camera.pixel_format), formats[i].shift));
+            report.notes.push_back(fmt::format(
+                "{}: values of {} are shifted left by {} bits, to the full 16-bit range",
+                camera.name, pixel_format_name(camera.pixel_format), formats[i].shift));
         if (formats[i].encoding.starts_with("bayer"))
-            report.notes.push_back(
-                fmt::format("{}: images are the sensor's mosaic ({}), not colours{}", camera.name,
-                            formats[i].encoding,
-                            kind == ExportKind::bag && formats[i].bytes == 2
-                                ? "; Kalibr refuses bags with mosaics of more than 8 bits: record "
-                                  "a format of 8 bits for it, or export with --to euroc"
-                                : ""));
+            report.notes.push_back(fmt::format(
+                "{}: images are raw mosaics ({}), not colour{}", camera.name, formats[i].encoding,
+                kind == ExportKind::bag && formats[i].bytes == 2
+                    ? "; Kalibr refuses bags with mosaics of more than 8 bits: record "
+                      "a format of 8 bits for it, or export with --to euroc"
+                    : ""));
     }
     for (const auto& imu : selection.imus) {
         if (imu.samples == 0)
@@ -200,7 +199,7 @@ void note_peculiarities(const std::vector<ExportFormat>& formats, ExportKind kin
 
 void note_recording(const Recording& recording, ExportReport& report) {
     if (!recording.facts().defect.empty())
-        report.notes.push_back(fmt::format("the recording: {}; exported is what can be read",
+        report.notes.push_back(fmt::format("the recording: {}; only what can be read is exported",
                                            recording.facts().defect));
     const auto gaps = recording.gaps();
     if (!gaps) return;
@@ -324,8 +323,7 @@ std::string to_text(const ExportReport& report, bool json) {
                             one.samples, one.rate_hz, static_cast<double>(one.longest_gap.ns) / 1e6,
                             left_out_text(counts, one.name));
     for (const auto& file : report.written) text += "  " + file + "\n";
-    if (!report.selection.left_out.empty())
-        text += "  what was left out is listed in left_out.csv\n";
+    if (!report.selection.left_out.empty()) text += "  left_out.csv lists what was left out\n";
     for (const auto& note : report.notes) text += "  note: " + note + "\n";
     return text;
 }

@@ -25,13 +25,13 @@ Expected<ExportDirectory> ExportDirectory::create(const fs::path& path) {
     fs::path plain = path.lexically_normal();
     if (!plain.has_filename()) plain = plain.parent_path();  // "there/"
     if (fs::exists(plain, error) && !(fs::is_directory(plain, error) && fs::is_empty(plain, error)))
-        return failure(path.string(), "is there, and not an empty directory",
+        return failure(path.string(), "exists, and is not an empty directory",
                        "name another, or remove it");
     ExportDirectory directory(plain);
     const fs::path part = directory.part_;
     if (fs::exists(part, error)) {
         directory.part_.clear();  // it is not ours
-        return failure(part.string(), "is left from an export that did not end, or is running",
+        return failure(part.string(), "belongs to an export that did not finish, or is running",
                        "remove it");
     }
     if (!fs::create_directories(part, error)) {
@@ -44,7 +44,7 @@ Expected<ExportDirectory> ExportDirectory::create(const fs::path& path) {
 Expected<> ExportDirectory::finish() {
     std::error_code error;
     fs::rename(part_, path_, error);
-    if (error) return failure(path_.string(), "cannot be given its name: " + error.message());
+    if (error) return failure(path_.string(), "cannot be renamed: " + error.message());
     part_.clear();
     return {};
 }

@@ -22,7 +22,7 @@ using Index = std::map<Key, std::size_t>;
 Index index_of(const std::vector<TableFrame>& frames) {
     Index index;
     for (std::size_t i = 0; i < frames.size(); ++i)
-        if (const auto key = key_of(frames[i]); key && frames[i].left_out == LeftOut::no)
+        if (const auto key = key_of(frames[i]); key && frames[i].left_out == SkipReason::no)
             index.emplace(*key, i);
     return index;
 }
@@ -41,17 +41,17 @@ std::vector<std::size_t> partners(const std::vector<Index>& others, const TableF
 
 }  // namespace
 
-const char* to_string(LeftOut reason) {
+const char* to_string(SkipReason reason) {
     switch (reason) {
-        case LeftOut::no: return "exported";
-        case LeftOut::suspect: return "suspect";
-        case LeftOut::arrival: return "arrival_only";
-        case LeftOut::incomplete: return "incomplete_set";
-        case LeftOut::outside_imu: return "outside_imu";
-        case LeftOut::not_later: return "not_later";
-        case LeftOut::repeated: return "repeated";
-        case LeftOut::no_pixels: return "no_pixels";
-        case LeftOut::another_size: return "another_size";
+        case SkipReason::no: return "exported";
+        case SkipReason::suspect: return "suspect";
+        case SkipReason::arrival: return "arrival_only";
+        case SkipReason::incomplete: return "incomplete_set";
+        case SkipReason::outside_imu: return "outside_imu";
+        case SkipReason::not_later: return "not_later";
+        case SkipReason::repeated: return "repeated";
+        case SkipReason::no_pixels: return "no_pixels";
+        case SkipReason::another_size: return "another_size";
     }
     return "unknown";
 }
@@ -64,7 +64,7 @@ bool FrameSetTable::inside(const FrameSet& set, OutputTime after, OutputTime bef
     return true;
 }
 
-void FrameSetTable::mark(const FrameSet& set, LeftOut reason) {
+void FrameSetTable::mark(const FrameSet& set, SkipReason reason) {
     for (std::size_t camera = 0; camera < frames_.size(); ++camera)
         frames_[camera][set.frames[camera]].left_out = reason;
 }
@@ -79,7 +79,7 @@ std::vector<FrameSet> FrameSetTable::pair(OutputTime after, OutputTime before) {
     for (const auto& frames : frames_) paired.emplace_back(frames.size(), false);
     for (std::size_t i = 0; i < frames_[0].size(); ++i) {
         const TableFrame& first = frames_[0][i];
-        if (first.left_out != LeftOut::no) continue;
+        if (first.left_out != SkipReason::no) continue;
         FrameSet set{first.time, partners(others, first)};
         if (set.frames.size() != others.size()) continue;
         set.frames.insert(set.frames.begin(), i);
@@ -88,16 +88,16 @@ std::vector<FrameSet> FrameSetTable::pair(OutputTime after, OutputTime before) {
         for (std::size_t camera = 0; camera < frames_.size(); ++camera)
             paired[camera][set.frames[camera]] = true;
         if (!inside(set, after, before))
-            mark(set, LeftOut::outside_imu);
+            mark(set, SkipReason::outside_imu);
         else if (!sets.empty() && set.name <= sets.back().name)
-            mark(set, LeftOut::not_later);
+            mark(set, SkipReason::not_later);
         else
             sets.push_back(std::move(set));
     }
     for (std::size_t camera = 0; camera < frames_.size(); ++camera)
         for (std::size_t i = 0; i < frames_[camera].size(); ++i)
-            if (frames_[camera][i].left_out == LeftOut::no && !paired[camera][i])
-                frames_[camera][i].left_out = LeftOut::incomplete;
+            if (frames_[camera][i].left_out == SkipReason::no && !paired[camera][i])
+                frames_[camera][i].left_out = SkipReason::incomplete;
     return sets;
 }
 

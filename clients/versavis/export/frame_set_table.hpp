@@ -13,7 +13,7 @@
 namespace versavis::client {
 
 /// Why something is not exported.
-enum class LeftOut : std::uint8_t {
+enum class SkipReason : std::uint8_t {
     no,
     suspect,       ///< its pairing is not proved, or the sensor reported a fault
     arrival,       ///< its stamp is only that of its arrival
@@ -24,7 +24,7 @@ enum class LeftOut : std::uint8_t {
     no_pixels,     ///< the file has no image for it
     another_size,  ///< its size or format is not that of the camera's first frame
 };
-const char* to_string(LeftOut reason);
+const char* to_string(SkipReason reason);
 
 struct TableFrame {
     OutputTime time;
@@ -33,7 +33,7 @@ struct TableFrame {
     std::uint32_t epoch;
     std::optional<std::uint64_t> tick;  ///< none: not triggered
     ItemPlace place;
-    LeftOut left_out = LeftOut::no;
+    SkipReason left_out = SkipReason::no;
 };
 
 /// Frames that belong together: one of each camera, as indices.
@@ -42,6 +42,7 @@ struct FrameSet {
     std::vector<std::size_t> frames;
 };
 
+/// First takes the metadata of all frames, then finds the sets. Used by one thread.
 class FrameSetTable {
  public:
     explicit FrameSetTable(std::size_t cameras) : frames_(cameras) {}
@@ -56,7 +57,7 @@ class FrameSetTable {
 
  private:
     bool inside(const FrameSet& set, OutputTime after, OutputTime before) const;
-    void mark(const FrameSet& set, LeftOut reason);
+    void mark(const FrameSet& set, SkipReason reason);
 
     std::vector<std::vector<TableFrame>> frames_;
 };

@@ -11,9 +11,9 @@ namespace versavis::client {
 
 namespace {
 
-/// Samples that repeat are left out, but between two that are exported there are never more than
-/// 20 ms: a sensor that stands still and shows it exactly would have no samples at all. At half,
-/// one more of them is kept in ten at 1 kHz; at twice, integration has longer steps to bridge.
+/// Samples that repeat are left out, but between two that are exported there are never more than 20
+/// ms: a sensor that stands still and shows it exactly would have no samples at all. If lower, one
+/// more of them is kept in ten at 1 kHz; if higher, integration has longer steps to bridge.
 constexpr Duration longest_without = milliseconds(20);
 
 /// Items between two looks at the clock of the progress line.
@@ -42,13 +42,13 @@ struct ImuWay {
     std::optional<OutputTime> first;
     OutputTime last;
 
-    LeftOut judge(OutputTime time, std::uint32_t flags, const ExportChoice& choice) const {
+    SkipReason judge(OutputTime time, std::uint32_t flags, const ExportChoice& choice) const {
         if ((flags & (flag_suspect | flag_sensor_error)) != 0 && !choice.include_suspect)
-            return LeftOut::suspect;
-        if (first && time <= last) return LeftOut::not_later;
+            return SkipReason::suspect;
+        if (first && time <= last) return SkipReason::not_later;
         const bool repeated = (flags & flag_repeated) != 0 && !choice.keep_repeated;
-        if (repeated && first && time - last <= longest_without) return LeftOut::repeated;
-        return LeftOut::no;
+        if (repeated && first && time - last <= longest_without) return SkipReason::repeated;
+        return SkipReason::no;
     }
 };
 
@@ -144,14 +144,14 @@ class Selector {
             camera.pixel_format = data.pixel_format;
         }
         if (item.place.image == ItemPlace::no_image)
-            frame.left_out = LeftOut::no_pixels;
+            frame.left_out = SkipReason::no_pixels;
         else if (data.width != camera.width || data.height != camera.height ||
                  data.pixel_format != camera.pixel_format)
-            frame.left_out = LeftOut::another_size;
+            frame.left_out = SkipReason::another_size;
         else if (!choice_.include_suspect && data.stamp_kind() == StampKind::arrival)
-            frame.left_out = LeftOut::arrival;
+            frame.left_out = SkipReason::arrival;
         else if (!choice_.include_suspect && (data.flags & (flag_suspect | flag_sensor_error)) != 0)
-            frame.left_out = LeftOut::suspect;
+            frame.left_out = SkipReason::suspect;
         table.add(index, frame);
     }
 
@@ -160,8 +160,8 @@ class Selector {
         const std::uint32_t index = imus_.at(item.stream);
         SelectedImu& imu = selection_.imus[index];
         ImuWay& way = ways_[index];
-        const LeftOut reason = way.judge(item.time, data.flags, choice_);
-        if (reason != LeftOut::no) {
+        const SkipReason reason = way.judge(item.time, data.flags, choice_);
+        if (reason != SkipReason::no) {
             selection_.left_out.push_back(
                 {static_cast<std::uint32_t>(selection_.cameras.size() + index), item.time,
                  item.number, 0, reason});
@@ -194,7 +194,7 @@ class Selector {
     void list_left_out(const FrameSetTable& table) {
         for (std::uint32_t camera = 0; camera < selection_.cameras.size(); ++camera)
             for (const TableFrame& frame : table.frames(camera))
-                if (frame.left_out != LeftOut::no)
+                if (frame.left_out != SkipReason::no)
                     selection_.left_out.push_back(
                         {camera, frame.time, frame.number, frame.tick.value_or(0), frame.left_out});
         std::stable_sort(selection_.left_out.begin(), selection_.left_out.end(),

@@ -49,7 +49,7 @@ struct LeftOutItem {
     OutputTime time;
     std::uint64_t number;
     std::uint64_t tick;
-    LeftOut reason;
+    SkipReason reason;
 };
 
 struct SelectedCamera {
@@ -65,7 +65,7 @@ struct SelectedImu {
     std::string name;
     double rate_hz = 0;
     std::uint64_t samples = 0;
-    Duration filter_delay;          ///< of the last sample: already taken off its stamp
+    Duration filter_delay;          ///< of the last sample: already subtracted from its stamp
     Duration longest_gap;           ///< between samples that are exported
     std::int32_t accel_age_ns = 0;  ///< the largest
 };

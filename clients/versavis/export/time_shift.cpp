@@ -27,11 +27,11 @@ nlohmann::json as_json(const TimeShift& shift) {
 
 std::string advice(const TimeShift& shift) {
     if (!shift.known)
-        return "name the recording with --recording: its stamps are already without the delay of "
-               "the IMU's filter, and the configured value is the sum\n";
+        return "pass the recording with --recording: the delay of the IMU's filter is already "
+               "subtracted from its stamps, and the configured value is the sum\n";
     std::string text = fmt::format(
-        "the recorded stamps are without {:.3f} ms of filter delay; with that the IMU is {:.3f} ms "
-        "behind {}",
+        "{:.3f} ms of filter delay are already subtracted from the stamps; with them the IMU is "
+        "{:.3f} ms behind {}",
         filter_s(shift) * 1e3, shift.total_s * 1e3, shift.cameras.front().camera);
     if (shift.total_s > 0 && shift.taken_off.ns > 0)
         text += fmt::format(", {:.1f} % of which its filter explains",
@@ -56,10 +56,10 @@ Expected<Duration> recorded_filter_delay(const Recording& recording, const std::
     if (imus.empty())
         return failure(
             where, imu.empty() ? "has no IMU" : "has no IMU " + imu,
-            "name the recording that was calibrated with; 'versavis info' lists streams");
+            "give the recording used for the calibration; 'versavis info' lists streams");
     if (imus.size() > 1)
         return failure(where, fmt::format("has several IMUs: {}", fmt::join(imus, ", ")),
-                       "say with --imu which of them was calibrated");
+                       "choose the calibrated one with --imu");
     std::optional<Duration> delay;
     const auto read = recording.glance(imus, [&](const RecordedItem& item) {
         delay = unpack<ImuMetadata>(item.metadata).filter_delay;

@@ -13,19 +13,18 @@
 
 #include "engine/ring/directory.hpp"
 #include "engine/ring/writer.hpp"
-#include "play/pace.hpp"
+#include "play/playback_clock.hpp"
 #include "versavis/ring_path.hpp"
 
 namespace versavis::client {
 
 namespace {
 
-/// Readers take a writer for dead after 3 s. At half more calls, at twice a slow disk would be
-/// taken for death sooner.
+/// Readers consider a writer dead after 3 s; a slow disk must not look like that.
 constexpr Duration heartbeat_interval = milliseconds(250);
 
-/// The service's default for cameras, and enough for documents. At half slow readers lose frames
-/// sooner, at twice it takes twice the memory.
+/// The service's default for cameras, and enough for documents. If lower, slow readers lose frames
+/// sooner; if higher, it takes more memory.
 constexpr std::uint32_t slots = 17;
 constexpr std::uint32_t descriptors_with_slots = 64;
 
@@ -42,8 +41,8 @@ bool has_stamp(ring::StreamKind kind) {
     return kind == ring::StreamKind::frames || kind == ring::StreamKind::imu;
 }
 
-/// Of what is played. Frames and samples set the pace: what pairing and clock were told may be from
-/// minutes before them. Without them, all items do.
+/// What is played. Frames and samples set the pace: inputs of pairing and clock may be from minutes
+/// before them. Without frames and samples, all items set it.
 struct Span {
     std::map<std::string, Extent> streams;
     bool stamped = false;  ///< there are frames or samples
@@ -121,7 +120,7 @@ class Player {
  private:
     bool stopped() const { return settings_.stop && settings_.stop(); }
 
-    /// New rings take the names of those before, whose readers are told of a restart.
+    /// New rings take the names of the old ones, whose readers see a restart.
     Expected<> begin_round() {
         const std::uint64_t life = random_life();
         for (const auto& [name, extent] : span_.streams) {
@@ -135,11 +134,12 @@ class Player {
     }
 
     Expected<> play_round() {
-        Pace pace(settings_.rate);
+        PlaybackClock clock(settings_.rate);
         return recording_.for_each(settings_.streams, [&](const RecordedItem& item) {
             const HostTime now = host_now();
             const bool paces = span_.paced_by(item.kind);
-            const HostTime due = paces ? pace.due(item.time, now) : pace.due_beside(item.time, now);
+            const HostTime due =
+                paces ? clock.due(item.time, now) : clock.due_beside(item.time, now);
             if (paces) newest_ = std::max(newest_, item.time);
             if (!wait_until(due)) return false;
             if (due < now) report_.latest = std::max(report_.latest, now - due);

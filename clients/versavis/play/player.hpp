@@ -15,7 +15,7 @@ namespace versavis::client {
 struct PlaySettings {
     std::string instance;
     std::vector<std::string> streams;  ///< empty: all
-    double rate = 1;                   ///< 2: twice as fast as it was
+    double rate = 1;                   ///< Playback speed factor (2 = twice real time)
     bool loop = false;
     std::function<bool()> stop;
     std::function<void(double seconds, double all)> progress;  ///< within the recording

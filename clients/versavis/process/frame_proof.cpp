@@ -10,18 +10,17 @@ namespace {
 
 using namespace pairing;
 
-// Of the period of the triggers: how far a frame's camera time may be from the exposure's. Half:
-// auto exposure, which moves the middle against what the camera stamps, leaves frames unproved.
-// Twice: a camera that stamps by a coarse timer could still not be off by one trigger, which is
-// eight times as far.
+// Of the period of the triggers: how far a frame's camera time may be from the exposure's. If
+// lower, auto exposure, which moves the middle against what the camera stamps, leaves frames
+// unproved; if higher, a camera that stamps by a coarse timer could still not be off by one
+// trigger, which is eight times as far.
 constexpr double tolerance = 0.125;
 
-// Frames between two anchors on one side. Half: the camera's clock rate is known half as well.
-// Twice: of a short stream the beginning stays unproved.
+// Frames between two anchors on one side. If lower, the camera's clock rate is known less well; if
+// higher, of a short stream the beginning stays unproved.
 constexpr std::size_t anchor_distance = 10;
 
-// How far beyond the anchors, in their distance. Half or twice: less or more of a long unproved
-// beginning is proved; the rate's error stays far below the tolerance.
+// How far beyond the anchors, in their distance.
 constexpr double reach = 8;
 
 /// Frames of one stream of the camera, in the order in which they arrived.

@@ -18,6 +18,8 @@ struct ProvedFrame {
     bool afterwards = false;  ///< by frames on both sides, or later ones; not by what came before
 };
 
+/// Pairs the frames of one camera again, from its recorded evidence, and proves further frames by
+/// their proved neighbours. Used by one thread.
 class FrameProof {
  public:
     FrameProof();

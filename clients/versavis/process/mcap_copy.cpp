@@ -77,7 +77,7 @@ class Copy {
             return failure(path_, "stopped before the end of the recording");
         Expected<> done;
         switch (record.opcode) {
-            case McapOpcode::data_end: return false;  // the summary is made anew
+            case McapOpcode::data_end: return false;  // the summary is rebuilt
             case McapOpcode::message_index: return true;
             case McapOpcode::chunk: done = chunk_at(record.offset); break;
             case McapOpcode::attachment:
@@ -195,7 +195,7 @@ class Copy {
         if (!message) return from_.damaged(record.offset, "a message is too short");
         const auto channel = channels_.find(message->channel);
         if (channel == channels_.end())
-            return from_.damaged(record.offset, "a message of a channel that was not told");
+            return from_.damaged(record.offset, "a message of an undeclared channel");
         const std::uint64_t place = records_.size();
         const auto changed = settings_.change(channel->second, *message);
         const std::uint64_t log_time = changed ? changed->log_time : message->log_time;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Writes an MCAP file anew, with some of its messages changed.
+// Rewrites an MCAP file with some of its messages changed.
 #pragma once
 
 #include <cstdint>

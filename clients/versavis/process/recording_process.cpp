@@ -21,8 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-// Stamps that are off the link's by more were made by PPS, which is better than messages are. Half
-// or twice: between 1 and 4 us, either is as good.
+// Stamps that are off the link's by more were made by PPS, which is better than messages are.
 constexpr double pps_differs_ns = 2000;
 
 constexpr std::uint32_t no_proof = UINT32_MAX;
@@ -42,7 +41,7 @@ struct Stream {
     ring::StreamKind kind = ring::StreamKind::frames;
     std::vector<Change> changes;  ///< by `before`
     std::vector<ProvedFrame> proofs;
-    ProcessedStream told;
+    ProcessedStream counts;
     std::uint64_t life = 0;
     std::uint32_t epoch = 0;
     std::optional<OutputTime> newest;  ///< of this epoch, suspects aside
@@ -61,7 +60,7 @@ Duration uncertain(const ProvedFrame& proof, HostTime middle) {
     return std::max(half, proof.arrival.arrived - middle);
 }
 
-/// How the link's asymmetry was taken off live.
+/// How the link's asymmetry was subtracted live.
 Duration asymmetry_of(const Recording& recording) {
     const Attachment* status = recording.attachment("status.json");
     if (status == nullptr) return {};
@@ -128,7 +127,7 @@ class Processing {
             if (!done) return done;
             if (!proof.begun())
                 report_.notes.push_back(camera +
-                                        ": the begin of its evidence is missing, so its frames "
+                                        ": the beginning of its evidence is missing, so its frames "
                                         "were not paired again");
             auto& proofs = streams_[camera].proofs;
             proofs = proof.finish();
@@ -156,7 +155,8 @@ class Processing {
         by_pps_ = *middle > pps_differs_ns;
         if (by_pps_)
             report_.notes.emplace_back(
-                "PPS made the stamps: the clock was not smoothed, as messages know it less well");
+                "PPS made the stamps: the clock was not smoothed, since messages are less "
+                "accurate");
         return {};
     }
 
@@ -170,7 +170,7 @@ class Processing {
                     [this](const RecordedItem& item) {
                         Stream& stream = streams_[item.stream];
                         stream.kind = item.kind;
-                        ++stream.told.items;
+                        ++stream.counts.items;
                         if (item.kind == ring::StreamKind::imu)
                             restamp_sample(item, stream);
                         else
@@ -178,8 +178,8 @@ class Processing {
                     });
     }
 
-    /// Within an epoch each stamp lies after the one before, as live: what would not is held just
-    /// after that, and says so.
+    /// Within an epoch each stamp is later than the previous one, as live: one that would not be is
+    /// held just after it, and flagged.
     static void hold(Change change, std::uint64_t life, std::uint32_t epoch, Stream& stream) {
         if (life != stream.life || epoch != stream.epoch) stream.newest.reset();
         stream.life = life;
@@ -202,7 +202,8 @@ class Processing {
         Change change{item.time, item.time, sample.host_time, sample.sigma_ns, sample.flags,
                       no_proof,  false};
         const auto stamp = clock_of(sample.board_time - sample.filter_delay, sample.host_time);
-        // What else is uncertain, as the filter's delay, is not told apart: sigma stays.
+        // Other uncertainties, such as the filter's delay, are not stored separately, so sigma
+        // stays.
         if (stamp) set(change, *stamp);
         hold(change, item.life, sample.epoch, stream);
     }
@@ -210,7 +211,7 @@ class Processing {
     void restamp_frame(const RecordedItem& item, Stream& stream) const {
         const auto frame = unpack<FrameMetadata>(item.metadata);
         const bool suspect = (frame.flags & flag_suspect) != 0;
-        stream.told.suspect += suspect ? 1U : 0U;
+        stream.counts.suspect += suspect ? 1U : 0U;
         const std::uint32_t index = proof_of(frame, stream.proofs);
         const ProvedFrame* proof = index == no_proof ? nullptr : &stream.proofs[index];
         if (suspect) {
@@ -220,7 +221,7 @@ class Processing {
         Change change{item.time, item.time, frame.host_time, frame.sigma_ns, frame.flags,
                       no_proof,  false};
         const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
-        stream.told.contradicted += contradicted ? 1U : 0U;
+        stream.counts.contradicted += contradicted ? 1U : 0U;
         const bool by_board = frame.stamp_kind() != StampKind::arrival && !contradicted;
         const auto stamp = by_board ? clock_of(frame.board_time, frame.host_time) : std::nullopt;
         if (stamp) {
@@ -256,7 +257,7 @@ class Processing {
                        static_cast<std::uint32_t>(proof.exposure.kind);
         change.sigma_ns = sigma_of(stamp->sigma, uncertain(proof, stamp->host));
         hold(change, item.life, frame.epoch, stream);
-        ++stream.told.proved;
+        ++stream.counts.proved;
     }
 
     static std::uint32_t proof_of(const FrameMetadata& frame,
@@ -271,22 +272,22 @@ class Processing {
     }
 
     void finish(const std::string& name, Stream& stream) {
-        ProcessedStream& told = stream.told;
-        told.restamped = stream.changes.size();
+        ProcessedStream& counts = stream.counts;
+        counts.restamped = stream.changes.size();
         std::uint64_t steady = 0;
         for (const Change& change : stream.changes) {
-            told.sigma_after_ns += change.sigma_ns;
+            counts.sigma_after_ns += change.sigma_ns;
             if (change.proof != no_proof) continue;
             const auto moved = static_cast<double>((change.after - change.before).ns);
-            told.change_rms_ns += moved * moved;
-            told.change_max_ns = std::max(told.change_max_ns, std::abs(moved));
+            counts.change_rms_ns += moved * moved;
+            counts.change_max_ns = std::max(counts.change_max_ns, std::abs(moved));
             ++steady;
         }
-        if (steady > 0) told.change_rms_ns = std::sqrt(told.change_rms_ns / steady);
-        if (told.restamped > 0) told.sigma_after_ns /= static_cast<double>(told.restamped);
+        if (steady > 0) counts.change_rms_ns = std::sqrt(counts.change_rms_ns / steady);
+        if (counts.restamped > 0) counts.sigma_after_ns /= static_cast<double>(counts.restamped);
         std::stable_sort(stream.changes.begin(), stream.changes.end(),
                          [](const auto& a, const auto& b) { return a.before < b.before; });
-        if (told.items > 0) report_.streams[name] = told;
+        if (counts.items > 0) report_.streams[name] = counts;
     }
 
     const Change* change_of(const std::string& name, OutputTime before) const {
@@ -416,7 +417,7 @@ std::optional<ChangedMessage> Processing::change(const McapChannel& channel,
 
 Expected<ProcessReport> process_recording(const std::string& path, const std::string& output,
                                           const std::function<bool(double share)>& go_on) {
-    const auto recording = Recording::open_file(path);  // it alone is written anew
+    const auto recording = Recording::open_file(path);  // only this one is rewritten
     if (!recording) return Unexpected(recording.error());
     ProcessReport report;
     report.file = output;
@@ -456,14 +457,15 @@ json to_json(const ProcessReport& report) {
 std::string to_text(const ProcessReport& report) {
     std::string text;
     for (const auto& [name, stream] : report.streams) {
-        text += fmt::format("{}: {} of {} stamps made anew, moved by {:.2f} us rms, {:.2f} at most",
-                            name, stream.restamped, stream.items, stream.change_rms_ns * 1e-3,
-                            stream.change_max_ns * 1e-3);
+        text +=
+            fmt::format("{}: {} of {} stamps recomputed, moved by {:.2f} us rms, {:.2f} at most",
+                        name, stream.restamped, stream.items, stream.change_rms_ns * 1e-3,
+                        stream.change_max_ns * 1e-3);
         if (stream.suspect > 0)
             text += fmt::format("; {} of {} suspect frames proved", stream.proved, stream.suspect);
         if (stream.contradicted > 0)
-            text +=
-                fmt::format("; {} paired otherwise now, and left as they are", stream.contradicted);
+            text += fmt::format("; {} would now be paired differently, and were left as they are",
+                                stream.contradicted);
         text += "\n";
     }
     for (const std::string& note : report.notes) text += "note: " + note + "\n";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A recording made anew: frames paired again, all stamps by the smoothed clock.
+// Recomputes a recording: frames are paired again, all stamps come from the smoothed clock.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct ProcessedStream {
     std::uint64_t contradicted = 0;  ///< published as proved, but paired otherwise now: unchanged
     double change_rms_ns = 0;        ///< of stamps that were proved before
     double change_max_ns = 0;
-    double sigma_after_ns = 0;  ///< mean of those made anew
+    double sigma_after_ns = 0;  ///< mean of the recomputed ones
 };
 
 struct ProcessReport {

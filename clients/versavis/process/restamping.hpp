@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Stamps of a recording made anew: the clock by all messages, earlier and later ones.
+// Recomputes the stamps of a recording from a clock that uses earlier and later messages.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,11 @@
 
 namespace versavis::client {
 
+/// Gives the smoothed stamp for a board time of any of the recorded boots. Read-only after
+/// construction.
 class Restamping {
  public:
-    /// `asymmetry`: of the link, as it was taken off live.
+    /// `asymmetry`: of the link, as it was subtracted live.
     Restamping(const RecordedClocks& clocks, Duration asymmetry);
 
     struct Stamp {
@@ -23,8 +25,8 @@ class Restamping {
         Duration sigma;  ///< of the clock alone
     };
 
-    /// `about`: when it was, on the host clock, within two seconds; it tells which of the board's
-    /// lives is meant. None: no messages around it, or the output clock is not known there.
+    /// `about`: the host time within two seconds; it selects the board's boot. None: no messages
+    /// around it, or the output clock is not known there.
     std::optional<Stamp> stamp(BoardTime board, HostTime about) const;
 
     /// Output time of an instant on the host clock.

@@ -297,7 +297,7 @@ Expected<> Recorder::read_calibration() {
     for (const std::string& path : settings_.calibration) {
         std::ifstream file(path, std::ios::binary);
         if (!file || std::filesystem::is_directory(path))
-            return failure(path, "cannot be read", "name calibration files, as Kalibr writes them");
+            return failure(path, "cannot be read", "give calibration files that Kalibr wrote");
         std::string bytes{std::istreambuf_iterator<char>(file), {}};
         const bool imu = bytes.find("rostopic") != std::string::npos &&
                          bytes.find("gyroscope_noise_density") != std::string::npos;
@@ -326,9 +326,8 @@ Expected<> Recorder::choose_file() {
     const bool split = settings_.split_bytes > 0 || settings_.split_length;
     const auto taken = split ? later_file(report_.files.front()) : std::nullopt;
     if (!taken) return {};
-    return failure(*taken,
-                   "is there already, and a later file of this recording would take its place",
-                   "name another file with -o, or move it away; none is overwritten");
+    return failure(*taken, "exists, and a later file of this recording would need its name",
+                   "choose another file with -o, or move it away; no file is overwritten");
 }
 
 Expected<> Recorder::begin_file() {

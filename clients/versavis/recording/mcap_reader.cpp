@@ -225,7 +225,7 @@ Expected<> McapReader::read_summary() {
         return failure({}, "its footer is damaged");
     if (begin == 0) return failure({}, "it has no summary");
     if (begin < data_begin_ || begin > footer || (offsets != 0 && offsets > footer))
-        return failure({}, "its footer names places that it does not have");
+        return failure({}, "its footer points beyond its end");
     if (auto checked = check_summary(begin, footer, crc); !checked) return checked;
     if (auto taken = take_summary(begin, footer); !taken) {
         forget();
@@ -323,7 +323,7 @@ Expected<> McapReader::claim(std::uint64_t begin, std::uint64_t end) {
     const auto next = claimed_.lower_bound(begin);
     const bool into_next = next != claimed_.end() && next->first < end;
     const bool into_previous = next != claimed_.begin() && std::prev(next)->second > begin;
-    if (into_next || into_previous) return damaged(begin, "this place is named twice");
+    if (into_next || into_previous) return damaged(begin, "two entries point to the same place");
     claimed_.emplace_hint(next, begin, end);
     return {};
 }

@@ -292,8 +292,8 @@ Expected<> Recording::File::take_stock() {
     if (streams.empty() && !ours)
         return failure(reader.path(),
                        reader.chunks().empty() && !reader.defect().empty()
-                           ? "holds no whole chunk: " + reader.defect()
-                           : "is no recording of VersaVIS: it has none of its items",
+                           ? "holds no complete chunk: " + reader.defect()
+                           : "is not a VersaVIS recording: it has none of its items",
                        "name a file that 'versavis record' wrote");
     return {};
 }
@@ -373,7 +373,7 @@ Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uin
     if (part.kind != ring::StreamKind::frames) {
         const std::uint64_t size = record.length - mcap_message_header - item_size;
         if (size != envelope->length)
-            return reader.damaged(record.offset, "an item has another length than it says");
+            return reader.damaged(record.offset, "an item's length differs from the one it states");
         std::vector<std::byte> rest;
         item.payload = message->data.subspan(item_size);
         if (item.payload.size() < size) {  // it was only glanced at

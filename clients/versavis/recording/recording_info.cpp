@@ -144,7 +144,7 @@ std::string stream_line(const json& one) {
     count("without_pixels", "without pixels");
     count("backwards", "stamps before their predecessor");
     if (one.value("lives", std::size_t{1}) > 1)
-        line += fmt::format(", {} lives of the service", one["lives"].get<std::size_t>());
+        line += fmt::format(", {} runs of the service", one["lives"].get<std::size_t>());
     return line + "\n";
 }
 
@@ -195,8 +195,7 @@ std::string info_text(const json& info) {
         text += fmt::format("  {} files\n", files);
     if (!info["whole"].get<bool>())
         text += fmt::format(
-            "  not whole: {}; {} of {} bytes can be read; 'versavis repair' makes "
-            "it whole\n",
+            "  incomplete: {}; {} of {} bytes can be read; 'versavis repair' completes it\n",
             info["defect"].get<std::string>(), info["good_bytes"].get<std::uint64_t>(),
             info["bytes"].get<std::uint64_t>());
     for (const auto& stream : info["streams"]) text += stream_line(stream);

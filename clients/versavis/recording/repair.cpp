@@ -112,7 +112,7 @@ class Stock {
         const auto message = parse_message(record.content);
         if (!message) return reader_.damaged(record.offset, "a message is too short");
         if (summary_.channels.count(id) == 0)
-            return reader_.damaged(record.offset, "a message of a channel that was not told");
+            return reader_.damaged(record.offset, "a message of an undeclared channel");
         if (last_.empty()) one.start_time = message->log_time;
         one.start_time = std::min(one.start_time, message->log_time);
         one.end_time = std::max(one.end_time, message->log_time);
@@ -195,7 +195,7 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
             in_place ? "repair it into a new file with -o" : "");
     if (::flock(file.get(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
         return failure(path, "is being written by another process",
-                       "stop the recorder, and see whether the file is whole then");
+                       "stop the recorder, then check whether the file is complete");
     return file;
 }
 
@@ -285,13 +285,14 @@ std::string to_text(const RepairReport& report, bool json) {
                               {"cut_file", report.cut_file}}
                    .dump() +
                "\n";
-    if (report.was_whole) return fmt::format("{}: is whole, nothing was done\n", report.file);
-    std::string text = fmt::format("{}: {}; it is whole now, with {} messages in {} chunks\n",
+    if (report.was_whole) return fmt::format("{}: is complete, nothing was changed\n", report.file);
+    std::string text = fmt::format("{}: {}; it is complete now, with {} messages in {} chunks\n",
                                    report.file, report.defect, report.messages, report.chunks);
     if (!report.cut_file.empty())
-        text += fmt::format("{} bytes behind that are in {}\n", report.cut_bytes, report.cut_file);
+        text +=
+            fmt::format("the {} bytes after that are in {}\n", report.cut_bytes, report.cut_file);
     else if (report.cut_bytes > 0)
-        text += fmt::format("{} bytes behind that are not in it\n", report.cut_bytes);
+        text += fmt::format("the {} bytes after that are left out\n", report.cut_bytes);
     return text;
 }
 

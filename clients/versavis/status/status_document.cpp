@@ -21,7 +21,7 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
             newest = std::move(text);
     }
     if (!stream->reader().writer_alive())
-        return failure(fmt::format("instance {}", instance), "the service has died or is hanging",
+        return failure(fmt::format("instance {}", instance), "the service has died or hangs",
                        "see its log ('journalctl -u versavisd'), then restart it");
     if (!newest)
         return failure(fmt::format("instance {}", instance),

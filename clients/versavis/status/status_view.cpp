@@ -108,7 +108,7 @@ struct ClockFact {
 constexpr std::array clock_facts{
     ClockFact{"state", "state", ""},
     ClockFact{"health", "health", ""},
-    ClockFact{"fault", "fault", "what is wrong, in a word"},
+    ClockFact{"fault", "fault", "the fault, in one word"},
     ClockFact{"hint", "hint", ""},
     ClockFact{"since_ns", "since", "when state or fault changed, CLOCK_MONOTONIC_RAW"},
     ClockFact{"output", "output clock", "clock of the published stamps"},
@@ -134,7 +134,7 @@ constexpr std::array clock_facts{
     ClockFact{"host_synchronised", "host synchronised", "according to the kernel"},
     ClockFact{"host_max_error_ns", "largest host error",
               "according to the kernel; 16 s: never set"},
-    ClockFact{"tai_offset_s", "TAI minus UTC", "0: the kernel was never told"},
+    ClockFact{"tai_offset_s", "TAI minus UTC", "0: never set in the kernel"},
     ClockFact{"tai_valid", "TAI valid", ""},
     ClockFact{"asymmetry_ns", "asymmetry",
               "subtracted: half of what the link is slower to the host"},

@@ -7,8 +7,8 @@ namespace {
 
 constexpr std::int64_t ns_uhz = 1'000'000'000'000'000;
 
-/// So that it times a remainder of up to 10^10 stays within 64 bits. At half, a step is made twice;
-/// ten times as much would overflow.
+/// So that it times a remainder of up to 10^10 stays within 64 bits. If lower, a step is made
+/// twice; ten times as much would overflow.
 constexpr std::int64_t most_at_once = 400'000'000;
 
 }  // namespace

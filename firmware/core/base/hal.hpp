@@ -75,7 +75,7 @@ struct Edge {
 /// half of the room is taken.
 struct EdgeStream {
     /// Edges of inputs outside of the mask cost nothing and are not reported. The first edge of an
-    /// input that is listened to anew is a true change of its line, after this call.
+    /// input that is enabled again is a real change of its line after this call.
     virtual void listen(std::uint32_t inputs) = 0;
     /// The next edge, in the order of their stamps over all inputs. False: there is none, or edges
     /// between the last one and the next one were lost, which take_lost() then counts.
@@ -86,7 +86,7 @@ struct EdgeStream {
     /// Edges lost after the last one that was popped, and before the next one that will be, because
     /// they were not popped in time.
     virtual std::uint32_t take_lost() = 0;
-    /// What the port's own proof of its stamps says. While it fails, edges are lost.
+    /// Result of the port's self-test of its stamps. While it fails, edges are lost.
     virtual wire::StampTest stamp_test() = 0;
 
  protected:
@@ -223,7 +223,7 @@ struct ByteLink {
     /// `received` is when they entered the board.
     virtual std::size_t read(std::uint8_t* data, Nanoseconds& received) = 0;
     /// Asks when the newest byte written leaves, which means acknowledged or, if the link knows no
-    /// more, handed over. Only the newest question is answered; a link that cannot tell never
+    /// more, handed over. Only the newest question is answered; a link that does not know never
     /// answers.
     virtual void watch_departure() {}
     /// True, once: the byte asked about left at `at`, no later than the host could receive it. A

@@ -21,7 +21,7 @@ struct SetupStep {
 /// Steps from power-up to samples, in order.
 class Setup {
  public:
-    /// A BMI088 needs 18. At half, the end of its set-up is missing; at twice, memory is wasted.
+    /// A BMI088 needs 18. If lower, the end of its set-up is missing; if higher, memory is wasted.
     static constexpr std::size_t capacity = 20;
 
     void write(std::uint8_t chip, std::uint8_t address, std::uint16_t value,
@@ -60,7 +60,7 @@ struct AccelBytes {
 
 enum class Verdict : std::uint8_t {
     taken,   ///< the sample is filled, with flags for what is wrong
-    unsure,  ///< one more reading is needed to tell
+    unsure,  ///< one more reading is needed to decide
 };
 
 inline constexpr unsigned max_readings = 5;

@@ -46,11 +46,11 @@ class ImuPort {
         return failures_ < max_failures;
     }
 
-    void report_event(wire::EventKind kind, Nanoseconds at, std::int64_t value,
+    void report_event(wire::BoardEventKind kind, Nanoseconds at, std::int64_t value,
                       std::uint16_t detail = 0) {
         reports_.event(kind, port_, at, value, detail);
     }
-    void report_failure(wire::EventKind kind, Nanoseconds at, std::int64_t value,
+    void report_failure(wire::BoardEventKind kind, Nanoseconds at, std::int64_t value,
                         std::uint16_t detail = 0) {
         ++restarts_;
         failures_ = 0;

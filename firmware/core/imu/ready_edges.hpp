@@ -59,10 +59,10 @@ class ReadyEdges {
     }
 
  private:
-    /// At half, a poll that is held up for a millisecond at 8 kHz loses a sample's stamp; at twice,
-    /// memory is wasted.
+    /// If lower, a poll that is held up for a millisecond at 8 kHz loses a sample's stamp; if
+    /// higher, memory is wasted.
     static constexpr std::uint32_t kept = 16;
-    /// At half, a line with long reflections counts double; at twice, parts at 4 kHz lose edges.
+    /// If lower, a line with long reflections counts double; if higher, parts at 4 kHz lose edges.
     static constexpr Nanoseconds longest_echo = 100'000;
 
     Nanoseconds width_ = 0;

@@ -7,38 +7,38 @@ namespace {
 
 constexpr Nanoseconds mhz_ns = 1'000'000'000'000;
 
-/// A reading on a grid is armed this long ahead, of 1 ms at the highest rate. At half, a slow poll
-/// misses it; at twice, the highest rate leaves no time between two readings.
+/// A reading on a grid is armed this long ahead, of 1 ms at the highest rate. If lower, a slow poll
+/// misses it; if higher, the highest rate leaves no time between two readings.
 constexpr Nanoseconds set_ahead = 500'000;
 
-/// No transfer takes this long unless the bus hangs. At half, a slow poll restarts a part on I2C;
-/// at twice, a bus that hangs is noticed later.
+/// No transfer takes this long unless the bus hangs. If lower, a slow poll restarts a part on I2C;
+/// if higher, a bus that hangs is noticed later.
 constexpr Nanoseconds transfer_limit = 25'000'000;
 
-/// Of the slowest part. At half, it does not answer yet; at twice, sampling begins later.
+/// Of the slowest part. If lower, it does not answer yet; if higher, sampling begins later.
 constexpr Nanoseconds power_up_time = 300'000'000;
 
-/// At half, jitter of a part restarts it; at twice, samples of a part that reset itself are
+/// If lower, jitter of a part restarts it; if higher, samples of a part that reset itself are
 /// published for longer.
 constexpr unsigned max_fast_edges = 20;
 
-/// Added to twenty periods. At half, a slow poll restarts fast parts; at twice, silence is told
-/// late.
+/// Added to twenty periods. If lower, a slow poll restarts fast parts; if higher, silence is
+/// reported late.
 constexpr Nanoseconds silence_floor = 100'000'000;
 
-/// Around the bytes of the accelerometer: how far a port's clock pauses between bytes. At half,
-/// such a port may name the wrong edge; at twice, more samples do not know which it was.
+/// Around the bytes of the accelerometer: how far a port's clock pauses between bytes. If lower,
+/// such a port may name the wrong edge; if higher, more samples do not know which it was.
 constexpr Nanoseconds accel_margin = 2'000;
 
-/// Clocks of accelerometers are exact to a sixteenth. At half, a coarse clock goes unstamped; at
-/// twice, a clock that jumps is believed.
+/// Clocks of accelerometers are exact to a sixteenth. If lower, a coarse clock goes unstamped; if
+/// higher, a clock that jumps is accepted.
 constexpr Nanoseconds accel_tolerance = 16;
 constexpr Nanoseconds accel_age_step = 32;
 
 constexpr std::uint16_t while_running = 0xFFFF;
 
-/// The fastest that parts on I2C share with cables of a few decimetres. At half, 1 kHz does not
-/// fit; at twice, most pull-ups are too weak.
+/// The fastest that parts on I2C share with cables of a few decimetres. If lower, 1 kHz does not
+/// fit; if higher, most pull-ups are too weak.
 constexpr std::uint32_t i2c_clock_hz = 400'000;
 constexpr std::uint8_t i2c_address = 0x68;  ///< the second is the next one
 constexpr std::uint8_t reads = 0x80;        ///< of a register's address on the SPI bus
@@ -118,17 +118,17 @@ void SpiImu::next_step(Nanoseconds now) {
     readings_ = 0;
     arm();
     if (job_state_ == Job::none)
-        fail(wire::EventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
+        fail(wire::BoardEventKind::imu_silent, now, 0, static_cast<std::uint16_t>(step_));
 }
 
 void SpiImu::check_step(Nanoseconds now) {
     const SetupStep& step = setup_[step_];
     const ImuReply& reply = replies_[0];
     const auto at = static_cast<std::uint16_t>(step_);
-    if (reply.refused) return fail(wire::EventKind::imu_silent, now, 0, at);
+    if (reply.refused) return fail(wire::BoardEventKind::imu_silent, now, 0, at);
     if (step.action == SetupStep::Action::expect) {
         const std::uint16_t answer = part_->answer(job_.transfers[0], reply);
-        if (answer != step.value) return fail(wire::EventKind::imu_failed, now, answer, at);
+        if (answer != step.value) return fail(wire::BoardEventKind::imu_failed, now, answer, at);
     }
     ++step_;
     resume_ = now + static_cast<Nanoseconds>(step.pause_us) * 1000;
@@ -147,10 +147,11 @@ void SpiImu::run(Nanoseconds now) {
     served_at_ = now;
     edges_lost_ = false;
     fast_edges_ = 0;
-    report_event(wire::EventKind::imu_ready, now, part_->identity());
+    report_event(wire::BoardEventKind::imu_ready, now, part_->identity());
 }
 
-void SpiImu::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail) {
+void SpiImu::fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value,
+                  std::uint16_t detail) {
     bus_.disarm();
     job_state_ = Job::none;
     report_failure(kind, now, value, detail);
@@ -197,11 +198,11 @@ bool SpiImu::stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& samp
     if (!ready_edges_.find(reply.started, sample.time_ns, edge)) return false;
     Nanoseconds next = 0;
     if (ready_edges_.next(edge, next) && next <= reply.ended)
-        return drop(wire::EventKind::imu_failed, now);
+        return drop(wire::BoardEventKind::imu_failed, now);
     if (static_cast<std::int32_t>(edge - served_) <= 0) return false;
     std::uint32_t due = edge - served_;
     if (edges_lost_) {
-        // How many there were is told by the period of the part.
+        // How many there were follows from the part's period.
         const Nanoseconds since = sample.time_ns - served_at_;
         const auto periods = static_cast<std::uint32_t>((since + period_ / 2) / period_);
         due = periods > due ? periods : due;
@@ -237,9 +238,9 @@ void SpiImu::stamp_accel(wire::ImuSample& sample) const {
     const Nanoseconds tolerance = accel_period_ / accel_tolerance;
     if (off > tolerance || -off > tolerance || end >= taken + period) return;
     const Nanoseconds age = (sample.time_ns - taken) / accel_age_step;
-    const auto told = static_cast<std::int16_t>(age);
-    if (told != age) return;
-    sample.accel_age = told;
+    const auto sent = static_cast<std::int16_t>(age);
+    if (sent != age) return;
+    sample.accel_age = sent;
     sample.flags |= wire::imu_accel_stamped;
 }
 
@@ -261,7 +262,7 @@ bool SpiImu::refused() const {
 }
 
 /// A reading gives no sample; its number will be missing.
-bool SpiImu::drop(wire::EventKind kind, Nanoseconds now) {
+bool SpiImu::drop(wire::BoardEventKind kind, Nanoseconds now) {
     readings_ = 0;
     if (!count_error()) fail(kind, now, 0, while_running);
     return false;
@@ -270,7 +271,7 @@ bool SpiImu::drop(wire::EventKind kind, Nanoseconds now) {
 bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     job_state_ = Job::none;
     sample = {};
-    if (refused()) return drop(wire::EventKind::imu_silent, now);
+    if (refused()) return drop(wire::BoardEventKind::imu_silent, now);
     if (part_->parse(replies_, readings_, sample) == Verdict::unsure) {
         arm_reading(not_routed, now, 1);
         return false;
@@ -282,7 +283,7 @@ bool SpiImu::take(Nanoseconds now, wire::ImuSample& sample) {
     sample.time_ns = reply.started;
     if (paced_by_part() && !stamp(reply, now, sample)) return false;
     stamp_accel(sample);
-    if (!finish(sample)) fail(wire::EventKind::imu_failed, now, 0, while_running);
+    if (!finish(sample)) fail(wire::BoardEventKind::imu_failed, now, 0, while_running);
     return true;
 }
 
@@ -307,16 +308,16 @@ bool SpiImu::poll(Nanoseconds now, Nanoseconds settled, wire::ImuSample& sample)
         (!paced_by_part() || replies_[readings_ - 1].started < settled))
         taken = take(now, sample);
     if (job_state_ == Job::armed && now >= job_until_)
-        fail(wire::EventKind::imu_silent, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_silent, now, 0, while_running);
     if (state_ == State::set_up && job_state_ == Job::none && now >= resume_) next_step(now);
     if (state_ != State::running) return taken;
     if (!paced_by_part()) {
         pace(now);
     } else if (now >= silent_at_) {
-        fail(wire::EventKind::imu_silent, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_silent, now, 0, while_running);
     } else if (fast_edges_ >= max_fast_edges) {
         // A part that has reset itself continues at another rate.
-        fail(wire::EventKind::imu_failed, now, 0, while_running);
+        fail(wire::BoardEventKind::imu_failed, now, 0, while_running);
     } else if (job_state_ == Job::none) {
         // Neither the newest edge nor its echoes, whether they have come or not, start a reading.
         arm_reading(input_imu_ready, max(began_, ready_edges_.quiet_until()), part_->readings());

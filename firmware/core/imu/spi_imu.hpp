@@ -9,6 +9,9 @@
 
 namespace versavis::firmware {
 
+/// Sets up an IMU on SPI or I2C by its ImuPart, reads it at each data-ready edge or on the board's
+/// grid, and checks and stamps its samples. Part of Board, called from Board::poll() only; the port
+/// runs the transfers by interrupts.
 class SpiImu final : public ImuPort {
  public:
     SpiImu(std::uint8_t port, ImuBus& bus, ChannelReports& reports);
@@ -53,13 +56,13 @@ class SpiImu final : public ImuPort {
     void check_step(Nanoseconds now);
     void run(Nanoseconds now);
     void expect_edge(Nanoseconds now) { silent_at_ = now + patience_; }
-    void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
+    void fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value, std::uint16_t detail);
     void adapt(ImuTransfer& transfer) const;
     void arm();
     void arm_reading(std::uint8_t input, Nanoseconds after, unsigned readings);
     bool take(Nanoseconds now, wire::ImuSample& sample);
     bool refused() const;
-    bool drop(wire::EventKind kind, Nanoseconds now);
+    bool drop(wire::BoardEventKind kind, Nanoseconds now);
     bool stamp(const ImuReply& reply, Nanoseconds now, wire::ImuSample& sample);
     void stamp_accel(wire::ImuSample& sample) const;
     void pace(Nanoseconds now);
@@ -76,7 +79,7 @@ class SpiImu final : public ImuPort {
     bool job_reads_ = false;     ///< its transfers are those that begin a sample
     Nanoseconds job_until_ = 0;  ///< when it must have ended; never: it waits for an edge
     unsigned readings_ = 0;      ///< of the sample that is being read
-    Nanoseconds period_ = 0;     ///< of the edges, as the part was told
+    Nanoseconds period_ = 0;     ///< of the edges, as configured in the part
     Nanoseconds accel_period_ = 0;
     unsigned fast_edges_ = 0;    ///< edges in a row that came sooner
     std::uint32_t served_ = 0;   ///< edges whose samples were read, or missed

@@ -28,8 +28,8 @@ constexpr std::size_t pressure_at = 52;
 constexpr Nanoseconds base_period = 1'250'000;  // of its own samples
 constexpr Nanoseconds power_up_time = 300'000'000;
 
-/// Edges closer to the one before are its echoes; the part's are a base period apart. At half, long
-/// reflections count double; at four times, two samples might be one.
+/// Edges closer to the one before are its echoes; the part's are a base period apart. If lower,
+/// long reflections count double; if higher, two samples might be one.
 constexpr Nanoseconds longest_echo = 300'000;
 
 std::uint32_t word32(const std::uint8_t* bytes) {
@@ -164,10 +164,10 @@ void Vn100::next_step(Nanoseconds now) {
     state_ = State::running;
     startup_ns_ = 0;
     wake_ = now + silence_floor + 20 * period_;
-    report_event(wire::EventKind::imu_ready, now, 100);
+    report_event(wire::BoardEventKind::imu_ready, now, 100);
 }
 
-void Vn100::fail(wire::EventKind kind, Nanoseconds now, std::int64_t value) {
+void Vn100::fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value) {
     report_failure(
         kind, now, value,
         state_ == State::running ? std::uint16_t{0xFFFF} : static_cast<std::uint16_t>(step_));
@@ -210,7 +210,7 @@ bool Vn100::take_line(Nanoseconds now) {
     drop(end);
     if (!waiting_) return true;
     if (error)
-        fail(wire::EventKind::imu_failed, now, code);
+        fail(wire::BoardEventKind::imu_failed, now, code);
     else if (answer)
         next_step(now);
     return true;
@@ -272,7 +272,7 @@ void Vn100::stamp(Nanoseconds first_byte, Nanoseconds since_last, wire::ImuSampl
     const Nanoseconds off = edges_[newest] - stamp_ - since_last;
     const bool agrees = off < base_period / 2 && -off < base_period / 2;
     stamp_ = edges_[newest];
-    // A clock that stood still, or began anew, says nothing about the edge.
+    // A clock that stood still, or restarted, says nothing about the edge.
     if (since_last <= 0 || !agrees) return;
     sample.time_ns = stamp_;
     sample.flags |= wire::imu_stamped;
@@ -314,7 +314,7 @@ bool Vn100::poll(Nanoseconds now, wire::ImuSample& sample) {
     if (waiting_ && step_ == Step::baud && baud_ != wanted_baud()) {
         set_baud(wanted_baud());  // it may have changed before it answered: ask again
     } else if (state_ == State::running || waiting_) {
-        fail(wire::EventKind::imu_silent, now, 0);
+        fail(wire::BoardEventKind::imu_silent, now, 0);
         return false;
     }
     send_step(now);

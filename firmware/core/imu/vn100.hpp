@@ -25,6 +25,8 @@ inline constexpr std::uint32_t fastest_millihertz = 800'000;
 inline constexpr std::size_t packet_size = 58;  ///< with time, IMU, magnetic and pressure fields
 }  // namespace vn100
 
+/// Sets up a VN-100 on the UART, and checks and stamps the packets that it sends. Part of Board,
+/// called from Board::poll() only.
 class Vn100 final : public ImuPort {
  public:
     Vn100(std::uint8_t port, ImuUart& uart, ChannelReports& reports);
@@ -70,7 +72,7 @@ class Vn100 final : public ImuPort {
     Nanoseconds count(std::uint64_t startup_ns);
     bool parse(Nanoseconds now, wire::ImuSample& sample);
     void drop(std::size_t size);
-    void fail(wire::EventKind kind, Nanoseconds now, std::int64_t value);
+    void fail(wire::BoardEventKind kind, Nanoseconds now, std::int64_t value);
 
     ImuUart& uart_;
     wire::ImuConfiguration configuration_{};

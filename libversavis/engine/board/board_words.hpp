@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,12 @@ static_assert((1U << part_count) - 1U == wire::present_all);
 
 /// Names of the bits of wire::Present that are set.
 std::vector<std::string> part_names(std::uint32_t present);
+
+/// Of a message: zeros at its end are no part of it.
+template <std::size_t size>
+std::string text(const char (&padded)[size]) {
+    return {padded, strnlen(padded, size)};
+}
 
 const char* to_string(wire::ResetCause cause);
 const char* to_string(wire::PpsState state);

@@ -50,8 +50,8 @@ constexpr std::size_t least_rank = 4;
 // grows by a sixth.
 constexpr std::size_t newest = 8;
 
-// By how much the lower quarter of delays may exceed that of a sharp edge by chance, as a share
-// of the lower half. Half: sharp edges are overshot. Twice: less is taken off for late wake-ups.
+// By how much the lower quarter of delays may exceed that of a sharp edge by chance, as a share of
+// the lower half. Half: sharp edges are overshot. Twice: less is subtracted for late wake-ups.
 constexpr double bend_slack = 0.1;
 
 // Overshoot for each ns of bend, as of log-normal wake-ups. Half: late wake-ups cost a fifth
@@ -116,17 +116,17 @@ Influence influence_of(double excess, double deviation, double scale) {
     return {score, std::clamp(curvature, 0.0, 1 / (deviation * deviation))};
 }
 
-void DelayEdge::offer(const Passage& passage, double delay_ns) {
+void DelayEdge::offer(const OffsetSample& sample, double delay_ns) {
     if (shortest_ && delay_ns >= shortest_ns_) return;
-    shortest_ = passage;
+    shortest_ = sample;
     shortest_ns_ = delay_ns;
 }
 
-std::optional<Passage> DelayEdge::take() { return std::exchange(shortest_, std::nullopt); }
+std::optional<OffsetSample> DelayEdge::take() { return std::exchange(shortest_, std::nullopt); }
 
 void DelayEdge::begin(double scale_ns) {
     shortest_.reset();
-    passages_.clear();
+    samples_.clear();
     newest_least_ns_.reset();
     judged_ = 0;
     lower_quarter_ns_ = lower_half_ns_ = 0;

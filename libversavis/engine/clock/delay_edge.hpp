@@ -15,7 +15,7 @@ namespace versavis::clock {
 enum class Direction { to_host = 1, to_board = -1 };
 
 /// One message: when it passed the board, and the host's stamp minus the board's.
-struct Passage {
+struct OffsetSample {
     BoardTime at;
     Duration host_minus_board;
 };
@@ -28,20 +28,21 @@ struct Influence {
 };
 
 /// `excess`: the delay less the expected edge; `deviation`: by which that edge is uncertain;
-/// `scale`: one over the density of delays above the edge; all in ns. A delay is taken to be the
-/// edge plus an exponential of this scale, now and then of a much larger one, blurred by
-/// `deviation`: far above the edge it says next to nothing, and below it it cannot be.
+/// `scale`: one over the density of delays above the edge; all in ns. A delay is modelled as the
+/// edge plus an exponential of this scale, occasionally of a much larger one, blurred by
+/// `deviation`: far above the edge it carries next to no information, and below it it is
+/// impossible.
 Influence influence_of(double excess, double deviation, double scale);
 
 /// The scale of delays, in ns, by how dense the shortest quarter of them is; reorders them. None:
 /// there are too few.
 std::optional<double> delay_scale(std::vector<double>& delays_ns);
 
-/// By so much the edge of delays of this scale is uncertain in itself, in ns.
+/// The inherent uncertainty of the edge of delays of this scale, in ns.
 double edge_blur(double scale_ns);
 
-/// Slots whose shortest delays tell how delays spread. Half as many: scale and overshoot scatter
-/// by 1.4 times as much. Twice as many: the clocks' wandering blurs them.
+/// Slots whose shortest delays show how delays spread. Half as many: scale and overshoot scatter by
+/// 1.4 times as much. Twice as many: the clocks' wandering blurs them.
 constexpr std::size_t remembered_slots = 64;
 
 /// The delays of one direction: the shortest of the present slot, and how those of the last slots
@@ -51,18 +52,18 @@ class DelayEdge {
     explicit DelayEdge(Direction direction) : direction_(direction) {}
 
     /// `delay_ns` as the present estimate has it.
-    void offer(const Passage& passage, double delay_ns);
+    void offer(const OffsetSample& sample, double delay_ns);
 
     /// The shortest since the last call; none: no message passed.
-    std::optional<Passage> take();
+    std::optional<OffsetSample> take();
 
-    /// Adds to the last slots' shortest; `delay_of(passage)` says how long they took, in ns.
+    /// Adds to the last slots' shortest; `delay_of(sample)` says how long they took, in ns.
     template <class DelayOf>
-    void remember(const Passage& passage, const DelayOf& delay_of) {
-        passages_.push_back(passage);
-        if (passages_.size() > remembered_slots) passages_.pop_front();
+    void remember(const OffsetSample& sample, const DelayOf& delay_of) {
+        samples_.push_back(sample);
+        if (samples_.size() > remembered_slots) samples_.pop_front();
         delays_.clear();
-        for (const Passage& p : passages_) delays_.push_back(delay_of(p));
+        for (const OffsetSample& p : samples_) delays_.push_back(delay_of(p));
         rescale();
     }
 
@@ -85,10 +86,10 @@ class DelayEdge {
     void judge_shape();
 
     Direction direction_;
-    std::optional<Passage> shortest_;
+    std::optional<OffsetSample> shortest_;
     double shortest_ns_ = 0;
-    std::deque<Passage> passages_;
-    std::vector<double> delays_;  ///< of the passages
+    std::deque<OffsetSample> samples_;
+    std::vector<double> delays_;  ///< of the samples
     std::vector<double> newest_;
     std::vector<double> sorted_;
     double scale_ns_ = 0;

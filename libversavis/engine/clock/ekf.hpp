@@ -21,7 +21,7 @@ struct EkfStart {
     /// As shipped. A board that differs much from the one it was tuned on stays outside the gate
     /// for minutes.
     static EkfStart published() { return {}; }
-    /// The first midpoint is believed, and the clocks are taken to run alike.
+    /// The first midpoint is accepted, and the clocks are assumed to run alike.
     static EkfStart fair() { return {0, 0, 1e-5, 1e-15}; }
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/clock/belief_matrix.hpp"
+#include "engine/clock/gaussian_state_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -91,8 +91,8 @@ constexpr std::uint64_t slots_to_trust = 4;
 // lock. Twice: they lock with an error of 0.5 ms.
 constexpr double locked_sigma_ns = 250e3;
 
-// Silence after which the state is `holdover`. Half: an exchange a second comes close to it.
-// Twice: silence is told later; sigma grows either way.
+// Silence after which the state is `holdover`. Half: an exchange a second comes close to it. Twice:
+// silence is reported later; sigma grows either way.
 constexpr std::int64_t holdover_after_ns = 3'000'000'000;
 
 /// 73 years: what is summed cannot overflow.
@@ -103,10 +103,10 @@ bool sane(Time<Clock> t) {
     return t.ns > -furthest_ns && t.ns < furthest_ns;
 }
 
-Passage to_host(const BoardTime sent, const HostTime arrived) {
+OffsetSample to_host(const BoardTime sent, const HostTime arrived) {
     return {sent, {arrived.ns - sent.ns}};
 }
-Passage to_board(const HostTime sent, const BoardTime arrived) {
+OffsetSample to_board(const HostTime sent, const BoardTime arrived) {
     return {arrived, {sent.ns - arrived.ns}};
 }
 
@@ -141,8 +141,8 @@ void EnvelopeFilter::add(const Exchange& exchange) {
         last_comparison_ = exchange.arrived;
     }
     if (!begun_) return begin(exchange, round_trip);
-    const Passage down = to_board(exchange.sent, exchange.received);
-    const Passage up = to_host(exchange.answered, exchange.arrived);
+    const OffsetSample down = to_board(exchange.sent, exchange.received);
+    const OffsetSample up = to_host(exchange.answered, exchange.arrived);
     const BoardTime now = std::max(exchange.received, exchange.answered);
     last_residual_ = rounded((delay_ns(up, up_) - delay_ns(down, down_)) / 2);
     const bool old = goes_back(std::min(exchange.received, exchange.answered));
@@ -173,7 +173,7 @@ void EnvelopeFilter::add(const Exchange& exchange) {
 
 void EnvelopeFilter::add(const OneWay& message) {
     if (!begun_ || !sane(message.sent) || !sane(message.arrived)) return;
-    const Passage up = to_host(message.sent, message.arrived);
+    const OffsetSample up = to_host(message.sent, message.arrived);
     if (goes_back(message.sent) || contradicts(up, up_)) return;
     ++one_way_messages_;
     up_.offer(up, delay_ns(up, up_));
@@ -187,13 +187,13 @@ void EnvelopeFilter::board_restarted() {
 }
 
 void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
-    const double kept_skew = std::abs(belief_.mean[1]) < largest_skew ? belief_.mean[1] : 0;
+    const double kept_skew = std::abs(state_.mean[1]) < largest_skew ? state_.mean[1] : 0;
     reference_ = middle(exchange.received, exchange.answered);
     base_ = {middle(exchange.sent, exchange.arrived).ns - reference_.ns};
-    belief_ = Belief::after_exchange(static_cast<double>(round_trip.ns));
+    state_ = GaussianState::after_exchange(static_cast<double>(round_trip.ns));
     if (reset_) {
-        belief_.mean[1] = kept_skew;
-        matrix(belief_)(1, 1) = square(kept_skew_sigma);
+        state_.mean[1] = kept_skew;
+        matrix(state_)(1, 1) = square(kept_skew_sigma);
     }
     begun_ = true;
     confirmed_ = false;
@@ -228,20 +228,20 @@ bool EnvelopeFilter::goes_back(BoardTime board) const {
 
 /// True when a message would have arrived before it was sent, by more than the estimate's own error
 /// explains: the error at the host's stamp, as the board's may be so far off that any error would.
-bool EnvelopeFilter::contradicts(const Passage& passage, const DelayEdge& edge) {
-    const double delay = delay_ns(passage, edge);
-    const Duration since = passage.at - reference_ + rounded(edge.sign() * delay);
-    if (delay >= -contradicting * std::sqrt(belief_.offset_variance_after(since))) return false;
+bool EnvelopeFilter::contradicts(const OffsetSample& sample, const DelayEdge& edge) {
+    const double delay = delay_ns(sample, edge);
+    const Duration since = sample.at - reference_ + rounded(edge.sign() * delay);
+    if (delay >= -contradicting * std::sqrt(state_.offset_variance_after(since))) return false;
     contradiction_ = rounded(-delay) + last_round_trip_;  // it took some time, too
     return true;
 }
 
-double EnvelopeFilter::relative_ns(const Passage& passage) const {
-    return static_cast<double>((passage.host_minus_board - base_).ns);
+double EnvelopeFilter::relative_ns(const OffsetSample& sample) const {
+    return static_cast<double>((sample.host_minus_board - base_).ns);
 }
 
-double EnvelopeFilter::delay_ns(const Passage& passage, const DelayEdge& edge) const {
-    return edge.sign() * (relative_ns(passage) - belief_.offset_after(passage.at - reference_));
+double EnvelopeFilter::delay_ns(const OffsetSample& sample, const DelayEdge& edge) const {
+    return edge.sign() * (relative_ns(sample) - state_.offset_after(sample.at - reference_));
 }
 
 void EnvelopeFilter::close_slot_if_due(BoardTime now) {
@@ -257,14 +257,14 @@ void EnvelopeFilter::close_slot(BoardTime now) {
     const auto up = up_.take();
     const auto down = down_.take();
     const BoardTime newest = std::max(up ? up->at : reference_, down ? down->at : reference_);
-    const double expected = belief_.offset_after(newest - reference_);
+    const double expected = state_.offset_after(newest - reference_);
     if (up && down && slots_ > slots_to_lock) follow_fall(*up, *down);
     const bool down_first = down && up && down->at < up->at;
     if (down && down_first) use(*down, down_);
     if (up) use(*up, up_);
     if (down && !down_first) use(*down, down_);
     follow_rise();
-    last_innovation_ = rounded(belief_.offset_after(newest - reference_) - expected);
+    last_innovation_ = rounded(state_.offset_after(newest - reference_) - expected);
 }
 
 /// Both directions take longer than they did, by more than they spread, or both are shorter than
@@ -274,45 +274,45 @@ void EnvelopeFilter::follow_rise() {
     const auto up = up_.newest_least_ns();
     const auto down = down_.newest_least_ns();
     if (!up || !down) return;
-    const double up_more = *up - belief_.mean[3];
-    const double down_more = *down - belief_.mean[3];
+    const double up_more = *up - state_.mean[3];
+    const double down_more = *down - state_.mean[3];
     if (up_more > up_.scale_ns() && down_more > down_.scale_ns())
         shift_level(std::min(up_more, down_more));
 }
 
-void EnvelopeFilter::follow_fall(const Passage& up, const Passage& down) {
-    const double up_less = belief_.mean[3] - delay_ns(up, up_);
-    const double down_less = belief_.mean[3] - delay_ns(down, down_);
+void EnvelopeFilter::follow_fall(const OffsetSample& up, const OffsetSample& down) {
+    const double up_less = state_.mean[3] - delay_ns(up, up_);
+    const double down_less = state_.mean[3] - delay_ns(down, down_);
     const double blur = edge_blur(std::max(up_.scale_ns(), down_.scale_ns()));
     if (std::min(up_less, down_less) > surprising * blur)
         shift_level(-std::min(up_less, down_less));
 }
 
 void EnvelopeFilter::shift_level(double by_ns) {
-    if (square(by_ns) < square(shift_deviations) * matrix(belief_)(3, 3)) return;
-    belief_.mean[3] += by_ns;
-    matrix(belief_)(3, 3) += square(by_ns);
+    if (square(by_ns) < square(shift_deviations) * matrix(state_)(3, 3)) return;
+    state_.mean[3] += by_ns;
+    matrix(state_)(3, 3) += square(by_ns);
 }
 
-void EnvelopeFilter::use(const Passage& passage, DelayEdge& edge) {
-    if (passage.at > reference_) {
-        belief_ = belief_.after(passage.at - reference_);
-        reference_ = passage.at;
+void EnvelopeFilter::use(const OffsetSample& sample, DelayEdge& edge) {
+    if (sample.at > reference_) {
+        state_ = state_.after(sample.at - reference_);
+        reference_ = sample.at;
     }
-    edge.remember(passage, [&](const Passage& p) { return delay_ns(p, edge); });
+    edge.remember(sample, [&](const OffsetSample& p) { return delay_ns(p, edge); });
     if (sites_ != nullptr)
-        sites_->push_back({passage, edge.direction(), edge.scale_ns(), restarts_});
-    move(passage, edge);
+        sites_->push_back({sample, edge.direction(), edge.scale_ns(), restarts_});
+    move(sample, edge);
 }
 
-/// Moments of the belief given this delay.
-void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
-    const Duration since = passage.at - reference_;
-    const BeliefVector direction = level_by_component(edge.sign(), since);
+/// Moments of the state given this delay.
+void EnvelopeFilter::move(const OffsetSample& sample, const DelayEdge& edge) {
+    const Duration since = sample.at - reference_;
+    const StateVector direction = level_by_component(edge.sign(), since);
     const double blur = edge_blur(edge.scale_ns());
-    const double excess = edge.sign() * relative_ns(passage) - direction.dot(vector(belief_));
+    const double excess = edge.sign() * relative_ns(sample) - direction.dot(vector(state_));
     const auto deviation = [&] {
-        return std::sqrt(direction.dot(matrix(belief_) * direction) + square(blur));
+        return std::sqrt(direction.dot(matrix(state_) * direction) + square(blur));
     };
     recent_surprises_ *= surprise_memory;
     if (excess < -surprising * deviation()) {
@@ -320,26 +320,26 @@ void EnvelopeFilter::move(const Passage& passage, const DelayEdge& edge) {
         if (++recent_surprises_ > surprises_of_skew) {
             // One may be anything; several in a row say that a clock runs at another pace than it
             // did.
-            matrix(belief_)(1, 1) += square(excess / surprise_span_s);
+            matrix(state_)(1, 1) += square(excess / surprise_span_s);
             recent_surprises_ = 0;
         }
-        matrix(belief_) *= std::min(square(excess / (surprising * deviation())), most_inflation);
+        matrix(state_) *= std::min(square(excess / (surprising * deviation())), most_inflation);
         // Without an end to them no component may grow beyond all that a first exchange leaves
         // open.
-        if (matrix(belief_)(1, 1) > square(largest_skew))
-            belief_.covariance =
-                Belief::after_exchange(static_cast<double>(last_round_trip_.ns)).covariance;
+        if (matrix(state_)(1, 1) > square(largest_skew))
+            state_.covariance =
+                GaussianState::after_exchange(static_cast<double>(last_round_trip_.ns)).covariance;
     }
     const Influence influence =
         influence_of(excess, std::max(deviation(), -excess / surprising), edge.scale_ns());
-    const BeliefVector gain = matrix(belief_) * direction;
-    vector(belief_) += gain * influence.score;
-    matrix(belief_) -= influence.curvature * gain * gain.transpose();
+    const StateVector gain = matrix(state_) * direction;
+    vector(state_) += gain * influence.score;
+    matrix(state_) -= influence.curvature * gain * gain.transpose();
     // No delay is negative; left alone, both edges could slide below what they bound.
-    if (belief_.mean[3] < 0)
-        vector(belief_) -= matrix(belief_).col(3) * (belief_.mean[3] / matrix(belief_)(3, 3));
+    if (state_.mean[3] < 0)
+        vector(state_) -= matrix(state_).col(3) * (state_.mean[3] / matrix(state_)(3, 3));
     // What rounding makes unequal is never measured away, but surprises would inflate it.
-    matrix(belief_) = (0.5 * (matrix(belief_) + matrix(belief_).transpose())).eval();
+    matrix(state_) = (0.5 * (matrix(state_) + matrix(state_).transpose())).eval();
 }
 
 void EnvelopeFilter::remember_round_trip(BoardTime now, Duration round_trip) {
@@ -355,7 +355,7 @@ Duration EnvelopeFilter::smallest_round_trip() const {
     return std::min(smallest_in_window_, smallest_before_);
 }
 
-double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(matrix(belief_)(1, 1)) * 1e-3; }
+double EnvelopeFilter::skew_sigma_ppm() const { return std::sqrt(matrix(state_)(1, 1)) * 1e-3; }
 
 Duration EnvelopeFilter::presumed_asymmetry() const {
     if (asymmetry_) return {};
@@ -367,13 +367,13 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     if (reset_) estimate.state = ClockState::reset;
     if (!begun_ || !sane(board)) return estimate;
     const Duration since = board - reference_;
-    const double variance = belief_.offset_variance_after(since);
-    const double offset = belief_.offset_after(since);
+    const double variance = state_.offset_variance_after(since);
+    const double offset = state_.offset_after(since);
     const double doubt = static_cast<double>(contradiction_.ns);
     const Duration asymmetry = asymmetry_ ? asymmetry_->offset : presumed_asymmetry();
     estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
     estimate.sigma = rounded(
-        std::sqrt(variance + asymmetry_variance(asymmetry_, belief_.mean[3]) + square(doubt)));
+        std::sqrt(variance + asymmetry_variance(asymmetry_, state_.mean[3]) + square(doubt)));
     estimate.bound = smallest_round_trip() / 2 + absolute(asymmetry) +
                      rounded(bound_sigmas * std::sqrt(variance) + doubt);
     if (doubt > 0)

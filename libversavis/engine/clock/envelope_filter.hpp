@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "engine/clock/asymmetry.hpp"
-#include "engine/clock/belief.hpp"
 #include "engine/clock/delay_edge.hpp"
 #include "engine/clock/estimate.hpp"
+#include "engine/clock/gaussian_state.hpp"
 #include "engine/clock/messages.hpp"
 #include "versavis/time.hpp"
 
@@ -18,10 +18,10 @@ namespace versavis::clock {
 
 /// A message that was used, as the smoother wants it.
 struct EdgeSite {
-    Passage passage;
+    OffsetSample sample;
     Direction direction = Direction::to_host;
     double scale_ns = 0;
-    std::uint64_t restarts = 0;  ///< of the filter until then
+    std::uint64_t restarts = 0;  ///< of the filter before this message
 };
 
 /// Method: within a slot that grows from one message to 2 s, the shortest delay of each direction
@@ -29,9 +29,9 @@ struct EdgeSite {
 /// estimate when it comes close to the edge, by as much as the spread of the last slots' delays
 /// justifies (moment matching of a Gaussian with an exponentially modified one; T. Minka,
 /// Expectation propagation for approximate Bayesian inference, 2001). Delays far above the edge
-/// count for nothing, in whatever direction and however many. Nothing is gated out: what surprises
-/// widens the belief before it is used, and messages that arrived before they were sent begin it
-/// anew. A pure function of the stamps it was given.
+/// count for nothing, in whatever direction and however many. Nothing is gated out: outliers widen
+/// the state before it is used, and messages that arrived before they were sent restart it. A pure
+/// function of its input stamps. Not thread-safe; Translator calls it under its lock.
 class EnvelopeFilter {
  public:
     /// In the order in which they became available. Before the first exchange one-way messages are
@@ -39,7 +39,7 @@ class EnvelopeFilter {
     void add(const Exchange& exchange);
     void add(const OneWay& message);
 
-    /// The board began a new life: its clock starts anew, with the crystal and the link it had.
+    /// The board restarted: its clock starts over, with the same crystal and link.
     void board_restarted();
 
     /// A message that is no exchange shows that the board's clock did not step.
@@ -48,7 +48,7 @@ class EnvelopeFilter {
     /// A measured asymmetry takes the place of the presumed one, and of the allowance for it.
     void set_asymmetry(const std::optional<Asymmetry>& asymmetry) { asymmetry_ = asymmetry; }
 
-    /// What is taken off while none is measured, by how sharply the delays of each direction break
+    /// What is subtracted while none is measured, by how sharply the delays of each direction break
     /// off; else 0. What measures an asymmetry adds it to the estimate.
     Duration presumed_asymmetry() const;
 
@@ -64,7 +64,7 @@ class EnvelopeFilter {
     std::uint64_t restarts() const { return restarts_; }
     std::uint64_t surprises() const { return surprises_; }  ///< delays well below the edge
     std::uint64_t slots() const { return slots_; }
-    double skew_ppm() const { return belief_.mean[1] * 1e-3; }  ///< host clock against board clock
+    double skew_ppm() const { return state_.mean[1] * 1e-3; }  ///< host clock against board clock
     double skew_sigma_ppm() const;
     Duration last_residual() const {
         return last_residual_;
@@ -82,25 +82,25 @@ class EnvelopeFilter {
  private:
     void begin(const Exchange& exchange, Duration round_trip);
     void restart(const Exchange& exchange, Duration round_trip);
-    bool contradicts(const Passage& passage, const DelayEdge& edge);
+    bool contradicts(const OffsetSample& sample, const DelayEdge& edge);
     bool goes_back(BoardTime board) const;
-    double relative_ns(const Passage& passage) const;
-    double delay_ns(const Passage& passage, const DelayEdge& edge) const;
+    double relative_ns(const OffsetSample& sample) const;
+    double delay_ns(const OffsetSample& sample, const DelayEdge& edge) const;
     void close_slot_if_due(BoardTime now);
     void close_slot(BoardTime now);
     void follow_rise();
-    void follow_fall(const Passage& up, const Passage& down);
+    void follow_fall(const OffsetSample& up, const OffsetSample& down);
     void shift_level(double by_ns);
-    void use(const Passage& passage, DelayEdge& edge);
-    void move(const Passage& passage, const DelayEdge& edge);
+    void use(const OffsetSample& sample, DelayEdge& edge);
+    void move(const OffsetSample& sample, const DelayEdge& edge);
     void remember_round_trip(BoardTime now, Duration round_trip);
 
     bool begun_ = false;
     bool confirmed_ = false;
     bool reset_ = false;  ///< what was known before is void but for the skew
-    Duration base_;       ///< host minus board time that the belief's offset counts from
+    Duration base_;       ///< host minus board time that the state's offset counts from
     BoardTime reference_;
-    Belief belief_;
+    GaussianState state_;
     DelayEdge up_{Direction::to_host};
     DelayEdge down_{Direction::to_board};
     std::optional<Asymmetry> asymmetry_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the estimators of the board's clock are told: stamps of messages between host and board.
+// The inputs of the clock estimators: stamps of messages between host and board.
 #pragma once
 
 #include <variant>

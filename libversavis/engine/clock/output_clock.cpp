@@ -9,7 +9,7 @@ namespace {
 
 // A reading between two of the host clock that are further apart is tried again. Half: most
 // readings of a slow machine are. Twice: a stamp may carry 2 us of reading error.
-constexpr Duration wide_sandwich = microseconds(2);
+constexpr Duration wide_reading = microseconds(2);
 
 // Tries for a narrow reading. Half: a loaded machine gets a wide one more often, and sigma says
 // so. Twice: a stamp may cost twice as much there.
@@ -61,7 +61,7 @@ Expected<OutputClock> OutputClock::create(OutputClockKind kind, bool force_tai,
 
 OutputClock::OutputClock(OutputClockKind kind, std::shared_ptr<SystemClocks> clocks)
     : kind_(kind), clocks_(std::move(clocks)), slept_(slept()), times_set_(clocks_->times_set()) {
-    if (kind_ != OutputClockKind::monotonic_raw) stepped_from_monotonic(best_sandwich());
+    if (kind_ != OutputClockKind::monotonic_raw) stepped_from_monotonic(best_bracketed());
     next_look_ = read_host() + look_interval;
 }
 
@@ -71,33 +71,33 @@ OutputReading OutputClock::read() {
         if (now >= next_look_) look_for_steps(now, false);
         return {now, {}, {}, steps_};
     }
-    Sandwich sandwich = best_sandwich();
-    const bool seen_step = stepped_from_monotonic(sandwich);
-    if (seen_step || sandwich.width() > wide_sandwich || sandwich.after >= next_look_) {
+    BracketedReading reading = best_bracketed();
+    const bool seen_step = stepped_from_monotonic(reading);
+    if (seen_step || reading.width() > wide_reading || reading.after >= next_look_) {
         const std::uint32_t before = steps_;
-        look_for_steps(sandwich.after, seen_step);
-        if (steps_ != before && !seen_step) {  // it may have come after the sandwich
-            sandwich = best_sandwich();
-            stepped_from_monotonic(sandwich);
+        look_for_steps(reading.after, seen_step);
+        if (steps_ != before && !seen_step) {  // it may have come after the reading
+            reading = best_bracketed();
+            stepped_from_monotonic(reading);
         }
     }
-    const HostTime at = middle(sandwich.before, sandwich.after);
-    return {at, {sandwich.output_ns - at.ns}, (sandwich.width() + nanoseconds(1)) / 2, steps_};
+    const HostTime at = middle(reading.before, reading.after);
+    return {at, {reading.output_ns - at.ns}, (reading.width() + nanoseconds(1)) / 2, steps_};
 }
 
-OutputClock::Sandwich OutputClock::read_sandwich() {
-    Sandwich sandwich{};
-    sandwich.before = read_host();
-    sandwich.output_ns = clocks_->read_ns(system_clock(kind_));
-    sandwich.monotonic_ns = clocks_->read_ns(SystemClock::monotonic);
-    sandwich.after = read_host();
-    return sandwich;
+OutputClock::BracketedReading OutputClock::read_bracketed() {
+    BracketedReading reading{};
+    reading.before = read_host();
+    reading.output_ns = clocks_->read_ns(system_clock(kind_));
+    reading.monotonic_ns = clocks_->read_ns(SystemClock::monotonic);
+    reading.after = read_host();
+    return reading;
 }
 
-OutputClock::Sandwich OutputClock::best_sandwich() {
-    Sandwich best = read_sandwich();
-    for (int attempt = 1; attempt < most_tries && best.width() > wide_sandwich; ++attempt) {
-        const Sandwich next = read_sandwich();
+OutputClock::BracketedReading OutputClock::best_bracketed() {
+    BracketedReading best = read_bracketed();
+    for (int attempt = 1; attempt < most_tries && best.width() > wide_reading; ++attempt) {
+        const BracketedReading next = read_bracketed();
         if (next.width() < best.width()) best = next;
     }
     return best;
@@ -105,16 +105,16 @@ OutputClock::Sandwich OutputClock::best_sandwich() {
 
 /// Output clock minus CLOCK_MONOTONIC is a constant of the kernel between two steps, however it is
 /// slewed.
-bool OutputClock::stepped_from_monotonic(const Sandwich& sandwich) {
-    const std::int64_t read_later_ns = sandwich.output_ns - sandwich.monotonic_ns;
+bool OutputClock::stepped_from_monotonic(const BracketedReading& reading) {
+    const std::int64_t read_later_ns = reading.output_ns - reading.monotonic_ns;
     const Bounds now{read_later_ns,
-                     read_later_ns + sandwich.width().ns + sandwich.width().ns / largest_slew};
+                     read_later_ns + reading.width().ns + reading.width().ns / largest_slew};
     const bool stepped = now.low_ns > against_monotonic_.high_ns + smallest_step.ns ||
                          now.high_ns < against_monotonic_.low_ns - smallest_step.ns;
     const bool narrower =
         now.high_ns - now.low_ns <= against_monotonic_.high_ns - against_monotonic_.low_ns;
     // A wide one that contradicts nothing would hide a step that follows.
-    if (stepped || narrower || sandwich.width() <= wide_sandwich) against_monotonic_ = now;
+    if (stepped || narrower || reading.width() <= wide_reading) against_monotonic_ = now;
     return stepped;
 }
 
@@ -133,16 +133,16 @@ bool OutputClock::was_suspended() {
     return suspended;
 }
 
-/// The kernel tells of each time that CLOCK_REALTIME is set, once, and some time after it can be
-/// read.
+/// The kernel reports each time that CLOCK_REALTIME is set, once, some time after the new time can
+/// be read.
 bool OutputClock::was_set(HostTime now, bool seen_step) {
     const std::uint32_t times = clocks_->times_set();
-    const bool told = times != std::exchange(times_set_, times);
+    const bool reported = times != std::exchange(times_set_, times);
     const bool known = seen_step || now < set_is_known_until_;
-    if (seen_step && !told) set_is_known_until_ = now + longest_report;
-    if (told && !seen_step) set_is_known_until_ = {};
+    if (seen_step && !reported) set_is_known_until_ = now + longest_report;
+    if (reported && !seen_step) set_is_known_until_ = {};
     // TAI goes on when UTC alone is stepped, as by a leap second: the comparison says all of it.
-    return told && !known && kind_ == OutputClockKind::realtime;
+    return reported && !known && kind_ == OutputClockKind::realtime;
 }
 
 void OutputClock::look_for_steps(HostTime now, bool seen_step) {

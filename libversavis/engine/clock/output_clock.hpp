@@ -23,10 +23,10 @@ struct OutputReading {
         0;  ///< before this reading; readings of equal `steps` differ by slewing alone
 };
 
-/// Reads both clocks in a sandwich, so that a preempted read cannot bend the translation, and sees
-/// each step: those of CLOCK_MONOTONIC and of the output clock are slewed alike, and only steps
-/// part them. What is smaller than such a comparison can show, the kernel tells a little later. Not
-/// thread-safe.
+/// Reads the output clock between two reads of the host clock, so that a preempted read cannot bend
+/// the translation, and detects steps: CLOCK_MONOTONIC and the output clock are slewed alike, and
+/// only steps separate them. Steps too small for this comparison are reported by the kernel a
+/// little later. Not thread-safe; Translator calls it under its lock.
 class OutputClock {
  public:
     /// Error: TAI was asked for, but the kernel does not know its offset from UTC. `force_tai`:
@@ -51,7 +51,7 @@ class OutputClock {
     KernelState kernel_state() const { return clocks_->kernel_state(); }
 
  private:
-    struct Sandwich {
+    struct BracketedReading {
         HostTime before;
         HostTime after;
         std::int64_t output_ns;
@@ -68,10 +68,10 @@ class OutputClock {
     OutputClock(OutputClockKind kind, std::shared_ptr<SystemClocks> clocks);
 
     HostTime read_host() { return {clocks_->read_ns(SystemClock::monotonic_raw)}; }
-    Sandwich read_sandwich();
-    Sandwich best_sandwich();
+    BracketedReading read_bracketed();
+    BracketedReading best_bracketed();
     Bounds slept();
-    bool stepped_from_monotonic(const Sandwich& sandwich);
+    bool stepped_from_monotonic(const BracketedReading& reading);
     bool was_suspended();
     bool was_set(HostTime now, bool seen_step);
     void look_for_steps(HostTime now, bool seen_step);
@@ -81,7 +81,7 @@ class OutputClock {
     Bounds against_monotonic_{INT64_MIN / 2, INT64_MAX / 2};  ///< at first: anything
     Bounds slept_;
     std::uint32_t times_set_ = 0;
-    HostTime set_is_known_until_;  ///< the kernel may still tell of a step that was seen already
+    HostTime set_is_known_until_;  ///< the kernel may still report a step that was seen already
     HostTime next_look_;
     std::uint32_t steps_ = 0;
     std::uint32_t suspends_ = 0;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/clock/belief_matrix.hpp"
+#include "engine/clock/gaussian_state_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -27,8 +27,8 @@ constexpr double misfit_sigmas = 8.0;
 // change of temperature that the model does not expect. Twice: as for misfit_sigmas.
 constexpr double smallest_misfit_ns = 2000.0;
 
-// Pulses in a row that do not fit before the map begins anew. One: a single false pulse restarts
-// it. Six: a receiver that was reset is ignored for six seconds.
+// Pulses in a row that do not fit before the map restarts. One: a single false pulse restarts it.
+// Six: a receiver that was reset is ignored for six seconds.
 constexpr int misfits_to_restart = 3;
 
 // Pulses in a row before the map is used. Two: its skew is that of one interval, off by 0.14 ppm.
@@ -44,9 +44,9 @@ constexpr Duration pulse_overdue = milliseconds(2500);
 void PpsMap::begin(BoardTime at, OutputTime second) {
     reference_ = at;
     base_ = {second.ns - at.ns};
-    belief_ = Belief::after_exchange(0);
-    matrix(belief_)(0, 0) = pulse_sigma_ns * pulse_sigma_ns;
-    matrix(belief_)(1, 1) = crystal_sigma * crystal_sigma;
+    state_ = GaussianState::after_exchange(0);
+    matrix(state_)(0, 0) = pulse_sigma_ns * pulse_sigma_ns;
+    matrix(state_)(1, 1) = crystal_sigma * crystal_sigma;
     in_row_ = 1;
     misfits_in_row_ = 0;
     last_residual_ = {};
@@ -61,7 +61,7 @@ void PpsMap::add(BoardTime at, OutputTime second) {
     ++pulses_;
     if (in_row_ == 0 || at <= reference_ || at - reference_ > longest_holdover)
         return begin(at, second);
-    const Belief now = belief_.after(at - reference_);
+    const GaussianState now = state_.after(at - reference_);
     const double residual = static_cast<double>(second.ns - at.ns - base_.ns) - now.mean[0];
     const double variance = matrix(now)(0, 0) + pulse_sigma_ns * pulse_sigma_ns;
     last_residual_ = rounded(residual);
@@ -73,9 +73,9 @@ void PpsMap::add(BoardTime at, OutputTime second) {
     misfits_in_row_ = 0;
     ++in_row_;
     reference_ = at;
-    const BeliefVector gain = matrix(now).col(0) / variance;
-    vector(belief_) = vector(now) + gain * residual;
-    matrix(belief_) = matrix(now) - gain * matrix(now).row(0);
+    const StateVector gain = matrix(now).col(0) / variance;
+    vector(state_) = vector(now) + gain * residual;
+    matrix(state_) = matrix(now) - gain * matrix(now).row(0);
 }
 
 bool PpsMap::healthy(BoardTime now) const {
@@ -85,8 +85,8 @@ bool PpsMap::healthy(BoardTime now) const {
 std::optional<OutputEstimate> PpsMap::translate(BoardTime board) const {
     if (in_row_ < pulses_to_trust || board - reference_ > longest_holdover) return std::nullopt;
     const Duration since = board - reference_;
-    return OutputEstimate{OutputTime{board.ns} + base_ + rounded(belief_.offset_after(since)),
-                          rounded(std::sqrt(belief_.offset_variance_after(since)))};
+    return OutputEstimate{OutputTime{board.ns} + base_ + rounded(state_.offset_after(since)),
+                          rounded(std::sqrt(state_.offset_variance_after(since)))};
 }
 
 }  // namespace versavis::clock

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "engine/clock/belief.hpp"
+#include "engine/clock/gaussian_state.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::clock {
@@ -16,7 +16,7 @@ struct OutputEstimate {
 };
 
 /// Kalman filter on offset, skew and drift; a pulse that does not fit is left out and counted, and
-/// three in a row begin it anew. A pure function of pulses and labels.
+/// three in a row restart it. A pure function of pulses and labels.
 class PpsMap {
  public:
     /// The board saw the pulse of this second at `at`. Pulses come in order.
@@ -41,7 +41,7 @@ class PpsMap {
     void begin(BoardTime at, OutputTime second);
     bool agrees(double residual_ns, double variance) const;
 
-    Belief belief_;
+    GaussianState state_;
     BoardTime reference_;
     Duration base_;  ///< output minus board time that the offset counts from
     std::uint64_t in_row_ = 0;

@@ -22,7 +22,7 @@ constexpr double doubt_sigmas = 3.0;
 // makes the two take turns. Twice: a drift of the PPS map by some 10 ns more.
 constexpr Duration host_named_memory = seconds(3);
 
-// Pulses that measure the asymmetry before it is taken off. Half: it scatters by 1.4 times as
+// Pulses that measure the asymmetry before it is subtracted. Half: it scatters by 1.4 times as
 // much. Twice: it is corrected half a minute later.
 constexpr unsigned pulses_to_measure = 32;
 

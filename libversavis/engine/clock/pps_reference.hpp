@@ -14,7 +14,7 @@
 
 namespace versavis::clock {
 
-/// Who says which second a pulse began.
+/// Which source labels the second that a pulse begins.
 enum class PpsLabels {
     off,   ///< pulses are not used
     host,  ///< the output clock, which the same source of time disciplines
@@ -31,12 +31,14 @@ struct PpsReport {
     std::uint64_t rejected = 0;  ///< that did not fit those before
 };
 
+/// Follows the PPS pulses, gives stamps by them while they are good, and measures the link's
+/// asymmetry. Not thread-safe: Translator calls it under its lock.
 class PpsReference {
  public:
     explicit PpsReference(PpsLabels labels = PpsLabels::off) : labels_(labels) {}
 
     /// The board saw a pulse. `by_link`: its instant as the messages have it; `output`: the output
-    /// clock now; `disciplined`: the kernel says that somebody steers CLOCK_REALTIME.
+    /// clock now; `disciplined`: the kernel reports that CLOCK_REALTIME is disciplined.
     void pulse(BoardTime at, const HostEstimate& by_link, const OutputReading& output,
                bool disciplined);
 
@@ -52,7 +54,7 @@ class PpsReference {
 
     /// The asymmetry that is left in `by_link`, after 32 pulses that the host's own clock named.
     std::optional<Asymmetry> left_in_link() const;
-    /// `by_link` is corrected by what was measured: begin anew.
+    /// `by_link` is corrected by what was measured: start over.
     void link_corrected();
 
     PpsReport report(BoardTime now) const;

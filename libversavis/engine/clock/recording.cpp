@@ -39,7 +39,7 @@ ClockMetadata write(const RecordedOutput& item) {
 }  // namespace
 
 ClockMetadata to_metadata(const ClockItem& item) {
-    return std::visit([](const auto& told) { return write(told); }, item);
+    return std::visit([](const auto& input) { return write(input); }, item);
 }
 
 Expected<ClockItem> from_metadata(const ClockMetadata& metadata) {

@@ -32,7 +32,7 @@ struct RecordedMessage {
     HostTime arrived;
 };
 
-/// The board's clock begins anew.
+/// The board's clock starts over.
 struct RecordedRestart {
     std::uint32_t nonce = 0;
 };

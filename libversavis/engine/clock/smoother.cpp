@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/clock/belief_matrix.hpp"
+#include "engine/clock/gaussian_state_matrix.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -42,14 +42,14 @@ constexpr Duration longest_silence = seconds(3);
 
 double square(double x) { return x * x; }
 
-BeliefVector level_now(Direction direction) {
+StateVector level_now(Direction direction) {
     return level_by_component(static_cast<double>(direction), {});
 }
 
 }  // namespace
 
-bool Smoother::earlier(const Knot& a, const Knot& b) {
-    return a.site.passage.at < b.site.passage.at;
+bool Smoother::earlier(const SmootherStep& a, const SmootherStep& b) {
+    return a.site.sample.at < b.site.sample.at;
 }
 
 Smoother::Smoother(const std::vector<Message>& messages) {
@@ -82,61 +82,63 @@ Smoother::Smoother(const std::vector<Message>& messages) {
 Smoother::Segment Smoother::begin(const std::vector<EdgeSite>& sites, std::size_t first,
                                   std::size_t last) {
     Segment segment;
-    const Duration down = sites[first].passage.host_minus_board;
-    const Duration up = sites[first + 1].passage.host_minus_board;
+    const Duration down = sites[first].sample.host_minus_board;
+    const Duration up = sites[first + 1].sample.host_minus_board;
     segment.base = down + (up - down) / 2;
     segment.first_round_trip = up - down;
-    for (std::size_t i = first; i < last; ++i) segment.knots.push_back({sites[i], 0, 0, {}, {}});
-    std::stable_sort(segment.knots.begin(), segment.knots.end(), earlier);
-    segment.begin = segment.knots.front().site.passage.at;
-    segment.end = segment.knots.back().site.passage.at;
+    for (std::size_t i = first; i < last; ++i) segment.steps.push_back({sites[i], 0, 0, {}, {}});
+    std::stable_sort(segment.steps.begin(), segment.steps.end(), earlier);
+    segment.begin = segment.steps.front().site.sample.at;
+    segment.end = segment.steps.back().site.sample.at;
     return segment;
 }
 
-double Smoother::level_ns(const Segment& segment, const Knot& knot) {
-    return static_cast<double>(knot.site.direction) *
-           static_cast<double>((knot.site.passage.host_minus_board - segment.base).ns);
+double Smoother::level_ns(const Segment& segment, const SmootherStep& step) {
+    return static_cast<double>(step.site.direction) *
+           static_cast<double>((step.site.sample.host_minus_board - segment.base).ns);
 }
 
-/// What a message adds to a belief of its level that does not hold it yet.
-void Smoother::judge(Knot& knot, double level_ns, double mean, double variance, double share) {
-    const double deviation = std::sqrt(variance + square(edge_blur(knot.site.scale_ns)));
-    const Influence influence = influence_of(level_ns - mean, deviation, knot.site.scale_ns);
+/// What a message adds to a state that does not include it yet.
+void Smoother::judge(SmootherStep& step, double level_ns, double mean, double variance,
+                     double share) {
+    const double deviation = std::sqrt(variance + square(edge_blur(step.site.scale_ns)));
+    const Influence influence = influence_of(level_ns - mean, deviation, step.site.scale_ns);
     const double precision = influence.curvature / (1 - variance * influence.curvature);
     const double precision_mean = precision * mean + influence.score * (1 + variance * precision);
-    knot.precision += share * (precision - knot.precision);
-    knot.precision_mean += share * (precision_mean - knot.precision_mean);
+    step.precision += share * (precision - step.precision);
+    step.precision_mean += share * (precision_mean - step.precision_mean);
 }
 
 void Smoother::pass_forth(Segment& segment, bool first) {
-    Belief belief = Belief::after_exchange(static_cast<double>(segment.first_round_trip.ns));
-    BoardTime at = segment.knots.front().site.passage.at;
-    for (Knot& knot : segment.knots) {
-        belief = belief.after(knot.site.passage.at - at);
-        at = knot.site.passage.at;
-        const BeliefVector direction = level_now(knot.site.direction);
-        const BeliefVector gain = matrix(belief) * direction;
+    GaussianState state =
+        GaussianState::after_exchange(static_cast<double>(segment.first_round_trip.ns));
+    BoardTime at = segment.steps.front().site.sample.at;
+    for (SmootherStep& step : segment.steps) {
+        state = state.after(step.site.sample.at - at);
+        at = step.site.sample.at;
+        const StateVector direction = level_now(step.site.direction);
+        const StateVector gain = matrix(state) * direction;
         const double variance = direction.dot(gain);
-        const double mean = direction.dot(vector(belief));
-        if (first) judge(knot, level_ns(segment, knot), mean, variance, 1);
-        const double scale = 1 / (1 + knot.precision * variance);
-        vector(belief) += gain * scale * (knot.precision_mean - knot.precision * mean);
-        matrix(belief) -= knot.precision * scale * gain * gain.transpose();
-        knot.filtered = belief;
+        const double mean = direction.dot(vector(state));
+        if (first) judge(step, level_ns(segment, step), mean, variance, 1);
+        const double scale = 1 / (1 + step.precision * variance);
+        vector(state) += gain * scale * (step.precision_mean - step.precision * mean);
+        matrix(state) -= step.precision * scale * gain * gain.transpose();
+        step.filtered = state;
     }
 }
 
 void Smoother::pass_back(Segment& segment) {
-    std::vector<Knot>& knots = segment.knots;
-    knots.back().smoothed = knots.back().filtered;
-    for (std::size_t i = knots.size() - 1; i-- > 0;) {
-        const Belief& filtered = knots[i].filtered;
-        const Duration span = knots[i + 1].site.passage.at - knots[i].site.passage.at;
-        const Belief predicted = filtered.after(span);
-        const BeliefMatrix back =
+    std::vector<SmootherStep>& steps = segment.steps;
+    steps.back().smoothed = steps.back().filtered;
+    for (std::size_t i = steps.size() - 1; i-- > 0;) {
+        const GaussianState& filtered = steps[i].filtered;
+        const Duration span = steps[i + 1].site.sample.at - steps[i].site.sample.at;
+        const GaussianState predicted = filtered.after(span);
+        const StateMatrix back =
             matrix(predicted).ldlt().solve(transition(span) * matrix(filtered)).transpose();
-        const Belief& later = knots[i + 1].smoothed;
-        Belief& smoothed = knots[i].smoothed;
+        const GaussianState& later = steps[i + 1].smoothed;
+        GaussianState& smoothed = steps[i].smoothed;
         vector(smoothed) = vector(filtered) + back * (vector(later) - vector(predicted));
         matrix(smoothed) =
             matrix(filtered) + back * (matrix(later) - matrix(predicted)) * back.transpose();
@@ -146,64 +148,64 @@ void Smoother::pass_back(Segment& segment) {
 /// The filter's first slots were short, as it knew no skew yet: of theirs, too, only the shortest
 /// delays of each two seconds count, lest they be judged by those of longer slots.
 void Smoother::thin(Segment& segment) {
-    std::vector<Knot> kept;
+    std::vector<SmootherStep> kept;
     std::optional<std::size_t> shortest[2];
-    BoardTime window = segment.knots.front().site.passage.at;
+    BoardTime window = segment.steps.front().site.sample.at;
     const BoardTime end = window + short_slots;
-    const auto delay = [&](const Knot& knot) {
-        return level_ns(segment, knot) -
-               static_cast<double>(knot.site.direction) * knot.smoothed.mean[0];
+    const auto delay = [&](const SmootherStep& step) {
+        return level_ns(segment, step) -
+               static_cast<double>(step.site.direction) * step.smoothed.mean[0];
     };
-    for (const Knot& knot : segment.knots) {
-        const BoardTime at = knot.site.passage.at;
+    for (const SmootherStep& step : segment.steps) {
+        const BoardTime at = step.site.sample.at;
         if (at - window >= slot || at >= end) {
             shortest[0] = shortest[1] = std::nullopt;
             window = at;
         }
         std::optional<std::size_t>& rival =
-            shortest[knot.site.direction == Direction::to_host ? 0 : 1];
+            shortest[step.site.direction == Direction::to_host ? 0 : 1];
         if (!rival) {
             rival = kept.size();
-            kept.push_back(knot);
-        } else if (delay(knot) < delay(kept[*rival])) {
-            kept[*rival] = knot;
+            kept.push_back(step);
+        } else if (delay(step) < delay(kept[*rival])) {
+            kept[*rival] = step;
         }
     }
     std::stable_sort(kept.begin(), kept.end(), earlier);
-    segment.knots = std::move(kept);
+    segment.steps = std::move(kept);
 }
 
 /// How the delays around each message spread, before and after it.
 void Smoother::rescale(Segment& segment, Direction direction) {
-    std::vector<Knot*> knots;
+    std::vector<SmootherStep*> steps;
     std::vector<double> delays;
-    for (Knot& knot : segment.knots) {
-        if (knot.site.direction != direction) continue;
-        knots.push_back(&knot);
-        const double offset = static_cast<double>(direction) * knot.smoothed.mean[0];
-        delays.push_back(level_ns(segment, knot) - offset);
+    for (SmootherStep& step : segment.steps) {
+        if (step.site.direction != direction) continue;
+        steps.push_back(&step);
+        const double offset = static_cast<double>(direction) * step.smoothed.mean[0];
+        delays.push_back(level_ns(segment, step) - offset);
     }
     std::vector<double> around;
-    for (std::size_t i = 0; i < knots.size(); ++i) {
+    for (std::size_t i = 0; i < steps.size(); ++i) {
         const std::size_t first = i < neighbours ? 0 : i - neighbours;
         const std::size_t last = std::min(i + neighbours + 1, delays.size());
         around.assign(delays.begin() + static_cast<std::ptrdiff_t>(first),
                       delays.begin() + static_cast<std::ptrdiff_t>(last));
-        EdgeSite& site = knots[i]->site;
+        EdgeSite& site = steps[i]->site;
         site.scale_ns = delay_scale(around).value_or(site.scale_ns);
     }
 }
 
-/// Each message anew, against what all others say.
+/// Judges each message again, against all the others.
 void Smoother::weigh(Segment& segment) {
-    for (Knot& knot : segment.knots) {
-        const BeliefVector direction = level_now(knot.site.direction);
-        const double precision = 1 / direction.dot(matrix(knot.smoothed) * direction);
-        const double others = precision - knot.precision;
+    for (SmootherStep& step : segment.steps) {
+        const StateVector direction = level_now(step.site.direction);
+        const double precision = 1 / direction.dot(matrix(step.smoothed) * direction);
+        const double others = precision - step.precision;
         if (others <= least_of_others * precision) continue;  // all that is known comes from it
         const double mean =
-            (precision * direction.dot(vector(knot.smoothed)) - knot.precision_mean) / others;
-        judge(knot, level_ns(segment, knot), mean, 1 / others, damping);
+            (precision * direction.dot(vector(step.smoothed)) - step.precision_mean) / others;
+        judge(step, level_ns(segment, step), mean, 1 / others, damping);
     }
 }
 
@@ -220,14 +222,14 @@ HostEstimate Smoother::translate(BoardTime board) const {
     HostEstimate estimate;
     const Segment* segment = segment_of(board);
     if (segment == nullptr) return estimate;
-    const std::vector<Knot>& knots = segment->knots;
-    const auto after =
-        std::upper_bound(knots.begin(), knots.end(), board,
-                         [](BoardTime at, const Knot& knot) { return at < knot.site.passage.at; });
-    const Knot& next = after == knots.end() ? knots.back() : *after;
-    const Knot& last = after == knots.begin() ? knots.front() : *(after - 1);
-    const Duration since_last = board - last.site.passage.at;
-    const Duration since_next = board - next.site.passage.at;
+    const std::vector<SmootherStep>& steps = segment->steps;
+    const auto after = std::upper_bound(
+        steps.begin(), steps.end(), board,
+        [](BoardTime at, const SmootherStep& step) { return at < step.site.sample.at; });
+    const SmootherStep& next = after == steps.end() ? steps.back() : *after;
+    const SmootherStep& last = after == steps.begin() ? steps.front() : *(after - 1);
+    const Duration since_last = board - last.site.sample.at;
+    const Duration since_next = board - next.site.sample.at;
     const double last_variance = last.smoothed.offset_variance_after(since_last);
     const double next_variance = next.smoothed.offset_variance_after(since_next);
     const double share = last_variance / (last_variance + next_variance);

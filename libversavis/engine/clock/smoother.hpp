@@ -5,16 +5,16 @@
 
 #include <vector>
 
-#include "engine/clock/belief.hpp"
 #include "engine/clock/envelope_filter.hpp"
+#include "engine/clock/gaussian_state.hpp"
 #include "engine/clock/messages.hpp"
 
 namespace versavis::clock {
 
-/// The model of EnvelopeFilter, solved forth and back (H. Rauch, F. Tung, C. Striebel, Maximum
-/// likelihood estimates of linear dynamic systems, 1965) several times, as each pass tells better
-/// what each message was worth (expectation propagation). Where the filter began anew, at a step or
-/// a reset, a new segment begins.
+/// The model of EnvelopeFilter, solved forward and backward (H. Rauch, F. Tung, C. Striebel,
+/// Maximum likelihood estimates of linear dynamic systems, 1965) several times, since each pass
+/// weighs each message better (expectation propagation). Where the filter restarted, at a step or a
+/// reset, a new segment begins. Used by one thread, after recording.
 class Smoother {
  public:
     /// In the order in which they became available.
@@ -27,31 +27,32 @@ class Smoother {
     std::size_t segments() const { return segments_.size(); }
 
  private:
-    struct Knot {
+    struct SmootherStep {
         EdgeSite site;
         double precision =
-            0;  ///< what the message says of the level of its edge, in natural parameters
+            0;  ///< what the message says about the level of its edge, in natural parameters
         double precision_mean = 0;
-        Belief filtered;
-        Belief smoothed;
+        GaussianState filtered;
+        GaussianState smoothed;
     };
     struct Segment {
         Duration base;
         Duration first_round_trip;
         BoardTime begin;
         BoardTime end;
-        std::vector<Knot> knots;
+        std::vector<SmootherStep> steps;
     };
 
     static Segment begin(const std::vector<EdgeSite>& sites, std::size_t first, std::size_t last);
     static void pass_forth(Segment& segment, bool first);
     static void pass_back(Segment& segment);
-    static bool earlier(const Knot& a, const Knot& b);
+    static bool earlier(const SmootherStep& a, const SmootherStep& b);
     static void thin(Segment& segment);
     static void rescale(Segment& segment, Direction direction);
     static void weigh(Segment& segment);
-    static void judge(Knot& knot, double level_ns, double mean, double variance, double share);
-    static double level_ns(const Segment& segment, const Knot& knot);
+    static void judge(SmootherStep& step, double level_ns, double mean, double variance,
+                      double share);
+    static double level_ns(const Segment& segment, const SmootherStep& step);
 
     const Segment* segment_of(BoardTime board) const;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The clocks of this machine, and what its kernel says of them; tests put simulated ones in their
-// place.
+// The clocks of this machine, and what its kernel reports about them; tests replace them by
+// simulated ones.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace versavis::clock {
 
 enum class SystemClock { monotonic_raw, monotonic, boottime, realtime, tai };
 
-/// How well CLOCK_REALTIME is disciplined, by whoever does it: NTP, PTP or GNSS.
+/// How well CLOCK_REALTIME is disciplined, by NTP, PTP or GNSS.
 struct KernelState {
     bool synchronised = false;
     Duration max_error;             ///< of CLOCK_REALTIME
-    std::int32_t tai_offset_s = 0;  ///< TAI minus UTC; 0: nobody told the kernel
+    std::int32_t tai_offset_s = 0;  ///< TAI minus UTC; 0: never set in the kernel
 };
 
 /// Thread-safe.
@@ -28,8 +28,8 @@ class SystemClocks {
     virtual KernelState kernel_state() = 0;
 
     /// How often CLOCK_REALTIME was set (by a person, a daemon, a leap second or the end of a
-    /// suspend) since this object was made, as far as this call can tell. A system call: some ten
-    /// times dearer than read_ns().
+    /// suspend) since this object was made, as far as this call shows. A system call: some ten
+    /// times as expensive as read_ns().
     virtual std::uint32_t times_set() = 0;
 };
 

@@ -24,8 +24,8 @@ constexpr int inversions = 4;
 
 const std::int64_t second_ns = 1'000'000'000;
 
-/// A wide reading of the output clock is part of the stamp's uncertainty: it is off by up to so
-/// much, evenly.
+/// A wide reading of the output clock is part of the stamp's uncertainty: it is off by up to that
+/// much, uniformly.
 Duration widened(Duration sigma, const OutputReading& output) {
     const auto estimate = static_cast<double>(sigma.ns);
     const auto reading = static_cast<double>(output.uncertainty.ns);

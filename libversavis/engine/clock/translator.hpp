@@ -34,11 +34,11 @@ struct BoardSecond {
     ClockState state = ClockState::init;
 };
 
-/// Where an asymmetry that is taken off comes from.
+/// Where a subtracted asymmetry comes from.
 enum class AsymmetrySource { none, stored, pps };
 const char* to_string(AsymmetrySource source);
 
-/// What the status document says of the clock.
+/// The clock's part of the status document.
 struct ClockReport {
     ClockState state = ClockState::init;
     OutputClockKind output = OutputClockKind::realtime;
@@ -81,7 +81,9 @@ struct OutputRelation {
     std::uint32_t epoch = 0;
 };
 
-/// Thread-safe.
+/// The only place that turns board time into stamps: estimate of the board's clock, PPS, output
+/// clock and epochs together. Thread-safe: the thread of the link adds messages, any thread
+/// translates.
 class Translator {
  public:
     /// `first_epoch`: the number of the first one, before the board was met.
@@ -89,10 +91,10 @@ class Translator {
                         std::uint32_t first_epoch = 0)
         : first_epoch_(first_epoch), output_(std::move(output)), pps_(labels) {}
 
-    /// The board began a new life: what was known of its clock is void, and a new epoch begins.
+    /// The board restarted: what was known about its clock is void, and a new epoch begins.
     void board_restarted();
 
-    /// What was stamped in this epoch may be off from what comes: a new one begins.
+    /// Starts a new epoch because later stamps may not be comparable with earlier ones.
     void begin_epoch();
 
     void add(const Exchange& exchange);

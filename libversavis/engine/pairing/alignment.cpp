@@ -31,11 +31,12 @@ constexpr std::ptrdiff_t longer_gaps = 2;
 constexpr double lateness_spread = 0.6;
 
 // How far the camera's own exposure time may be off from the measured one. At half the ramps of
-// some exposure outputs look like another exposure; at twice short exposures are told apart less.
+// some exposure outputs look like another exposure; at twice short exposures are distinguished
+// less.
 constexpr Duration length_tolerance = microseconds(200);
 
 // The same for long exposures, as a share. At half coarse exposure times of cameras contradict; at
-// twice auto exposure must change by more before it tells one exposure from the next.
+// twice auto exposure must change by more before it distinguishes one exposure from the next.
 constexpr double length_tolerance_share = 0.05;
 
 // Frames that a start needs by the camera's clock: the four gaps that stand in one place of the
@@ -233,9 +234,9 @@ unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to
                : 0;
 }
 
-bool lengths_differ(Duration told, Duration measured) {
+bool lengths_differ(Duration reported, Duration measured) {
     const Duration share{part_of(measured.ns, length_tolerance_share)};
-    return absolute(told - measured) > std::max(length_tolerance, share);
+    return absolute(reported - measured) > std::max(length_tolerance, share);
 }
 
 bool length_contradicts(const Arrival& arrival, const Exposure& exposure) {

@@ -57,8 +57,9 @@ std::uint64_t perhaps_not_taken(const Record& from, const Record& to);
 /// record may have been taken or not.
 unsigned step_faults(std::uint64_t id_step, const Record& from, const Record& to);
 
-/// True when these cannot be lengths of the same exposure, as told by the camera and as measured.
-bool lengths_differ(Duration told, Duration measured);
+/// True when these cannot be lengths of the same exposure, as reported by the camera and as
+/// measured.
+bool lengths_differ(Duration reported, Duration measured);
 
 /// True when the camera's own account of the exposure cannot be of this one.
 bool length_contradicts(const Arrival& arrival, const Exposure& exposure);

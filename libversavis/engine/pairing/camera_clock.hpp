@@ -53,7 +53,7 @@ class CameraClock {
     int votes_ = 0;  ///< in a row
 };
 
-/// True when the board saw this instant, or can tell it from what it saw.
+/// True when the board saw this instant, or it follows from what it saw.
 bool seen(const Exposure& exposure, Instant instant);
 
 }  // namespace versavis::pairing

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What pairing is told of one camera: exposures by the board, frames by the camera.
+// What pairing gets of one camera: exposures by the board, frames by the camera.
 #pragma once
 
 #include <cstdint>

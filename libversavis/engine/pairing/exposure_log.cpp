@@ -27,14 +27,15 @@ std::int64_t Record::instant_ns(Instant instant) const {
 void ExposureLog::add(const Exposure& exposure, bool prompt) {
     ++recorded_;
     if (!exposure.exposed) ++silent_;
-    const Duration told = exposure.end - exposure.start;
-    Duration length = told;
-    if (exposure.kind == StampKind::measured_middle) last_length_ = told;
-    // An end that nobody saw is told as late as it may be.
+    const Duration reported = exposure.end - exposure.start;
+    Duration length = reported;
+    if (exposure.kind == StampKind::measured_middle) last_length_ = reported;
+    // An end that nobody saw is as late as it may be.
     if (exposure.kind == StampKind::predicted_middle && last_length_.ns != 0)
-        length = std::min(told, last_length_);
-    records_.push_back({exposure, exposure.start + length, exposure.end_on_host - (told - length),
-                        false, recorded_, silent_, prompt});
+        length = std::min(reported, last_length_);
+    records_.push_back({exposure, exposure.start + length,
+                        exposure.end_on_host - (reported - length), false, recorded_, silent_,
+                        prompt});
     if (prompt && exposure.exposed) explain_late_ones();
     measure();
 }

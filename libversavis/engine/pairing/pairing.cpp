@@ -45,8 +45,9 @@ constexpr int frames_to_give_up = 5;
 // pattern; at twice fast cameras wait longer for theirs.
 constexpr Duration shortest_check = milliseconds(100);
 
-// The same without a camera's clock, where nothing else tells a late frame from a trigger that was
-// missed. At half frames that were only late cost a slow start; at twice real slips last longer.
+// The same without a camera's clock, where nothing else distinguishes a late frame from a trigger
+// that was missed. At half frames that were only late cost a slow start; at twice real slips last
+// longer.
 constexpr Duration shortest_check_by_arrival = milliseconds(300);
 
 // Ids this far behind the newest are of frames out of order; further behind, of a counter that
@@ -441,7 +442,7 @@ bool Pairing::has_witness() const {
 
 void Pairing::slip(const Arrival& arrival) {
     state_ = State::checking;
-    suspicions_ = {};
+    hypotheses_ = {};
     undecided_ = 0;
     slipped_ = arrival.arrived;
     outcome_.slipped(arrival);
@@ -459,7 +460,7 @@ const Record* Pairing::by_clock(const Arrival& arrival) const {
     return found;
 }
 
-/// None as well when frames come too irregularly to tell.
+/// None as well when frames come too irregularly.
 const Record* Pairing::by_latency(const Arrival& arrival) const {
     if (!latency_trusted()) return nullptr;
     return exposures_.near(Instant::arrival, latency_.expected_instant_ns(arrival.arrived.ns),
@@ -520,7 +521,7 @@ bool Pairing::decide_checking() {
 
 /// True when it is certain by now: then the frame was published.
 bool Pairing::suspect(Stepped kind, const Arrival& arrival, const Record* record) {
-    Suspicion& suspicion = suspicions_[static_cast<std::size_t>(kind)];
+    SlipHypothesis& suspicion = hypotheses_[static_cast<std::size_t>(kind)];
     if (record == nullptr) {
         suspicion.frames = 0;
         return false;

@@ -85,8 +85,8 @@ class Pairing {
     /// What the camera stamps, by what was said or found out.
     Instant stamped() const { return clock_.stamped(); }
 
-    /// What the board should do for this camera now; none: go on. Say start_requested() when it was
-    /// told so.
+    /// What the board should do for this camera now; none: go on. Call start_requested()
+    /// once it was asked to.
     std::optional<Start> wanted_start(HostTime now) const;
     void start_requested(Start start, HostTime now);
 
@@ -101,7 +101,7 @@ class Pairing {
         Arrival arrival;
         Record record;
     };
-    struct Suspicion {  ///< of one kind of evidence
+    struct SlipHypothesis {  ///< of one kind of evidence
         int frames = 0;
         Pair last;
     };
@@ -182,12 +182,12 @@ class Pairing {
     std::deque<Arrival> given_up_;  ///< by the search, for want of room: their times still count
     std::deque<Shortfall> shortfalls_;
     CameraClock clock_;
-    std::int64_t shortest_delay_ns_ = 0;     ///< from end of exposure to arrival, since the lock
-    Relation latency_{false};                ///< arrival against its end on the host
-    std::optional<Pair> proved_;             ///< the newest that was published
-    std::array<Suspicion, 3> suspicions_{};  ///< by Stepped
-    bool waits_for_witness_ = false;         ///< the oldest frame does
-    int undecided_ = 0;                      ///< frames since the slip
+    std::int64_t shortest_delay_ns_ = 0;  ///< from end of exposure to arrival, since the lock
+    Relation latency_{false};             ///< arrival against its end on the host
+    std::optional<Pair> proved_;          ///< the newest that was published
+    std::array<SlipHypothesis, 3> hypotheses_{};  ///< by Stepped
+    bool waits_for_witness_ = false;              ///< the oldest frame does
+    int undecided_ = 0;                           ///< frames since the slip
     HostTime slipped_;
 
     std::optional<Start> start_;  ///< asked for

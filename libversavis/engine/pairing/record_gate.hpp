@@ -30,12 +30,12 @@ class RecordGate {
     bool in_order(const Exposure& before, const Exposure& after) const;
 
     /// The newest record reached the host as soon as others did. When it did not, the link stalls
-    /// or the board's time was set back: nobody can tell.
+    /// or the board's time was set back: which of them is unknown.
     bool prompt() const { return prompt_; }
 
     /// The link has caught up: the newest record is of an exposure so long after the last late one
-    /// came that it was not held up with that. Until then, nobody can tell a delay of the link from
-    /// a step of the board's time.
+    /// came that it was not held up with that. Until then, a delay of the link cannot be
+    /// distinguished from a step of the board's time.
     bool live() const;
 
     /// How soon records reach the host is learned anew.

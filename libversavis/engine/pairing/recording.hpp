@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Everything a pairing was told, in order, as items of a ring: so that it can be done again,
+// Everything a pairing got, in order, as items of a ring: so that it can be done again,
 // elsewhere.
 #pragma once
 
@@ -24,7 +24,7 @@ struct StartRequest {
     HostTime now;
 };
 
-/// What a pairing can be told. Limits come first, and again with each new stream of the camera: a
+/// What a pairing can get. Limits come first, and again with each new stream of the camera: a
 /// new pairing begins.
 using Evidence = std::variant<Limits, Exposure, Arrival, Shortfall, Advance, Reset, StartRequest>;
 

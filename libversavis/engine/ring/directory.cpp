@@ -16,7 +16,7 @@
 #include "client/process.hpp"
 #include "client/segment.hpp"
 #include "client/trust.hpp"
-#include "engine/ring/ending.hpp"
+#include "engine/ring/segment_lifecycle.hpp"
 
 namespace versavis::ring {
 
@@ -41,7 +41,7 @@ Expected<> check_trust(const std::filesystem::path& path) {
                        fmt::format("remove it, or 'chmod 0750 {}'", path.string()));
     const auto above = path.parent_path();
     ::stat(above.c_str(), &parent);  // it is there: `path` was found in it
-    // Whom readers are told to believe does not take the right from root and this user.
+    // Root and this user may always write, whatever VERSAVIS_OWNER says.
     if (parent.st_uid != 0 && parent.st_uid != ::geteuid() && !may_own(parent.st_uid, std::nullopt))
         return failure(above.string(),
                        fmt::format("belongs to another user (uid {}), who could put another "

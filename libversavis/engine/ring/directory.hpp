@@ -24,7 +24,7 @@ class OwnedDirectory {
     OwnedDirectory& operator=(OwnedDirectory&&) = delete;
 
     /// Retires and removes the segments that another process made, except those named in `keep`:
-    /// their readers are handed over when the segment is made anew.
+    /// their readers move on when the segment is created again.
     void remove_stale(const std::vector<std::string>& keep) const;
 
     const std::filesystem::path& path() const { return path_; }

@@ -7,8 +7,8 @@
 
 namespace versavis::ring {
 
-/// Numbers reserved at once. Half: a service that begins 256 epochs between two calls of keep(),
-/// and is killed then, may see its last ones used again. Twice: numbers grow faster.
+/// Numbers reserved at once. If lower, a service that begins 256 epochs between two calls of
+/// keep(), and is killed then, may see its last ones used again; if higher, numbers grow faster.
 constexpr std::uint32_t epochs_reserved = 1024;
 
 class EpochBlock {

@@ -18,10 +18,10 @@
 
 #include "client/process.hpp"
 #include "client/segment.hpp"
-#include "engine/ring/crowd.hpp"
-#include "engine/ring/door.hpp"
-#include "engine/ring/ending.hpp"
-#include "engine/ring/room.hpp"
+#include "engine/ring/memory_budget.hpp"
+#include "engine/ring/segment_lifecycle.hpp"
+#include "engine/ring/segment_server.hpp"
+#include "engine/ring/waiter_waker.hpp"
 
 namespace versavis::ring {
 
@@ -29,16 +29,16 @@ struct Writer::Segment {
     std::filesystem::path path;
     FileId name;
     Mapping mapping;
-    std::unique_ptr<Door> door;  ///< of a sealed one
+    std::unique_ptr<SegmentServer> server;  ///< of a sealed one
     std::uint64_t head;
-    Crowd crowd;  ///< before the mapping goes, its thread ends
+    WaiterWaker waker;  ///< before the mapping goes, its thread ends
 
-    Segment(std::filesystem::path file, Mapping mapped, std::unique_ptr<Door> opened,
+    Segment(std::filesystem::path file, Mapping mapped, std::unique_ptr<SegmentServer> opened,
             std::uint64_t first)
         : path(std::move(file)),
           name(file_id(path)),
           mapping(std::move(mapped)),
-          door(std::move(opened)),
+          server(std::move(opened)),
           head(first) {}
     ~Segment() {
         const auto live = static_cast<std::uint32_t>(WriterState::live);
@@ -105,13 +105,14 @@ Expected<FileDescriptor> make_nameless(const std::filesystem::path& path, std::u
     return file;
 }
 
-/// From here on the only one who can write is who has mapped it already.
-Expected<std::unique_ptr<Door>> seal(FileDescriptor file, const std::filesystem::path& path) {
+/// From here on only existing mappings can write.
+Expected<std::unique_ptr<SegmentServer>> seal(FileDescriptor file,
+                                              const std::filesystem::path& path) {
     const int seals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL;
     if (::fcntl(file.get(), F_ADD_SEALS, seals) != 0)
         return failure(path.string(), fmt::format("cannot be sealed: {}", reason(errno)),
                        "set 'sealed = false' in [memory], or use Linux 5.1 or newer");
-    return Door::open(path, std::move(file));
+    return SegmentServer::open(path, std::move(file));
 }
 
 /// Gives the memory of a dead writer's payloads back, even where readers still map it: each finds
@@ -134,13 +135,13 @@ void release_dead(const std::filesystem::path& directory) {
     for (const auto& entry : std::filesystem::directory_iterator(directory, error)) {
         const auto segment = Mapping::open(entry.path(), Mapping::Access::read_write);
         if (!segment || is_own(segment->constants())) continue;
-        if (presence(segment->constants()) != Presence::there) release(entry.path(), *segment);
+        if (liveness(segment->constants()) != Liveness::alive) release(entry.path(), *segment);
     }
 }
 
 /// Of the process that fills the header: no other one of this machine, ever, has the same.
 std::uint64_t life_of(const Header& header) {
-    // 0, as of segments that do not tell, is one hash of 2^64.
+    // 0, as in segments without it, is one hash of 2^64.
     return std::hash<std::string>{}(fmt::format("{} {} {} {}", fmt::join(header.boot_id, " "),
                                                 header.pid_namespace, header.writer_pid,
                                                 header.writer_start_ticks));
@@ -202,7 +203,7 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     const std::uint64_t size = total_size(shape);
     auto old = Mapping::open(path, Mapping::Access::read_write);
     const auto make = [&]() -> Expected<FileDescriptor> {
-        auto fits = place.sealed ? check_memory(path, size) : check_room(path, size);
+        auto fits = place.sealed ? check_memory(path, size) : check_tmpfs_space(path, size);
         if (!fits) return Unexpected(fits.error());
         return place.sealed ? make_nameless(path, size) : make_file(temporary, size);
     };
@@ -221,14 +222,14 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     fill_header(mapping->header(), shape, size);
     mapping->read_constants();
     number_descriptors(*mapping, shape.first_item);
-    std::unique_ptr<Door> door;
+    std::unique_ptr<SegmentServer> server;
     if (place.sealed) {
         auto opened = seal(std::move(*file), temporary);
         if (!opened) {
             ::unlink(temporary.c_str());
             return Unexpected(opened.error());
         }
-        door = std::move(*opened);
+        server = std::move(*opened);
     }
     // Superseded before the name changes: when this process dies in between, readers know at once
     // that nothing more comes from the old one. They are woken when there is something to find.
@@ -242,7 +243,7 @@ Expected<Writer> Writer::create(const Place& place, const Shape& shape) {
     }
     if (old) wake_readers(old->header());
     return Writer(
-        std::make_unique<Segment>(path, std::move(*mapping), std::move(door), shape.first_item));
+        std::make_unique<Segment>(path, std::move(*mapping), std::move(server), shape.first_item));
 }
 
 Writer::Writer(std::unique_ptr<Segment> segment) : segment_(std::move(segment)) {
@@ -314,7 +315,7 @@ void Writer::write_descriptor(std::uint64_t slot_generation, std::uint64_t lengt
     header.head.store(number + 1, std::memory_order_release);
     // SYNC 5: release here, acquire in Reader::next(): a reader that sees this sees the new head.
     header.wake.fetch_add(1, std::memory_order_release);
-    segment_->crowd.wake(header.wake);
+    segment_->waker.wake(header.wake);
 }
 
 }  // namespace versavis::ring

@@ -69,7 +69,7 @@ class Writer {
     /// Items published so far, the number of the next one.
     std::uint64_t head() const;
 
-    /// Tells readers that the writer is alive; call it at least once a second.
+    /// Updates the heartbeat; call it at least once a second.
     void heartbeat(HostTime now);
 
  private:

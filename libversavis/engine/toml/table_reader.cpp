@@ -240,6 +240,12 @@ const toml::table* TableReader::table(std::string_view key) {
     return node == nullptr ? nullptr : node->as_table();
 }
 
+std::optional<TableReader> TableReader::below(std::string_view key, std::string title) {
+    const toml::table* found = table(key);
+    if (found == nullptr) return std::nullopt;
+    return TableReader(file_, *found, std::move(title));
+}
+
 std::vector<const toml::table*> TableReader::tables(std::string_view key) {
     std::vector<const toml::table*> found;
     const toml::node* node = find(key);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <toml++/toml.h>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -55,6 +56,12 @@ class TableReader {
         value = static_cast<Integer>(wide);
     }
 
+    /// Without the key there is no value.
+    template <class Type, class... Range>
+    void read(std::string_view key, std::optional<Type>& value, Range... range) {
+        if (find(key) != nullptr) read(key, value.emplace(), range...);
+    }
+
     /// One of the names given.
     template <class Enum>
     void choose(std::string_view key, Enum& value,
@@ -67,10 +74,16 @@ class TableReader {
     /// The table below `key`, if there is one.
     const toml::table* table(std::string_view key);
 
+    /// The reader of that table, which messages call `title`.
+    std::optional<TableReader> below(std::string_view key, std::string title = {});
+
     /// The tables of the array below `key`.
     std::vector<const toml::table*> tables(std::string_view key);
 
     bool has(std::string_view key) const { return table_.contains(key); }
+
+    /// All that is in the table, for keys that nobody knows beforehand.
+    const toml::table& contents() const { return table_; }
 
     /// True for a key that was asked for.
     bool knows(std::string_view key) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the metadata of an item say, value by value: one table for each kind, for whoever prints,
+// What the metadata of an item say, value by value: one table for each kind, for code that prints,
 // stores or compares them by name. docs/contracts/shm-layout.md has the same names.
 #pragma once
 

@@ -53,8 +53,8 @@ struct FrameMetadata {
     std::uint32_t epoch;         ///< trigger numbers and clocks are continuous within one
     std::uint32_t flags;         ///< ItemFlag
     std::uint32_t tick_low;      ///< of tick()
-    std::int32_t delay_ns;       ///< of camera's and board's lines, already taken off all times
-    std::uint32_t tick_high;     ///< of tick()
+    std::int32_t delay_ns;    ///< of camera's and board's lines, already subtracted from all times
+    std::uint32_t tick_high;  ///< of tick()
 
     StampKind stamp_kind() const { return static_cast<StampKind>(flags & stamp_kind_mask); }
 
@@ -83,9 +83,9 @@ struct ImuMetadata {
     float pressure;        ///< pascal; NaN where the part has none
     std::uint32_t sigma_ns;
     std::uint32_t epoch;
-    std::uint32_t flags;        ///< ItemFlag
-    Duration filter_delay;      ///< of the part's filter, already taken off host and output time
-    std::int32_t accel_age_ns;  ///< acceleration before angular rate, not taken off; 0: unknown
+    std::uint32_t flags;    ///< ItemFlag
+    Duration filter_delay;  ///< of the part's filter, already subtracted from host and output time
+    std::int32_t accel_age_ns;  ///< acceleration before angular rate, not subtracted; 0: unknown
     std::uint32_t reserved;
 };
 

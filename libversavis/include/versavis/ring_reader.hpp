@@ -87,15 +87,15 @@ class VERSAVIS_API Reader {
     /// The next item, without waiting.
     Received next();
 
-    /// The next item, waiting for it up to `timeout` in the kernel. That the service is gone is
-    /// told at once the first time, and from then on after `timeout`.
+    /// The next item, waiting for it up to `timeout` in the kernel. Returns Pause::gone at once the
+    /// first time, and after `timeout` from then on.
     Received next(Duration timeout);
 
     /// The newest item, passing over older ones without calling them lost; if it has been read
     /// already, waits up to `timeout` for the next.
     Received latest(Duration timeout = {});
 
-    /// Sleeps until next() may have something to tell, for `timeout` at most.
+    /// Sleeps until next() may have something to return, for `timeout` at most.
     void wait(Duration timeout);
 
     /// Goes to a place among the items that there are.
@@ -106,7 +106,7 @@ class VERSAVIS_API Reader {
     void seek(OutputTime time, std::uint64_t earlier = 0);
 
     /// A file descriptor for poll or epoll, the reader's own: readable when a call of next() may
-    /// find something, until one finds nothing. Errors: no descriptor or thread to be had.
+    /// find something, until one finds nothing. Errors: no descriptor or thread available.
     Expected<int> fd();
 
     StreamKind kind() const;

@@ -59,7 +59,7 @@ class VERSAVIS_API SetReader {
     Expected<FrameSet, NoItem> next(Duration timeout);
 
     /// For poll and epoll: readable when next() may have a set, until it has none. Errors: no
-    /// descriptor or thread to be had.
+    /// descriptor or thread available.
     Expected<int> fd();
 
     const SetReport& report() const;

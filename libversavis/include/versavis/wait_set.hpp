@@ -24,13 +24,13 @@ class VERSAVIS_API WaitSet {
     /// Errors: 127 readers are in it already.
     Expected<> add(ring::Reader& reader);
 
-    /// Sleeps until next() of one of the readers has something to tell: an item, or another
+    /// Sleeps until next() of one of the readers has something to return: an item, or another
     /// reason than Pause::nothing. Returns its number, in the order of add(); none: nothing within
     /// `timeout`. Readers take turns, so that a fast stream does not keep a slow one waiting.
     std::optional<std::size_t> wait(Duration timeout);
 
     /// For poll and epoll: readable when wait() may find something, until it finds nothing. With
-    /// `deadline`, also from that time on. Errors: no descriptor or thread to be had.
+    /// `deadline`, also from that time on. Errors: no descriptor or thread available.
     Expected<int> fd();
 
     /// The descriptor becomes readable then at the latest; none: only when something happens.

@@ -18,7 +18,7 @@ bool keep(const wire::Packet& packet, std::vector<T>& list) {
 
 }  // namespace
 
-std::vector<wire::Event> Inbox::events_of(wire::EventKind kind) const {
+std::vector<wire::Event> Inbox::events_of(wire::BoardEventKind kind) const {
     std::vector<wire::Event> found;
     std::copy_if(events.begin(), events.end(), std::back_inserter(found),
                  [kind](const wire::Event& event) { return event.kind == kind; });

@@ -24,7 +24,7 @@ struct Inbox {
     std::uint64_t packets = 0;
     std::uint64_t lost = 0;  ///< by sequence numbers
 
-    std::vector<wire::Event> events_of(wire::EventKind kind) const;
+    std::vector<wire::Event> events_of(wire::BoardEventKind kind) const;
 };
 
 class HostModel {

@@ -120,9 +120,9 @@ void World::judge_ticks(unsigned camera, std::string& out) {
         return;
     std::multiset<std::uint64_t> ticks;
     for (const wire::Exposure& record : inbox().exposures[camera]) ticks.insert(record.tick);
-    for (const wire::Event& event : inbox().events_of(wire::EventKind::trigger_skipped))
+    for (const wire::Event& event : inbox().events_of(wire::BoardEventKind::trigger_skipped))
         if (event.source == camera) ticks.insert(static_cast<std::uint64_t>(event.value));
-    for (const wire::Event& event : inbox().events_of(wire::EventKind::triggers_skipped))
+    for (const wire::Event& event : inbox().events_of(wire::BoardEventKind::triggers_skipped))
         for (unsigned i = 0; i < event.detail && event.source == camera; ++i)
             ticks.insert(static_cast<std::uint64_t>(event.value) + i);
     std::uint64_t expected = ticks.empty() ? 0 : *ticks.begin();
@@ -228,12 +228,13 @@ void World::judge_accel_age(const wire::ImuSample& sample, std::string& out) con
 void World::judge_pulses(std::string& out) {
     for (const PulseSource& source : pulses_) {
         const unsigned input = source.input - firmware::input_pulse;
-        const auto kind = input == wire::pulse_pps    ? wire::EventKind::pps
-                          : input == wire::pulse_sync ? wire::EventKind::sync_pulse
-                                                      : wire::EventKind::aux_pulse;
+        const auto kind = input == wire::pulse_pps    ? wire::BoardEventKind::pps
+                          : input == wire::pulse_sync ? wire::BoardEventKind::sync_pulse
+                                                      : wire::BoardEventKind::aux_pulse;
         std::vector<wire::Event> events = inbox().events_of(kind);
         std::erase_if(events, [&](const wire::Event& event) {
-            return kind == wire::EventKind::aux_pulse && event.source != input - wire::pulse_aux0;
+            return kind == wire::BoardEventKind::aux_pulse &&
+                   event.source != input - wire::pulse_aux0;
         });
         for (std::size_t i = 1; i < events.size(); ++i)
             if (events[i].value != events[i - 1].value + 1 && !drops_allowed)
@@ -276,7 +277,7 @@ void World::judge_light(std::string& out) {
         if (saved < -1000 - (drops_allowed ? light.max_on_ns : 0.0))
             complain(out, "the light was on for too much of the time at {}", interval.on);
     }
-    if (!inbox().events_of(wire::EventKind::illumination_limited).empty()) return;
+    if (!inbox().events_of(wire::BoardEventKind::illumination_limited).empty()) return;
     for (const auto& [output, model] : cameras_) {
         if ((light.cameras >> output & 1U) == 0) continue;
         for (const TruePulse& pulse : model->pulses()) {

@@ -39,7 +39,7 @@ std::string message_log(const Inbox& inbox) {
     std::string out;
     for (const auto& [camera, records] : inbox.exposures)
         for (const wire::Exposure& record : records) out += line(record);
-    std::map<std::pair<wire::EventKind, unsigned>, std::string> events;
+    std::map<std::pair<wire::BoardEventKind, unsigned>, std::string> events;
     for (const wire::Event& event : inbox.events) events[{event.kind, event.source}] += line(event);
     for (const auto& [stream, lines] : events) out += lines;
     for (const auto& [port, samples] : inbox.samples)

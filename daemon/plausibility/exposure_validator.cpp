@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "exposure_validator.hpp"
+
+#include <algorithm>
+
+namespace versavis::daemon {
+
+namespace {
+
+/// What a board needs to notice that an exposure has lasted too long.
+constexpr Duration overlong_slack = milliseconds(2);
+
+/// The board waits for a start so long, or for a period.
+constexpr Duration shortest_patience = milliseconds(2);
+
+/// Exposures that differ by less are of equal length: triggers then say how fast the grid runs.
+constexpr Duration equal_exposures = microseconds(40);
+
+/// The grid runs at the board's pace within one part in so many: aligned, it follows another clock.
+constexpr std::int64_t first_pace_parts = 500;
+
+/// Over lost records the pace may wander by one part in so many.
+constexpr std::int64_t wander_parts = 10'000;
+
+/// A trigger that leaves late says so, and is sent no later than this.
+constexpr Duration latest_trigger = milliseconds(2);
+
+/// How far the second latency, or the second exposure of equal length, may be off from the first.
+constexpr Duration first_tolerance = milliseconds(1);
+
+/// 73 years: a grid point beyond it is a lie.
+constexpr double furthest_ns = 2.3e18;
+
+bool has_start(const wire::Exposure& record) { return record.start_ns != wire::no_time; }
+bool has_end(const wire::Exposure& record) { return record.end_ns != wire::no_time; }
+bool has(const wire::Exposure& record, unsigned flags) { return (record.flags & flags) != 0; }
+
+/// Flags and times must agree.
+bool flags_agree(const wire::Exposure& record, const CameraConfiguration& configuration) {
+    constexpr unsigned outcomes = wire::exposure_measured | wire::exposure_no_start |
+                                  wire::exposure_no_end | wire::exposure_predicted;
+    const bool wired = configuration.strobe != Strobe::none;
+    const bool by_master = !wired && !configuration.master.empty();
+    if (has(record, wire::exposure_from_master) != by_master) return false;
+    switch (record.flags & outcomes) {
+        case wire::exposure_measured:
+            return has_start(record) && has_end(record) && (wired || by_master);
+        case wire::exposure_predicted: return has_start(record) && has_end(record) && !wired;
+        case wire::exposure_no_start: return !has_start(record) && !has_end(record);
+        case wire::exposure_no_end: return has_start(record) && !has_end(record);
+        default: return false;
+    }
+}
+
+}  // namespace
+
+std::optional<Implausibility> contradicts_itself(const wire::Exposure& record,
+                                                 const CameraConfiguration& configuration) {
+    if (!flags_agree(record, configuration))
+        return Implausibility{EventReason::implausible_flags, record.flags, 0};
+    if (!has_start(record)) return std::nullopt;
+    const Duration latest = from_us(configuration.latency_us) + period_of(configuration) +
+                            shortest_patience + overlong_slack;
+    if (record.start_ns < record.trigger_ns || record.start_ns - record.trigger_ns > latest.ns)
+        return Implausibility{EventReason::implausible_time, record.start_ns, record.trigger_ns};
+    if (!has_end(record)) return std::nullopt;
+    const Duration longest = from_us(configuration.max_exposure_us) + overlong_slack;
+    if (record.end_ns < record.start_ns || record.end_ns - record.start_ns > longest.ns)
+        return Implausibility{EventReason::implausible_length, record.end_ns,
+                              record.start_ns + longest.ns};
+    return std::nullopt;
+}
+
+ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
+    : period_(period_of(configuration)),
+      slave_(!configuration.master.empty()),
+      slew_(rounded(static_cast<double>(period_.ns) * configuration.grid_slew_ppm * 1e-6)),
+      pace_(period_, period_ / first_pace_parts),
+      latency_(first_tolerance),
+      length_(first_tolerance) {
+    lengths_[length_count_++] = from_us(configuration.exposure_us);
+}
+
+std::optional<Implausibility> ExposureHistory::doubt(const ExposureObservation& exposure) const {
+    const wire::Exposure& record = exposure.record;
+    if (newest_)
+        if (auto doubt = number_doubt(record)) return doubt;
+    if (newest_ && grid_known_)
+        if (auto doubt = trigger_doubt(record)) return doubt;
+    if (auto doubt = start_doubt(record)) return doubt;
+    return end_doubt(exposure);
+}
+
+/// Each trigger has a grid point of its own, in order, and each grid point a trigger, but for those
+/// that the board leaves out.
+std::optional<Implausibility> ExposureHistory::number_doubt(const wire::Exposure& record) const {
+    const std::uint64_t ticks = record.tick - newest_->tick;
+    const std::uint64_t triggers = record.trigger - newest_->trigger;
+    const bool counted = record.trigger > newest_->trigger;
+    if (!grid_known_ && counted) return std::nullopt;
+    if (counted && record.tick > newest_->tick && triggers <= ticks &&
+        may_skip(record, ticks - triggers))
+        return std::nullopt;
+    return Implausibility{EventReason::implausible_number,
+                          static_cast<std::int64_t>(record.trigger),
+                          static_cast<std::int64_t>(newest_->trigger + 1)};
+}
+
+bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t points) const {
+    constexpr unsigned sparse = wire::exposure_pattern | wire::exposure_slow;
+    return points <= skips_ || slave_ || has(record, sparse) || has(*newest_, sparse);
+}
+
+std::optional<Implausibility> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
+    const Duration since{record.trigger_ns - punctual_->trigger_ns};
+    const std::uint64_t ticks = record.tick - punctual_->tick;
+    const Implausibility doubt{EventReason::implausible_time, record.trigger_ns,
+                               punctual_->trigger_ns + pace_.value().ns};
+    // As real numbers: ticks may be a lie.
+    const double expected_ns = static_cast<double>(ticks) * static_cast<double>(pace_.value().ns);
+    if (expected_ns > furthest_ns) return doubt;
+    const Duration off = since - Duration{static_cast<std::int64_t>(expected_ns)};
+    Duration tolerance = pace_.tolerance() + compensation(record);
+    const std::int64_t skipped = rounded(expected_ns).ns / pace_.value().ns - 1;
+    tolerance = tolerance + slew_ * (skipped + 1) +
+                (pace_.value() / wander_parts + pace_.uncertainty()) * skipped;
+    if (has(record, wire::exposure_late) || has(*punctual_, wire::exposure_late))
+        tolerance = tolerance + latest_trigger;
+    if (absolute(off) <= tolerance) return std::nullopt;
+    return Implausibility{doubt.reason, doubt.said, (Duration{record.trigger_ns} - off).ns};
+}
+
+/// By how much two triggers may lie closer or further apart, because other exposures were expected
+/// of them.
+Duration ExposureHistory::compensation(const wire::Exposure& record) const {
+    const std::size_t known = std::min(length_count_, remembered_lengths);
+    auto [shortest, longest] = std::minmax_element(lengths_, lengths_ + known);
+    Duration low = *shortest;
+    Duration high = *longest;
+    if (has_start(record) && has_end(record)) {
+        const Duration own{record.end_ns - record.start_ns};
+        low = std::min(low, own);
+        high = std::max(high, own);
+    }
+    return (high - low) / 2;
+}
+
+std::optional<Implausibility> ExposureHistory::start_doubt(const wire::Exposure& record) const {
+    if (!has_start(record)) return std::nullopt;
+    if (latency_.fits({record.start_ns - record.trigger_ns})) return std::nullopt;
+    return Implausibility{EventReason::implausible_time, record.start_ns,
+                          record.trigger_ns + latency_.value().ns};
+}
+
+std::optional<Implausibility> ExposureHistory::end_doubt(
+    const ExposureObservation& exposure) const {
+    const wire::Exposure& record = exposure.record;
+    if (!has_start(record) || !has_end(record)) return std::nullopt;
+    if (exposure.commanded.ns == 0 || exposure.commanded != commanded_) return std::nullopt;
+    if (length_.fits({record.end_ns - record.start_ns})) return std::nullopt;
+    return Implausibility{EventReason::implausible_length, record.end_ns,
+                          record.start_ns + length_.value().ns};
+}
+
+void ExposureHistory::learn(const ExposureObservation& exposure) {
+    const wire::Exposure& record = exposure.record;
+    if (grid_known_ && !has(record, wire::exposure_late) && !has(*punctual_, wire::exposure_late) &&
+        compensation(record) * 2 < equal_exposures) {
+        const auto ticks = static_cast<std::int64_t>(record.tick - punctual_->tick);
+        pace_.learn({(record.trigger_ns - punctual_->trigger_ns) / ticks});
+    }
+    if (!grid_known_ || !has(record, wire::exposure_late)) punctual_ = record;
+    newest_ = record;
+    grid_known_ = true;
+    skips_ = 0;
+    if (!has_start(record)) return;
+    latency_.learn({record.start_ns - record.trigger_ns});
+    if (!has_end(record)) return;
+    const Duration length{record.end_ns - record.start_ns};
+    lengths_[length_count_++ % remembered_lengths] = length;
+    if (exposure.commanded != commanded_) length_ = RunningEstimate(first_tolerance);
+    commanded_ = exposure.commanded;
+    length_.learn(length);
+}
+
+bool ExposureHistory::repeats(const ExposureObservation& exposure) const {
+    return of_newest_trigger(exposure.record) && !disputes_newest(exposure.record);
+}
+
+bool ExposureHistory::disputes_newest(const wire::Exposure& record) const {
+    return of_newest_trigger(record) &&
+           (newest_->start_ns != record.start_ns || newest_->end_ns != record.end_ns ||
+            newest_->trigger_ns != record.trigger_ns);
+}
+
+}  // namespace versavis::daemon
