@@ -19,6 +19,7 @@
 
 #include "../../firmware/native/native_board.hpp"
 #include "engine/clock/output_clock.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::rig {
 
@@ -119,7 +120,7 @@ BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime
       chip_(std::move(chip)) {
     if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
     boot({}, clock_errors_, zero);
-    thread_ = std::thread([this] { run(); });
+    thread_ = start_thread("board", [this] { run(); });
 }
 
 BoardHost::~BoardHost() {

@@ -2,18 +2,12 @@
 #include "emulated_board.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include "../../firmware/rp2040/pins.hpp"
@@ -100,39 +94,20 @@ Expected<std::unique_ptr<EmulatedChip>> EmulatedChip::create(const std::string& 
             return failure(file, "there is no such file",
                            "the emulated board runs where the project was built, after './dev demo "
                            "--board rp2040'");
-    int sockets[2];
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) != 0)
-        return failure("socketpair", std::generic_category().message(errno), "try again");
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, sockets[1], STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, sockets[1], STDOUT_FILENO);
-    std::vector<std::string> arguments = {"node", script, image, wiring().dump()};
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    pid_t process = -1;
-    const int error = posix_spawnp(&process, "node", &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    ::close(sockets[1]);
-    if (error != 0) {
-        ::close(sockets[0]);
-        return failure("node", std::generic_category().message(error), "install nodejs");
+    auto process = ChildProcess::start({"node", script, image, wiring().dump()},
+                                       ChildProcess::Errors::inherited);
+    if (!process) {
+        process.error().cure = "install nodejs";
+        return Unexpected(process.error());
     }
-    return std::unique_ptr<EmulatedChip>(new EmulatedChip(process, sockets[0]));
-}
-
-EmulatedChip::~EmulatedChip() {
-    ::close(socket_);
-    ::kill(process_, SIGKILL);
-    ::waitpid(process_, nullptr, 0);
+    return std::unique_ptr<EmulatedChip>(new EmulatedChip(std::move(*process)));
 }
 
 json EmulatedChip::read() {
     std::size_t end = 0;
     while ((end = text_.find('\n')) == std::string::npos) {
         char buffer[16'384];
-        const ssize_t size = ::recv(socket_, buffer, sizeof buffer, 0);
+        const ssize_t size = ::recv(process_.socket(), buffer, sizeof buffer, 0);
         if (size <= 0) throw std::runtime_error("the emulated board has ended");
         text_.append(buffer, static_cast<std::size_t>(size));
     }
@@ -144,7 +119,8 @@ json EmulatedChip::read() {
 void EmulatedChip::write(const json& line) {
     const std::string text = line.dump() + "\n";
     for (std::size_t sent = 0; sent < text.size();) {
-        const ssize_t size = ::send(socket_, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
+        const ssize_t size =
+            ::send(process_.socket(), text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
         if (size <= 0) throw std::runtime_error("the emulated board has ended");
         sent += static_cast<std::size_t>(size);
     }

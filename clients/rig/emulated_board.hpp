@@ -3,8 +3,6 @@
 // lock-step with its owner.
 #pragma once
 
-#include <sys/types.h>
-
 #include <deque>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include "../../firmware/native/virtual_board.hpp"
+#include "posix/child_process.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::rig {
@@ -22,9 +21,6 @@ class EmulatedChip {
  public:
     /// With the firmware of `image`, an .elf or .uf2. Error: there is no such file, or no node.
     static Expected<std::unique_ptr<EmulatedChip>> create(const std::string& image);
-    ~EmulatedChip();
-    EmulatedChip(const EmulatedChip&) = delete;
-    EmulatedChip& operator=(const EmulatedChip&) = delete;
 
     /// Throws std::runtime_error when the emulator ends, which says why on standard error.
     nlohmann::json read();
@@ -34,10 +30,9 @@ class EmulatedChip {
     static std::string default_image();
 
  private:
-    EmulatedChip(pid_t process, int socket) : process_(process), socket_(socket) {}
+    explicit EmulatedChip(ChildProcess process) : process_(std::move(process)) {}
 
-    pid_t process_;
-    int socket_;
+    ChildProcess process_;
     std::string text_;  ///< received, and not read
 };
 

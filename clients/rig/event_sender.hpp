@@ -10,6 +10,7 @@
 #include <mutex>
 #include <thread>
 
+#include "posix/thread.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::rig {
@@ -34,7 +35,8 @@ struct TimedEvent {
 class EventSender {
  public:
     /// `socket`: of the camera's control port, whose address the packets come from.
-    explicit EventSender(int socket) : socket_(socket), thread_([this] { run(); }) {}
+    explicit EventSender(int socket)
+        : socket_(socket), thread_(start_thread("events", [this] { run(); })) {}
     ~EventSender();
     EventSender(const EventSender&) = delete;
     EventSender& operator=(const EventSender&) = delete;

@@ -14,6 +14,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "posix/thread.hpp"
+
 namespace versavis::rig {
 
 namespace {
@@ -135,7 +137,7 @@ GigeCamera::GigeCamera(const Scenario& scenario, const CameraScenario& settings,
       broadcast_socket_(std::move(broadcast_socket)),
       events_(socket_.get()) {
     configure_stream();
-    server_ = std::thread([this] { serve(); });
+    server_ = start_thread("camera", [this] { serve(); });
 }
 
 GigeCamera::~GigeCamera() {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "posix/thread.hpp"
 #include "scene.hpp"
 
 namespace versavis::rig {
@@ -116,7 +117,7 @@ GvspTransmitter::GvspTransmitter(const std::string& address, double link_mbps, d
     ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&self), sizeof self);
     const int buffer = 4 << 20;
     ::setsockopt(socket_.get(), SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
-    thread_ = std::thread([this] { run(); });
+    thread_ = start_thread("transmitter", [this] { run(); });
 }
 
 GvspTransmitter::~GvspTransmitter() {

@@ -7,8 +7,8 @@
 #include <functional>
 #include <future>
 #include <memory>
-#include <thread>
 
+#include "posix/thread.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {
@@ -24,8 +24,8 @@ class DetachedTasks {
         ++*unfinished_;
         std::promise<void> done;
         auto future = done.get_future();
-        std::thread([work = std::move(work), done = std::move(done),
-                     unfinished = unfinished_]() mutable {
+        start_thread("release", [work = std::move(work), done = std::move(done),
+                                 unfinished = unfinished_]() mutable {
             work();
             work = nullptr;
             --*unfinished;

@@ -3,10 +3,14 @@
 
 #include "base/log.hpp"
 
+#include "posix/thread.hpp"
+
 namespace versavis::daemon {
 
 AsymmetryKeeper::AsymmetryKeeper(const std::string& directory, clock::Translator& translator)
-    : store_(directory), translator_(translator), writer_([this] { write(); }) {}
+    : store_(directory),
+      translator_(translator),
+      writer_(start_thread("writer", [this] { write(); })) {}
 
 AsymmetryKeeper::~AsymmetryKeeper() {
     {

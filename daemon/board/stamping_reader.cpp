@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "base/log.hpp"
-#include "base/thread_name.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::daemon {
 
@@ -50,7 +50,7 @@ StampingReader::StampingReader(ByteStream& stream, const WakeUp& consumer)
     while (pieces_.push(Piece{})) {
     }
     pieces_.reset();
-    thread_ = std::thread([this] { run(); });
+    thread_ = start_thread("stamping", [this] { run(); });
 }
 
 StampingReader::~StampingReader() {
@@ -59,7 +59,6 @@ StampingReader::~StampingReader() {
 }
 
 void StampingReader::run() {
-    name_thread("stamping");
     ask_for_realtime();
     int idle_wakes = 0;
     std::array<std::uint8_t, largest_chunk> buffer{};

@@ -7,12 +7,12 @@
 #include <chrono>
 #include <cmath>
 
-#include "base/thread_name.hpp"
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_events.hpp"
 #include "camera/camera_setup.hpp"
 #include "camera/image_receiver.hpp"
+#include "posix/thread.hpp"
 #include "settings/receive_mode.hpp"
 
 namespace versavis::daemon {
@@ -91,7 +91,7 @@ Camera::Camera(const CameraConfiguration& configuration, CameraContext& environm
 Camera::~Camera() { stop(); }
 
 void Camera::start() {
-    thread_ = std::thread([this] { run(); });
+    thread_ = start_thread("camera " + configuration_.name, [this] { run(); });
 }
 
 void Camera::request_stop() {
@@ -153,7 +153,6 @@ void Camera::set_setting_up_since(HostTime since) {
 }
 
 void Camera::run() {
-    name_thread("camera " + configuration_.name);
     set_state(CameraState::opening, "");
     for (;;) {
         auto ended = session();

@@ -5,15 +5,14 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <fstream>
 
+#include "posix/child_process.hpp"
 #include "posix/file.hpp"
 
 namespace versavis::daemon {
@@ -43,66 +42,31 @@ struct Verdict {
     bool slow = false;    ///< perhaps because this host is
 };
 
-/// A child with its standard input and output; killed when nobody waits for it any more.
+/// What a probe process says of one description.
 class Probe {
  public:
-    Probe(const std::string& program, bool zipped) {
-        std::array<int, 2> ends{};
-        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) return;
-        socket_ = ends[0];
-        ::fcntl(socket_, F_SETFL, O_NONBLOCK);
-        std::string option = "--probe-description";
-        std::string kind = zipped ? "zip" : "xml";
-        std::string name = program;
-        char* const arguments[] = {name.data(), option.data(), kind.data(), nullptr};
-        posix_spawn_file_actions_t files;
-        posix_spawn_file_actions_init(&files);
-        posix_spawn_file_actions_adddup2(&files, ends[1], STDIN_FILENO);
-        posix_spawn_file_actions_adddup2(&files, ends[1], STDOUT_FILENO);
-        // What its libraries write there fails and is nobody's; /dev/null may not exist in a
-        // chroot.
-        posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/", O_RDONLY | O_DIRECTORY, 0);
-        posix_spawnattr_t attributes;
-        posix_spawnattr_init(&attributes);
-        sigset_t none;
-        sigemptyset(&none);
-        posix_spawnattr_setsigmask(&attributes, &none);
-        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
-        if (posix_spawn(&pid_, name.c_str(), &files, &attributes, arguments, environ) != 0)
-            pid_ = -1;
-        posix_spawnattr_destroy(&attributes);
-        posix_spawn_file_actions_destroy(&files);
-        ::close(ends[1]);
+    explicit Probe(ChildProcess process) : process_(std::move(process)) {
+        ::fcntl(process_.socket(), F_SETFL, O_NONBLOCK);
     }
-    ~Probe() {
-        if (socket_ >= 0) ::close(socket_);
-        if (pid_ > 0) {
-            ::kill(pid_, SIGKILL);
-            ::waitpid(pid_, nullptr, 0);
-        }
-    }
-    Probe(const Probe&) = delete;
-    Probe& operator=(const Probe&) = delete;
-
-    bool runs() const { return pid_ > 0; }
 
     /// Sends all, and receives what it says until it is done. False: it does not end.
     bool talk(const std::vector<std::uint8_t>& bytes, const Cancelled& cancelled) {
         const HostTime deadline = host_now() + probe_patience;
         for (std::size_t sent = 0; host_now() < deadline && !cancelled();) {
             const bool sending = sent < bytes.size();
-            pollfd polled{socket_, static_cast<short>(sending ? POLLIN | POLLOUT : POLLIN), 0};
+            pollfd polled{process_.socket(),
+                          static_cast<short>(sending ? POLLIN | POLLOUT : POLLIN), 0};
             const timespec pause{0, look_interval.ns};
             if (::ppoll(&polled, 1, &pause, nullptr) <= 0) continue;
             if (sending && (polled.revents & POLLOUT) != 0) {
-                const ssize_t size =
-                    ::send(socket_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+                const ssize_t size = ::send(process_.socket(), bytes.data() + sent,
+                                            bytes.size() - sent, MSG_NOSIGNAL);
                 sent = size > 0 ? sent + static_cast<std::size_t>(size) : bytes.size();
-                if (sent == bytes.size()) ::shutdown(socket_, SHUT_WR);
+                if (sent == bytes.size()) ::shutdown(process_.socket(), SHUT_WR);
             }
             if ((polled.revents & (POLLIN | POLLHUP)) == 0) continue;
             std::array<char, longest_reason> part{};
-            const ssize_t size = ::recv(socket_, part.data(), part.size(), 0);
+            const ssize_t size = ::recv(process_.socket(), part.data(), part.size(), 0);
             if (size <= 0) return true;
             said_.append(part.data(), static_cast<std::size_t>(size));
             if (said_.size() > longest_reason) return true;
@@ -111,9 +75,7 @@ class Probe {
     }
 
     Verdict verdict() {
-        int status = 0;
-        ::waitpid(pid_, &status, 0);
-        pid_ = -1;
+        const int status = process_.wait();
         if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
         if (WIFEXITED(status) && !said_.empty())
             return {said_.substr(0, said_.find_first_of('\n'))};
@@ -125,8 +87,7 @@ class Probe {
     }
 
  private:
-    int socket_ = -1;
-    pid_t pid_ = -1;
+    ChildProcess process_;
     std::string said_;
 };
 
@@ -171,10 +132,13 @@ Expected<> DescriptionSandbox::vet(const std::string& camera, const Description&
     const std::string hash = hash_of(description) + (description.zipped ? " zip" : " xml");
     auto refused = known(hash);
     if (!refused) {
-        Probe probe(program_, description.zipped);
-        if (!probe.runs())
+        auto process = ChildProcess::start(
+            {program_, "--probe-description", description.zipped ? "zip" : "xml"},
+            ChildProcess::Errors::dropped);
+        if (!process)
             return failure(camera, "its description cannot be checked: no probe process",
                            "allow the service to start processes");
+        Probe probe(std::move(*process));
         if (!probe.talk(description.bytes, cancelled))
             return failure(camera,
                            cancelled() ? "the check was stopped"

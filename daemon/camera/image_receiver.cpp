@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "base/thread_name.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::daemon {
 
@@ -65,7 +65,7 @@ ImageReceiver::ImageReceiver(ArvDevice* device, PacketRing ring, const Stream& s
           {setup.payload, stream.packet_size, stream.sends_again, frame_retention(configuration)},
           *this),
       stop_(::eventfd(0, EFD_CLOEXEC)),
-      thread_([this] { run(); }) {}
+      thread_(start_thread("receive " + configuration.name, [this] { run(); })) {}
 
 ImageReceiver::~ImageReceiver() {
     ::eventfd_write(stop_.get(), 1);
@@ -83,7 +83,6 @@ ImageReceiver::~ImageReceiver() {
 }
 
 void ImageReceiver::run() {
-    name_thread("receive " + configuration_.name);
     pollfd stopped{stop_.get(), POLLIN, 0};
     while (::poll(&stopped, 1, 0) == 0) {
         const HostTime now = host_now();

@@ -8,8 +8,8 @@
 
 #include <algorithm>
 
-#include "base/thread_name.hpp"
 #include "camera/gvcp.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::daemon {
 
@@ -102,7 +102,7 @@ MessageChannel::MessageChannel(FileDescriptor socket, std::uint16_t port, in_add
       numbers_(std::move(numbers)),
       ticks_per_second_(ticks_per_second),
       sink_(std::move(sink)),
-      thread_([this] { run(); }) {}
+      thread_(start_thread("messages", [this] { run(); })) {}
 
 MessageChannel::~MessageChannel() {
     ::eventfd_write(stop_.get(), 1);
@@ -110,7 +110,6 @@ MessageChannel::~MessageChannel() {
 }
 
 void MessageChannel::run() {
-    name_thread("messages");
     for (;;) {
         pollfd ready[] = {{socket_.get(), POLLIN, 0}, {stop_.get(), POLLIN, 0}};
         if (::poll(ready, 2, -1) < 0) continue;  // stop_ ends it

@@ -15,6 +15,7 @@
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_setup.hpp"
 #include "engine/ring/directory.hpp"
+#include "posix/thread.hpp"
 #include "publish/clock_recorder.hpp"
 
 namespace versavis::daemon {
@@ -163,7 +164,7 @@ class CountedCamera {
             arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(setup_.payload));
         if (!error.set()) arv_camera_start_acquisition(camera, error.out());
         if (error.set()) return failure(configuration_.name, error.text());
-        thread_ = std::thread([this] { receive(); });
+        thread_ = start_thread("receive", [this] { receive(); });
         return {};
     }
 

@@ -13,7 +13,7 @@
 
 #include "client/deadline.hpp"
 #include "client/futex.hpp"
-#include "client/thread_without_signals.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::ring {
 
@@ -40,7 +40,7 @@ Expected<std::unique_ptr<Watch>> Watch::start() {
                        std::error_code(errno, std::generic_category()).message());
     auto watch = std::unique_ptr<Watch>(new Watch(std::move(event)));
     try {
-        watch->thread_ = start_thread_without_signals([self = watch.get()] { self->run(); });
+        watch->thread_ = start_thread("watch", [self = watch.get()] { self->run(); });
     } catch (const std::system_error& error) {
         return failure("a thread to wait in", error.what());
     }

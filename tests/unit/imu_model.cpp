@@ -52,7 +52,7 @@ namespace {
 
 double delay_ms(const char* name, unsigned filter, double rate_hz, bool data_ready) {
     const auto delay = imu::filter_delay(*imu::find_model(name), filter, rate_hz, data_ready);
-    CHECK(delay.source == imu::DelaySource::model);
+    CHECK(delay.source == imu::FilterDelaySource::model);
     CHECK(delay.sigma.ns > 0);
     return static_cast<double>(delay.delay.ns) * 1e-6;
 }
@@ -87,7 +87,7 @@ TEST_CASE("imu_model: what the board reads on its own grid may be new or old, an
     const imu::ImuModel& icm = *imu::find_model("icm42688p");
     const double filter_ns = 0.3 / 400 * 1e9, period_ns = 1e9 / 800;
     const auto delay = imu::filter_delay(icm, 0, 200, false);
-    CHECK(delay.source == imu::DelaySource::unknown);
+    CHECK(delay.source == imu::FilterDelaySource::unknown);
     CHECK(static_cast<double>(delay.delay.ns) == Approx(period_ns / 2));
     CHECK(static_cast<double>(delay.sigma.ns) ==
           Approx(std::hypot(filter_ns, period_ns / std::sqrt(12))));
@@ -98,7 +98,7 @@ TEST_CASE("imu_model: a delay that was measured is taken as it is") {
     const auto paced = imu::measured_delay(adis, 200, true, microseconds(2500));
     CHECK(paced.delay == microseconds(2500));
     CHECK(paced.sigma.ns == 0);
-    CHECK(paced.source == imu::DelaySource::configuration);
+    CHECK(paced.source == imu::FilterDelaySource::configuration);
     const auto unpaced = imu::measured_delay(adis, 200, false, microseconds(2500));
     CHECK(unpaced.delay == microseconds(2500));
     CHECK(static_cast<double>(unpaced.sigma.ns) == Approx(2 / 2048.0 / std::sqrt(12) * 1e9));
@@ -108,7 +108,7 @@ TEST_CASE("imu_model: a filter whose delay nobody states is not guessed, and sig
     for (const char* name : {"icm42688p", "bmi088", "vn100"}) {
         const auto delay = imu::filter_delay(*imu::find_model(name), 0, 200, true);
         CHECK(delay.delay.ns == 0);
-        CHECK(delay.source == imu::DelaySource::unknown);
+        CHECK(delay.source == imu::FilterDelaySource::unknown);
         CHECK(delay.sigma > milliseconds(1));
         CHECK(delay.sigma < milliseconds(10));
     }

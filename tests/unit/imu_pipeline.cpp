@@ -229,7 +229,7 @@ TEST_CASE(
     CHECK(metadata.sigma_ns >= age_sigma_ns);
     CHECK((metadata.sigma_ns >= age_sigma_ns + 10'000) == !override_us);
     CHECK(pipeline.report().filter.source ==
-          (override_us ? imu::DelaySource::configuration : imu::DelaySource::model));
+          (override_us ? imu::FilterDelaySource::configuration : imu::DelaySource::model));
 }
 
 TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it has changed") {

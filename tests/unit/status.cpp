@@ -220,7 +220,8 @@ TEST_CASE("status: what was taken off for lines and filters, and what says other
     pipeline.lines.start = {microseconds(36), microseconds(9)};
     pipeline.lines.end = {microseconds(18), microseconds(5)};
     pipeline.lines.source = DelaySource::preset;
-    status.imus[0].report.filter = {microseconds(3662), microseconds(100), imu::DelaySource::model};
+    status.imus[0].report.filter = {microseconds(3662), microseconds(100),
+                                    imu::FilterDelaySource::model};
     const auto document = nlohmann::json::parse(to_json(status));
     CHECK(document["cameras"][0]["line_delay_start_ns"] == 36'000);
     CHECK(document["cameras"][0]["line_delay_sigma_ns"] == 7'000);

@@ -14,6 +14,7 @@
 
 #include "board/board_info.hpp"
 #include "board/bring_up.hpp"
+#include "commands/progress_line.hpp"
 #include "engine/board/firmware_file.hpp"
 
 namespace versavis::client {
@@ -45,28 +46,6 @@ void show(const BringUpStep& step) {
 }
 
 }  // namespace
-
-/// One line that is written over and over. To a file it would be a line for each step.
-class ProgressLine {
- public:
-    ~ProgressLine() { end(); }
-
-    void show(const std::string& what, std::size_t done, std::size_t all) {
-        if (!terminal_) return;
-        fmt::print(stderr, "\r\x1b[K{} {} %", what, 100 * done / all);
-        std::fflush(stderr);
-        shown_ = true;
-    }
-
-    void end() {
-        if (shown_) fmt::print(stderr, "\r\x1b[K");
-        shown_ = false;
-    }
-
- private:
-    const bool terminal_ = isatty(STDERR_FILENO) != 0;
-    bool shown_ = false;
-};
 
 BoardCommands::BoardCommands(CLI::App& app, std::function<bool()> stop)
     : flash_(
@@ -156,7 +135,7 @@ int BoardCommands::flash_board() {
     ProgressLine line;
     FlashSettings settings{file_.empty() ? own.string() : file_, choice_, instance_, stop_};
     settings.progress = [&](const std::string& what, std::size_t done, std::size_t all) {
-        line.show(what, done, all);
+        line.show(fmt::format("{} {} %", what, 100 * done / all));
     };
     if (all_) return flash_fleet(settings, line);
     const auto flashed = flash(settings);
@@ -209,7 +188,7 @@ int BoardCommands::test() {
     ProgressLine line;
     SelfTestSettings settings{choice_, instance_, wires_, stop_};
     settings.progress = [&](const char* what, std::size_t done, std::size_t all) {
-        line.show(what, done, all);
+        line.show(fmt::format("{} {} %", what, 100 * done / all));
     };
     const auto tested = self_test(settings);
     line.end();

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <sysexits.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include <iterator>
 #include <map>
 
+#include "commands/progress_line.hpp"
 #include "export/time_shift.hpp"
 #include "recording/recording_info.hpp"
 #include "recording/repair.hpp"
@@ -25,31 +25,6 @@ int fail(const Error& error) {
     fmt::print(stderr, "versavis: {}\n", error.message());
     return EX_UNAVAILABLE;
 }
-
-/// One line that is written over and over, ten times a second. To a file it would be a line for
-/// each step.
-class ProgressLine {
- public:
-    ~ProgressLine() { end(); }
-
-    void show(const std::string& text) {
-        if (!terminal_) return;
-        const HostTime now = host_now();
-        if (now - shown_ < milliseconds(100)) return;
-        shown_ = now;
-        fmt::print(stderr, "\r\x1b[K{}", text);
-        std::fflush(stderr);
-    }
-
-    void end() {
-        if (shown_.ns != 0) fmt::print(stderr, "\r\x1b[K");
-        shown_ = {};
-    }
-
- private:
-    const bool terminal_ = isatty(STDERR_FILENO) != 0;
-    HostTime shown_;
-};
 
 /// None: no recording was named.
 Expected<std::optional<Duration>> filter_delay(const std::string& path, const std::string& imu) {

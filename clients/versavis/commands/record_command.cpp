@@ -3,13 +3,14 @@
 
 #include <fmt/format.h>
 #include <sysexits.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+
+#include "commands/progress_line.hpp"
 
 namespace versavis::client {
 
@@ -37,28 +38,15 @@ double rate_of(const StreamReport& stream) {
     return stream.items > 1 && seconds > 0 ? static_cast<double>(stream.items - 1) / seconds : 0;
 }
 
-/// In place, on a terminal.
-class Progress {
- public:
-    ~Progress() {
-        if (shown_) fmt::print(stderr, "\r\x1b[K");
-    }
-    void show(const RecordReport& report, std::uint64_t room) {
-        if (isatty(STDERR_FILENO) == 0) return;
-        const double seconds = std::max(in_seconds(report.duration), 1.0);
-        const double rate = static_cast<double>(report.bytes) / seconds;
-        fmt::print(
-            stderr, "\r\x1b[K{:.0f} s, {} items, {} lost, {:.1f} MB/s, {:.2f} GB; {}", seconds,
-            report.items(), report.lost(), rate * 1e-6, static_cast<double>(report.bytes) * 1e-9,
-            rate > 0 ? fmt::format("disk full in {:.0f} min", static_cast<double>(room) / rate / 60)
-                     : "");
-        std::fflush(stderr);
-        shown_ = true;
-    }
-
- private:
-    bool shown_ = false;
-};
+std::string progress_text(const RecordReport& report, std::uint64_t room) {
+    const double seconds = std::max(in_seconds(report.duration), 1.0);
+    const double rate = static_cast<double>(report.bytes) / seconds;
+    return fmt::format(
+        "{:.0f} s, {} items, {} lost, {:.1f} MB/s, {:.2f} GB; {}", seconds, report.items(),
+        report.lost(), rate * 1e-6, static_cast<double>(report.bytes) * 1e-9,
+        rate > 0 ? fmt::format("disk full in {:.0f} min", static_cast<double>(room) / rate / 60)
+                 : "");
+}
 
 nlohmann::ordered_json to_json(const RecordReport& report) {
     nlohmann::ordered_json streams = nlohmann::ordered_json::object();
@@ -163,9 +151,9 @@ int RecordCommand::run(const std::string& instance) {
             return EX_USAGE;
         }
     auto report = [&] {
-        Progress progress;
+        ProgressLine line;
         settings_.progress = [&](const RecordReport& so_far, std::uint64_t room) {
-            progress.show(so_far, room);
+            line.show(progress_text(so_far, room));
         };
         return record(settings_);
     }();

@@ -4,9 +4,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "posix/thread.hpp"
+
 namespace versavis::client {
 
-WriteBack::WriteBack() : thread_([this] { run(); }) {}
+WriteBack::WriteBack() : thread_(start_thread("write back", [this] { run(); })) {}
 
 WriteBack::~WriteBack() {
     {

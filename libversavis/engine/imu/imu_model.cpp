@@ -91,11 +91,11 @@ Duration from_s(double seconds) { return {std::llround(seconds * 1e9)}; }
 /// over the samples that make one of the output.
 FilterDelay adis_delay(const ImuModel& model, unsigned filter, double rate_hz) {
     const double samples = std::exp2(filter) - 1 + (adis_averaged(model, rate_hz) - 1) / 2;
-    return {from_s(samples / model.fastest_hz), adis_rest, DelaySource::model};
+    return {from_s(samples / model.fastest_hz), adis_rest, FilterDelaySource::model};
 }
 
 FilterDelay unknown(double bandwidth_hz) {
-    return {{}, from_s(periods_of_bandwidth / bandwidth_hz), DelaySource::unknown};
+    return {{}, from_s(periods_of_bandwidth / bandwidth_hz), FilterDelaySource::unknown};
 }
 
 /// Without the age of what the board reads.
@@ -104,7 +104,7 @@ FilterDelay of_filters(const ImuModel& model, unsigned filter, double rate_hz) {
     if (model.kind == wire::ImuKind::icm42688p)
         return unknown(icm42688p_bandwidth_hz(filter, rate_hz));
     if (model.kind == wire::ImuKind::bmi088) return unknown(bmi088_bandwidth_hz(rate_hz));
-    return {{}, vn100_window, DelaySource::unknown};
+    return {{}, vn100_window, FilterDelaySource::unknown};
 }
 
 /// What the board reads on its own grid is as old as anything up to this, a period of the part. A
@@ -120,11 +120,11 @@ double age_sigma_s(double oldest_s) { return oldest_s / std::sqrt(12); }
 
 }  // namespace
 
-const char* to_string(DelaySource source) {
+const char* to_string(FilterDelaySource source) {
     switch (source) {
-        case DelaySource::unknown: return "unknown";
-        case DelaySource::model: return "model";
-        case DelaySource::configuration: return "configuration";
+        case FilterDelaySource::unknown: return "unknown";
+        case FilterDelaySource::model: return "model";
+        case FilterDelaySource::configuration: return "configuration";
     }
     return "unknown";
 }
@@ -141,7 +141,7 @@ FilterDelay filter_delay(const ImuModel& model, unsigned filter, double rate_hz,
 FilterDelay measured_delay(const ImuModel& model, double rate_hz, bool data_ready,
                            Duration measured) {
     return {measured, from_s(age_sigma_s(oldest_s(model, rate_hz, data_ready))),
-            DelaySource::configuration};
+            FilterDelaySource::configuration};
 }
 
 std::vector<std::string> model_names() {

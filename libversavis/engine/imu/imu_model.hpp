@@ -29,15 +29,15 @@ std::vector<std::string> model_names();
 const ImuModel* find_model(wire::ImuKind kind);
 const ImuModel* find_model(const std::string& name);
 
-enum class DelaySource { unknown, model, configuration };
-const char* to_string(DelaySource source);
+enum class FilterDelaySource { unknown, model, configuration };
+const char* to_string(FilterDelaySource source);
 
 /// How much later than the motion its sample is: by the filters that the part is set up with, and,
 /// without its data-ready line, by the age of what the board reads.
 struct FilterDelay {
     Duration delay;
     Duration sigma;  ///< one standard deviation
-    DelaySource source = DelaySource::unknown;
+    FilterDelaySource source = FilterDelaySource::unknown;
 };
 
 /// Of a part set up for this strength and rate.

@@ -13,7 +13,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "client/thread_without_signals.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::ring {
 
@@ -71,7 +71,7 @@ Expected<std::unique_ptr<SegmentServer>> SegmentServer::open(const std::filesyst
         return not_made(path);
     std::unique_ptr<SegmentServer> server(new SegmentServer(std::move(segment), std::move(socket)));
     try {
-        server->thread_ = start_thread_without_signals([self = server.get()] { self->serve(); });
+        server->thread_ = start_thread("server", [self = server.get()] { self->serve(); });
     } catch (const std::system_error& error) {
         return failure(path.string(), fmt::format("cannot start a thread: {}", error.what()),
                        "raise the limit on tasks");

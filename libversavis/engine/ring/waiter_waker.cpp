@@ -5,7 +5,7 @@
 #include <system_error>
 
 #include "client/futex.hpp"
-#include "client/thread_without_signals.hpp"
+#include "posix/thread.hpp"
 
 namespace versavis::ring {
 
@@ -41,7 +41,7 @@ void WaiterWaker::call(const std::atomic<std::uint32_t>& word) {
     notify();
     if (thread_.joinable()) return;
     try {
-        thread_ = start_thread_without_signals([this, &word] { run(word); });
+        thread_ = start_thread("waker", [this, &word] { run(word); });
     } catch (const std::system_error&) {
         futex_wake(word, INT_MAX);  // no thread available: slower, but all are woken
     }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "client/thread_without_signals.hpp"
+#include "posix/thread.hpp"
 
 #include <catch2/catch.hpp>
 #include <vector>
 
-using namespace versavis::ring;
+using namespace versavis;
 
 namespace {
 
@@ -21,10 +21,15 @@ std::vector<int> blocked_signals() {
 
 }  // namespace
 
-TEST_CASE("thread_without_signals: takes no signal, and its maker takes those that it did") {
+TEST_CASE("thread: has its name and takes no signal, and its maker takes those that it did") {
     const std::vector<int> before = blocked_signals();
     std::vector<int> inside;
-    start_thread_without_signals([&] { inside = blocked_signals(); }).join();
+    char name[16]{};
+    start_thread("a name of 20 bytes..", [&] {
+        inside = blocked_signals();
+        ::pthread_getname_np(::pthread_self(), name, sizeof name);
+    }).join();
+    CHECK(name == std::string("a name of 20 by"));
     CHECK(inside.size() == 12);
     CHECK(blocked_signals() == before);
 }

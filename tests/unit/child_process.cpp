@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "posix/child_process.hpp"
+
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+
+#include <catch2/catch.hpp>
+#include <cerrno>
+#include <optional>
+
+using namespace versavis;
+
+namespace {
+
+std::string received(const ChildProcess& process) {
+    std::string text(100, '\0');
+    text.resize(
+        static_cast<std::size_t>(::recv(process.socket(), text.data(), text.size(), MSG_WAITALL)));
+    return text;
+}
+
+}  // namespace
+
+TEST_CASE("child_process: reads and writes one socket, and its end is known") {
+    auto echo = ChildProcess::start({"sh", "-c", "cat; echo lost >&2; exit 7"},
+                                    ChildProcess::Errors::dropped);
+    REQUIRE(echo);
+    REQUIRE(::send(echo->socket(), "text", 4, MSG_NOSIGNAL) == 4);
+    ::shutdown(echo->socket(), SHUT_WR);
+    CHECK(received(*echo) == "text");
+    const int status = echo->wait();
+    CHECK(WIFEXITED(status));
+    CHECK(WEXITSTATUS(status) == 7);
+}
+
+TEST_CASE("child_process: does not outlive its owner, wherever that was moved") {
+    auto first = ChildProcess::start({"sh", "-c", "echo $$; exec sleep 60"},
+                                     ChildProcess::Errors::inherited);
+    REQUIRE(first);
+    std::optional<ChildProcess> owner(std::move(*first));
+    std::string text(20, '\0');
+    text.resize(static_cast<std::size_t>(::recv(owner->socket(), text.data(), text.size(), 0)));
+    const pid_t pid = std::stoi(text);
+    CHECK(::kill(pid, 0) == 0);
+    owner.reset();
+    CHECK(::kill(pid, 0) != 0);
+    CHECK(errno == ESRCH);
+}
+
+TEST_CASE("child_process: a program that is not there is an error") {
+    const auto none = ChildProcess::start({"/nowhere/program"}, ChildProcess::Errors::inherited);
+    REQUIRE_FALSE(none);
+    CHECK_THAT(none.error().message(), Catch::Contains("/nowhere/program: cannot be started"));
+}
