@@ -42,8 +42,7 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
 
 constexpr Duration lateness = milliseconds(600);
 constexpr Duration marked_ahead = milliseconds(500);
-/// Edges of the IMU's data-ready line are scheduled so long before they are due. At half, a busy
-/// host makes more of them late; at twice, more of them have the old rate after a new one was set.
+/// Edges of the IMU's data-ready line are scheduled so long before they are due.
 constexpr Duration signalled_ahead = milliseconds(2);
 constexpr Duration ready_width = microseconds(100);
 constexpr Duration sentence_after = milliseconds(150);
@@ -267,7 +266,7 @@ void BoardHost::hear_gnss() {
                          clock_->device_ns(complete));
 }
 
-/// Edges of the data-ready line, where the part was told to use it. Returns when to come again.
+/// Edges of the data-ready line, where the part is set to use it. Returns when to come again.
 HostTime BoardHost::signal_samples() {
     const HostTime now = host_now();
     if (!imu_.signals(now.ns) || suffers(FaultKind::imu_missing)) {

@@ -21,19 +21,16 @@ using nlohmann::json;
 
 constexpr Nanoseconds cycle_ns = 8;
 
-/// Bytes take so long between the board and an owner in real time, each way. At half, the board
-/// cannot run ahead; at twice, answers take longer than on a real bus.
+/// Bytes take so long between the board and an owner in real time, each way.
 constexpr Nanoseconds real_way = 300'000;
 
 /// Less than the way: nothing that the host sends later can reach the board sooner than that. So
 /// far it runs ahead of such an owner, and then what it sends is ready when it is due, however long
-/// the emulation took. At half, the owner looks twice as often; at twice, bytes of the host come
-/// too late.
+/// the emulation took.
 constexpr Nanoseconds lead = 200'000;
 
 /// The board ends its runs with a whole instruction or the entry of an exception. So far ahead it
-/// hears of events around it, whose edges then reach its pins in their own cycle. At half, the
-/// longest instructions make edges late; at twice, events are told sooner than they need be.
+/// hears of events around it, whose edges then reach its pins in their own cycle.
 constexpr Nanoseconds longest_step = 32 * cycle_ns;
 
 /// The cycle in which an instant is over.
@@ -171,10 +168,10 @@ void EmulatedBoard::run_until(Nanoseconds until) {
 void EmulatedBoard::step_to(Nanoseconds until) {
     if (!environment_.next_event) return run_to(until);
     const Nanoseconds event = environment_.next_event();
-    const Nanoseconds told = event - longest_step;
-    run_to(std::clamp(told, now_, until));
+    const Nanoseconds reported = event - longest_step;
+    run_to(std::clamp(reported, now_, until));
     deliver(now_);
-    if (told <= now_) environment_.fire(event);
+    if (reported <= now_) environment_.fire(event);
 }
 
 /// To the host, what has arrived there at `at`.

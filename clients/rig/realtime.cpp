@@ -8,7 +8,7 @@ namespace versavis::rig {
 namespace {
 
 /// Below the threads of the service that ask for real time (20): it is their delays that are
-/// measured. At half it is the same; at twice they wait for the rig.
+/// measured.
 constexpr int hardware_priority = 10;
 
 }  // namespace

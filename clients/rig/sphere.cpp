@@ -10,11 +10,9 @@ namespace versavis::rig {
 namespace {
 
 constexpr std::uint32_t faces = 6;
-/// Texels of a face of the largest texture. At half, a sharp camera sees blurred cells; at twice,
-/// the world takes 100 MB.
+/// Texels of a face of the largest texture.
 constexpr double largest_face = 2048;
-/// Within so many pixels the projection is taken as linear. At half, rendering takes twice the
-/// divisions; at twice, pixels near the corners of a face are off by a third of a texel.
+/// Within so many pixels the projection is taken as linear.
 constexpr std::uint32_t stretch = 8;
 /// Positions in the texture, in fractions of a texel.
 constexpr unsigned fraction_bits = 8;

@@ -8,8 +8,7 @@ namespace versavis::rig {
 
 namespace {
 
-/// Pulses that are remembered: two seconds of the fastest. At half, frames that wait long are
-/// painted wrong; at twice, it takes 320 kB.
+/// Pulses that are remembered: two seconds of the fastest.
 constexpr std::size_t most_pulses = 20'000;
 constexpr std::chrono::milliseconds longest_wait{500};
 

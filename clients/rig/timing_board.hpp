@@ -27,11 +27,11 @@ class TimingBoard {
 
     /// The output that it counts rose. Instants must not go back.
     void pulse(HostTime at);
-    /// All pulses up to `until` have been told.
+    /// All pulses up to `until` have been reported.
     void settle(HostTime until);
 
     /// What share of the exposure each LED was on. Waits, half a second at most, until all pulses
-    /// up to the end of the exposure have been told.
+    /// up to the end of the exposure have been reported.
     Row lit(HostTime start, HostTime end);
 
     /// While so many pulses have been counted.

@@ -159,7 +159,7 @@ int main(int argc, char** argv) {
     if (watch || *tail_command || clock.records() || board.chosen() || evaluate.chosen() ||
         process.chosen() || files.chosen() || recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
-    signal(SIGXFSZ, SIG_IGN);  // a limit on files is told like a full disk
+    signal(SIGXFSZ, SIG_IGN);  // a limit on files is reported like a full disk
     if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
     if (*list) {
         const auto text = client::list_streams(instance, json);

@@ -12,11 +12,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// What the asymmetry of a port may change from one day to the next, added to its sigma. At half,
-/// sigma is too small after an update of the kernel; at twice, stored values are worth less.
+/// What the asymmetry of a port may change from one day to the next, added to its sigma.
 constexpr Duration another_day = microseconds(3);
 
-/// A stored number beyond a second is none. At half or twice, the same files are refused.
+/// A stored number beyond a second is none.
 constexpr std::int64_t largest_ns = 1'000'000'000;
 
 /// An object, empty when there is no file; null when it is not understood.

@@ -23,14 +23,15 @@ inline constexpr const char* unkept_configuration =
     "it could not keep its configuration, and begins with an older one at its next power-up: "
     "restart the service to try again, or set keep_configuration = false";
 
-/// What the log has of an event that tells of the board itself.
+/// What the log has of an event about the board itself.
 struct BoardRemark {
     LogLevel level = LogLevel::info;
     std::string text;
 };
 std::optional<BoardRemark> remark(const wire::Event& event);
 
-/// Source and name are the board's own. None: a newer board tells what this version does not know.
+/// Source and name are the board's own. None: a newer board reports what this version does not
+/// know.
 std::optional<JournalEntry> journal_entry(const wire::Event& event);
 
 }  // namespace versavis::daemon

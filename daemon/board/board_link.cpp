@@ -13,45 +13,35 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Between looks for a board that is not there. At half, an idle service scans the bus twice as
-/// often; at twice, frames come a third of a second later after the board is plugged in.
+/// Between looks for a board that is not there.
 constexpr Duration retry_interval = milliseconds(300);
 
-/// For a board that only the user can make fit. At half, the log fills twice as fast; at twice,
-/// the user waits longer after mending it.
+/// For a board that only the user can make fit.
 constexpr Duration retry_refused = seconds(5);
 
-/// Time for one answer; the board takes milliseconds. At half, a loaded host gives up on a healthy
-/// board; at twice, a dead one is noticed later.
+/// Time for one answer; the board takes milliseconds.
 constexpr Duration answer_timeout = milliseconds(1000);
 
 /// The board reports its health every second: one that is silent for so long may have begun a new
-/// life, and is greeted again. At half, all boards are; at twice, a lost board is noticed later.
+/// life, and is greeted again.
 constexpr Duration silence_limit = milliseconds(1500);
 
-/// Exchanges before cameras may start, so that the first frame can be stamped. At half, the first
-/// stamps are worse; at twice, the first frame comes 0.1 s later.
+/// Exchanges before cameras may start, so that the first frame can be stamped.
 constexpr unsigned exchanges_to_start = 4;
 
-/// For the follow-ups of the first exchanges, which nothing else paces. At half, those of a slow
-/// link are lost; at twice, a link without any starts 0.2 s later.
+/// For the follow-ups of the first exchanges, which nothing else paces.
 constexpr Duration follow_up_patience = milliseconds(50);
 
-/// Longest wait for bytes and commands. At half, the thread wakes up twice as often for nothing; at
-/// twice, silence is noticed later.
+/// Longest wait for bytes and commands.
 constexpr Duration longest_wait = milliseconds(100);
 
-/// Shortest wait for bytes: a request that is due may be late by so much. At half, it hardly wakes
-/// more often; at twice, neither.
+/// Shortest wait for bytes: a request that is due may be late by so much.
 constexpr Duration shortest_wait = microseconds(100);
 
-/// A board whose clock is off by more than this is in another life, whatever its nonce says. At
-/// half, a stalled link begins a new epoch for nothing; at twice, a restart with an equal nonce
-/// within a second of the last one is missed.
+/// A board whose clock is off by more than this is in another life, whatever its nonce says.
 constexpr Duration largest_clock_surprise = milliseconds(500);
 
-/// Packets in a row with one and the same unknown nonce that are a new life of the board. At half,
-/// a single damaged one is; at twice, a new life is noticed three packets later.
+/// Packets in a row with one and the same unknown nonce that are a new life of the board.
 constexpr int strangers_to_believe = 3;
 
 constexpr std::uint8_t all_cameras = 0xFF;
@@ -266,7 +256,7 @@ Expected<> BoardLink::synchronise() {
                                    "does not answer clock requests");
             !done)
             return done;
-        // A link that cannot tell when the answer left is no failure.
+        // A link that does not know when the answer left is no failure.
         static_cast<void>(read_until([&] { return !clock_.expects_follow_up(); },
                                      follow_up_patience, "sends no follow-up"));
     }
@@ -320,7 +310,8 @@ void BoardLink::take(const wire::Packet& packet, HostTime received) {
                          [&](const auto& event) { listener_.board_event(event, received); }) ||
         use<wire::ClockAnswer>(packet,
                                [&](const auto& answer) { note(clock_.take(answer, received)); }) ||
-        use<wire::ClockFollowUp>(packet, [&](const auto& told) { note(clock_.take(told)); });
+        use<wire::ClockFollowUp>(packet,
+                                 [&](const auto& follow_up) { note(clock_.take(follow_up)); });
     if (!used) take_answer(packet);
 }
 

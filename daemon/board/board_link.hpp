@@ -145,7 +145,7 @@ class BoardLink {
     BoardCounters counters_;
     bool greeted_ = false;
     bool connected_ = false;
-    std::uint64_t dropped_bytes_ = 0;  ///< of this connection, told so far
+    std::uint64_t dropped_bytes_ = 0;  ///< of this connection, reported so far
     bool anew_ = false;  ///< the board began a new life, or seems to: greet it at once
     device::Greeting greeting_;
     std::uint32_t nonce_ = 0;

@@ -20,8 +20,7 @@ struct Chunk {
     std::size_t size = 0;  ///< 0: nothing came in time
 };
 
-/// Most bytes that come together: some 40 packets of the board. At half, a burst takes twice the
-/// reads; at twice, nothing gains, since a short USB packet ends a read.
+/// Most bytes that come together: some 40 packets of the board.
 inline constexpr std::size_t largest_chunk = 4096;
 
 /// read() belongs to one thread, write() to one other.

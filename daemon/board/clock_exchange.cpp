@@ -7,12 +7,11 @@ namespace versavis::daemon {
 
 namespace {
 
-/// An answer that takes longer tells little and may be of another request. At half, a loaded host
-/// loses some of them; at twice, the worst of them still say next to nothing.
+/// An answer that takes longer says little and may be of another request.
 constexpr Duration request_timeout = milliseconds(500);
 
 /// Requests come between these parts of the interval, so that they do not beat with the schedule of
-/// the bus. At half the spread they drift through it more slowly; at twice they come in bursts.
+/// the bus.
 constexpr double earliest_part = 0.75;
 constexpr double latest_part = 1.25;
 
@@ -103,7 +102,7 @@ std::optional<Implausibility> ClockExchange::take(const wire::ClockFollowUp& fol
     return std::nullopt;
 }
 
-/// A board whose link cannot tell leaves the departure open.
+/// A board whose link does not know it leaves the departure open.
 void ClockExchange::take(const wire::ImuSample& sample, HostTime received) {
     if (sample.departure_ns == 0) return;
     const clock::OneWay message{BoardTime{sample.time_ns} + Duration{sample.departure_ns},

@@ -38,7 +38,7 @@ class ClockExchange {
     std::optional<Implausibility> take(const wire::ClockAnswer& answer, HostTime received);
     std::optional<Implausibility> take(const wire::ClockFollowUp& follow_up);
 
-    /// When a sample left tells of the clock, too.
+    /// When a sample left is evidence of the clock, too.
     void take(const wire::ImuSample& sample, HostTime received);
 
     unsigned answers() const { return answers_; }  ///< since begin()
@@ -62,7 +62,7 @@ class ClockExchange {
     std::mt19937 random_{std::random_device{}()};
     std::uint32_t request_id_ = 0;
     std::deque<Request> open_;  ///< in their order: a slow link holds several of them
-    std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still be told
+    std::optional<clock::Exchange> exchange_;  ///< answered; when the answer left may still follow
     std::uint32_t exchange_id_ = 0;            ///< of its request
     unsigned answers_ = 0;
     HostTime next_request_;

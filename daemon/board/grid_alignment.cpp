@@ -11,29 +11,23 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Between messages to the board. At half, the link carries twice as many; at twice, the grid
-/// drifts for twice as long by what the clocks' pace is known wrongly.
+/// Between messages to the board.
 constexpr Duration interval = seconds(1);
 
-/// A clock that is worse tells the board nothing. At half, a rough link is never aligned; at twice,
-/// the grid is moved by errors that one sees.
+/// With a worse clock, nothing is sent to the board.
 constexpr Duration largest_sigma = milliseconds(1);
 
 /// Readings of the output clock, one a second and each good to some ten nanoseconds, that its pace
-/// against the host's is taken from. At half, the pace scatters by twice as much; at twice, a
-/// change of slew is followed more slowly.
+/// against the host's is taken from.
 constexpr std::size_t offsets_kept = 8;
 
-/// Exposures whose median is the grid's error. At half, one late exposure shows; at twice, an error
-/// shows a little later.
+/// Exposures whose median is the grid's error.
 constexpr std::size_t errors_kept = 9;
 
-/// What is older says nothing of now. At half, slow cameras never show an error; at twice, an error
-/// that is mended shows for longer.
+/// What is older says nothing of now.
 constexpr Duration memory = seconds(3);
 
-/// An error up to here is called aligned. At half, cameras whose exposure was not announced are
-/// not; at twice, an error that matters for stereo with another host is overlooked.
+/// An error up to here is called aligned.
 constexpr Duration aligned_within = microseconds(100);
 
 }  // namespace
@@ -46,7 +40,7 @@ GridAlignment::GridAlignment(const ClockConfiguration& clock, const wire::Config
 void GridAlignment::begin() {
     const std::lock_guard lock(mutex_);
     next_ = {};
-    told_.reset();
+    updated_.reset();
     errors_.clear();
 }
 
@@ -61,7 +55,7 @@ std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Trans
     const double pace_ppb = std::round(pace(*second) * 1e9);
     if (std::abs(pace_ppb) > wire::align_largest_pace_ppb) return std::nullopt;
     next_ = now + interval;
-    told_ = now;
+    updated_ = now;
     return wire::AlignGrid{second->board.ns, static_cast<std::int32_t>(pace_ppb), max_slew_ppb_};
 }
 
@@ -104,7 +98,8 @@ GridReport GridAlignment::report(HostTime now) const {
         std::nth_element(recent.begin(), middle, recent.end());
         report.error = *middle;
     }
-    report.aligned = told_ && now - *told_ < memory && absolute(report.error) < aligned_within;
+    report.aligned =
+        updated_ && now - *updated_ < memory && absolute(report.error) < aligned_within;
     return report;
 }
 

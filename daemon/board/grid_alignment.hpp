@@ -13,7 +13,7 @@ namespace versavis::daemon {
 
 struct GridReport {
     bool aligned =
-        false;       ///< the board is told once a second, and its exposures lie where they should
+        false;  ///< the board is updated once a second, and its exposures lie where they should
     Duration error;  ///< of the grid, by the middles of recent exposures; 0: there were none
 };
 
@@ -24,10 +24,10 @@ class GridAlignment {
 
     bool wanted() const { return wanted_; }
 
-    /// A new connection: the board is to be told at once.
+    /// A new connection: the board is to be updated at once.
     void begin();
 
-    /// What the board is to be told now. None: it was told within the last second, or the clock is
+    /// What to send to the board now. None: it was updated within the last second, or the clock is
     /// not known well enough.
     std::optional<wire::AlignGrid> message(HostTime now, clock::Translator& translator);
 
@@ -53,7 +53,7 @@ class GridAlignment {
     wire::Configuration board_;
     mutable std::mutex mutex_;
     HostTime next_;
-    std::optional<HostTime> told_;
+    std::optional<HostTime> updated_;
     std::optional<std::uint32_t> epoch_;
     std::deque<Offset> offsets_;  ///< of the last seconds, in one epoch
     std::deque<Error> errors_;

@@ -13,17 +13,14 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Above every ordinary thread, below the kernel's own interrupt threads (50). At half it is the
-/// same; at twice, with interrupts in threads, it competes with what it waits for.
+/// Above every ordinary thread, below the kernel's own interrupt threads (50).
 constexpr int realtime_priority = 20;
 
-/// Longest wait for bytes, and so for the end of the thread. At half, it wakes up twice as often
-/// for nothing; at twice, it ends later.
+/// Longest wait for bytes, and so for the end of the thread.
 constexpr Duration longest_read = milliseconds(100);
 
 /// Times that the thread may be woken for nothing, beyond those for something: then it gives
-/// real-time priority back. At half, a burst of writes may cost it; at twice, a stream that never
-/// sleeps holds all others up for twice as long.
+/// real-time priority back.
 constexpr int most_idle_wakes = 100;
 
 void ask_for_realtime() {

@@ -40,12 +40,10 @@ class StampingReader {
     /// Bytes that found no room, because nobody drained.
     std::uint64_t dropped() const { return dropped_; }
 
-    /// What the queue holds at least. At half, a service that is held up for a second at the full
-    /// rate of a board loses packets; at twice, it takes 2 MiB more.
+    /// What the queue holds at least.
     static constexpr std::size_t capacity = 8192;
 
     /// Bytes of one piece: with its stamp and size 256, so that pieces do not share cache lines.
-    /// At half, most packets take two; at twice, most of the queue stays empty.
     static constexpr std::size_t piece_size = 244;
 
  private:

@@ -17,8 +17,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// A board that does not take data for so long is gone. At half, a stopped process is lost sooner;
-/// at twice, those who wait to send wait longer.
+/// A board that does not take data for so long is gone.
 constexpr int write_timeout_ms = 500;
 
 class UnixStream final : public ByteStream {

@@ -19,8 +19,7 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Reads that are always under way, so that the host controller never waits for the service. At
-/// half, a late thread loses a USB frame; at twice, 16 KiB more are locked.
+/// Reads that are always under way, so that the host controller never waits for the service.
 constexpr std::size_t transfer_count = 4;
 
 constexpr unsigned write_timeout_ms = device::transfer_timeout.ns / 1'000'000;

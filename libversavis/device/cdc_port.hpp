@@ -9,8 +9,7 @@
 
 namespace versavis::device {
 
-/// For a request or a write: a board that takes none for so long is gone. At half, one that boots
-/// or erases its flash is lost; at twice, one that hangs is noticed later.
+/// For a request or a write: a board that takes none for so long is gone.
 inline constexpr Duration transfer_timeout = milliseconds(500);
 
 /// Found by the descriptors of the device, and claimed for this program.

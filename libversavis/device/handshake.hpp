@@ -16,9 +16,7 @@
 
 namespace versavis::device {
 
-/// Hellos until the board is given up, and the time for the answer to each. At half, a board that
-/// boots is missed at first; at twice, one that hangs, or a foreign device on the port, is noticed
-/// later.
+/// Hellos until the board is given up, and the time for the answer to each.
 inline constexpr int hello_attempts = 5;
 inline constexpr Duration hello_timeout = milliseconds(250);
 

@@ -11,8 +11,7 @@ from . import _library as library
 from .errors import Error, Gone, Lost, Nothing, Released, Restarted
 from .items import Held, typed
 
-# Of one sleep in the library, in seconds: Python handles signals in between. Half: twice as many
-# wake-ups in silence. Twice: Ctrl-C takes twice as long.
+# Of one sleep in the library, in seconds: Python handles signals, such as Ctrl-C, in between.
 SLICE = 0.1
 
 

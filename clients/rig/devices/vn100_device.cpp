@@ -16,8 +16,7 @@ constexpr Nanoseconds answer_time = 1'000'000;
 constexpr double gravity = 9.80665;
 constexpr double radians = 3.14159265358979 / 180;
 
-/// Bytes at one speed are read right at the other. At half, a divider of a coarse clock fails; at
-/// twice, ten bits end in the next one.
+/// Bytes at one speed are read right at the other.
 bool is_near(std::uint32_t one, std::uint32_t other) {
     constexpr std::uint32_t tolerance_percent = 2;
     return std::max(one, other) - std::min(one, other) <= other * tolerance_percent / 100;

@@ -7,8 +7,7 @@
 
 namespace versavis::client {
 
-/// Documents of the service have some five levels. At half they would still be read; at twice, too,
-/// but what writes them out calls itself for each level, and at some 10000 the stack is used up.
+/// Documents of the service have some five levels.
 inline constexpr int deepest_json = 64;
 
 /// Discarded (is_discarded()): it is damaged, or nested more deeply.

@@ -11,11 +11,10 @@ namespace versavis::client {
 namespace {
 
 /// Until a board that was rebooted has said hello: it boots within a second, and hosts take another
-/// to list it. At half, a slow hub is too slow; at twice, a board that does not come is told later.
+/// to list it.
 constexpr Duration boot_patience = seconds(10);
 
-/// Between two tries. At half, a board that boots is asked twice as often; at twice, it is met a
-/// tenth of a second later.
+/// Between two tries.
 constexpr Duration try_interval = milliseconds(100);
 
 Error busy(const FoundBoard& board, const std::string& instance, const device::UsbError& error) {

@@ -15,8 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The board reports its health once a second. At half, the first report is missed; at twice, a
-/// board that sends none is told a second later.
+/// The board reports its health once a second.
 constexpr Duration health_patience = milliseconds(1500);
 
 /// What a board counts from its boot.

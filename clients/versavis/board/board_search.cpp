@@ -10,8 +10,7 @@ namespace versavis::client {
 
 namespace {
 
-/// Between two looks at the bus. At half, the bus is listed twice as often; at twice, a board is
-/// met later.
+/// Between two looks at the bus.
 constexpr Duration look_interval = milliseconds(50);
 
 bool fits(const FoundBoard& board, const BoardChoice& choice) {

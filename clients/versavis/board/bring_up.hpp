@@ -26,8 +26,8 @@ std::span<const BringUpStep> bring_up_steps();
 struct BringUpResult {
     const BringUpStep* step = nullptr;
     std::optional<bool> as_expected;  ///< what the user saw; none: nobody looked
-    bool failed = false;              ///< as the board itself tells
-    std::string finding;              ///< what it tells
+    bool failed = false;              ///< by what the board itself reports
+    std::string finding;              ///< what it reports
 };
 
 struct BringUp {

@@ -8,8 +8,7 @@ namespace versavis::client {
 
 namespace {
 
-/// Packets of the board that one read takes. At half, a burst takes twice the reads; at twice,
-/// nothing gains.
+/// Packets of the board that one read takes.
 constexpr std::size_t largest_read = 4096;
 
 }  // namespace

@@ -16,8 +16,7 @@ namespace versavis::client {
 
 namespace {
 
-/// For the boot loader to appear: it takes half a second. At half, a slow hub is too slow; at
-/// twice, a board whose program hangs is flashed two seconds later.
+/// For the boot loader to appear: it takes half a second.
 constexpr Duration reboot_patience = seconds(3);
 
 using Sectors = decltype(FlashImage::sectors);

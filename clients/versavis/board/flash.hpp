@@ -36,8 +36,8 @@ struct Flashed {
 /// its boot loader, whenever it lost power, and is flashed again.
 Expected<Flashed> flash(const FlashSettings& settings);
 
-/// Flash every connected board, one after the other, whatever becomes of each; `finished` is told.
-/// How many there are. Error: none was begun.
+/// Flash every connected board, one after the other, whatever becomes of each; `finished` is called
+/// for each. How many there are. Error: none was begun.
 Expected<std::size_t> flash_all(
     const FlashSettings& settings,
     const std::function<void(const FoundBoard&, const Expected<Flashed>&)>& finished);

@@ -11,8 +11,7 @@ namespace versavis::client {
 
 namespace {
 
-/// How far an edge may be from its place. At half, level shifters and isolators fail; at twice, a
-/// line that is loaded passes.
+/// How far an edge may be from its place.
 constexpr std::int64_t tolerance_ns = 10'000;
 
 /// Not negative.

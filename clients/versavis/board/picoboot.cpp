@@ -32,12 +32,10 @@ constexpr std::uint8_t vendor_in = 0xC1;
 constexpr std::uint8_t interface_reset = 0x41;
 constexpr std::uint8_t get_command_status = 0x42;
 
-/// For one command. The slowest erases a sector, which takes a worn flash 0.4 s. At half, nothing
-/// changes; at twice, a boot loader that hangs is told later.
+/// For one command. The slowest erases a sector, which takes a worn flash 0.4 s.
 constexpr Duration command_timeout = seconds(3);
 
-/// Between the answer to the reboot and the reboot, so that the answer arrives. At half, a slow hub
-/// may lose it; at twice, the board is back a tenth of a second later.
+/// Between the answer to the reboot and the reboot, so that the answer arrives.
 constexpr std::uint32_t reboot_delay_ms = 100;
 
 /// As the boot loader answers it.

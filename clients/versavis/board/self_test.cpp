@@ -14,8 +14,7 @@ namespace versavis::client {
 
 namespace {
 
-/// What is sent: a wire passes it on whatever drives it, and the board's filters let it pass. At
-/// half the period, slow isolators fail; at twice, the test takes twice the time.
+/// What is sent: a wire passes it on whatever drives it, and the board's filters let it pass.
 constexpr Duration pulse_period = milliseconds(10);
 constexpr Duration pulse_width = milliseconds(1);
 constexpr std::uint32_t pulse_rate_millihertz = 100'000;
@@ -24,12 +23,10 @@ constexpr std::uint32_t pulse_rate_millihertz = 100'000;
 constexpr Duration exposure_period = milliseconds(20);
 constexpr std::uint32_t exposure_rate_uhz = 50'000'000;
 
-/// Pulses that are looked at. At half, a contact that fails now and then passes; at twice, the test
-/// takes twice the time.
+/// Pulses that are looked at.
 constexpr std::size_t pulse_count = 20;
 
-/// Until so many have come, or none will. At half, a host that is busy misses some; at twice, lines
-/// that are not wired take twice the time.
+/// Until so many have come, or none will.
 constexpr Duration collect_patience = milliseconds(800);
 
 constexpr std::array output_names{"test", "trigger0", "trigger1", "trigger2", "trigger3", "sync"};
@@ -88,7 +85,7 @@ class Tester {
         return {};
     }
 
-    /// By the events of the pulse inputs. They tell one kind of edges at a time; pulses begin at
+    /// By the events of the pulse inputs. They report one kind of edge at a time; pulses begin at
     /// multiples of the period, so that the other kind can be seen later.
     Expected<> test_pulses(unsigned output) {
         const SentPulses sent{pulse_period, pulse_width, pulse_count};

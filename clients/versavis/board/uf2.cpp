@@ -30,8 +30,7 @@ constexpr std::uint32_t last_rp2350 = 0xE48BFF5B;
 /// Bytes of the boot stage that its check covers; the check follows them.
 constexpr std::size_t boot_stage_size = 252;
 
-/// The largest file that is read: twice the flash, as half of each block is payload. At half, an
-/// image that fills the flash is refused; at twice, a wrong file takes more memory before it is.
+/// The largest file that is read: twice the flash, as half of each block is payload.
 constexpr std::size_t largest_file = 2 * std::size_t{wire::flash_size};
 
 const char* const cure = "take the versavis.uf2 of this release, or copy it again";

@@ -41,7 +41,7 @@ json describe(const RecordedOutput& item) {
 }  // namespace
 
 json to_json(const ClockItem& item) {
-    return std::visit([](const auto& told) { return describe(told); }, item);
+    return std::visit([](const auto& recorded) { return describe(recorded); }, item);
 }
 
 }  // namespace versavis::client

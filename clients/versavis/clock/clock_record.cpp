@@ -31,7 +31,7 @@ class Recording {
 
     /// False: the board restarted, and this item belongs to its new boot.
     bool add(const clock::ClockItem& item) {
-        return std::visit([this](const auto& told) { return take(told); }, item);
+        return std::visit([this](const auto& recorded) { return take(recorded); }, item);
     }
 
     void service_restarted() { service_restarted_ = true; }
@@ -60,31 +60,31 @@ class Recording {
         return nonce == *nonce_;
     }
 
-    bool take(const clock::RecordedExchange& told) {
-        if (!same_life(told.nonce)) return false;
-        exchange_file_->write(fmt::format("{},{},{},{}\n", told.sent.ns, told.received.ns,
-                                          told.answered.ns, told.arrived.ns));
+    bool take(const clock::RecordedExchange& recorded) {
+        if (!same_life(recorded.nonce)) return false;
+        exchange_file_->write(fmt::format("{},{},{},{}\n", recorded.sent.ns, recorded.received.ns,
+                                          recorded.answered.ns, recorded.arrived.ns));
         ++exchanges_;
         return true;
     }
 
-    bool take(const clock::RecordedMessage& told) {
-        if (!same_life(told.nonce)) return false;
+    bool take(const clock::RecordedMessage& recorded) {
+        if (!same_life(recorded.nonce)) return false;
         if (one_way_file_)
-            one_way_file_->write(fmt::format("{},{}\n", told.departed.ns, told.arrived.ns));
+            one_way_file_->write(fmt::format("{},{}\n", recorded.departed.ns, recorded.arrived.ns));
         ++one_way_;
         return true;
     }
 
     /// A new service meets the board for the first time, too.
-    bool take(const clock::RecordedRestart& told) {
-        const bool met_again = service_restarted_ && told.nonce == nonce_;
+    bool take(const clock::RecordedRestart& recorded) {
+        const bool met_again = service_restarted_ && recorded.nonce == nonce_;
         service_restarted_ = false;
-        if (exchanges_ + one_way_ == 0) nonce_ = told.nonce;
+        if (exchanges_ + one_way_ == 0) nonce_ = recorded.nonce;
         return met_again || exchanges_ + one_way_ == 0;
     }
 
-    bool take(const clock::RecordedOutput& /*told*/) { return true; }
+    bool take(const clock::RecordedOutput& /*recorded*/) { return true; }
 
     std::optional<NewFile> exchange_file_;
     std::optional<NewFile> one_way_file_;
@@ -102,8 +102,8 @@ bool take(const clock::ClockStream::Result& item, Recording& recording) {
         if (item.error().why == Pause::restarted) recording.service_restarted();
         return true;
     }
-    const auto told = clock::from_metadata(item->data);
-    return !told || recording.add(*told);
+    const auto recorded = clock::from_metadata(item->data);
+    return !recorded || recording.add(*recorded);
 }
 
 /// Reads until the time is up. False: the board restarted first.

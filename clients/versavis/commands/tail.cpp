@@ -52,8 +52,8 @@ json describe(const pairing::EvidenceItem& item) {
 
 json describe(const clock::StampItem& item) {
     json line = describe(static_cast<const ring::Item&>(item));
-    const auto told = clock::from_metadata(item.data);
-    line.update(told ? to_json(*told) : json{{"clock", "unknown"}});
+    const auto recorded = clock::from_metadata(item.data);
+    line.update(recorded ? to_json(*recorded) : json{{"clock", "unknown"}});
     return line;
 }
 

@@ -12,8 +12,7 @@ namespace versavis::client {
 
 namespace {
 
-/// Frames under way for each processor. Half: one waits while the next is copied. Twice: so much
-/// more memory, and a burst is borne a little longer.
+/// Frames under way for each processor.
 constexpr std::size_t frames_for_each = 4;
 
 }  // namespace

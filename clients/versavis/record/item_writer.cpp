@@ -17,8 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint32_t utc_label = static_cast<std::uint32_t>(EventKind::utc_label);
 
-/// From one status message to the next. Half: each document of the service is told. Twice: a short
-/// fault is not seen in it; the items have them all.
+/// From one status message to the next.
 constexpr std::int64_t status_period_ns = 900'000'000;
 
 constexpr const char* any_object = R"({"type":"object"})";
@@ -157,18 +156,17 @@ void ItemWriter::write_frame_notes(Channels& channels, const std::string& stream
 
 void ItemWriter::write_imu(Channels& channels, const std::string& stream, const ring::Item& item) {
     const auto sample = unpack<ImuMetadata>(item.metadata);
-    const auto tell = [&](const char* topic, const char* type, const std::string& message) {
+    const auto add = [&](const char* topic, const char* type, const std::string& message) {
         file_.write(
             {ros_channel(channels, "/" + stream + topic, type), channels.sequence, item.time.ns},
             message);
     };
-    tell("/data_raw", "sensor_msgs/msg/Imu", ros_imu(item.time, stream, sample));
+    add("/data_raw", "sensor_msgs/msg/Imu", ros_imu(item.time, stream, sample));
     if (!std::isnan(sample.magnetic[0]))
-        tell("/mag", "sensor_msgs/msg/MagneticField",
-             ros_magnetic_field(item.time, stream, sample));
+        add("/mag", "sensor_msgs/msg/MagneticField", ros_magnetic_field(item.time, stream, sample));
     if (std::isnan(sample.temperature) || sample.temperature == channels.temperature) return;
     channels.temperature = sample.temperature;
-    tell("/temperature", "sensor_msgs/msg/Temperature", ros_temperature(item.time, stream, sample));
+    add("/temperature", "sensor_msgs/msg/Temperature", ros_temperature(item.time, stream, sample));
 }
 
 void ItemWriter::write_event(Channels& channels, const ring::Item& item) {

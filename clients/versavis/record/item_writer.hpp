@@ -21,7 +21,7 @@ enum class GapReason { lost, restarted, gone, epoch };
 
 const char* to_string(GapReason reason);
 
-/// One file. Streams are told in it when their first item comes.
+/// One file. Streams are announced in it when their first item comes.
 class ItemWriter {
  public:
     /// `lenses`: of the cameras of which they are known.
@@ -54,8 +54,8 @@ class ItemWriter {
     struct Channels {
         std::map<std::string, std::uint16_t> by_topic;
         std::uint32_t sequence = 0;
-        float temperature = -1e9F;   ///< as last told
-        std::int64_t status_ns = 0;  ///< when the status was last told
+        float temperature = -1e9F;   ///< as last written
+        std::int64_t status_ns = 0;  ///< when the status was last written
     };
 
     std::uint16_t ros_channel(Channels& channels, const std::string& topic,

@@ -30,21 +30,17 @@ namespace versavis::client {
 
 namespace {
 
-/// A chunk ends when it is so large, or so old. Half: twice as many indexes. Twice: twice as much
-/// is not there after a crash.
+/// A chunk ends when it is so large, or so old: a crash loses no more.
 constexpr std::uint64_t chunk_size = 4 << 20U;
 constexpr Duration chunk_age = milliseconds(500);
 
-/// Between looks at streams that came, and reports of progress. Half: twice the work. Twice: the
-/// first two seconds of a new stream must still be in its ring.
+/// Between looks for new streams, whose rings hold some seconds at least, and reports of progress.
 constexpr Duration round = seconds(1);
 
-/// Between looks at `stop`. Half: twice as many wake-ups where nothing comes. Twice: Ctrl-C feels
-/// slow.
+/// Between looks at `stop`.
 constexpr Duration longest_wait = milliseconds(100);
 
-/// Items of one stream in a row, while others wait. Half: a long backlog takes longer. Twice: a
-/// frame waits behind so many more samples, some 20 us each.
+/// Items of one stream in a row, while others wait.
 constexpr int in_a_row = 64;
 
 constexpr std::uint32_t slipped = static_cast<std::uint32_t>(EventKind::pairing_slipped);
@@ -66,7 +62,7 @@ struct Source {
     std::string name;
     ring::Reader reader;
     std::uint32_t epoch = 0;
-    bool gone = false;   ///< and that was told
+    bool gone = false;   ///< and that was reported
     bool begun = false;  ///< an item of it was taken
     OutputTime last{};   ///< stamp of the newest that was
     /// What is older is not wanted, and what was overwritten before the first item not missed.
@@ -201,7 +197,7 @@ Expected<> Recorder::open_stream(const std::string& name, ring::Position start) 
     options.start = start;
     auto reader = ring::Reader::open(stream_path(settings_.instance, name), options);
     if (!reader) return Unexpected(reader.error());
-    // Pairing and clock can only be done again from what they were told before, too.
+    // Pairing and clock can only be done again from their earlier inputs, too.
     const bool whole = !has_stamps(reader->kind());
     if (whole) reader->seek(ring::Position::oldest);
     sources_.push_back(std::make_unique<Source>(Source{name, std::move(*reader)}));
@@ -348,7 +344,7 @@ Expected<> Recorder::begin_file() {
     std::ifstream("/proc/sys/kernel/random/boot_id") >> facts["boot_id"];
     if (status) keep_configuration(*status);
     if (status) facts["output_clock"] = text_at(*status, "/clock/output");
-    if (auto told = writer_->file().add_metadata("versavis", facts); !told) return told;
+    if (auto added = writer_->file().add_metadata("versavis", facts); !added) return added;
     if (status) {
         auto attached = writer_->file().attach("status.json", "application/json", status->dump(),
                                                std::int64_t{0});
@@ -487,7 +483,7 @@ Expected<> Recorder::take(Source& source) {
         }
         if (item.error().why == ring::Pause::nothing) break;
         const bool gone = item.error().why == ring::Pause::gone;
-        // That it is gone is told once; the reader tells it whenever it is asked.
+        // That it is gone is reported once; the reader returns it at each call.
         if (gone && std::exchange(source.gone, true)) break;
         take_pause(source, item.error());
         if (gone) break;

@@ -30,7 +30,7 @@ struct RecordReport {
     std::uint64_t bytes = 0;
     Duration duration;
     std::map<std::string, StreamReport> streams;
-    std::uint64_t slips = 0;             ///< of the pairing, as events told
+    std::uint64_t slips = 0;             ///< of the pairing, by events
     std::vector<std::string> left_out;   ///< streams that could not be read, and why
     std::optional<Error> stopped_early;  ///< the disk's; what was written before is good
 

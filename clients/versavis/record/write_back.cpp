@@ -44,7 +44,7 @@ void WriteBack::run() {
         descriptor_ = -1;
         busy_ = true;
         lock.unlock();
-        // Errors are met, and told, by whoever writes next or closes the file.
+        // Whoever writes next or closes the file meets the error, and reports it.
         ::fdatasync(descriptor);
         ::posix_fadvise(descriptor, 0, end, POSIX_FADV_DONTNEED);
         lock.lock();

@@ -11,7 +11,7 @@ namespace versavis::client {
 
 namespace {
 
-/// Inside this file only: yaml-cpp tells errors by exceptions, and none leaves it.
+/// Inside this file only: yaml-cpp throws, and no exception leaves it.
 struct BadYaml {
     YAML::Mark mark;
     std::string what;

@@ -52,7 +52,7 @@ std::string yaml_number(double value);
 Transform inverse(const Transform& transform);
 
 /// Cameras of a chain in another order, or some of them: `order` has their places in `chain`. Links
-/// (T_cn_cnm1) and overlaps are those of the new order; a link that the chain does not tell is
+/// (T_cn_cnm1) and overlaps are those of the new order; a link that the chain does not have is
 /// none.
 std::vector<CalibratedCamera> rearranged(const std::vector<CalibratedCamera>& chain,
                                          const std::vector<std::size_t>& order);

@@ -28,15 +28,13 @@ constexpr std::uint64_t footer_length = 20;
 constexpr std::uint64_t footer_record = record_header + footer_length;
 
 /// How much of a record is looked at where its content is not wanted. An image begins with less
-/// than 1 KiB, status documents have some 20 KiB. At half and at twice little changes: it is what
-/// one read of the file fetches.
+/// than 1 KiB, status documents have some 20 KiB.
 constexpr std::uint64_t glance_size = 64 << 10U;
 
 /// Enough of a chunk to see where its records lie. Twice as much reads no more of a disk.
 constexpr std::uint64_t chunk_header_size = 256;
 
-/// Records that are kept. Attachments are configurations and lists of features, of some 100 KiB. At
-/// half nothing would change, at twice a hostile file could use more memory.
+/// Records that are kept. Attachments are configurations and lists of features, of some 100 KiB.
 constexpr std::uint64_t content_limit = 64 << 20U;
 
 /// Places in a chunk are 32 bits: one frame and 4 MiB, as ours have, are far less. Twice as much

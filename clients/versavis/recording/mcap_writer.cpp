@@ -17,12 +17,10 @@ namespace versavis::client {
 
 namespace {
 
-/// Bytes that the disk keeps free ahead of the file, so that it lies in few pieces. Half: twice as
-/// many requests. Twice: a full disk is met so much earlier.
+/// Bytes that the disk keeps free ahead of the file, so that it lies in few pieces.
 constexpr std::uint64_t reserved_ahead = 64 << 20U;
 
-/// Below that, a disk that is nearly full is asked for what is needed. Half or twice: one question
-/// more or less.
+/// Below that, a disk that is nearly full is asked for what is needed.
 constexpr std::uint64_t least_ahead = 1 << 20U;
 
 /// Of a chunk that is not ended: longer than any file, so that every reader finds it cut off.
@@ -30,9 +28,8 @@ constexpr std::uint64_t unended = std::uint64_t{1} << 50U;
 
 constexpr std::uint64_t chunk_head_size = 49;
 
-/// Room for the parts of a summary that do not grow; and for what each of the others has beside
-/// its names, and each channel of a chunk. Half: a full disk may have no room for the end of the
-/// file. Twice: a full disk is met some KiB earlier.
+/// Room for the parts of a summary that do not grow; and for what each of the others has beside its
+/// names, and each channel of a chunk.
 constexpr std::uint64_t summary_base = 16 << 10U;
 constexpr std::uint64_t summary_entry = 128;
 constexpr std::uint64_t summary_place = 10;

@@ -23,8 +23,8 @@ namespace {
 constexpr std::uint64_t item_size = 128;  ///< before its payload
 constexpr std::string_view item_encoding = "versavis_item";
 
-/// Chunks that at() keeps. Streams are written within some chunks of one another; at half, a
-/// recording with many cameras may be read twice, at twice it takes twice the memory.
+/// Chunks that at() keeps. Streams are written within some chunks of one another: with fewer, a
+/// recording with many cameras may be read twice.
 constexpr std::size_t kept_chunks = 8;
 
 enum class Role { other, item, image, compressed, gap };
@@ -103,7 +103,7 @@ struct Image {
     bool compressed;
 };
 
-/// What one way through chunks knows; channels may be told on the way.
+/// What one way through chunks knows; channels may be announced on the way.
 struct Walk {
     std::map<std::uint16_t, Part> parts;
     std::set<std::string, std::less<>> wanted;  ///< empty: all
@@ -130,9 +130,9 @@ void add_pixels(const Image& image, const FrameMetadata& frame, std::vector<std:
         item.payload = message->data;
 }
 
-std::string told(const RecordingFacts& facts, const std::string& key) {
-    const auto found = facts.told.find(key);
-    return found == facts.told.end() ? std::string() : found->second;
+std::string metadata_value(const RecordingFacts& facts, const std::string& key) {
+    const auto found = facts.metadata.find(key);
+    return found == facts.metadata.end() ? std::string() : found->second;
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ Recording::~Recording() = default;
 
 Expected<Recording> Recording::open(const std::string& path) {
     auto recording = open_file(path);
-    if (recording && told(recording->facts_, "part") == "0") recording->follow(path);
+    if (recording && metadata_value(recording->facts_, "part") == "0") recording->follow(path);
     return recording;
 }
 
@@ -200,10 +200,11 @@ void Recording::follow(const std::string& path) {
         std::error_code error;
         if (!std::filesystem::exists(next, error)) return;
         auto opened = open_file(next.string());
-        const bool belongs = opened && told(opened->facts_, "part") == std::to_string(part) &&
-                             told(opened->facts_, "recording") == told(facts_, "recording") &&
-                             told(opened->facts_, "boot_id") == told(facts_, "boot_id") &&
-                             told(opened->facts_, "instance") == told(facts_, "instance");
+        const bool belongs =
+            opened && metadata_value(opened->facts_, "part") == std::to_string(part) &&
+            metadata_value(opened->facts_, "recording") == metadata_value(facts_, "recording") &&
+            metadata_value(opened->facts_, "boot_id") == metadata_value(facts_, "boot_id") &&
+            metadata_value(opened->facts_, "instance") == metadata_value(facts_, "instance");
         if (!belongs) {
             const std::string why = opened ? "it is of another recording" : opened.error().what;
             facts_.defect += fmt::format("{}{} is not used: {}", facts_.defect.empty() ? "" : "; ",
@@ -275,7 +276,7 @@ Expected<> Recording::File::take_stock() {
     bool ours = false;
     for (const auto& one : reader.metadata())
         if (one.name == "versavis") {
-            facts.told = one.values;
+            facts.metadata = one.values;
             ours = true;
         }
     for (const auto& channel : reader.channels())
@@ -298,7 +299,7 @@ Expected<> Recording::File::take_stock() {
     return {};
 }
 
-/// Of a file that was cut off: channels are told on the way.
+/// Of a file that was cut off: channels are announced on the way.
 Expected<> Recording::File::count_items() {
     Walk all = walk({});
     const Take take = [&](const RecordedItem& item) {

@@ -56,7 +56,7 @@ struct Attachment {
     std::string content;
 };
 
-/// What is not there, as the recorder tells it.
+/// What is not there, as the recorder reports it.
 struct RecordedGap {
     std::string stream;
     std::string reason;  ///< lost, restarted, gone, epoch
@@ -70,8 +70,8 @@ struct RecordingFacts {
     std::string defect;      ///< why a file's summary is not used; empty: all are whole
     std::uint64_t good_end;  ///< bytes that can be read
     std::uint64_t chunks;
-    std::string library;                      ///< that wrote it
-    std::map<std::string, std::string> told;  ///< the Metadata record `versavis`
+    std::string library;                          ///< that wrote it
+    std::map<std::string, std::string> metadata;  ///< the Metadata record `versavis`
 };
 
 class Recording {

@@ -92,7 +92,7 @@ json stream_json(const RecordedStream& stream, const StreamFacts& facts) {
     return one;
 }
 
-/// From the first stamp to the last. What pairing and clock were told may be from minutes before
+/// From the first stamp to the last. The inputs of pairing and clock may be from minutes before
 /// the recording: it counts where there is nothing else.
 std::pair<OutputTime, OutputTime> extent(const std::vector<RecordedStream>& all,
                                          const std::map<std::string, StreamFacts>& streams) {
@@ -124,7 +124,8 @@ json gaps_json(const std::vector<RecordedGap>& gaps) {
     return list;
 }
 
-std::string told(const std::map<std::string, std::string>& values, const std::string& key) {
+std::string metadata_value(const std::map<std::string, std::string>& values,
+                           const std::string& key) {
     const auto found = values.find(key);
     return found == values.end() ? std::string() : found->second;
 }
@@ -167,10 +168,10 @@ Expected<json> recording_info(const std::string& path, const Recording& recordin
               {"defect", facts.defect},
               {"good_bytes", facts.good_end},
               {"chunks", facts.chunks},
-              {"output_clock", told(facts.told, "output_clock")},
-              {"instance", told(facts.told, "instance")},
-              {"part", told(facts.told, "part")},
-              {"recorder", told(facts.told, "recorder")},
+              {"output_clock", metadata_value(facts.metadata, "output_clock")},
+              {"instance", metadata_value(facts.metadata, "instance")},
+              {"part", metadata_value(facts.metadata, "part")},
+              {"recorder", metadata_value(facts.metadata, "recorder")},
               {"streams", json::array()},
               {"gaps", gaps_json(*gaps)},
               {"attachments", json::array()}};

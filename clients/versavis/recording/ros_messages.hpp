@@ -23,7 +23,7 @@ std::string ros_image_head(OutputTime time, std::string_view stream, const Frame
 std::string ros_png_head(OutputTime time, std::string_view stream, const FrameMetadata& frame,
                          std::uint32_t length);
 
-/// What a CameraInfo tells of a lens: a pinhole, and its distortion by a name of ROS.
+/// What a CameraInfo says of a lens: a pinhole, and its distortion by a name of ROS.
 struct RosLens {
     std::uint32_t width = 0;
     std::uint32_t height = 0;

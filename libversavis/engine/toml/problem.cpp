@@ -11,8 +11,7 @@ namespace versavis {
 
 namespace {
 
-/// Most of a user's own text that a message repeats. At half, paths are cut; at twice, one message
-/// fills several lines.
+/// Most of a user's own text that a message repeats.
 constexpr std::size_t longest_quotation = 80;
 
 /// Ends of names of keys, and their units; the first that fits counts.

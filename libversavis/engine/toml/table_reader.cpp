@@ -15,12 +15,10 @@ namespace versavis {
 
 namespace {
 
-/// Largest file that is read: 1 MiB. At half or twice, nothing that anybody writes by hand changes
-/// sides.
+/// Largest file that is read: 1 MiB.
 constexpr std::size_t largest_file = 1U << 20;
 
-/// Most dots on one line. At half, paths with many dots may be refused; at twice, nested values
-/// need twice the stack.
+/// Most dots on one line.
 constexpr std::ptrdiff_t most_dots = 64;
 
 /// Levenshtein distance: insertions, deletions and substitutions that turn `a` into `b`.
@@ -39,8 +37,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-/// One letter of so many may be wrong for a name to be probably meant. At half, "on" would mean
-/// "off"; at twice, a plural is taken for another word.
+/// One letter of so many may be wrong for a name to be probably meant.
 constexpr std::size_t letters_of_a_typo = 2;
 
 /// The one of `names` that was probably meant; none is near: empty. Whoever left out the unit meant
