@@ -96,12 +96,11 @@ Expected<> WholeFile::finish() {
     if (part_ != path_) {
         if (auto synced = sync_file(file_, path_); !synced) return synced;
         if (std::rename(part_.c_str(), path_.c_str()) != 0) return not_written(path_);
-        // So that the name, too, outlives a machine that loses power.
+        // So that the name, too, outlives a machine that loses power; not every file system can.
         const auto folder = std::filesystem::path(path_).parent_path();
         const FileDescriptor directory(
             ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-        file_ = {};
-        return sync_file(directory, path_);
+        ::fsync(directory.get());
     }
     file_ = {};
     return {};
