@@ -229,7 +229,7 @@ TEST_CASE(
     CHECK(metadata.sigma_ns >= age_sigma_ns);
     CHECK((metadata.sigma_ns >= age_sigma_ns + 10'000) == !override_us);
     CHECK(pipeline.report().filter.source ==
-          (override_us ? imu::FilterDelaySource::configuration : imu::DelaySource::model));
+          (override_us ? imu::FilterDelaySource::configuration : imu::FilterDelaySource::model));
 }
 
 TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it has changed") {
@@ -245,7 +245,7 @@ TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it h
         event.kind = kind;
         event.value = value;
         now = now + seconds(1);
-        if (pipeline.tell(event, now)) ++told;
+        if (pipeline.note_state(event, now)) ++told;
     };
     for (int i = 0; i < 3600; ++i) tell(wire::BoardEventKind::imu_failed, 120);
     CHECK(told == 6);

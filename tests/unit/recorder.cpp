@@ -203,7 +203,7 @@ TEST_CASE_METHOD(Instance, "recorder: each item is in the file as it was in the 
     CHECK(frames.numbers == from_to(0, 20));
     CHECK(frames.right);
     const auto recording = Recording::open(settings.output);
-    CHECK(recording->facts().told.at("instance") == name);
+    CHECK(recording->facts().metadata.at("instance") == name);
     std::uint64_t samples = 0;
     CHECK(recording->for_each({"imu0"}, [&](const RecordedItem& item) {
         CHECK(unpack<ImuMetadata>(item.metadata).number == samples++);
@@ -447,7 +447,7 @@ TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
     CHECK_THAT(report.files[1], Contains("split-0001.mcap"));
     CHECK(frames_in(report.files.front()).numbers == from_to(0, 24));  // it has the others follow
     const auto id = [](const std::string& path) {
-        return Recording::open_file(path)->facts().told.at("recording");
+        return Recording::open_file(path)->facts().metadata.at("recording");
     };
     CHECK(id(report.files[0]).size() == 16);
     CHECK(id(report.files[0]) == id(report.files[3]));

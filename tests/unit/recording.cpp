@@ -55,7 +55,7 @@ TEST_CASE("recording: pixels come back bit for bit, from images and PNG, of 8 an
     }));
     CHECK(frames == recording->streams()[0].items + recording->streams()[1].items);
     CHECK(recording->attachment("configuration.toml")->content == "instance = \"test\"\n");
-    CHECK(recording->facts().told.at("output_clock") == "realtime");
+    CHECK(recording->facts().metadata.at("output_clock") == "realtime");
 }
 
 TEST_CASE("recording: a glance and a place give what reading gives") {
