@@ -35,6 +35,14 @@ def in_body(statements, kind=None):
     return mutated(f"int f() {{\n{statements}\nreturn end;\n}}\n", kind)
 
 
+class OwnEntries(unittest.TestCase):
+    def test_each_entry_of_the_project_is_of_a_mutant_that_there_is(self):
+        tool = mutants.Tool(mutants.ROOT, [], mutants.parse([]))
+        entries = mutants.read_entries((mutants.ROOT / mutants.EQUIVALENT).read_text())
+        self.assertGreater(len(entries), 300)
+        self.assertEqual([(entry.line, entry.key) for entry in tool.stale(entries)], [])
+
+
 class Finding(unittest.TestCase):
     def test_comparisons_become_their_neighbours_and_their_opposites(self):
         self.assertEqual(mutated("bool b = x < y;"), ["bool b = x <= y;", "bool b = x >= y;"])
