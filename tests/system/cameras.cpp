@@ -227,7 +227,7 @@ TEST_CASE("cameras: a clock of another unit than it says is named, and frames co
     const auto status = stack.wait_for_status([&](const auto& s) {
         const auto hint = s["cameras"][0]["hint"].template get<std::string>();
         return healthy(s) &&
-               std::sscanf(hint.c_str(), "its clock runs %lf times as fast as it says", &rate) == 1;
+               std::sscanf(hint.c_str(), "its clock runs at %lf times its stated rate", &rate) == 1;
     });
     CHECK(rate == Approx(8).epsilon(0.01));  // it is measured by arrivals
     CHECK(status["cameras"][0]["frames_published"] > 0);

@@ -110,7 +110,7 @@ const std::vector<Case> cases{
      Scene::no_rig},
     {"the IMU is unplugged", "imu0", "imu_missing", "no part answers", true,
      "kind = 'imu_missing'\nseconds = 5"},
-    {"another IMU is plugged in", "imu0", "imu_wrong", "another part", false, "", "", "",
+    {"another IMU is plugged in", "imu0", "imu_wrong", "a part other than", false, "", "", "",
      "model = 'adis16460'"},
     {"the IMU is silent", "imu0", "imu_silent", "sends nothing", true,
      "kind = 'imu_stuck'\nseconds = 5"},
