@@ -196,7 +196,7 @@ TEST_CASE("board: the self-test finds lines that are loaded, and wires that are 
                Contains("test     failed  at aux0: period 10.000 ms, width 1060.0 us") &&
                    Contains("pull-up and load") && Contains("trigger0 failed  at exposure0") &&
                    Contains("pulses begin 30.0 us after") &&
-                   Contains("sync     failed  at sync_input; no pulse came"));
+                   Contains("sync     failed  at sync_input; no pulse arrived"));
     CHECK(bench.board({"selftest", "--wire", "sync=exposure0"}) == 69);
     CHECK_THAT(bench.said, Contains("--wire sync=exposure0") && Contains("is no output and input"));
 }
@@ -268,5 +268,5 @@ TEST_CASE("board: a bring-up that nobody looks at tests the loops") {
     const LoopedBoard board(bench.testbed.get(), "LOOP0002", {});
     CHECK(bench.board({"selftest", "--bringup"}) == 1);
     CHECK_THAT(bench.said, Contains("measure: pins 25, 26, 27, 29") && Contains("not looked at") &&
-                               Contains("failed  at exposure0; no pulse came"));
+                               Contains("failed  at exposure0; no pulse arrived"));
 }

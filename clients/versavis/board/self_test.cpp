@@ -119,8 +119,8 @@ class Tester {
             wire::Event event{};
             if (!packet.read(event)) return false;
             const auto input = input_of(event);
-            // Those of the configuration before may still come.
-            if (!input || event.time_ns < board_.configured_ns()) return false;
+            // Those of the configuration before may still come, and the end of a pulse that it cut.
+            if (!input || event.time_ns < board_.configured_ns() + pulse_period.ns) return false;
             edges[*input].push_back(event.time_ns);
             return edges[*input].size() > pulse_count;
         };
