@@ -210,8 +210,8 @@ TEST_CASE("flash: a boot loader that does not answer is told") {
     settings.faults.held_command = 0x05;
     SimulatedPico pico(bench.testbed.get(), settings);
     CHECK(bench.flash() == 69);
-    CHECK_THAT(bench.said,
-               Contains("cannot write at 0x10001000: it does not answer") && Contains("anew"));
+    CHECK_THAT(bench.said, Contains("cannot write at 0x10001000: it does not answer") &&
+                               Contains("reconnect the board"));
 }
 
 TEST_CASE("flash: a board that does not reboot into its boot loader is told") {
