@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "settings/line_delays.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -21,8 +23,6 @@ constexpr std::size_t frames_of_a_free_run = 3;
 constexpr Duration line_time = microseconds(40);
 constexpr double relative_tolerance = 0.03;
 
-/// A difference of the edges up to here is that of a slow line; above, it is another signal.
-constexpr Duration slowest_edge = milliseconds(1);
 constexpr Duration noticeable_edge = microseconds(60);
 
 /// A start that is later than the latency by more than this has a cause in the camera.

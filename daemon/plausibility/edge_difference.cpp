@@ -20,9 +20,6 @@ constexpr unsigned frames_to_tell = 8;
 /// A difference is a contradiction beyond so many sigma.
 constexpr double significant_sigmas = 3;
 
-/// Slowest edge of a line: makers and pull-ups stay below.
-constexpr Duration slowest_edge = milliseconds(1);
-
 /// Standard deviation of normal noise by the median of its absolute deviations, and that of the
 /// median of n samples by theirs: factors of statistics, not of taste.
 constexpr double sigma_per_deviation = 1.4826;

@@ -21,9 +21,6 @@ constexpr std::int64_t uhz_ns = 1'000'000'000'000'000;
 /// The same with its rate in milli-hertz.
 constexpr std::int64_t millihertz_ns = 1'000'000'000'000;
 
-/// Longest that 32 bits of nanoseconds hold.
-constexpr std::int64_t longest_ns = 4'000'000'000;
-
 std::uint8_t pulse_inputs(const std::vector<std::string>& names) {
     unsigned mask = 0;
     for (const std::string& name : names)
@@ -42,7 +39,7 @@ std::uint32_t milli_hertz(double hertz) {
 
 /// The wire has 32 bits for it. Rounding to whole nanoseconds, here and of the period,
 /// must not carry it beyond what the board takes.
-std::uint32_t short_ns(double us, std::int64_t maximum = longest_ns) {
+std::uint32_t short_ns(double us, std::int64_t maximum = wire::limits::longest_short_ns) {
     return static_cast<std::uint32_t>(std::min<std::int64_t>(std::llround(us * 1e3), maximum));
 }
 
@@ -69,7 +66,7 @@ wire::CameraConfiguration board_camera(const CameraConfiguration& camera) {
 /// Half the period of what the test output shows.
 std::int64_t longest_test_pulse_ns(const wire::Configuration& board) {
     const std::uint8_t test = board.ports.test;
-    if (test == wire::test_none) return longest_ns;
+    if (test == wire::test_none) return wire::limits::longest_short_ns;
     if (test == wire::test_rate) return millihertz_ns / board.ports.test_rate_millihertz / 2;
     if (test >= wire::test_imu0)
         return millihertz_ns / board.imus[test - wire::test_imu0].rate_millihertz / 2;

@@ -30,9 +30,6 @@ bool fits(const std::vector<std::string>& parts, const std::string& text) {
            });
 }
 
-/// Slowest edge of a line that a preset may state.
-constexpr double slowest_edge_us = 1000;
-
 std::optional<EdgeDelay> read_edge(TableReader& reader, std::string_view key) {
     std::vector<double> us;
     reader.read(key, us, 2, 0, slowest_edge_us);

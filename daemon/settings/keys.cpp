@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string_view>
 #include <type_traits>
 #include <utility>
+
+#include "line_delays.hpp"
 
 namespace versavis::daemon {
 
@@ -20,24 +23,17 @@ namespace limits = wire::limits;
 constexpr double ns_per_us = 1e3;
 constexpr double longest_us = limits::longest_exposure_ns / ns_per_us;
 
-/// What 32 bits of nanoseconds on the wire hold.
-constexpr double longest_shift_us = 4e6;
+constexpr double longest_shift_us = limits::longest_short_ns / ns_per_us;
 
 /// Longest history of a ring: an hour, for which no machine has the memory.
 constexpr double longest_history_s = 3600;
 
-/// Slowest edge of an exposure line: a figure in nanoseconds must not pass for microseconds.
-constexpr double slowest_edge_us = 1000;
-
 /// Delay of a board's own driver or buffer, with room for a filter at the input.
 constexpr double slowest_board_ns = 100'000;
 
-/// What the wire's 8 bits of 0.1 us hold.
-constexpr double shortest_glitch_us = 0.1;
-constexpr double longest_glitch_us = 25.5;
-
-/// The fastest of all parts.
-constexpr double fastest_imu_hz = 8000;
+/// The wire has eight bits for it.
+constexpr double glitch_step_us = wire::glitch_unit_ns / ns_per_us;
+constexpr double longest_glitch_us = 255 * glitch_step_us;
 
 /// Filter delay of an IMU: strong filters at low rates.
 constexpr double longest_filter_us = 1e6;
@@ -325,8 +321,8 @@ Keys<CameraConfiguration> trigger_keys() {
              .usually("by preset"),
          "how late its line falls"},
         {"glitch_us",
-         number(&Camera::glitch_us, shortest_glitch_us, longest_glitch_us)
-             .on_board(Field::glitch, ns_per_us / wire::glitch_unit_ns),
+         number(&Camera::glitch_us, glitch_step_us, longest_glitch_us)
+             .on_board(Field::glitch, 1 / glitch_step_us),
          "shorter pulses of the exposure line do not count"},
         {"exposure", choice(&Camera::exposure_by_pulse, {{"timed", false}, {"pulse", true}}),
          "`pulse`: it exposes while its trigger lasts"}};
@@ -416,8 +412,14 @@ template <>
 const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
     using Imu = ImuConfiguration;
     std::vector<std::pair<std::string, const imu::ImuModel*>> models;
-    for (const std::string& name : imu::model_names())
-        models.emplace_back(name, imu::find_model(name));
+    double fastest_hz = 0;
+    unsigned strongest_filter = 0;
+    for (const std::string& name : imu::model_names()) {
+        const imu::ImuModel* model = imu::find_model(name);
+        models.emplace_back(name, model);
+        fastest_hz = std::max(fastest_hz, model->fastest_hz);
+        strongest_filter = std::max<unsigned>(strongest_filter, model->strongest_filter);
+    }
     static const Keys<Imu> all{
         {"name", plain(&Imu::name, "a name, unique"), "name of its stream"},
         {"model",
@@ -430,7 +432,7 @@ const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
         {"i2c_address", number(&Imu::i2c_address, 0, 0xFF).usually("0x68").within("0x68, 0x69"),
          "its address, with `bus = \"i2c\"`"},
         {"rate_hz",
-         number(&Imu::rate_hz, limits::slowest_imu_millihertz / 1e3, fastest_imu_hz)
+         number(&Imu::rate_hz, limits::slowest_imu_millihertz / 1e3, fastest_hz)
              .within("1 to the fastest of the part")
              .on_board(Field::imu_rate, 1e3),
          "samples per second"},
@@ -438,7 +440,7 @@ const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
          "the data-ready line is wired: it paces and stamps samples"},
         {"accel_ready", flag(&Imu::accel_ready), "so is the accelerometer's own line; bmi088 only"},
         {"filter",
-         number(&Imu::filter, 0, 7)
+         number(&Imu::filter, 0, strongest_filter)
              .within("0 to the strongest of the part")
              .on_board(Field::imu_filter, 1),
          "strength of the part's own filter"},

@@ -17,6 +17,11 @@ struct EdgeDelay {
     Duration sigma;  ///< one standard deviation
 };
 
+/// Slowest edge of an exposure line: makers and pull-ups stay below, and a figure in nanoseconds
+/// that was meant in microseconds does not.
+constexpr Duration slowest_edge = milliseconds(1);
+constexpr double slowest_edge_us = slowest_edge.ns * 1e-3;
+
 enum class DelaySource { unknown, preset, configuration };
 const char* to_string(DelaySource source);
 

@@ -13,6 +13,8 @@ inline constexpr std::int64_t shortest_pulse_ns = 1'000;
 inline constexpr std::int64_t longest_pulse_ns = 10'000'000;
 inline constexpr std::int64_t longest_latency_ns = 100'000'000;
 inline constexpr std::int64_t longest_exposure_ns = 10'000'000'000;
+/// Of what the wire has in 32 bits, such as phase and gap.
+inline constexpr std::int64_t longest_short_ns = 4'000'000'000;
 inline constexpr std::int64_t shortest_max_exposure_ns = 1'000;
 
 inline constexpr std::uint32_t slowest_imu_millihertz = 1'000;
