@@ -231,7 +231,7 @@ int main(int argc, char** argv) {
                    "--json", "--check-config, --keys, --check-cameras or --probe-camera")),
                EX_USAGE;
     if (list_keys) {
-        fmt::print("{}\n", as_json ? to_json(describe_keys()) : to_text(describe_keys()));
+        fmt::print("{}", as_json ? to_json(describe_keys()) + "\n" : to_text(describe_keys()));
         return EX_OK;
     }
     if (check_cables) return check_wiring(path, as_json);

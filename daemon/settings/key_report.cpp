@@ -10,6 +10,15 @@ namespace versavis::daemon {
 
 using nlohmann::json;
 
+namespace {
+
+std::string without_markdown(std::string text) {
+    text.erase(std::remove(text.begin(), text.end(), '`'), text.end());
+    return text;
+}
+
+}  // namespace
+
 std::string to_text(const std::vector<KeyDescription>& keys) {
     std::string text;
     std::string table;
@@ -18,8 +27,7 @@ std::string to_text(const std::vector<KeyDescription>& keys) {
         text += fmt::format("{:<19} {}\n{:<20}{}{}\n", key.key, key.meaning, "", key.range,
                             key.default_value.empty() ? "" : "; default: " + key.default_value);
     }
-    text.erase(std::remove(text.begin(), text.end(), '`'), text.end());
-    return text;
+    return without_markdown(text);
 }
 
 std::string to_json(const std::vector<KeyDescription>& keys) {
@@ -27,9 +35,9 @@ std::string to_json(const std::vector<KeyDescription>& keys) {
     for (const auto& [table, key, default_value, range, meaning] : keys)
         list.push_back({{"table", table},
                         {"key", key},
-                        {"default", default_value},
-                        {"range", range},
-                        {"meaning", meaning}});
+                        {"default", without_markdown(default_value)},
+                        {"range", without_markdown(range)},
+                        {"meaning", without_markdown(meaning)}});
     return list.dump(2);
 }
 

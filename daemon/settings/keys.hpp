@@ -17,7 +17,7 @@ namespace versavis::daemon {
 template <class Part>
 void read_keys(TableReader& reader, Part& part);
 
-/// A key as docs/user/configuration.md has it: `default_value` and `range` are TOML or words.
+/// A key as docs/user/configuration.md has it, in Markdown.
 struct KeyDescription {
     std::string table;  ///< such as "[[camera]]"; empty: the top of the file
     std::string key;

@@ -511,6 +511,8 @@ TEST_CASE("end to end: a bad configuration ends with 78 and its place, a good on
     Stack good({"config2", 21, 1, 20, "", "", ""});
     CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()},
               good.log_path("ok.log"), &output) == 0);
+    CHECK(run({program("versavisd"), "--keys", "--json"}, good.log_path("keys"), &output) == 0);
+    CHECK(nlohmann::json::parse(output)[0]["key"] == "instance");
     CHECK(run({program("versavisd"), "--json"}, good.log_path("usage.log"), &output) == 64);
     CHECK(run({program("versavisd"), "--nonsense"}, good.log_path("usage.log"), &output) == 64);
 }
