@@ -14,8 +14,9 @@ namespace {
 /// themselves. At half it ends about when the service believes it, at twice it says no more.
 constexpr unsigned lasting_messages = 20;
 
-/// Slow edges and wrong ends of an exposure move its middle by less than the usual floor: these
-/// kinds have one of their own, twice the scatter of the rig's clock on a loaded machine.
+/// Slow edges and wrong ends of an exposure move its middle by less than the clock may be wrong on
+/// a loaded machine, so these kinds are judged against the other cameras too. The least that they
+/// move it by is 150 us, and honest frames of two cameras differ by less than 20 us.
 constexpr Duration tight = microseconds(60);
 
 const std::vector<Field> exposure_instants = instants(Type::exposure);
@@ -72,7 +73,6 @@ const std::vector<Kind>& kinds() {
         {"start", Way::shift, {{Type::exposure, {exposure::start}}}},
         {"end", Way::shift, {{Type::exposure, {exposure::end}}}},
         {"edges", Way::shift, {{Type::exposure, {exposure::start, exposure::end}}}},
-        // Before the kinds that move the clock, whose error is no fault of an edge.
         {"end-second",
          Way::regular,
          {{Type::exposure, {exposure::end}}},

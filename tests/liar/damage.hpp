@@ -41,10 +41,10 @@ struct Kind {
     std::string_view name;
     Way way;
     std::vector<Victim> victims;
-    unsigned every = 1;               ///< for Way::regular: n
-    Duration least{};                 ///< for Way::regular: how late, drawn anew for each
-    Duration most{};                  ///< the same
-    std::optional<Duration> floor{};  ///< errors below it are not held against a stamp; none: usual
+    unsigned every = 1;                    ///< for Way::regular: n
+    Duration least{};                      ///< for Way::regular: how late, drawn anew for each
+    Duration most{};                       ///< the same
+    std::optional<Duration> edge_floor{};  ///< see LiveJudge::set_edge_floor
 };
 
 const std::vector<Kind>& kinds();

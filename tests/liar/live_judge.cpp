@@ -39,6 +39,10 @@ bool has(const std::string& line, const std::string& text) {
     return line.find(text) != std::string::npos;
 }
 
+bool honest(Duration error, std::uint32_t sigma_ns, Duration floor) {
+    return absolute(error) <= std::max(Duration{honest_sigmas * sigma_ns}, floor);
+}
+
 }  // namespace
 
 Tally& Tally::operator+=(const Tally& more) {
@@ -50,7 +54,6 @@ Tally& Tally::operator+=(const Tally& more) {
 
 LiveJudge::LiveJudge(JudgedSystem system, const Liar& liar)
     : system_(std::move(system)),
-      floor_(system_.floor),
       liar_(liar),
       utc_(*clock::OutputClock::create(clock::OutputClockKind::realtime)),
       truth_file_(system_.truth_path),
@@ -100,10 +103,6 @@ void LiveJudge::read_truth() {
     }
 }
 
-bool LiveJudge::honest(Duration error, std::uint32_t sigma_ns) const {
-    return error <= std::max(Duration{honest_sigmas * sigma_ns}, floor_);
-}
-
 /// True: stamp and order are right.
 bool LiveJudge::compare(const std::string& name, Judged& judged, TrueItem& truth, OutputTime stamp,
                         std::uint32_t sigma_ns, std::uint32_t epoch, Wrong wrong) {
@@ -113,7 +112,7 @@ bool LiveJudge::compare(const std::string& name, Judged& judged, TrueItem& truth
     const bool twice = truth.fate == Fate::good;
     const bool back = stamp < judged.last && epoch == judged.last_epoch;
     epoch_ = std::max(epoch_, epoch);
-    if (!honest(absolute(error), sigma_ns)) {
+    if (!honest(error, sigma_ns, system_.floor)) {
         wrong.what = fmt::format("{}: stamp {:+.3f} ms off, sigma {} ns, epoch {}", of,
                                  static_cast<double>(-error.ns) * 1e-6, sigma_ns, epoch);
         wrongs_.push_back(wrong);
@@ -129,6 +128,11 @@ bool LiveJudge::compare(const std::string& name, Judged& judged, TrueItem& truth
     }
     worst_ = std::max(worst_, absolute(error));
     return true;
+}
+
+bool LiveJudge::edges_are_honest(unsigned camera, Duration error, std::uint32_t sigma_ns) {
+    if (camera != 0) clock_error_ = error;
+    return camera != 0 || !edge_floor_ || honest(error - clock_error_, sigma_ns, *edge_floor_);
 }
 
 void LiveJudge::take(unsigned camera, const Frame& item) {
@@ -158,6 +162,12 @@ void LiveJudge::take(unsigned camera, const Frame& item) {
     if (!compare(name, cameras_[camera], truth, item.time, item.data.sigma_ns, item.data.epoch,
                  wrong))
         return;
+    if (!edges_are_honest(camera, OutputTime{truth.at.ns} - item.time, item.data.sigma_ns)) {
+        wrong.what = fmt::format("{} {}: stamp more than {} us from those of the other cameras",
+                                 name, truth.number, edge_floor_->ns / 1000);
+        wrongs_.push_back(wrong);
+        return;
+    }
     const auto tick = liar_.true_tick(camera, truth.number);
     if (tick && item.data.tick() != *tick) {
         wrong.is_stamp = false;
@@ -203,7 +213,7 @@ void LiveJudge::take(const Event& item) {
     const std::int64_t past =
         ((item.time.ns + utc_.offset().ns) % second_ns + second_ns) % second_ns;
     const std::int64_t off = past > second_ns / 2 ? past - second_ns : past;
-    if (!honest(absolute({off}), item.data.sigma_ns))
+    if (!honest({off}, item.data.sigma_ns, system_.floor))
         wrongs_.push_back(
             {0, 0, true,
              fmt::format("PPS {}: {:+.3f} ms from a whole second, sigma {} ns", item.data.value,

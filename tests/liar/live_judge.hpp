@@ -50,8 +50,9 @@ class LiveJudge {
     /// Reads what is new; returns what is wrong with it.
     std::vector<Wrong> poll();
 
-    /// From now on; none: that of the system.
-    void set_floor(std::optional<Duration> floor) { floor_ = floor.value_or(system_.floor); }
+    /// From now on, camera 0 is also compared with the other cameras, whose stamps have the same
+    /// error of the clock but honest edges; none: only with the truth.
+    void set_edge_floor(std::optional<Duration> floor) { edge_floor_ = floor; }
 
     Tally tally(HostTime begin, HostTime end) const;
 
@@ -82,13 +83,14 @@ class LiveJudge {
     void take(unsigned camera, const Frame& item);
     void take(const ImuSample& item);
     void take(const Event& item);
+    bool edges_are_honest(unsigned camera, Duration error, std::uint32_t sigma_ns);
     bool compare(const std::string& name, Judged& judged, TrueItem& truth, OutputTime stamp,
                  std::uint32_t sigma_ns, std::uint32_t epoch, Wrong wrong);
-    bool honest(Duration error, std::uint32_t sigma_ns) const;
     std::vector<const Judged*> all() const;
 
     JudgedSystem system_;
-    Duration floor_;
+    std::optional<Duration> edge_floor_;
+    Duration clock_error_;  ///< of the newest frame that is not camera 0's
     const Liar& liar_;
     clock::OutputClock utc_;
     std::ifstream truth_file_;

@@ -89,10 +89,10 @@ class Run {
         for (const Kind* kind : chosen) {
             Row row{std::string(kind->name)};
             const bool last = kind == chosen.back();
-            judge_->set_floor(kind->floor);
+            judge_->set_edge_floor(kind->edge_floor);
             phase(
                 row, [&] { tell(*kind, row); }, !settings_.brief || last);
-            judge_->set_floor({});
+            judge_->set_edge_floor({});
         }
         std::erase_if(chosen, [](const Kind* kind) {
             return kind->way == Way::step || kind->way == Way::regular;
@@ -336,6 +336,10 @@ class Run {
         const int code = stack_.service().terminate();
         if (code != 0)
             fmt::print("the service ended with {}:\n{}\n", code, stack_.service().output());
+        for (const Row& row : rows_)
+            if (row.wrong + row.mislabelled > 0)
+                fmt::print("{}: {} wrong, first: {}\n", row.name, row.wrong + row.mislabelled,
+                           row.complaints.front());
         const bool ok = sum.wrong == 0 && sum.mislabelled == 0 && !slow && code == 0;
         fmt::print(
             "{}: seed {}, {} messages damaged, {} wrong stamps and {} wrong labels were "
