@@ -91,8 +91,9 @@ Expected<std::unique_ptr<EmulatedChip>> EmulatedChip::create(const std::string& 
             return failure(file, "there is no such file",
                            "the emulated board runs where the project was built, after './dev demo "
                            "--board rp2040'");
-    auto process = ChildProcess::start({"node", script, image, wiring().dump()},
-                                       ChildProcess::Errors::inherited);
+    auto process =
+        ChildProcess::start({"node", "--single-threaded", script, image, wiring().dump()},
+                            ChildProcess::Errors::inherited);
     if (!process) {
         process.error().cure = "install nodejs";
         return Unexpected(process.error());

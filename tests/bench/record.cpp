@@ -249,7 +249,7 @@ class OthersReader {
     std::optional<std::uint64_t> items(const std::string& path,
                                        const std::vector<std::string>& how) const {
         if (!there_) return std::nullopt;
-        std::vector<std::string> command{"node", script_, path};
+        std::vector<std::string> command{"node", "--single-threaded", script_, path};
         command.insert(command.end(), how.begin(), how.end());
         std::string output;
         if (test::run(command, log_, &output) != 0) return std::nullopt;

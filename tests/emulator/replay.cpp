@@ -38,8 +38,9 @@ Replayed replay(const std::vector<std::uint32_t>& recording, bool with_profile) 
     std::ofstream(recorded, std::ios::binary)
         .write(reinterpret_cast<const char*>(recording.data()),
                static_cast<std::streamsize>(recording.size() * sizeof recording[0]));
-    std::vector<std::string> command = {"node", directory / "replay.mjs", directory / "replay.elf",
-                                        recorded, result};
+    std::vector<std::string> command = {
+        "node", "--single-threaded", directory / "replay.mjs", directory / "replay.elf", recorded,
+        result};
     if (with_profile) command.emplace_back("--profile");
     test::Process process(command, scratch.path() / "log");
     const int code = process.wait(longest);
