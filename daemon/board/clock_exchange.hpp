@@ -8,7 +8,7 @@
 #include <random>
 
 #include "engine/clock/translator.hpp"
-#include "plausibility/implausibility.hpp"
+#include "engine/plausibility/implausibility.hpp"
 #include "publish/clock_recorder.hpp"
 #include "wire/messages.hpp"
 

@@ -18,9 +18,12 @@ constexpr std::uint32_t slots_for_readers = 2;
 /// Pulses by which the board's start pattern may last longer than its length says.
 constexpr int pattern_margin = 2;
 
-/// Majority of records that agree, after nothing was known, until those that do not are doubted
-/// rather than they themselves.
-constexpr int records_to_confirm = 3;
+pairing::RecordLimits record_limits_of(const CameraConfiguration& configuration) {
+    return {period_of(configuration),           from_us(configuration.latency_us),
+            from_us(configuration.exposure_us), from_us(configuration.max_exposure_us),
+            configuration.grid_slew_ppm,        configuration.strobe != Strobe::none,
+            !configuration.master.empty()};
+}
 
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
     pairing::Limits limits;
@@ -62,7 +65,8 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       events_(events),
       frames_(configuration),
       evidence_(translator),
-      validator_(ExposureHistory(configuration), records_to_confirm),
+      record_limits_(record_limits_of(configuration)),
+      filter_(record_limits_),
       completion_(configuration),
       check_(configuration),
       answers_(period_of(configuration)),
@@ -71,15 +75,23 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
 
-/// All that pairing gets goes through here, so that the recording is complete.
+/// All that pairing and the filter of records get goes through here, so that the recording is
+/// complete.
 void CameraPipeline::feed(const pairing::Evidence& evidence) {
     evidence_.record(evidence);
+    pairing::apply(filter_, evidence);
     pairing::apply(pairing_, evidence);
 }
 
 void CameraPipeline::restart_pairing() {
     feed(pairing::Reset{});
     middles_.clear();  // of numbers that may come again
+}
+
+/// Where the next record belongs is unknown, too.
+void CameraPipeline::forget_records() {
+    feed(pairing::Reset{true});
+    middles_.clear();
 }
 
 /// Its clock does not count nanoseconds: arrivals alone say what exposures the frames are of.
@@ -113,8 +125,8 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     }
     {
         const std::lock_guard lock(mutex_);
-        validator_.forget();
-        restart_pairing();
+        feed(record_limits_);
+        forget_records();
     }
     auto ring = frames_.make_ring(place, payload_size);
     if (!ring) return Unexpected(ring.error());
@@ -212,20 +224,20 @@ std::optional<clock::Stamp> CameraPipeline::add(const wire::Exposure& record, Ho
 
 std::optional<Implausibility> CameraPipeline::doubt(const wire::Exposure& record,
                                                     HostTime received) {
-    if (const auto doubt = contradicts_itself(record, configuration_)) return doubt;
     const clock::ClockContact contact = translator_.contact();
     follow_clock(contact.life);
-    const BoardTime newest{std::max({record.trigger_ns, record.start_ns, record.end_ns})};
-    const auto arrival = contradicts_arrival(newest, received, translator_);
-    const ExposureObservation exposure{record, check_.reported_at(received)};
-    const auto doubt = validator_.judge(exposure, contact.exchanges, arrival);
-    if (validator_.overturned()) restart_pairing();  // which of them lied is unknown
-    if (!doubt) translator_.clock_continues();
-    if (!doubt || arrival || contact.contradicted || !validator_.stepped(contact.exchanges))
-        return doubt;
-    validator_.adopt(exposure);
-    adopt_step(record, *doubt);
-    return std::nullopt;
+    const auto arrival =
+        contradicts_arrival(pairing::newest_instant(record), received, translator_);
+    feed(pairing::ReceivedRecord{
+        record, check_.reported_at(received), contact.exchanges, arrival ? arrival->expected : 0,
+        arrival ? arrival->reason : EventReason::none, contact.contradicted});
+    const pairing::RecordVerdict verdict = filter_.verdict();
+    if (verdict.overturned) restart_pairing();
+    if (verdict.step)
+        adopt_step(record, *verdict.step);
+    else if (!verdict.doubt)
+        translator_.clock_continues();
+    return verdict.doubt;
 }
 
 /// What pairing knows of the board's time is void when the estimate of that time is.
@@ -251,12 +263,12 @@ void CameraPipeline::count_rejected(const wire::Exposure& record, const Implausi
                  {},
                  doubt.expected});
     // Two accounts of one exposure: neither is believed.
-    if (validator_.believed().disputes_newest(record)) middles_.erase(record.trigger);
+    if (filter_.disputes_newest(record)) middles_.erase(record.trigger);
 }
 
 void CameraPipeline::triggers_skipped(std::uint64_t count) {
     const std::lock_guard lock(mutex_);
-    validator_.believed().triggers_skipped(count);
+    feed(pairing::TriggersSkipped{count});
 }
 
 void CameraPipeline::paired(const pairing::Arrival& arrival, const pairing::Exposure& exposure) {
@@ -388,8 +400,7 @@ void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t va
 
 void CameraPipeline::reset() {
     const std::lock_guard lock(mutex_);
-    validator_.forget();
-    restart_pairing();
+    forget_records();
     triggers_.answered();
 }
 
@@ -420,7 +431,6 @@ pairing::Start CameraPipeline::first_start() {
 
 void CameraPipeline::start_requested(pairing::Start start, HostTime now) {
     const std::lock_guard lock(mutex_);
-    validator_.believed().forget_grid();
     feed(pairing::StartRequest{start, now});
     triggers_.asked(now);
 }

@@ -16,7 +16,6 @@
 #include "engine/pairing/recording.hpp"
 #include "event_lengths.hpp"
 #include "plausibility/exposure_check.hpp"
-#include "plausibility/exposure_validator.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/evidence_recorder.hpp"
 #include "publish/exposure_completion.hpp"
@@ -150,6 +149,7 @@ class CameraPipeline final : private pairing::Outcome {
 
     void feed(const pairing::Evidence& evidence);
     void restart_pairing();
+    void forget_records();
     void pair_without_clock();
     std::optional<Implausibility> doubt(const wire::Exposure& record, HostTime received);
     void count_rejected(const wire::Exposure& record, const Implausibility& doubt);
@@ -175,7 +175,8 @@ class CameraPipeline final : private pairing::Outcome {
     std::mutex mutex_;
     FramePublisher frames_;
     EvidenceRecorder evidence_;
-    ExposureValidator validator_;
+    pairing::RecordLimits record_limits_;
+    pairing::RecordFilter filter_;
     std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
     ExposureCompletion completion_;
     ExposureCheck check_;

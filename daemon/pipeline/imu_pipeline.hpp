@@ -7,7 +7,7 @@
 
 #include "engine/clock/translator.hpp"
 #include "engine/ring/writer.hpp"
-#include "plausibility/majority_filter.hpp"
+#include "engine/plausibility/majority_filter.hpp"
 #include "plausibility/pulse_history.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/stamp_guard.hpp"

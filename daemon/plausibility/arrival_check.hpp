@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "engine/clock/translator.hpp"
-#include "implausibility.hpp"
+#include "engine/plausibility/implausibility.hpp"
 
 namespace versavis::daemon {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <string>
 
-#include "running_estimate.hpp"
+#include "engine/plausibility/running_estimate.hpp"
 #include "settings/line_delays.hpp"
 
 namespace versavis::daemon {

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "engine/clock/translator.hpp"
-#include "implausibility.hpp"
-#include "majority_filter.hpp"
+#include "engine/plausibility/implausibility.hpp"
+#include "engine/plausibility/majority_filter.hpp"
 #include "pulse_history.hpp"
 #include "wire/messages.hpp"
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "implausibility.hpp"
-#include "running_estimate.hpp"
+#include "engine/plausibility/implausibility.hpp"
+#include "engine/plausibility/running_estimate.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::daemon {

@@ -334,26 +334,18 @@ TEST_CASE("pairing_slips: a search learns anew how soon records come") {
     for (const auto& pulse : bench.told.pulses) CHECK(pulse.reason != EventReason::mismatch);
 }
 
-TEST_CASE("pairing_slips: a step of the board's time is followed by its records, if they can be") {
-    for (const bool ahead : {false, true}) {
-        Bench bench;
-        bench.lock();
-        bench.pairing.start_requested(Start::pattern, bench.now);
-        bench.told = {};
-        std::vector<Told::Pulse> expected;
-        for (int i = 0; i < 3; ++i) {
-            Exposure one = bench.next();
-            one.start = one.start + seconds(3);
-            one.end = one.end + seconds(3);
-            if (ahead)  // they seem to come before they are
-                one.earliest_on_host = one.end_on_host = one.end_on_host + seconds(3);
-            bench.pairing.add(one);
-            expected.push_back({one.trigger, ahead ? EventReason::mismatch : EventReason::reset});
-        }
-        CHECK(bench.pairing.state() == State::searching);
-        // The start is wanted without frames, once the one before is over.
-        CHECK(bench.pairing.wanted_start(bench.now + seconds(2)) == Start::pattern);
-        bench.pairing.reset();
-        CHECK(bench.told.pulses == expected);
+TEST_CASE("pairing_slips: after a step of the board's time a start is wanted without frames") {
+    Bench bench;
+    bench.lock();
+    bench.pairing.start_requested(Start::pattern, bench.now);
+    for (int i = 0; i < 3; ++i) {  // they seem to come before they are
+        Exposure one = bench.next();
+        one.start = one.start + seconds(3);
+        one.end = one.end + seconds(3);
+        one.earliest_on_host = one.end_on_host = one.end_on_host + seconds(3);
+        bench.pairing.add(one);
     }
+    CHECK(bench.pairing.state() == State::searching);
+    // Once the one before is over.
+    CHECK(bench.pairing.wanted_start(bench.now + seconds(2)) == Start::pattern);
 }

@@ -59,7 +59,34 @@ TEST_CASE("recording: evidence comes back from an item of the ring as it was") {
     CHECK_FALSE(there_and_back(limits).camera_clock);
     CHECK(there_and_back(Shortfall{5, EventReason::no_buffer}).reason == EventReason::no_buffer);
     CHECK(there_and_back(StartRequest{Start::slow, HostTime{4}}).start == Start::slow);
-    there_and_back(Reset{});
+    CHECK_FALSE(there_and_back(Reset{}).records_too);
+    CHECK(there_and_back(Reset{true}).records_too);
+
+    RecordLimits of_records;
+    of_records.latency = microseconds(30);
+    of_records.grid_slew_ppm = 2.5;
+    of_records.wired = false;
+    of_records.slave = true;
+    CHECK(there_and_back(of_records).latency == microseconds(30));
+    CHECK(there_and_back(of_records).grid_slew_ppm == 2.5);
+    CHECK_FALSE(there_and_back(of_records).wired);
+    CHECK(there_and_back(of_records).slave);
+    ReceivedRecord received;
+    received.record.flags = wire::exposure_late;
+    received.record.end_ns = 5;
+    received.commanded = milliseconds(3);
+    received.exchanges = 17;
+    received.expected_ns = 6;
+    received.arrival = EventReason::too_old;
+    received.clock_contradicted = true;
+    CHECK(there_and_back(received).record.flags == wire::exposure_late);
+    CHECK(there_and_back(received).record.end_ns == 5);
+    CHECK(there_and_back(received).commanded == milliseconds(3));
+    CHECK(there_and_back(received).exchanges == 17);
+    CHECK(there_and_back(received).expected_ns == 6);
+    CHECK(there_and_back(received).arrival == EventReason::too_old);
+    CHECK(there_and_back(received).clock_contradicted);
+    CHECK(there_and_back(TriggersSkipped{4}).count == 4);
 }
 
 TEST_CASE("recording: layout by the document, and kinds that nobody knows") {
@@ -70,8 +97,16 @@ TEST_CASE("recording: layout by the document, and kinds that nobody knows") {
     CHECK(metadata.words[0] == 0x1122334455667788);
     CHECK(to_metadata(Reset{}).kind == 6);
     EvidenceMetadata unknown = metadata;
-    unknown.kind = GENERATE(0U, 8U, 0xFFFFFFFFU);
+    unknown.kind = GENERATE(0U, 11U, 0xFFFFFFFFU);
     CHECK_FALSE(from_metadata(unknown));
+}
+
+TEST_CASE("recording: an older one, whose resets say nothing of records, forgets none") {
+    EvidenceMetadata reset{};
+    reset.kind = 6;
+    const auto read = from_metadata(reset);
+    REQUIRE(read);
+    CHECK_FALSE(std::get<Reset>(*read).records_too);
 }
 
 TEST_CASE("recording: what is recorded tells another pairing the same") {
@@ -100,4 +135,31 @@ TEST_CASE("recording: what is recorded tells another pairing the same") {
     CHECK(replayed.pairing.state() == State::searching);
     CHECK(replayed.told.pairs == live.told.pairs);
     CHECK(replayed.told.pulses == live.told.pulses);
+}
+
+TEST_CASE("recording: a replay leaves out the exposure of a record that it doubts") {
+    const bool judged = GENERATE(true, false);
+    test::Told told;
+    Replay replay(told);
+    const test::Bench bench;
+    CHECK_FALSE(replay.begun());
+    replay.apply(test::Bench::exposure(9, 9));  // before the beginning
+    if (judged) replay.apply(RecordLimits{});
+    replay.apply(Limits{});
+    CHECK(replay.begun());
+    CHECK((replay.record_verdict() != nullptr) == judged);
+    for (const std::uint64_t trigger : {1U, 2U}) {
+        const Exposure exposure = test::Bench::exposure(trigger, trigger);
+        ReceivedRecord received;
+        received.record.trigger = received.record.tick = trigger;
+        received.record.trigger_ns = received.record.start_ns = exposure.start.ns;
+        received.record.end_ns = exposure.end.ns;
+        received.record.flags = trigger == 1 ? wire::exposure_measured : wire::exposure_no_end;
+        replay.apply(received);
+        if (judged) CHECK(replay.record_verdict()->doubt.has_value() == (trigger == 2));
+        replay.apply(exposure);
+    }
+    replay.finish();
+    REQUIRE(told.pulses.size() == (judged ? 1 : 2));
+    CHECK(told.pulses[0].trigger == 1);
 }

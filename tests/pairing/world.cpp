@@ -39,6 +39,7 @@ class World final : private pairing::Outcome {
           exposure_{settings.exposure.ns != 0 ? settings.exposure
                                               : std::min(milliseconds(2), period_ / 3)},
           random_(settings.seed),
+          filter_(record_limits()),
           pairing_(limits(), *this),
           next_id_(settings.first_id) {
         for (const auto& [pulse, kind] : settings_.faults) {
@@ -93,6 +94,15 @@ class World final : private pairing::Outcome {
         return limits;
     }
 
+    pairing::RecordLimits record_limits() const {
+        pairing::RecordLimits limits;
+        limits.period = period_;
+        limits.exposure = exposure_;
+        limits.max_exposure = period_;
+        limits.wired = settings_.strobe;
+        return limits;
+    }
+
     void at(HostTime time, std::function<void()> happen) {
         events_.push({std::max(time, now_), ++order_, std::move(happen)});
     }
@@ -116,6 +126,7 @@ class World final : private pairing::Outcome {
     }
 
     void request(Start start) {
+        filter_.forget_grid();
         pairing_.start_requested(start, now_);
         at(now_ + command_delay, [this, start, life = life_] {
             if (life != life_) return;
@@ -128,6 +139,7 @@ class World final : private pairing::Outcome {
     /// Camera or board is there (again): everything begins from the start.
     void start_anew() {
         if (camera_dead_ || !board_alive_) return;
+        filter_.forget();
         pairing_.reset();
         if (stale_first_ || chance(0.2)) send_stale_frames();
         started_ = now_;
@@ -182,8 +194,9 @@ class World final : private pairing::Outcome {
         exposure.exposed =
             takes || !settings_.strobe || swapped_ || (crowded && settings_.drops_after_exposure);
         const HostTime sent = start + (exposure.exposed ? exposure_ : start_patience());
-        if (fault_ == FaultKind::lying_record) lie(exposure);
-        if (!lost) send_record(exposure, sent);
+        BoardTime triggered = to_board(now_);
+        if (fault_ == FaultKind::lying_record) lie(exposure, triggered);
+        if (!lost) send_record(exposure, triggered, sent);
         if (!swapped_) expose(start, truth, takes);
         if (settings_.switched_every != 0 && pulses_ % settings_.switched_every == 0)
             exposure_ = pulses_ / settings_.switched_every % 2 != 0 ? settings_.other_exposure
@@ -203,7 +216,37 @@ class World final : private pairing::Outcome {
         return {board_offset_ + std::llround(static_cast<double>(host.ns) * (1 + board_drift))};
     }
 
-    void send_record(Exposure exposure, HostTime sent) {
+    /// As the board writes it.
+    wire::Exposure written(const Exposure& exposure, BoardTime triggered) const {
+        wire::Exposure record{};
+        record.trigger = exposure.trigger;
+        record.tick = exposure.tick;
+        record.trigger_ns = triggered.ns;
+        record.start_ns = exposure.exposed ? exposure.start.ns : wire::no_time;
+        record.end_ns = exposure.exposed ? exposure.end.ns : wire::no_time;
+        record.flags = !settings_.strobe  ? wire::exposure_predicted
+                       : exposure.exposed ? wire::exposure_measured
+                                          : wire::exposure_no_start;
+        if (mode_ == Start::pattern) record.flags |= wire::exposure_pattern;
+        if (mode_ == Start::slow) record.flags |= wire::exposure_slow;
+        return record;
+    }
+
+    /// By the filter of records, as the service asks it.
+    bool believed(const wire::Exposure& record) {
+        constexpr Duration exchange_period = milliseconds(100);
+        constexpr Duration ahead_slack = milliseconds(1);
+        pairing::ReceivedRecord received;
+        received.record = record;
+        received.exchanges = static_cast<std::uint64_t>(now_.ns / exchange_period.ns);
+        if (now_ - to_host(pairing::newest_instant(record)) < -ahead_slack)
+            received.arrival = EventReason::not_yet;
+        const pairing::RecordVerdict verdict = filter_.judge(received);
+        if (verdict.overturned || verdict.step) pairing_.reset();
+        return !verdict.doubt;
+    }
+
+    void send_record(Exposure exposure, BoardTime triggered, HostTime sent) {
         if (fault_ == FaultKind::usb_stall) link_free_ = now_ + seconds(2);
         Duration delay = settings_.record_delay;
         if (fault_ == FaultKind::record_late) delay = delay + milliseconds(100);
@@ -211,10 +254,12 @@ class World final : private pairing::Outcome {
             delay = delay + between({}, period_ * 2);
         link_free_ = std::max(link_free_, sent + delay);
         const Duration noise = between(-microseconds(30), microseconds(30));
-        at(link_free_, [this, exposure, noise, life = life_]() mutable {
+        const wire::Exposure record = written(exposure, triggered);
+        at(link_free_, [this, exposure, record, noise, life = life_]() mutable {
             if (life != life_) return;
             // As the service does, before it looks at the record.
             if (std::exchange(clock_anew_, false)) pairing_.reset();
+            if (!believed(record)) return;
             exposure.recorded = now_;
             exposure.end_on_host = exposure.earliest_on_host = to_host(exposure.end) + noise;
             pairing_.add(exposure);
@@ -250,7 +295,7 @@ class World final : private pairing::Outcome {
     }
 
     /// One number is wrong, as after a torn read or by ill will.
-    void lie(Exposure& exposure) {
+    void lie(Exposure& exposure, BoardTime& triggered) {
         const double size = std::pow(10, uniform(6, 12));
         const Duration shift{std::llround(chance(0.5) ? size : -size)};
         switch (std::uniform_int_distribution<>(0, 5)(random_)) {
@@ -259,7 +304,10 @@ class World final : private pairing::Outcome {
             case 2: exposure.trigger += 1000; break;
             case 3: exposure.tick += random_() % 1000; break;
             case 4: exposure.start.ns += std::int64_t{1} << 32U; [[fallthrough]];
-            default: exposure.start = exposure.start + shift; exposure.end = exposure.end + shift;
+            default:
+                triggered = triggered + shift;
+                exposure.start = exposure.start + shift;
+                exposure.end = exposure.end + shift;
         }
     }
 
@@ -495,6 +543,7 @@ class World final : private pairing::Outcome {
     Duration period_;
     Duration exposure_;
     std::mt19937_64 random_;
+    pairing::RecordFilter filter_;
     pairing::Pairing pairing_;
     pairing::BlockIdUnwrapper unwrapper_;
     Verdict verdict_;

@@ -12,6 +12,7 @@
 
 #include "engine/pairing/block_id.hpp"
 #include "engine/pairing/pairing.hpp"
+#include "engine/pairing/record_filter.hpp"
 
 namespace versavis::test {
 

@@ -430,7 +430,7 @@ TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs ag
     judge(stack, 6);
     stack.wait_for_status(healthy);
     std::string recording;
-    CHECK(stack.tool({"tail", "cam0-evidence", "--oldest", "-n", "290", "--json"}, &recording) ==
+    CHECK(stack.tool({"tail", "cam0-evidence", "--oldest", "-n", "440", "--json"}, &recording) ==
           0);
     const std::string path = stack.log_path("evidence.jsonl");
     std::ofstream(path) << recording;
@@ -441,6 +441,7 @@ TEST_CASE("cameras: what was recorded of the evidence leads to the same pairs ag
     CHECK(summary["slips"] == 1);
     CHECK(summary["locks"] == 2);
     CHECK(summary["paired"].get<int>() > 120);
+    CHECK(summary["records_doubted"] == 0);
     live.terminate();
     std::ifstream decisions(stack.log_path("decisions.jsonl"));
     const Pairs replayed = pairs(decisions, "paired");

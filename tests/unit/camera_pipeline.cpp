@@ -2,9 +2,11 @@
 #include "pipeline/camera_pipeline.hpp"
 #include "../support/look.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <functional>
+#include <random>
 #include <thread>
 
 #include "pipelines.hpp"
@@ -339,6 +341,65 @@ TEST_CASE("camera_pipeline: a record that lies costs its own frame, and no other
     CHECK(report.records_doubted == 1);
     CHECK(report.slips == 0);
     CHECK(report.locks == 1);
+}
+
+TEST_CASE("camera_pipeline: a replay believes the records that the service believed") {
+    Bench bench(camera(20));
+    auto evidence = bench.reader("cam0-evidence");
+    std::mt19937_64 random(1);
+    std::vector<bool> live;
+    bench.lie = [&](wire::Exposure& record) {
+        if (random() % 8 != 0) return;
+        const std::int64_t by_ns = static_cast<std::int64_t>(random() % 200'000'000) - 100'000'000;
+        switch (random() % 5) {
+            case 0: record.start_ns += by_ns; break;
+            case 1: record.end_ns += by_ns; break;
+            case 2: record.tick += random() % 3; break;
+            case 3: record.trigger += random() % 3; break;
+            default:
+                record.trigger_ns += by_ns;
+                record.start_ns += by_ns;
+                record.end_ns += by_ns;
+        }
+    };
+    const auto pass = [&](std::uint64_t tick) {
+        const std::uint64_t doubted = bench.pipeline.report().records_doubted;
+        bench.pass(tick);
+        live.push_back(bench.pipeline.report().records_doubted == doubted);
+    };
+    for (const std::uint64_t tick : pattern) pass(tick);
+    for (std::uint64_t tick = 20; tick < 400; ++tick) {
+        pass(tick);
+        if (tick % 100 == 0) bench.pipeline.triggers_skipped(1);
+    }
+
+    struct Pairs final : pairing::Outcome {
+        void paired(const pairing::Arrival& arrival, const pairing::Exposure&) override {
+            ids.push_back(arrival.block_id);
+        }
+        void frame_unpaired(const pairing::Arrival&, EventReason,
+                            const pairing::Exposure*) override {}
+        void exposure_unpaired(const pairing::Exposure&, EventReason) override {}
+        void locked(const pairing::Exposure&) override {}
+        void slipped(const pairing::Arrival&) override {}
+        std::vector<std::uint64_t> ids;
+    } pairs;
+    pairing::Replay replay(pairs);
+    std::vector<bool> replayed;
+    for (auto item = test::look(evidence.next()); item.found == test::Found::item;
+         item = test::look(evidence.next())) {
+        const auto input = pairing::from_metadata(unpack<pairing::EvidenceMetadata>(item.metadata));
+        REQUIRE(input);
+        replay.apply(*input);
+        if (std::holds_alternative<pairing::ReceivedRecord>(*input))
+            replayed.push_back(!replay.record_verdict()->doubt);
+    }
+    CHECK(replayed == live);
+    CHECK(std::count(live.begin(), live.end(), false) > 20);
+    std::vector<std::uint64_t> published;
+    for (const FrameMetadata& frame : bench.published) published.push_back(frame.block_id);
+    CHECK(pairs.ids == published);
+    CHECK(published.size() > 200);
 }
 
 TEST_CASE("camera_pipeline: when the board's clock begins anew, the lock is dropped") {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plausibility/majority_filter.hpp"
+#include "engine/plausibility/majority_filter.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace versavis;
-using namespace versavis::daemon;
+using namespace versavis;
 
 namespace {
 

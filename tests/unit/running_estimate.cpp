@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plausibility/running_estimate.hpp"
+#include "engine/plausibility/running_estimate.hpp"
 
 #include <catch2/catch.hpp>
 #include <random>
 
 using namespace versavis;
-using daemon::RunningEstimate;
 
 TEST_CASE("running_estimate: the first value is believed, the next within the first tolerance") {
     RunningEstimate value(milliseconds(1));

@@ -54,12 +54,47 @@ json describe(const Advance& advance) {
     return {{"evidence", "advance"}, {"now_ns", advance.now.ns}};
 }
 
-json describe(const Reset& /*reset*/) { return {{"evidence", "reset"}}; }
+json describe(const Reset& reset) {
+    return {{"evidence", "reset"}, {"records_too", reset.records_too}};
+}
 
 json describe(const StartRequest& request) {
     return {{"evidence", "start"},
             {"start", static_cast<std::uint32_t>(request.start)},
             {"now_ns", request.now.ns}};
+}
+
+json describe(const RecordLimits& limits) {
+    return {{"evidence", "record_limits"},
+            {"period_ns", limits.period.ns},
+            {"latency_ns", limits.latency.ns},
+            {"exposure_ns", limits.exposure.ns},
+            {"max_exposure_ns", limits.max_exposure.ns},
+            {"grid_slew_ppm", limits.grid_slew_ppm},
+            {"wired", limits.wired},
+            {"slave", limits.slave}};
+}
+
+/// Times that the board does not know are null.
+json describe(const ReceivedRecord& received) {
+    const wire::Exposure& record = received.record;
+    const auto time = [](std::int64_t ns) { return ns == wire::no_time ? json() : json(ns); };
+    return {{"evidence", "record"},
+            {"trigger", record.trigger},
+            {"tick", record.tick},
+            {"flags", record.flags},
+            {"trigger_ns", time(record.trigger_ns)},
+            {"start_ns", time(record.start_ns)},
+            {"end_ns", time(record.end_ns)},
+            {"commanded_ns", received.commanded.ns},
+            {"exchanges", received.exchanges},
+            {"expected_ns", received.expected_ns},
+            {"arrival", static_cast<std::uint32_t>(received.arrival)},
+            {"clock_contradicted", received.clock_contradicted}};
+}
+
+json describe(const TriggersSkipped& skipped) {
+    return {{"evidence", "triggers_skipped"}, {"count", skipped.count}};
 }
 
 Limits limits(const json& line) {
@@ -99,6 +134,37 @@ Arrival arrival(const json& line) {
     return arrival;
 }
 
+RecordLimits record_limits(const json& line) {
+    RecordLimits limits;
+    limits.period.ns = line.at("period_ns");
+    limits.latency.ns = line.at("latency_ns");
+    limits.exposure.ns = line.at("exposure_ns");
+    limits.max_exposure.ns = line.at("max_exposure_ns");
+    limits.grid_slew_ppm = line.at("grid_slew_ppm");
+    limits.wired = line.at("wired");
+    limits.slave = line.at("slave");
+    return limits;
+}
+
+ReceivedRecord received_record(const json& line) {
+    const auto time = [&](const char* key) {
+        return line.at(key).is_null() ? wire::no_time : line.at(key).get<std::int64_t>();
+    };
+    ReceivedRecord received;
+    received.record.trigger = line.at("trigger");
+    received.record.tick = line.at("tick");
+    received.record.flags = line.at("flags");
+    received.record.trigger_ns = time("trigger_ns");
+    received.record.start_ns = time("start_ns");
+    received.record.end_ns = time("end_ns");
+    received.commanded.ns = line.at("commanded_ns");
+    received.exchanges = line.at("exchanges");
+    received.expected_ns = line.at("expected_ns");
+    received.arrival = static_cast<EventReason>(line.at("arrival").get<std::uint32_t>());
+    received.clock_contradicted = line.at("clock_contradicted");
+    return received;
+}
+
 Evidence read(const json& line) {
     const std::string kind = line.at("evidence");
     if (kind == "begin") return limits(line);
@@ -108,10 +174,13 @@ Evidence read(const json& line) {
         return Shortfall{line.at("block_id"),
                          static_cast<EventReason>(line.at("reason").get<std::uint32_t>())};
     if (kind == "advance") return Advance{{line.at("now_ns")}};
-    if (kind == "reset") return Reset{};
+    if (kind == "reset") return Reset{line.value("records_too", false)};  // older: not recorded
     if (kind == "start")
         return StartRequest{static_cast<Start>(line.at("start").get<std::uint32_t>()),
                             {line.at("now_ns")}};
+    if (kind == "record_limits") return record_limits(line);
+    if (kind == "record") return received_record(line);
+    if (kind == "triggers_skipped") return TriggersSkipped{line.at("count")};
     throw std::invalid_argument(fmt::format("'{}' is not a kind of evidence", kind));
 }
 

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <optional>
-
 #include "pairing/evidence_json.hpp"
 
 namespace versavis::client {
@@ -19,6 +17,16 @@ class Decisions final : public Outcome {
     explicit Decisions(std::ostream* out) : out_(out) {}
 
     ReplaySummary summary;
+
+    void judged(const ReceivedRecord& received, const RecordVerdict& verdict) {
+        if (!verdict.doubt) return;
+        ++summary.records_doubted;
+        write({{"decision", "record_doubted"},
+               {"trigger", received.record.trigger},
+               {"reason", to_string(verdict.doubt->reason)},
+               {"stated", verdict.doubt->said},
+               {"expected", verdict.doubt->expected}});
+    }
 
  private:
     void paired(const Arrival& arrival, const Exposure& exposure) override {
@@ -62,7 +70,7 @@ class Decisions final : public Outcome {
 
 Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* out) {
     Decisions decisions(out);
-    std::optional<Pairing> pairing;
+    Replay replay(decisions);
     std::uint64_t number = 0;
     for (std::string text; std::getline(recording, text);) {
         const std::string where = fmt::format("line {}", ++number);
@@ -72,18 +80,14 @@ Expected<ReplaySummary> replay_pairing(std::istream& recording, std::ostream* ou
                            "record with: versavis tail CAMERA-evidence --oldest --json");
         auto evidence = to_evidence(line);
         if (!evidence) return failure(where, evidence.error().message());
-        if (const auto* limits = std::get_if<Limits>(&*evidence)) {
-            if (pairing)
-                pairing->set_limits(*limits);
-            else
-                pairing.emplace(*limits, decisions);
-            continue;
-        }
-        if (!pairing) continue;
-        if (std::holds_alternative<Arrival>(*evidence)) ++decisions.summary.frames;
-        versavis::pairing::apply(*pairing, *evidence);  // unqualified, std::apply would match
+        if (replay.begun() && std::holds_alternative<Arrival>(*evidence))
+            ++decisions.summary.frames;
+        replay.apply(*evidence);
+        if (const auto* received = std::get_if<ReceivedRecord>(&*evidence);
+            received && replay.record_verdict() != nullptr)
+            decisions.judged(*received, *replay.record_verdict());
     }
-    if (!pairing)
+    if (!replay.begun())
         return failure("recording", "does not contain the beginning of the stream",
                        "record from the start of the service, or soon after it with --oldest");
     return decisions.summary;
@@ -95,16 +99,16 @@ std::string to_text(const ReplaySummary& summary, bool as_json) {
                     {"paired", summary.paired},
                     {"frames_without_trigger", summary.frames_without_trigger},
                     {"triggers_without_frame", summary.triggers_without_frame},
+                    {"records_doubted", summary.records_doubted},
                     {"locks", summary.locks},
                     {"slips", summary.slips}}
                    .dump() +
                "\n";
     return fmt::format(
-        "{} frames: {} paired, {} without trigger; {} triggers without frame; locked {} times, "
-        "slipped {} "
-        "times\n",
+        "{} frames: {} paired, {} without trigger; {} triggers without frame; {} records doubted; "
+        "locked {} times, slipped {} times\n",
         summary.frames, summary.paired, summary.frames_without_trigger,
-        summary.triggers_without_frame, summary.locks, summary.slips);
+        summary.triggers_without_frame, summary.records_doubted, summary.locks, summary.slips);
 }
 
 }  // namespace versavis::client

@@ -15,6 +15,7 @@ struct ReplaySummary {
     std::uint64_t paired = 0;
     std::uint64_t frames_without_trigger = 0;
     std::uint64_t triggers_without_frame = 0;
+    std::uint64_t records_doubted = 0;
     std::uint64_t locks = 0;
     std::uint64_t slips = 0;
 };

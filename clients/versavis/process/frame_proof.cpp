@@ -134,7 +134,7 @@ void prove_afterwards(Stream& stream) {
 
 struct FrameProof::Run {
     Collector collector;
-    std::optional<Pairing> pairing;
+    Replay replay{collector};
 };
 
 FrameProof::FrameProof() : run_(std::make_unique<Run>()) {}
@@ -143,25 +143,20 @@ FrameProof& FrameProof::operator=(FrameProof&&) noexcept = default;
 FrameProof::~FrameProof() = default;
 
 void FrameProof::add(const Evidence& evidence) {
+    std::vector<Stream>& streams = run_->collector.streams;
     if (const auto* limits = std::get_if<Limits>(&evidence)) {
-        if (run_->pairing) run_->pairing->reset();  // gives back what it holds, to its own stream
-        run_->collector.streams.push_back({*limits, {}, {}});
-        if (run_->pairing)
-            run_->pairing->set_limits(*limits);
-        else
-            run_->pairing.emplace(*limits, run_->collector);
-        return;
+        run_->replay.finish();  // gives back what it holds, to its own stream
+        streams.push_back({*limits, {}, {}});
     }
-    if (!run_->pairing) return;
-    versavis::pairing::apply(*run_->pairing, evidence);  // unqualified, std::apply would match
-    if (std::holds_alternative<Reset>(evidence))
-        run_->collector.streams.push_back({run_->collector.streams.back().limits, {}, {}});
+    run_->replay.apply(evidence);
+    if (begun() && std::holds_alternative<Reset>(evidence))
+        streams.push_back({streams.back().limits, {}, {}});
 }
 
-bool FrameProof::begun() const { return run_->pairing.has_value(); }
+bool FrameProof::begun() const { return run_->replay.begun(); }
 
 std::vector<ProvedFrame> FrameProof::finish() {
-    if (run_->pairing) run_->pairing->reset();
+    run_->replay.finish();
     std::vector<ProvedFrame> proved;
     for (Stream& stream : run_->collector.streams) {
         std::stable_sort(

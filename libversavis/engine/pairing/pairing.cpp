@@ -21,9 +21,14 @@ constexpr std::size_t fewest_exposures = 128;
 // late at most; at twice a search there takes four times as long.
 constexpr std::size_t most_exposures = 1024;
 
-// Odd records in a row that make a step of the board's time when they follow each other. At half
-// (1) a single lie costs a start; at twice a step costs twice as many frames before the start.
-constexpr std::size_t odd_to_step = 3;
+// Records in a row that come too early and so are of a board whose time, or its estimate, has
+// stepped. At half (1) a single lie costs a start; at twice a step costs twice as many frames
+// before the start.
+constexpr int early_to_step = 3;
+
+// No honest time of board or host is further from 0: 73 years. Differences of two such times fit in
+// 64 bits.
+constexpr std::int64_t furthest_ns = std::int64_t{1} << 61U;
 
 // Exposures that a search keeps even when no frame of them can arrive any more. At half slow
 // patterns may lose their beginning; at twice more old ones compete.
@@ -143,7 +148,7 @@ Pairing::Pairing(const Limits& limits, Outcome& outcome)
       outcome_(outcome),
       by_clock_(limits.camera_clock),
       exposures_(limits.period),
-      gate_(limits),
+      delay_(limits),
       clock_(limits.stamped) {}
 
 std::int64_t Pairing::loose_ns() const {
@@ -189,15 +194,27 @@ bool Pairing::steady(const Arrival& arrival, const Reading& reading) const {
 }
 
 void Pairing::add(const Exposure& exposure) {
-    if (!gate_.accepts(exposure)) return set_aside(exposure);
-    refuse_odd(EventReason::mismatch);
+    if (!follows(exposure)) return outcome_.exposure_unpaired(exposure, EventReason::mismatch);
+    if (delay_.too_early(exposure)) return refuse_early(exposure);
+    early_ = 0;
     accept(exposure);
     process();
 }
 
+/// The filter of records lets no other pass, but not each recording went through it.
+bool Pairing::follows(const Exposure& exposure) const {
+    const auto possible = [](auto time) { return std::abs(time.ns) < furthest_ns; };
+    if (!possible(exposure.start) || !possible(exposure.end) || exposure.end < exposure.start ||
+        !possible(exposure.end_on_host) || !possible(exposure.earliest_on_host))
+        return false;
+    if (exposures_.empty()) return true;
+    const Exposure& newest = exposures_.back().exposure;
+    return exposure.trigger > newest.trigger && exposure.start > newest.start;
+}
+
 void Pairing::accept(const Exposure& exposure) {
-    gate_.take(exposure);
-    exposures_.add(exposure, gate_.prompt());
+    delay_.take(exposure);
+    exposures_.add(exposure, delay_.prompt());
     const auto in_flight = static_cast<std::size_t>(
         (limits_.latest_arrival + limits_.exposure_wait).ns / limits_.period.ns);
     const std::size_t kept =
@@ -205,24 +222,15 @@ void Pairing::accept(const Exposure& exposure) {
     if (exposures_.size() > kept) drop_oldest_exposure(EventReason::frame_missing);
 }
 
-/// It lies, or the board's time has stepped, which others after it will show. All that was learned
-/// by that time is void then.
-void Pairing::set_aside(const Exposure& exposure) {
-    if (!odd_.empty() && !gate_.in_order(odd_.back(), exposure)) refuse_odd(EventReason::mismatch);
-    odd_.push_back(exposure);
-    if (odd_.size() < odd_to_step) return;
+/// It lies, or the board is ahead of its clock's estimate, as those after it will show: nothing can
+/// be proved by that, and all that was learned by that time is void then.
+void Pairing::refuse_early(const Exposure& exposure) {
+    outcome_.exposure_unpaired(exposure, EventReason::mismatch);
+    if (++early_ < early_to_step) return;
+    early_ = 0;
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
     if (state_ != State::searching) search_anew();
-    gate_ = RecordGate(limits_);
-    for (const Exposure& stepped : std::exchange(odd_, {}))
-        if (gate_.accepts(stepped))
-            accept(stepped);
-        else  // the board is ahead of its clock's estimate: nothing can be proved by that
-            outcome_.exposure_unpaired(stepped, EventReason::mismatch);
-}
-
-void Pairing::refuse_odd(EventReason reason) {
-    for (const Exposure& odd : std::exchange(odd_, {})) outcome_.exposure_unpaired(odd, reason);
+    delay_ = RecordDelay(limits_);
 }
 
 void Pairing::add(const Arrival& arrival) {
@@ -251,7 +259,7 @@ void Pairing::note(const Shortfall& shortfall) {
 }
 
 void Pairing::process() {
-    if (!gate_.live()) return;
+    if (!delay_.live()) return;
     if (state_ == State::searching) search();
     while (state_ != State::searching && !arrivals_.empty() &&
            (state_ == State::locked ? decide_locked() : decide_checking())) {
@@ -567,7 +575,7 @@ void Pairing::give_up_front() {
 /// The start is wanted at once.
 void Pairing::search_anew() {
     state_ = State::searching;
-    gate_.forget_delay();
+    delay_.forget();
     frames_since_start_ = static_cast<int>(frames_for_proof(by_clock_));
 }
 
@@ -693,7 +701,7 @@ void Pairing::set_limits(const Limits& limits) {
     limits_ = limits;
     by_clock_ = limits.camera_clock;
     exposures_ = ExposureLog(limits.period);
-    gate_ = RecordGate(limits);
+    delay_ = RecordDelay(limits);
     clock_ = CameraClock(limits.stamped);
 }
 
@@ -701,9 +709,9 @@ void Pairing::reset() {
     while (!arrivals_.empty()) drop_front(EventReason::reset);
     given_up_.clear();
     while (!exposures_.empty()) drop_oldest_exposure(EventReason::reset);
-    refuse_odd(EventReason::reset);
     state_ = State::searching;
-    gate_ = RecordGate(limits_);
+    delay_ = RecordDelay(limits_);
+    early_ = 0;
     shortfalls_.clear();
     fruitless_starts_ = 0;
     frames_since_start_ = 0;

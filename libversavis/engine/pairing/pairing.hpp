@@ -10,7 +10,7 @@
 
 #include "engine/pairing/alignment.hpp"
 #include "engine/pairing/camera_clock.hpp"
-#include "engine/pairing/record_gate.hpp"
+#include "engine/pairing/record_delay.hpp"
 #include "engine/pairing/relation.hpp"
 
 namespace versavis::pairing {
@@ -122,9 +122,9 @@ class Pairing {
     Reading read(const Arrival& arrival) const;
     bool steady(const Arrival& arrival, const Reading& reading) const;
 
+    bool follows(const Exposure& exposure) const;
     void accept(const Exposure& exposure);
-    void set_aside(const Exposure& exposure);
-    void refuse_odd(EventReason reason);
+    void refuse_early(const Exposure& exposure);
     void search_anew();
 
     void process();
@@ -176,8 +176,8 @@ class Pairing {
     State state_ = State::searching;
     bool by_clock_ = true;  ///< of the camera, else by arrival
     ExposureLog exposures_;
-    RecordGate gate_;
-    std::vector<Exposure> odd_;     ///< records that contradict the newest good one
+    RecordDelay delay_;
+    int early_ = 0;                 ///< records in a row that came too early
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::deque<Arrival> given_up_;  ///< by the search, for want of room: their times still count
     std::deque<Shortfall> shortfalls_;

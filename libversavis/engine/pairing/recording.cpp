@@ -23,6 +23,18 @@ static_assert(offsetof(Arrival, block_id) == 8 && offsetof(Arrival, arrived) == 
               offsetof(Arrival, exposure) == 32 && offsetof(Arrival, width) == 40 &&
               offsetof(Arrival, size) == 56);
 static_assert(offsetof(Shortfall, reason) == 8 && offsetof(StartRequest, now) == 8);
+static_assert(offsetof(RecordLimits, latency) == 8 && offsetof(RecordLimits, exposure) == 16 &&
+              offsetof(RecordLimits, max_exposure) == 24 &&
+              offsetof(RecordLimits, grid_slew_ppm) == 32 && offsetof(RecordLimits, wired) == 40 &&
+              offsetof(RecordLimits, slave) == 41);
+static_assert(offsetof(wire::Exposure, flags) == 2 && offsetof(wire::Exposure, trigger) == 8 &&
+              offsetof(wire::Exposure, tick) == 16 && offsetof(wire::Exposure, trigger_ns) == 24 &&
+              offsetof(wire::Exposure, start_ns) == 32 && offsetof(wire::Exposure, end_ns) == 40);
+static_assert(offsetof(ReceivedRecord, commanded) == 48 &&
+              offsetof(ReceivedRecord, exchanges) == 56 &&
+              offsetof(ReceivedRecord, expected_ns) == 64 &&
+              offsetof(ReceivedRecord, arrival) == 72 &&
+              offsetof(ReceivedRecord, clock_contradicted) == 76);
 
 /// A bool is 0 or 1, whatever byte somebody stored.
 template <class Item, std::size_t size>
@@ -30,6 +42,13 @@ void make_bools(std::array<unsigned char, size>& bytes) {
     const auto make = [&](std::size_t at) { bytes[at] = bytes[at] != 0 ? 1 : 0; };
     if constexpr (std::is_same_v<Item, Exposure>) make(offsetof(Exposure, exposed));
     if constexpr (std::is_same_v<Item, Limits>) make(offsetof(Limits, camera_clock));
+    if constexpr (std::is_same_v<Item, Reset>) make(offsetof(Reset, records_too));
+    if constexpr (std::is_same_v<Item, RecordLimits>) {
+        make(offsetof(RecordLimits, wired));
+        make(offsetof(RecordLimits, slave));
+    }
+    if constexpr (std::is_same_v<Item, ReceivedRecord>)
+        make(offsetof(ReceivedRecord, clock_contradicted));
 }
 
 template <std::size_t index = 0>
@@ -41,12 +60,10 @@ Expected<Evidence> read(const EvidenceMetadata& metadata) {
         if (metadata.kind != index + 1) return read<index + 1>(metadata);
         using Item = std::variant_alternative_t<index, Evidence>;
         Item item;
-        if constexpr (!std::is_empty_v<Item>) {
-            std::array<unsigned char, sizeof item> bytes{};
-            std::memcpy(bytes.data(), metadata.words, sizeof item);
-            make_bools<Item>(bytes);
-            std::memcpy(&item, bytes.data(), sizeof item);
-        }
+        std::array<unsigned char, sizeof item> bytes{};
+        std::memcpy(bytes.data(), metadata.words, sizeof item);
+        make_bools<Item>(bytes);
+        std::memcpy(&item, bytes.data(), sizeof item);
         return Evidence(item);
     }
 }
@@ -61,7 +78,7 @@ EvidenceMetadata to_metadata(const Evidence& evidence) {
             using Item = std::decay_t<decltype(item)>;
             static_assert(std::is_trivially_copyable_v<Item> &&
                           sizeof item <= sizeof metadata.words);
-            if constexpr (!std::is_empty_v<Item>) std::memcpy(metadata.words, &item, sizeof item);
+            std::memcpy(metadata.words, &item, sizeof item);
         },
         evidence);
     return metadata;
@@ -79,10 +96,48 @@ void apply(Pairing& pairing, const Evidence& evidence) {
                 pairing.reset();
             else if constexpr (std::is_same_v<Item, StartRequest>)
                 pairing.start_requested(item.start, item.now);
-            else if constexpr (!std::is_same_v<Item, Limits>)
+            else if constexpr (std::is_same_v<Item, Exposure> || std::is_same_v<Item, Arrival> ||
+                               std::is_same_v<Item, Shortfall>)
                 pairing.add(item);
         },
         evidence);
+}
+
+void apply(RecordFilter& filter, const Evidence& evidence) {
+    if (const auto* received = std::get_if<ReceivedRecord>(&evidence))
+        filter.judge(*received);
+    else if (const auto* skipped = std::get_if<TriggersSkipped>(&evidence))
+        filter.triggers_skipped(skipped->count);
+    else if (const auto* reset = std::get_if<Reset>(&evidence); reset && reset->records_too)
+        filter.forget();
+    else if (std::holds_alternative<StartRequest>(evidence))
+        filter.forget_grid();
+}
+
+void Replay::apply(const Evidence& evidence) {
+    if (const auto* limits = std::get_if<RecordLimits>(&evidence); limits && !filter_)
+        filter_.emplace(*limits);
+    if (filter_) pairing::apply(*filter_, evidence);
+    if (const auto* received = std::get_if<ReceivedRecord>(&evidence); received && filter_)
+        refused_ =
+            filter_->verdict().doubt ? std::optional(received->record.trigger) : std::nullopt;
+    if (const auto* limits = std::get_if<Limits>(&evidence)) {
+        if (pairing_)
+            pairing_->set_limits(*limits);
+        else
+            pairing_.emplace(*limits, outcome_);
+    }
+    const auto* exposure = std::get_if<Exposure>(&evidence);
+    if (pairing_ && !(exposure && exposure->trigger == refused_))
+        pairing::apply(*pairing_, evidence);
+}
+
+const RecordVerdict* Replay::record_verdict() const {
+    return filter_ ? &filter_->verdict() : nullptr;
+}
+
+void Replay::finish() {
+    if (pairing_) pairing_->reset();
 }
 
 }  // namespace versavis::pairing

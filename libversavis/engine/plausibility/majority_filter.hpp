@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "implausibility.hpp"
+#include "engine/plausibility/implausibility.hpp"
 
-namespace versavis::daemon {
+namespace versavis {
 
 /// History: what messages were believed. It has `std::optional<Implausibility> doubt(message)
 /// const`, `void learn(message)`, `bool repeats(message) const`, true of the newest one come twice,
@@ -139,4 +139,4 @@ class MajorityFilter {
     bool overturned_ = false;
 };
 
-}  // namespace versavis::daemon
+}  // namespace versavis

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Holds the record of an exposure against the one before it, its grid point and its way to the
-// host.
+// How long records take on their way to the host.
 #pragma once
 
 #include <cstdint>
@@ -10,24 +9,20 @@
 
 namespace versavis::pairing {
 
-/// A record has three witnesses: its grid point says how much time has passed since the record
-/// before, its number cannot have grown by more than the grid, and it cannot reach the host before
-/// its exposure has ended, nor sooner after that than any other.
-class RecordGate {
+/// A record cannot reach the host before its exposure has ended, nor much sooner after that than
+/// any other. One that comes late says that the link stalls, or that the board's time was set back.
+class RecordDelay {
  public:
-    explicit RecordGate(const Limits& limits)
+    explicit RecordDelay(const Limits& limits)
         : period_(limits.period),
           earliest_(limits.earliest_arrival),
           latest_(limits.exposure_wait) {}
 
-    bool accepts(const Exposure& exposure) const;
+    bool too_early(const Exposure& exposure) const;
 
     /// The newest good record from here on. One of a silent line says nothing about the link: the
     /// board waits for a start before it sends one.
     void take(const Exposure& exposure);
-
-    /// These are one after the other, by one clock.
-    bool in_order(const Exposure& before, const Exposure& after) const;
 
     /// The newest record reached the host as soon as others did. When it did not, the link stalls
     /// or the board's time was set back: which of them is unknown.
@@ -39,7 +34,7 @@ class RecordGate {
     bool live() const;
 
     /// How soon records reach the host is learned anew.
-    void forget_delay() {
+    void forget() {
         least_delay_ns_.reset();
         confirmed_ = 0;
     }
@@ -47,13 +42,11 @@ class RecordGate {
  private:
     std::int64_t tolerance_ns() const;
     double earliest_ns() const;
-    bool too_early(const Exposure& exposure) const;
-    void learn_delay(const Exposure& exposure);
+    void learn(const Exposure& exposure);
 
     Duration period_;
     Duration earliest_;
     Duration latest_;
-    std::optional<Exposure> newest_;
     std::optional<Exposure> newest_exposed_;
     std::optional<std::int64_t> least_delay_ns_;  ///< on the way to the host
     int confirmed_ = 0;                           ///< records that took no less, in a row

@@ -6,7 +6,7 @@
 
 #include "versavis/metadata.hpp"
 
-namespace versavis::daemon {
+namespace versavis {
 
 struct Implausibility {
     EventReason reason = EventReason::none;
@@ -14,4 +14,4 @@ struct Implausibility {
     std::int64_t expected = 0;  ///< by its witnesses
 };
 
-}  // namespace versavis::daemon
+}  // namespace versavis

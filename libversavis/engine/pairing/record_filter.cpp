@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "exposure_validator.hpp"
+#include "engine/pairing/record_filter.hpp"
 
 #include <algorithm>
+#include <utility>
 
-namespace versavis::daemon {
+namespace versavis::pairing {
 
 namespace {
 
@@ -28,6 +29,10 @@ constexpr Duration latest_trigger = milliseconds(2);
 /// How far the second latency, or the second exposure of equal length, may be off from the first.
 constexpr Duration first_tolerance = milliseconds(1);
 
+/// Majority of records that agree, after nothing was known, until those that do not are doubted
+/// rather than they themselves.
+constexpr int records_to_confirm = 3;
+
 /// 73 years: a grid point beyond it is a lie.
 constexpr double furthest_ns = 2.3e18;
 
@@ -36,16 +41,15 @@ bool has_end(const wire::Exposure& record) { return record.end_ns != wire::no_ti
 bool has(const wire::Exposure& record, unsigned flags) { return (record.flags & flags) != 0; }
 
 /// Flags and times must agree.
-bool flags_agree(const wire::Exposure& record, const CameraConfiguration& configuration) {
+bool flags_agree(const wire::Exposure& record, const RecordLimits& limits) {
     constexpr unsigned outcomes = wire::exposure_measured | wire::exposure_no_start |
                                   wire::exposure_no_end | wire::exposure_predicted;
-    const bool wired = configuration.strobe != Strobe::none;
-    const bool by_master = !wired && !configuration.master.empty();
+    const bool by_master = !limits.wired && limits.slave;
     if (has(record, wire::exposure_from_master) != by_master) return false;
     switch (record.flags & outcomes) {
         case wire::exposure_measured:
-            return has_start(record) && has_end(record) && (wired || by_master);
-        case wire::exposure_predicted: return has_start(record) && has_end(record) && !wired;
+            return has_start(record) && has_end(record) && (limits.wired || by_master);
+        case wire::exposure_predicted: return has_start(record) && has_end(record) && !limits.wired;
         case wire::exposure_no_start: return !has_start(record) && !has_end(record);
         case wire::exposure_no_end: return has_start(record) && !has_end(record);
         default: return false;
@@ -54,46 +58,49 @@ bool flags_agree(const wire::Exposure& record, const CameraConfiguration& config
 
 }  // namespace
 
+BoardTime newest_instant(const wire::Exposure& record) {
+    return {std::max({record.trigger_ns, record.start_ns, record.end_ns})};
+}
+
 std::optional<Implausibility> contradicts_itself(const wire::Exposure& record,
-                                                 const CameraConfiguration& configuration) {
-    if (!flags_agree(record, configuration))
+                                                 const RecordLimits& limits) {
+    if (!flags_agree(record, limits))
         return Implausibility{EventReason::implausible_flags, record.flags, 0};
     if (!has_start(record)) return std::nullopt;
-    const Duration latest = from_us(configuration.latency_us) + period_of(configuration) +
-                            shortest_patience + overlong_slack;
+    const Duration latest = limits.latency + limits.period + shortest_patience + overlong_slack;
     if (record.start_ns < record.trigger_ns || record.start_ns - record.trigger_ns > latest.ns)
         return Implausibility{EventReason::implausible_time, record.start_ns, record.trigger_ns};
     if (!has_end(record)) return std::nullopt;
-    const Duration longest = from_us(configuration.max_exposure_us) + overlong_slack;
+    const Duration longest = limits.max_exposure + overlong_slack;
     if (record.end_ns < record.start_ns || record.end_ns - record.start_ns > longest.ns)
         return Implausibility{EventReason::implausible_length, record.end_ns,
                               record.start_ns + longest.ns};
     return std::nullopt;
 }
 
-ExposureHistory::ExposureHistory(const CameraConfiguration& configuration)
-    : period_(period_of(configuration)),
-      slave_(!configuration.master.empty()),
-      slew_(rounded(static_cast<double>(period_.ns) * configuration.grid_slew_ppm * 1e-6)),
+RecordHistory::RecordHistory(const RecordLimits& limits)
+    : period_(limits.period),
+      slave_(limits.slave),
+      slew_(rounded(static_cast<double>(period_.ns) * limits.grid_slew_ppm * 1e-6)),
       pace_(period_, period_ / first_pace_parts),
       latency_(first_tolerance),
       length_(first_tolerance) {
-    lengths_[length_count_++] = from_us(configuration.exposure_us);
+    lengths_[length_count_++] = limits.exposure;
 }
 
-std::optional<Implausibility> ExposureHistory::doubt(const ExposureObservation& exposure) const {
-    const wire::Exposure& record = exposure.record;
+std::optional<Implausibility> RecordHistory::doubt(const ReceivedRecord& received) const {
+    const wire::Exposure& record = received.record;
     if (newest_)
         if (auto doubt = number_doubt(record)) return doubt;
     if (newest_ && grid_known_)
         if (auto doubt = trigger_doubt(record)) return doubt;
     if (auto doubt = start_doubt(record)) return doubt;
-    return end_doubt(exposure);
+    return end_doubt(received);
 }
 
 /// Each trigger has a grid point of its own, in order, and each grid point a trigger, but for those
 /// that the board leaves out.
-std::optional<Implausibility> ExposureHistory::number_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> RecordHistory::number_doubt(const wire::Exposure& record) const {
     const std::uint64_t ticks = record.tick - newest_->tick;
     const std::uint64_t triggers = record.trigger - newest_->trigger;
     const bool counted = record.trigger > newest_->trigger;
@@ -106,12 +113,12 @@ std::optional<Implausibility> ExposureHistory::number_doubt(const wire::Exposure
                           static_cast<std::int64_t>(newest_->trigger + 1)};
 }
 
-bool ExposureHistory::may_skip(const wire::Exposure& record, std::uint64_t points) const {
+bool RecordHistory::may_skip(const wire::Exposure& record, std::uint64_t points) const {
     constexpr unsigned sparse = wire::exposure_pattern | wire::exposure_slow;
     return points <= skips_ || slave_ || has(record, sparse) || has(*newest_, sparse);
 }
 
-std::optional<Implausibility> ExposureHistory::trigger_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> RecordHistory::trigger_doubt(const wire::Exposure& record) const {
     const Duration since{record.trigger_ns - punctual_->trigger_ns};
     const std::uint64_t ticks = record.tick - punctual_->tick;
     const Implausibility doubt{EventReason::implausible_time, record.trigger_ns,
@@ -132,7 +139,7 @@ std::optional<Implausibility> ExposureHistory::trigger_doubt(const wire::Exposur
 
 /// By how much two triggers may lie closer or further apart, because other exposures were expected
 /// of them.
-Duration ExposureHistory::compensation(const wire::Exposure& record) const {
+Duration RecordHistory::compensation(const wire::Exposure& record) const {
     const std::size_t known = std::min(length_count_, remembered_lengths);
     auto [shortest, longest] = std::minmax_element(lengths_, lengths_ + known);
     Duration low = *shortest;
@@ -145,25 +152,24 @@ Duration ExposureHistory::compensation(const wire::Exposure& record) const {
     return (high - low) / 2;
 }
 
-std::optional<Implausibility> ExposureHistory::start_doubt(const wire::Exposure& record) const {
+std::optional<Implausibility> RecordHistory::start_doubt(const wire::Exposure& record) const {
     if (!has_start(record)) return std::nullopt;
     if (latency_.fits({record.start_ns - record.trigger_ns})) return std::nullopt;
     return Implausibility{EventReason::implausible_time, record.start_ns,
                           record.trigger_ns + latency_.value().ns};
 }
 
-std::optional<Implausibility> ExposureHistory::end_doubt(
-    const ExposureObservation& exposure) const {
-    const wire::Exposure& record = exposure.record;
+std::optional<Implausibility> RecordHistory::end_doubt(const ReceivedRecord& received) const {
+    const wire::Exposure& record = received.record;
     if (!has_start(record) || !has_end(record)) return std::nullopt;
-    if (exposure.commanded.ns == 0 || exposure.commanded != commanded_) return std::nullopt;
+    if (received.commanded.ns == 0 || received.commanded != commanded_) return std::nullopt;
     if (length_.fits({record.end_ns - record.start_ns})) return std::nullopt;
     return Implausibility{EventReason::implausible_length, record.end_ns,
                           record.start_ns + length_.value().ns};
 }
 
-void ExposureHistory::learn(const ExposureObservation& exposure) {
-    const wire::Exposure& record = exposure.record;
+void RecordHistory::learn(const ReceivedRecord& received) {
+    const wire::Exposure& record = received.record;
     if (grid_known_ && !has(record, wire::exposure_late) && !has(*punctual_, wire::exposure_late) &&
         compensation(record) * 2 < equal_exposures) {
         const auto ticks = static_cast<std::int64_t>(record.tick - punctual_->tick);
@@ -178,19 +184,39 @@ void ExposureHistory::learn(const ExposureObservation& exposure) {
     if (!has_end(record)) return;
     const Duration length{record.end_ns - record.start_ns};
     lengths_[length_count_++ % remembered_lengths] = length;
-    if (exposure.commanded != commanded_) length_ = RunningEstimate(first_tolerance);
-    commanded_ = exposure.commanded;
+    if (received.commanded != commanded_) length_ = RunningEstimate(first_tolerance);
+    commanded_ = received.commanded;
     length_.learn(length);
 }
 
-bool ExposureHistory::repeats(const ExposureObservation& exposure) const {
-    return of_newest_trigger(exposure.record) && !disputes_newest(exposure.record);
+bool RecordHistory::repeats(const ReceivedRecord& received) const {
+    return of_newest_trigger(received.record) && !disputes_newest(received.record);
 }
 
-bool ExposureHistory::disputes_newest(const wire::Exposure& record) const {
+bool RecordHistory::disputes_newest(const wire::Exposure& record) const {
     return of_newest_trigger(record) &&
            (newest_->start_ns != record.start_ns || newest_->end_ns != record.end_ns ||
             newest_->trigger_ns != record.trigger_ns);
 }
 
-}  // namespace versavis::daemon
+RecordFilter::RecordFilter(const RecordLimits& limits)
+    : limits_(limits), filter_(RecordHistory(limits), records_to_confirm) {}
+
+RecordVerdict RecordFilter::judge(const ReceivedRecord& received) {
+    verdict_ = {};
+    verdict_.doubt = contradicts_itself(received.record, limits_);
+    if (verdict_.doubt) return verdict_;
+    std::optional<Implausibility> arrival;
+    if (received.arrival != EventReason::none)
+        arrival = {received.arrival, newest_instant(received.record).ns, received.expected_ns};
+    verdict_.doubt = filter_.judge(received, received.exchanges, arrival);
+    verdict_.overturned = filter_.overturned();
+    if (verdict_.doubt && !arrival && !received.clock_contradicted &&
+        filter_.stepped(received.exchanges)) {
+        filter_.adopt(received);
+        verdict_.step = std::exchange(verdict_.doubt, std::nullopt);
+    }
+    return verdict_;
+}
+
+}  // namespace versavis::pairing

@@ -8,7 +8,7 @@
 #include "engine/rounding.hpp"
 #include "versavis/time.hpp"
 
-namespace versavis::daemon {
+namespace versavis {
 
 /// Not thread-safe.
 class RunningEstimate {
@@ -66,4 +66,4 @@ class RunningEstimate {
     double count_ = 0;
 };
 
-}  // namespace versavis::daemon
+}  // namespace versavis

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/pairing/record_gate.hpp"
+#include "engine/pairing/record_delay.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,15 +7,6 @@
 namespace versavis::pairing {
 
 namespace {
-
-// How far the distance of two starts may be off that of their grid points, in periods. Exposures
-// begin earlier by half of what they grow. At half a sudden long exposure looks like a step; at
-// twice (1.2) a step by one period passes.
-constexpr double off_grid = 0.6;
-
-// The same for the rate of a grid that follows another clock. At half a grid that slews may look
-// like a step after a pause; at twice a step during a pause of some seconds passes.
-constexpr double grid_rate = 2e-3;
 
 // How far off the quickest delay a record is neither late nor early, in periods. At half a busy
 // link keeps ids that began anew from being repaired; at twice a step by half a period is not
@@ -42,49 +33,34 @@ double apart_ns(Time from, Time to) {
 
 }  // namespace
 
-bool RecordGate::in_order(const Exposure& before, const Exposure& after) const {
-    if (after.trigger <= before.trigger || after.tick <= before.tick ||
-        after.trigger - before.trigger > after.tick - before.tick)
-        return false;
-    const auto period = static_cast<double>(period_.ns);
-    const double by_grid = static_cast<double>(after.tick - before.tick) * period;
-    return std::abs(apart_ns(before.start, after.start) - by_grid) <=
-           off_grid * period + grid_rate * by_grid;
-}
-
-std::int64_t RecordGate::tolerance_ns() const {
+std::int64_t RecordDelay::tolerance_ns() const {
     return std::max(part_of(period_.ns, off_delay), least_off_delay_ns);
 }
 
 /// Least time from the end of an exposure until its record comes.
-double RecordGate::earliest_ns() const {
+double RecordDelay::earliest_ns() const {
     const auto least_ns = static_cast<double>(earliest_.ns);
     if (confirmed_ < records_to_confirm) return least_ns;
     return std::max(least_ns, static_cast<double>(*least_delay_ns_ - tolerance_ns()));
 }
 
-bool RecordGate::too_early(const Exposure& exposure) const {
+bool RecordDelay::too_early(const Exposure& exposure) const {
     return exposure.recorded.ns != 0 &&
            apart_ns(exposure.earliest_on_host, exposure.recorded) < earliest_ns();
 }
 
-bool RecordGate::live() const {
+bool RecordDelay::live() const {
     return !newest_exposed_ ||
            apart_ns(newest_exposed_->earliest_on_host, late_until_) <= earliest_ns();
 }
 
-bool RecordGate::accepts(const Exposure& exposure) const {
-    return !too_early(exposure) && (!newest_ || in_order(*newest_, exposure));
-}
-
-void RecordGate::take(const Exposure& exposure) {
-    newest_ = exposure;
+void RecordDelay::take(const Exposure& exposure) {
     if (!exposure.exposed) return;
-    if (exposure.recorded.ns != 0) learn_delay(exposure);
+    if (exposure.recorded.ns != 0) learn(exposure);
     newest_exposed_ = exposure;
 }
 
-void RecordGate::learn_delay(const Exposure& exposure) {
+void RecordDelay::learn(const Exposure& exposure) {
     const std::int64_t delay_ns = (exposure.recorded - exposure.earliest_on_host).ns;
     const double since_ns = newest_exposed_ ? apart_ns(newest_exposed_->start, exposure.start) : 0;
     const bool first = !least_delay_ns_;

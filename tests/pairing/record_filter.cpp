@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/pairing/record_filter.hpp"
+
+#include <rapidcheck.h>
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+using namespace versavis::pairing;
+
+namespace {
+
+RecordLimits camera() {
+    RecordLimits limits;
+    limits.exposure = milliseconds(4);
+    limits.max_exposure = milliseconds(40);
+    return limits;
+}
+
+/// The record of the trigger at `tick`, as the board sends it: its middle is on the grid if the
+/// exposure is as expected.
+wire::Exposure record(std::uint64_t tick, Duration exposure, Duration expected) {
+    wire::Exposure made{};
+    made.trigger = made.tick = tick;
+    made.flags = wire::exposure_measured;
+    made.trigger_ns = static_cast<std::int64_t>(tick) * 50'000'000 - expected.ns / 2;
+    made.start_ns = made.trigger_ns + 20'000;
+    made.end_ns = made.start_ns + exposure.ns;
+    return made;
+}
+
+wire::Exposure displaced(wire::Exposure made, std::uint64_t trigger, Duration by) {
+    made.trigger = trigger;
+    made.trigger_ns += by.ns;
+    made.start_ns += by.ns;
+    made.end_ns += by.ns;
+    return made;
+}
+
+struct Bench {
+    Bench() {
+        // What is confirmed is no longer overturned by those that contradict it.
+        for (std::uint64_t tick = 1; tick <= before; ++tick)
+            REQUIRE(believes(record(tick, milliseconds(4), milliseconds(4))));
+    }
+
+    bool believes(const wire::Exposure& made, Duration commanded = {}) {
+        ReceivedRecord received;
+        received.record = made;
+        received.commanded = commanded;
+        return !filter.judge(received).doubt;
+    }
+
+    static constexpr std::uint64_t before = 3;
+    RecordFilter filter{camera()};
+};
+
+}  // namespace
+
+TEST_CASE("record_filter: exposures that vary move the triggers, and are believed") {
+    Bench bench;
+    Duration expected = milliseconds(4);
+    const std::vector<Duration> exposures{milliseconds(4),  milliseconds(4), milliseconds(30),
+                                          milliseconds(30), milliseconds(2), milliseconds(2),
+                                          milliseconds(17), milliseconds(1)};
+    for (std::uint64_t tick = Bench::before + 1; tick < 100; ++tick) {
+        const Duration exposure = exposures[tick % exposures.size()];
+        CHECK(bench.believes(record(tick, exposure, expected)));
+        expected = exposure;
+    }
+}
+
+TEST_CASE("record_filter: an exposure of which the camera says that it is fixed stays so") {
+    Bench bench;
+    const Duration fixed = milliseconds(4);
+    for (std::uint64_t tick = Bench::before + 1; tick < 40; ++tick)
+        CHECK(bench.believes(record(tick, fixed, fixed), fixed));
+    CHECK_FALSE(bench.believes(record(40, fixed + microseconds(150), fixed), fixed));
+    // Set anew, the new one is learned.
+    CHECK(bench.believes(record(41, milliseconds(9), fixed), milliseconds(9)));
+    CHECK_FALSE(bench.believes(record(42, milliseconds(11), milliseconds(9)), milliseconds(9)));
+}
+
+TEST_CASE("record_filter: lost records, skipped triggers and late ones are no contradiction") {
+    Bench bench;
+    const Duration fixed = milliseconds(4);
+    for (std::uint64_t tick = Bench::before + 1; tick < 20; ++tick)
+        bench.believes(record(tick, fixed, fixed));
+    wire::Exposure skipped = record(25, fixed, fixed);
+    skipped.trigger = 22;
+    CHECK_FALSE(bench.believes(skipped));
+    bench.filter.triggers_skipped(1);
+    CHECK_FALSE(bench.believes(skipped));
+    bench.filter.triggers_skipped(2);
+    CHECK(bench.believes(skipped));
+    wire::Exposure late = displaced(record(26, fixed, fixed), 23, microseconds(1500));
+    CHECK_FALSE(bench.believes(late));
+    late.flags |= wire::exposure_late;
+    CHECK(bench.believes(late));
+    // It excuses nothing in those after it.
+    CHECK_FALSE(bench.believes(displaced(record(27, fixed, fixed), 24, microseconds(500))));
+    wire::Exposure next = record(27, fixed, fixed);
+    next.trigger = 24;
+    CHECK(bench.believes(next));
+}
+
+TEST_CASE("record_filter: flags say which line there is") {
+    RecordLimits limits = camera();
+    const bool wired = limits.wired = GENERATE(true, false);
+    const bool slave = limits.slave = GENERATE(true, false);
+    wire::Exposure made = record(1, milliseconds(4), milliseconds(4));
+    const auto agrees = [&](unsigned flags) {
+        made.flags = static_cast<std::uint16_t>(flags);
+        return !contradicts_itself(made, limits);
+    };
+    CHECK(agrees(wire::exposure_measured) == wired);
+    CHECK(agrees(wire::exposure_measured | wire::exposure_from_master) == (!wired && slave));
+    CHECK(agrees(wire::exposure_predicted) == (!wired && !slave));
+    CHECK_FALSE(agrees(wire::exposure_no_start));
+    CHECK_FALSE(agrees(wire::exposure_no_end));
+    CHECK_FALSE(agrees(0));
+}
+
+TEST_CASE("record_filter: no field of a record overflows anything") {
+    Bench bench;
+    for (std::uint64_t tick = Bench::before + 1; tick < 20; ++tick)
+        bench.believes(record(tick, milliseconds(4), milliseconds(4)));
+    CHECK(rc::check("random fields", [&] {
+        wire::Exposure made = record(20, milliseconds(4), milliseconds(4));
+        if (*rc::gen::arbitrary<bool>()) made.trigger = *rc::gen::arbitrary<std::uint64_t>();
+        if (*rc::gen::arbitrary<bool>()) made.tick = *rc::gen::arbitrary<std::uint64_t>();
+        if (*rc::gen::arbitrary<bool>())
+            made.trigger_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
+        if (*rc::gen::arbitrary<bool>())
+            made.start_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
+        if (*rc::gen::arbitrary<bool>())
+            made.end_ns = *rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 60);
+        const wire::Exposure honest = record(20, milliseconds(4), milliseconds(4));
+        const bool damaged = made.trigger != honest.trigger || made.tick != honest.tick ||
+                             made.trigger_ns != honest.trigger_ns ||
+                             made.start_ns != honest.start_ns || made.end_ns != honest.end_ns;
+        Bench fresh = bench;
+        const bool believed = fresh.believes(made);
+        RC_ASSERT(believed != damaged || (believed && made.trigger == 20 && made.tick == 20));
+    }));
+}
+
+TEST_CASE("record_filter: a record that comes at an impossible time is doubted, whatever it says") {
+    Bench bench;
+    ReceivedRecord received;
+    received.record = record(4, milliseconds(4), milliseconds(4));
+    received.expected_ns = 17;
+    received.arrival = GENERATE(EventReason::not_yet, EventReason::too_old);
+    const RecordVerdict verdict = bench.filter.judge(received);
+    REQUIRE(verdict.doubt);
+    CHECK(verdict.doubt->reason == received.arrival);
+    CHECK(verdict.doubt->said == received.record.end_ns);
+    CHECK(verdict.doubt->expected == 17);
+    CHECK(bench.filter.verdict().doubt);
+    received.arrival = EventReason::none;
+    CHECK_FALSE(bench.filter.judge(received).doubt);
+}
+
+TEST_CASE("record_filter: three that agree on another time are a step, if the clock agrees, too") {
+    Bench bench;
+    const auto judge = [&](std::uint64_t tick, std::uint64_t exchanges, EventReason arrival,
+                           bool contradicted) {
+        ReceivedRecord received;
+        received.record =
+            displaced(record(tick, milliseconds(4), milliseconds(4)), tick, milliseconds(10));
+        received.exchanges = exchanges;
+        received.arrival = arrival;
+        received.clock_contradicted = contradicted;
+        return bench.filter.judge(received);
+    };
+    const auto doubted = [&](const RecordVerdict& verdict) {
+        return verdict.doubt && !verdict.step && !verdict.overturned;
+    };
+    CHECK(doubted(judge(4, 10, EventReason::none, false)));
+    CHECK(doubted(judge(5, 12, EventReason::none, false)));
+    CHECK(doubted(judge(6, 13, EventReason::none, false)));  // three exchanges since
+    CHECK(doubted(judge(7, 14, EventReason::none, true)));
+    CHECK(doubted(judge(8, 15, EventReason::not_yet, false)));
+    const RecordVerdict step = judge(9, 16, EventReason::none, false);
+    CHECK_FALSE(step.doubt);
+    REQUIRE(step.step);
+    CHECK(step.step->reason == EventReason::implausible_time);
+    CHECK_FALSE(judge(10, 16, EventReason::none, false).step);
+    CHECK_FALSE(bench.filter.verdict().doubt);
+}
+
+TEST_CASE("record_filter: before three agree, one that contradicts them makes them void") {
+    RecordFilter filter{camera()};
+    ReceivedRecord received;
+    received.record = record(7, milliseconds(4), milliseconds(4));
+    CHECK_FALSE(filter.judge(received).overturned);
+    received.record = displaced(record(8, milliseconds(4), milliseconds(4)), 8, milliseconds(10));
+    const RecordVerdict verdict = filter.judge(received);
+    CHECK(verdict.overturned);
+    CHECK_FALSE(verdict.doubt);
+}
+
+TEST_CASE("record_filter: what was believed is known until all is forgotten") {
+    Bench bench;
+    wire::Exposure other = record(3, milliseconds(4), milliseconds(4));
+    CHECK_FALSE(bench.filter.disputes_newest(other));
+    ++other.start_ns;
+    CHECK(bench.filter.disputes_newest(other));
+    // The grid moves, and triggers are counted on.
+    bench.filter.forget_grid();
+    CHECK_FALSE(bench.believes(
+        displaced(record(5, milliseconds(4), milliseconds(4)), 3, milliseconds(20))));
+    CHECK(bench.believes(
+        displaced(record(5, milliseconds(4), milliseconds(4)), 4, milliseconds(20))));
+    bench.filter.forget();
+    CHECK(bench.believes(record(1, milliseconds(4), milliseconds(4))));
+}
