@@ -3,9 +3,9 @@
 
 #include <fmt/ranges.h>
 
-#include "base/thread_name.hpp"
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_file.hpp"
+#include "posix/thread.hpp"
 #include "settings/board_configuration.hpp"
 #include "settings/board_parts.hpp"
 
@@ -84,7 +84,7 @@ BoardLink::BoardLink(OpenStream open, const Configuration& configuration, double
 BoardLink::~BoardLink() { stop(); }
 
 void BoardLink::start() {
-    thread_ = std::thread([this] { run(); });
+    thread_ = start_thread("link", [this] { run(); });
 }
 
 void BoardLink::stop() {
@@ -120,7 +120,6 @@ BoardReport BoardLink::report() const {
 }
 
 void BoardLink::run() {
-    name_thread("link");
     set_state(BoardState::absent, "looking for it");
     for (bool go_on = true; go_on;) {
         auto stream = open_();

@@ -2,7 +2,8 @@
 #include "receive_mode.hpp"
 
 #include <sys/socket.h>
-#include <unistd.h>
+
+#include "posix/file_descriptor.hpp"
 
 namespace versavis::daemon {
 
@@ -18,10 +19,8 @@ Duration receive_lateness(const CameraConfiguration& camera) {
 }
 
 bool packet_socket_allowed() {
-    const int socket = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);  // receives nothing
-    if (socket < 0) return false;
-    ::close(socket);
-    return true;
+    // It receives nothing.
+    return FileDescriptor(::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0)).get() >= 0;
 }
 
 Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed,
