@@ -47,6 +47,7 @@ static_assert(offsetof(versavis_event, count) == offsetof(EventMetadata, count))
 static_assert(sizeof(ring::Payload) <= sizeof(versavis_item::held) &&
               alignof(ring::Payload) <= alignof(std::uint64_t));
 static_assert(static_cast<int>(Pause::gone) == VERSAVIS_GONE);
+static_assert(static_cast<int>(SpanGap::numbers) == VERSAVIS_SPAN_NUMBERS);
 static_assert(VERSAVIS_MOST_CAMERAS <= 32);
 
 /// An item that was begun with zeros holds nothing.
@@ -157,7 +158,7 @@ void fill(versavis_imu_span& to, versavis_imu_window& window, const ImuSpan& spa
     to.samples = window.samples.data();
     to.count = window.samples.size();
     to.lost = span.lost;
-    to.covered = span.covered ? 1 : 0;
+    to.gap = static_cast<std::uint32_t>(span.gap);
     to.has_beyond = span.beyond ? 1 : 0;
     to.beyond = span.beyond ? sample_of(*span.beyond) : versavis_imu_sample{};
 }
@@ -179,7 +180,8 @@ void fill(versavis_set& to, versavis_sets& sets, FrameSet made) {
     to.imu = sets.imu.data();
     to.imu_count = sets.imu.size();
     to.imu_lost = made.imu.lost;
-    to.imu_covered = made.imu.covered ? 1 : 0;
+    to.imu_covered = made.imu.covered() ? 1 : 0;
+    to.imu_gap = static_cast<std::uint32_t>(made.imu.gap);
 }
 
 Expected<SetReader> open_sets(const std::vector<std::string>& names, const StreamOptions& streams,
@@ -378,12 +380,12 @@ int versavis_imu_window_open(const char* instance, const char* stream,
 
 void versavis_imu_window_close(versavis_imu_window* window) { delete window; }
 
-int versavis_imu_window_between(versavis_imu_window* window, int64_t after, int64_t upto,
-                                int64_t patience, versavis_imu_span* span) {
+int versavis_imu_window_span(versavis_imu_window* window, uint32_t epoch, int64_t after,
+                             int64_t upto, int64_t patience, versavis_imu_span* span) {
     if (window == nullptr || span == nullptr || upto < after) return VERSAVIS_INVALID;
     return guarded(nullptr, [&]() -> int {
-        const auto found =
-            window->window.between(OutputTime{after}, OutputTime{upto}, nanoseconds(patience));
+        const auto found = window->window.between(OutputTime{after}, OutputTime{upto}, epoch,
+                                                  nanoseconds(patience));
         if (!found) return static_cast<int>(found.error().why);
         fill(*span, *window, *found);
         return VERSAVIS_OK;

@@ -62,7 +62,8 @@ struct SetReader::State {
     std::map<Key, Pending> pending;
     std::vector<std::optional<Key>> newest;  ///< of each camera
     std::optional<Key> finished;             ///< of the set before
-    std::optional<OutputTime> last;          ///< latest stamp of the set before
+    std::optional<OutputTime> last;          ///< latest stamp of the set before, and its epoch
+    std::uint32_t last_epoch = 0;
     std::uint64_t life{};
     std::vector<bool> ended;  ///< of each camera: its stream is gone
     SetReport report;
@@ -76,6 +77,7 @@ struct SetReader::State {
     bool decided(const Key& key, const Pending& set) const;
     std::optional<FrameSet> ready();
     FrameSet finish(const Key& key, Pending set);
+    ImuSpan samples_until(OutputTime latest, std::uint32_t epoch);
     std::optional<HostTime> next_deadline() const;
 };
 
@@ -168,10 +170,21 @@ FrameSet SetReader::State::finish(const Key& key, Pending set) {
     made.time = times.front();
     made.spread = spread_of(*earliest, *latest);
     finished = key;
-    if (imu) made.imu = imu->take(last.value_or(*latest), *latest);
+    if (imu) made.imu = samples_until(*latest, made.epoch);
     last = *latest;
+    last_epoch = made.epoch;
     ++report.sets;
     return made;
+}
+
+ImuSpan SetReader::State::samples_until(OutputTime latest, std::uint32_t epoch) {
+    constexpr OutputTime before_all{std::numeric_limits<std::int64_t>::min()};
+    ImuSpan span = imu->take(last && last_epoch == epoch ? *last
+                             : last                      ? before_all
+                                                         : latest,
+                             latest, epoch);
+    if (!last) span.gap = SpanGap::begin;  // no set before says from where on they count
+    return span;
 }
 
 std::optional<FrameSet> SetReader::State::ready() {
@@ -189,7 +202,8 @@ std::optional<FrameSet> SetReader::State::ready() {
         OutputTime latest{INT64_MIN};
         for (const auto& frame : frames)
             if (frame) latest = std::max(latest, frame->time, std::less<>());
-        if (imu && !imu->reaches(latest) && !is_over(first->second.give_up)) return std::nullopt;
+        if (imu && !imu->reaches(latest, first->first.first) && !is_over(first->second.give_up))
+            return std::nullopt;
         if (!whole) ++report.incomplete;
         auto node = pending.extract(first);
         return finish(node.key(), std::move(node.mapped()));

@@ -266,11 +266,20 @@ typedef struct versavis_imu_sample {
 
 typedef struct versavis_imu_window versavis_imu_window;
 
+/* Why samples do not reach from the first instant to the second. */
+typedef enum versavis_span_gap {
+    VERSAVIS_SPAN_COVERED = 0,
+    VERSAVIS_SPAN_BEGIN = 1,   /* no sample at or before the first instant is known */
+    VERSAVIS_SPAN_END = 2,     /* no sample of the second instant or later has come yet */
+    VERSAVIS_SPAN_EPOCH = 3,   /* the epoch began or ended within: times beyond do not compare */
+    VERSAVIS_SPAN_NUMBERS = 4, /* numbers stand still or go back: how many are lost is unknown */
+} versavis_span_gap;
+
 typedef struct versavis_imu_span {
     const versavis_imu_sample *samples; /* until the next call or close */
     size_t count;
     uint64_t lost;              /* samples missing within them */
-    int32_t covered;            /* 1: they reach from the first instant to the second */
+    uint32_t gap;               /* a versavis_span_gap */
     int32_t has_beyond;         /* 1: beyond is there */
     versavis_imu_sample beyond; /* the first one after the second instant, to interpolate */
 } versavis_imu_span;
@@ -281,12 +290,12 @@ VERSAVIS_EXPORT int versavis_imu_window_open(const char *instance, const char *s
                                              versavis_imu_window **opened, versavis_error *error);
 VERSAVIS_EXPORT void versavis_imu_window_close(versavis_imu_window *window);
 
-/* Samples with after < time <= upto. Waits up to patience until one of upto or later has come; then
- * covered is 0. Spans may follow each other or overlap. VERSAVIS_RESTARTED, once: times before and
- * after do not compare. */
-VERSAVIS_EXPORT int versavis_imu_window_between(versavis_imu_window *window, int64_t after,
-                                                int64_t upto, int64_t patience,
-                                                versavis_imu_span *span);
+/* Samples of epoch, that of the instants, with after < time <= upto. Waits up to patience until one
+ * of upto or later has come, or of a later epoch. Spans may follow each other or overlap.
+ * VERSAVIS_RESTARTED, once: times before and after do not compare. */
+VERSAVIS_EXPORT int versavis_imu_window_span(versavis_imu_window *window, uint32_t epoch,
+                                             int64_t after, int64_t upto, int64_t patience,
+                                             versavis_imu_span *span);
 
 /* ---- Sets of frames ---------------------------------------------------------------------- */
 
@@ -312,8 +321,8 @@ typedef struct versavis_set {
     const versavis_imu_sample *imu; /* since the set before; until the next call or close */
     size_t imu_count;
     uint64_t imu_lost;   /* samples missing within them */
-    int32_t imu_covered; /* 1: they reach up to the latest stamp of this set */
-    uint32_t reserved;
+    int32_t imu_covered; /* 1: they reach from the set before to the latest stamp of this one */
+    uint32_t imu_gap;    /* a versavis_span_gap */
 } versavis_set;
 #define VERSAVIS_SET_INIT VERSAVIS_ZEROS
 

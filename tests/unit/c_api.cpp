@@ -61,6 +61,7 @@ struct CApi {
     static void samples(ring::Writer& imu, std::int64_t first, std::int64_t last,
                         std::uint64_t number) {
         ImuMetadata sample{};
+        sample.epoch = 1;
         for (std::int64_t time = first; time <= last; ++time) {
             sample.number = number++;
             imu.publish(OutputTime{time}, pack(sample));
@@ -473,7 +474,7 @@ TEST_CASE_METHOD(CApi, "c_api: NULL beside what is not is refused, too") {
     versavis_set_report report{};
     CHECK(versavis_sets_report(sets, nullptr) == VERSAVIS_INVALID);
     CHECK(versavis_sets_report(nullptr, &report) == VERSAVIS_INVALID);
-    CHECK(versavis_imu_window_between(window, 1, 2, 0, nullptr) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_span(window, 0, 1, 2, 0, nullptr) == VERSAVIS_INVALID);
     CHECK(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, nullptr, nullptr) ==
           VERSAVIS_INVALID);
     versavis_release(&item);
@@ -526,22 +527,22 @@ TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
     REQUIRE(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, &window, &error) ==
             VERSAVIS_OK);
     versavis_imu_span span{};
-    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    REQUIRE(versavis_imu_window_span(window, 0, 1000, 1002, 0, &span) == VERSAVIS_OK);
     REQUIRE(span.count == 2);
     CHECK(span.samples[1].time == 1002);
-    CHECK(span.covered == 1);
+    CHECK(span.gap == VERSAVIS_SPAN_COVERED);
     CHECK(span.lost == 1);  // up to the one beyond
     CHECK(span.has_beyond == 1);
     CHECK(span.beyond.time == 1003);
     CHECK(span.beyond.data.number == 4);
-    REQUIRE(versavis_imu_window_between(window, 1002, 2000, 0, &span) == VERSAVIS_OK);
+    REQUIRE(versavis_imu_window_span(window, 0, 1002, 2000, 0, &span) == VERSAVIS_OK);
     CHECK(span.count == 2);
-    CHECK(span.covered == 0);
+    CHECK(span.gap == VERSAVIS_SPAN_END);
     CHECK(span.has_beyond == 0);
-    CHECK(versavis_imu_window_between(window, 2000, 2000, -1, &span) == VERSAVIS_OK);
+    CHECK(versavis_imu_window_span(window, 0, 2000, 2000, -1, &span) == VERSAVIS_OK);
     CHECK(span.count == 0);
-    CHECK(versavis_imu_window_between(window, 2, 1, 0, &span) == VERSAVIS_INVALID);
-    CHECK(versavis_imu_window_between(nullptr, 1, 2, 0, &span) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_span(window, 0, 2, 1, 0, &span) == VERSAVIS_INVALID);
+    CHECK(versavis_imu_window_span(nullptr, 0, 1, 2, 0, &span) == VERSAVIS_INVALID);
     versavis_imu_window_close(window);
     CHECK(versavis_imu_window_open(instance.c_str(), "cam0", nullptr, &window, &error) ==
           VERSAVIS_ERROR);
@@ -563,12 +564,12 @@ TEST_CASE_METHOD(CApi,
             VERSAVIS_OK);
     samples(*first, 1000, 1004, 0);
     versavis_imu_span span{};
-    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    REQUIRE(versavis_imu_window_span(window, 1, 1000, 1002, 0, &span) == VERSAVIS_OK);
     first.reset();
     ring::Writer second = make_imu();
     samples(second, 1000, 1002, 0);
-    CHECK(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_RESTARTED);
-    REQUIRE(versavis_imu_window_between(window, 1000, 1002, 0, &span) == VERSAVIS_OK);
+    CHECK(versavis_imu_window_span(window, 1, 1000, 1002, 0, &span) == VERSAVIS_RESTARTED);
+    REQUIRE(versavis_imu_window_span(window, 1, 1000, 1002, 0, &span) == VERSAVIS_OK);
     CHECK(span.count == 2);
     versavis_imu_window_close(window);
 }
@@ -587,6 +588,7 @@ TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     versavis_set set = VERSAVIS_SET_INIT;
     CHECK(versavis_sets_next(sets, &set, 0) == VERSAVIS_NOTHING);
     ImuMetadata sample{};
+    sample.epoch = 1;
     sample.gyro[1] = 0.5F;
     for (std::int64_t i = 0; i < 5; ++i) {
         sample.number = static_cast<std::uint64_t>(i + 1);
@@ -604,6 +606,8 @@ TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     CHECK(static_cast<const std::uint8_t*>(set.frames[1].payload)[0] == 2);
     CHECK(versavis_valid(&set.frames[0]) == 1);
     CHECK(set.imu_count == 0);  // there was no set before
+    CHECK(set.imu_covered == 0);
+    CHECK(set.imu_gap == VERSAVIS_SPAN_BEGIN);
     frame(*camera, 4);
     frame(*other, 4);
     REQUIRE(versavis_sets_next(sets, &set, 0) == VERSAVIS_OK);
@@ -615,6 +619,7 @@ TEST_CASE_METHOD(CApi, "c_api: sets of frames with the samples between them") {
     CHECK(report.sets == 2);
     CHECK(set.imu_lost == 0);
     CHECK(set.imu_covered == 1);
+    CHECK(set.imu_gap == VERSAVIS_SPAN_COVERED);
     samples(imu, 1005, 1006, 8);  // two are missing
     frame(*camera, 6);
     frame(*other, 6);
@@ -671,6 +676,7 @@ TEST_CASE_METHOD(CApi, "c_api: sets that lack something, by the options") {
     REQUIRE(versavis_sets_next(lenient, &set, 0) == VERSAVIS_OK);
     CHECK(set.present == 3);
     CHECK(set.imu_covered == 0);
+    CHECK(set.imu_gap != VERSAVIS_SPAN_COVERED);
     REQUIRE(versavis_sets_next(lenient, &set, 0) == VERSAVIS_OK);
     CHECK(set.present == 2);
     CHECK(set.frames[0].payload == nullptr);

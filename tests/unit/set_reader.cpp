@@ -67,11 +67,11 @@ struct Rig {
         REQUIRE(slot);
         writer.publish(*slot, 8, OutputTime{time_of(tick) + late_ns}, pack(metadata));
     }
-    void sample(std::int64_t time_ns, std::uint64_t skipped = 0) {
+    void sample(std::int64_t time_ns, std::uint64_t skipped = 0, std::uint32_t epoch = 1) {
         ImuMetadata metadata{};
         sample_number += 1 + skipped;
         metadata.number = sample_number;
-        metadata.epoch = 1;
+        metadata.epoch = epoch;
         imu->publish(OutputTime{time_ns}, pack(metadata));
     }
     static std::int64_t time_of(std::uint64_t tick) {
@@ -186,7 +186,7 @@ TEST_CASE_METHOD(Rig, "set_reader: samples since the set before come with it, on
     auto set = sets.next({});
     REQUIRE(set);
     CHECK(set->imu.samples.empty());  // there was none before
-    CHECK(set->imu.covered);
+    CHECK(set->imu.gap == SpanGap::begin);
     REQUIRE(set->imu.beyond);
     CHECK(set->imu.beyond->time.ns == time_of(1) + step);
     sample(time_of(1) + 2 * step);
@@ -200,8 +200,42 @@ TEST_CASE_METHOD(Rig, "set_reader: samples since the set before come with it, on
     CHECK(set->imu.samples[0].time.ns == time_of(1) + step);
     CHECK(set->imu.samples[2].time.ns == time_of(2));  // up to and with its stamp
     CHECK(set->imu.lost == 3);
-    CHECK(set->imu.covered);
+    CHECK(set->imu.covered());
     CHECK_FALSE(set->imu.complete());
+}
+
+TEST_CASE_METHOD(Rig, "set_reader: where the clock steps, no set has samples of another epoch") {
+    const std::int64_t step_ns = GENERATE(-300, -100, -50, 3'600'000) * std::int64_t{1'000'000};
+    SetOptions with_imu = options();
+    with_imu.imu = "imu";
+    SetReader sets = open(with_imu);
+    constexpr std::int64_t between_samples_ns = period_ns / 10;
+    constexpr std::uint64_t last_before = 20;
+    std::uint64_t delivered = 0;
+    for (std::uint64_t tick = 10; tick < 35; ++tick) {
+        const bool stepped = tick > last_before;
+        const std::uint32_t epoch = stepped ? 2 : 1;
+        const std::int64_t by_ns = stepped ? step_ns : 0;
+        frame(*a, tick, by_ns, 0, epoch);
+        frame(*b, tick, by_ns, 0, epoch);
+        for (int i = -4; i <= 5; ++i)
+            sample(time_of(tick) + i * between_samples_ns + by_ns, 0, epoch);
+        const auto set = sets.next({});
+        REQUIRE(set);
+        CHECK(set->tick == tick);
+        for (const ImuSample& sample : set->imu.samples) CHECK(sample.data.epoch == epoch);
+        if (tick == 10) continue;
+        ++delivered;
+        if (tick == last_before + 1) {  // those since the epoch began
+            CHECK(set->imu.gap == SpanGap::epoch);
+            CHECK(set->imu.samples.size() == 5);
+            continue;
+        }
+        CHECK(set->imu.complete());
+        REQUIRE(set->imu.samples.size() == 10);
+        CHECK(set->imu.samples.back().time == set->time);
+    }
+    CHECK(delivered == 24);
 }
 
 TEST_CASE_METHOD(Rig, "set_reader: a silent IMU does not hold sets back for ever") {
@@ -214,7 +248,7 @@ TEST_CASE_METHOD(Rig, "set_reader: a silent IMU does not hold sets back for ever
     const auto set = sets.next(seconds(20));
     REQUIRE(set);
     CHECK(set->complete());
-    CHECK_FALSE(set->imu.covered);
+    CHECK_FALSE(set->imu.covered());
 }
 
 TEST_CASE_METHOD(Rig, "set_reader: overtaken frames are counted, and what is in a set knows it") {
@@ -449,7 +483,7 @@ TEST_CASE_METHOD(Rig, "set_reader: a damaged ring, or stamps that are anything, 
         StreamOptions where;
         where.instance = options().instance;
         auto window = ImuWindow::open("imu", where);
-        CHECK_FALSE(window->between({0}, {1}, milliseconds(1))->covered);
+        CHECK_FALSE(window->between({0}, {1}, 1, milliseconds(1))->covered());
     }
 }
 

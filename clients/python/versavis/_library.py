@@ -96,7 +96,7 @@ class ImuSample(ctypes.Structure):
 
 class ImuSpan(ctypes.Structure):
     _fields_ = [
-        ("samples", c_void_p), ("count", c_size_t), ("lost", c_uint64), ("covered", c_int32),
+        ("samples", c_void_p), ("count", c_size_t), ("lost", c_uint64), ("gap", c_uint32),
         ("has_beyond", c_int32), ("beyond", ImuSample),
     ]
 
@@ -112,7 +112,7 @@ class Set(ctypes.Structure):
         ("life", c_uint64), ("tick", c_uint64), ("epoch", c_uint32), ("present", c_uint32),
         ("time", c_int64), ("spread", c_int64), ("frames", Item * MOST_CAMERAS),
         ("imu", c_void_p), ("imu_count", c_size_t), ("imu_lost", c_uint64),
-        ("imu_covered", c_int32), ("reserved", c_uint32),
+        ("imu_covered", c_int32), ("imu_gap", c_uint32),
     ]
 
 
@@ -143,7 +143,7 @@ SIGNATURES = {
     "imu_window_open": (c_int, [c_char_p, c_char_p, POINTER(Options), POINTER(c_void_p),
                                 POINTER(ErrorText)]),
     "imu_window_close": (None, [c_void_p]),
-    "imu_window_between": (c_int, [c_void_p, c_int64, c_int64, c_int64, POINTER(ImuSpan)]),
+    "imu_window_span": (c_int, [c_void_p, c_uint32, c_int64, c_int64, c_int64, POINTER(ImuSpan)]),
     "sets_open": (c_int, [c_char_p, POINTER(c_char_p), c_size_t, POINTER(SetsOptions),
                           POINTER(c_void_p), POINTER(ErrorText)]),
     "sets_close": (None, [c_void_p]),

@@ -6,7 +6,7 @@ from . import _library as library
 from .errors import Error
 from .items import Frame, Held
 from .streams import Handle, Source, encoded, nanoseconds, stream_options
-from .window import samples_at
+from .window import GAPS, samples_at
 
 
 class FrameSet:
@@ -16,7 +16,9 @@ class FrameSet:
     time: output time of the first camera that is there, ns; spread: latest less earliest, ns.
     frames: in the order in which the cameras were named; None where one is missing.
     imu: array of the samples since the set before, up to this one's latest stamp, see imu_dtype;
-    imu_lost: samples missing within them; imu_covered: they reach up to this set.
+    imu_lost: samples missing within them; imu_gap: why they do not reach from the set before to
+    this one, as ImuSpan.gap; imu_covered: they do. The first set has none ("begin"); the first of
+    an epoch has those of the epoch ("epoch").
     """
 
     def __init__(self, made, held):
@@ -25,7 +27,11 @@ class FrameSet:
         self.frames = [Frame(frame) if made.present >> i & 1 else None
                        for i, frame in enumerate(held)]
         self.imu = samples_at(made.imu, made.imu_count)
-        self.imu_lost, self.imu_covered = made.imu_lost, bool(made.imu_covered)
+        self.imu_lost, self.imu_gap = made.imu_lost, GAPS[made.imu_gap]
+
+    @property
+    def imu_covered(self):
+        return self.imu_gap is None
 
     @property
     def complete(self):

@@ -26,16 +26,28 @@ def samples_at(address, count):
     return samples
 
 
+# Why samples do not reach from one instant to another, by the library's number.
+GAPS = (None, "begin", "end", "epoch", "numbers")
+
+
 class ImuSpan:
-    """samples: array, see imu_dtype; lost: how many are missing within them; covered: they reach
-    from the first instant to the second; beyond: the first sample after that (None: not there
-    yet), to interpolate."""
+    """samples: array, see imu_dtype; lost: how many are missing within them; beyond: the first
+    sample after the second instant (None: not there yet), to interpolate.
+
+    gap: why they do not reach from the first instant to the second; None: they do. "begin": no
+    sample at or before the first is known; "end": none of the second or later has come yet;
+    "epoch": it began or ended between them, and times beyond do not compare; "numbers": those of
+    the samples stand still or go back, so nobody knows how many are missing."""
 
     def __init__(self, span):
         self.samples = samples_at(span.samples, span.count)
-        self.lost, self.covered = span.lost, bool(span.covered)
+        self.lost, self.gap = span.lost, GAPS[span.gap]
         beyond = samples_at(ctypes.addressof(span.beyond), 1)
         self.beyond = beyond[0] if span.has_beyond else None
+
+    @property
+    def covered(self):
+        return self.gap is None
 
     @property
     def complete(self):
@@ -45,9 +57,10 @@ class ImuSpan:
 class ImuWindow(Source):
     """Samples between any two instants, as far as the ring holds them."""
 
-    def between(self, after, upto, patience=None):
-        """An ImuSpan of the samples with after < time <= upto (output time, ns). Waits for a sample
-        of upto or later for patience seconds (None: without end); then it is not covered.
+    def between(self, after, upto, epoch, patience=None):
+        """An ImuSpan of the samples with after < time <= upto (output time, ns) of epoch, that of
+        the frames whose times these are. Waits for a sample of upto or later, or of a later epoch,
+        for patience seconds (None: without end).
 
         Raises Restarted, once: times before and after do not compare."""
         if upto < after:
@@ -57,12 +70,13 @@ class ImuWindow(Source):
         while True:
             left = remaining(deadline)
             with self._opened() as pointer:
-                result = library.functions.imu_window_between(pointer, after, upto,
-                                                              nanoseconds(left), span)
+                result = library.functions.imu_window_span(pointer, epoch, after, upto,
+                                                           nanoseconds(left), span)
                 made = ImuSpan(span) if result == library.OK else None
             if made is None:
                 raise self._pause(result)
-            if made.covered or made.beyond is not None or left < SLICE:
+            ended = made.gap == "epoch" or made.beyond is not None
+            if made.covered or ended or left < SLICE:
                 return made
 
 

@@ -13,13 +13,25 @@
 
 namespace versavis {
 
+/// Why samples do not reach from the first instant of a span to the second.
+enum class SpanGap : std::uint32_t {
+    none = 0,
+    begin = 1,    ///< no sample at or before the first instant is known
+    end = 2,      ///< no sample of the second instant or later has come yet
+    epoch = 3,    ///< the epoch began or ended within it: times beyond that do not compare
+    numbers = 4,  ///< sample numbers stand still or go back: nobody knows how many are missing
+};
+VERSAVIS_API const char* to_string(SpanGap gap);
+
 struct ImuSpan {
     std::vector<ImuSample> samples;   ///< after the first instant, up to and with the second
     std::optional<ImuSample> beyond;  ///< the first one after the second instant, to interpolate
     std::uint64_t lost = 0;           ///< missing within the span, by the samples' numbers
-    bool covered = false;             ///< samples reach from the first instant to the second
+    SpanGap gap = SpanGap::begin;
 
-    bool complete() const { return covered && lost == 0; }
+    /// Samples reach from the first instant to the second, though some may be lost between them.
+    bool covered() const { return gap == SpanGap::none; }
+    bool complete() const { return covered() && lost == 0; }
 };
 
 /// Not thread-safe.
@@ -28,29 +40,31 @@ class VERSAVIS_API ImuWindow {
     /// Errors: as for ImuStream::open. It begins with what the ring still holds.
     static Expected<ImuWindow> open(const std::string& name, const StreamOptions& options = {});
 
-    /// Samples with `after` < time <= `upto`. Waits until a sample of `upto` or later has come, for
-    /// `patience` at most; then `covered` is false. Spans may follow each other or overlap; what
-    /// lies before `after` is forgotten, but found again as long as the ring holds it. Error:
-    /// Pause::restarted, once: times before and after do not compare.
-    Expected<ImuSpan, NoItem> between(OutputTime after, OutputTime upto, Duration patience);
+    /// Samples of `epoch`, that of the instants, with `after` < time <= `upto`. Waits until one of
+    /// `upto` or later has come, or of a later epoch, for `patience` at most. Spans may follow each
+    /// other or overlap; what lies before `after` is forgotten, but found again as long as the ring
+    /// holds it. Error: Pause::restarted, once: times before and after do not compare.
+    Expected<ImuSpan, NoItem> between(OutputTime after, OutputTime upto, std::uint32_t epoch,
+                                      Duration patience);
 
     /// Takes what has come, without waiting. Error: Pause::restarted.
     Expected<void, NoItem> collect();
 
-    /// True when a sample of this time or later has come.
-    bool reaches(OutputTime time) const;
+    /// True when a sample of this time or later has come, or one of a later epoch.
+    bool reaches(OutputTime time, std::uint32_t epoch) const;
 
     /// As between(), of what was collected.
-    ImuSpan take(OutputTime after, OutputTime upto);
+    ImuSpan take(OutputTime after, OutputTime upto, std::uint32_t epoch);
 
     ring::Reader& reader() { return stream_.reader(); }
 
  private:
     explicit ImuWindow(ImuStream stream) : stream_(std::move(stream)) {}
-    void look_back(OutputTime after);
+    void look_back(OutputTime after, std::uint32_t epoch);
+    void forget();
 
     ImuStream stream_;
-    std::deque<ImuSample> samples_;
+    std::deque<ImuSample> samples_;    ///< as they came, of one epoch after the other
     std::optional<ImuSample> before_;  ///< the one before the first of samples_
 };
 

@@ -21,7 +21,9 @@ struct VERSAVIS_API FrameSet {
     OutputTime time;                           ///< of the first camera that is there
     Duration spread;                           ///< latest less earliest stamp
     std::vector<std::optional<Frame>> frames;  ///< in the order in which cameras were named
-    ImuSpan imu;  ///< after the set before, up to the latest stamp of this one; the first has none
+    /// After the set before, up to the latest stamp of this one. The first set has no samples, and
+    /// the first of an epoch those of the epoch: both say that samples may be missing.
+    ImuSpan imu;
 
     bool complete() const;
     bool valid() const;  ///< all payloads: what was read of them before this call is good
