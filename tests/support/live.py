@@ -2,6 +2,7 @@
 """Virtual rig and service as processes of a test in Python, with addresses and names of their
 own."""
 import ctypes
+import os
 import shutil
 import signal
 import subprocess
@@ -79,9 +80,10 @@ class Live:
                                "--socket", self.directory / "board",
                                "--truth", self.directory / "truth.jsonl")
 
-    def start_service(self):
+    def start_service(self, environment=None):
+        """environment: variables beside those of this process."""
         self.service = self._start("serving instance", "versavisd", "--config",
-                                   self.directory / "versavis.toml")
+                                   self.directory / "versavis.toml", environment=environment)
 
     def kill_service(self):
         self.service.kill()
@@ -98,10 +100,11 @@ class Live:
     def _remove_rings(self):
         shutil.rmtree(Path("/dev/shm/versavis") / self.name, ignore_errors=True)
 
-    def _start(self, ready, program, *arguments):
+    def _start(self, ready, program, *arguments, environment=None):
         log = self.directory / (program + ".log")
         with log.open("wb") as file:
             process = subprocess.Popen([self.programs / program, *arguments], stdout=file,
-                                       stderr=subprocess.STDOUT, preexec_fn=die_with_parent)
+                                       stderr=subprocess.STDOUT, preexec_fn=die_with_parent,
+                                       env={**os.environ, **(environment or {})})
         until(lambda: ready in log.read_text(), 20, f"{program} says '{ready}'; see {log}")
         return process
