@@ -6,8 +6,8 @@
 #include <string>
 
 #include "engine/clock/translator.hpp"
-#include "engine/ring/writer.hpp"
 #include "engine/plausibility/majority_filter.hpp"
+#include "engine/ring/writer.hpp"
 #include "plausibility/pulse_history.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/stamp_guard.hpp"
