@@ -73,7 +73,8 @@ Service::Service(const Configuration& configuration, ring::OwnedDirectory direct
                  clock::OutputClock output, StatusPublisher status)
     : configuration_(configuration),
       directory_(std::move(directory)),
-      translator_(std::move(output), configuration.clock.pps, directory_.epochs().first()),
+      translator_(std::move(output), configuration.clock.pps, directory_.epochs().first(),
+                  configuration.clock.on_second_conflict),
       status_(std::move(status)),
       asymmetry_(configuration.state_directory, translator_),
       alignment_(configuration.clock, board_configuration(configuration)),
@@ -204,7 +205,13 @@ void Service::board_event(const wire::Event& event, HostTime received) {
 void Service::use_pps(const wire::Event& event) {
     if (event.kind == wire::BoardEventKind::pps) translator_.pps_pulse(BoardTime{event.time_ns});
     if (event.kind == wire::BoardEventKind::utc_label)
-        translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000);
+        if (const auto differ =
+                translator_.pps_label(BoardTime{event.time_ns}, event.value * 1'000'000'000)) {
+            events_->add({EventKind::seconds_differ, EventReason::none, 0, "board", *differ,
+                          BoardTime{event.time_ns}});
+            log(*differ == 0 ? LogLevel::info : LogLevel::warning, "clock",
+                "the receiver's seconds less the host's: {}", *differ);
+        }
 }
 
 void Service::tick() {

@@ -592,6 +592,7 @@ const char* to_string(Fault fault) {
         case Fault::clock_unknown: return "clock_unknown";
         case Fault::clock_holdover: return "clock_holdover";
         case Fault::clock_step: return "clock_step";
+        case Fault::seconds_differ: return "seconds_differ";
         case Fault::camera_absent: return "camera_absent";
         case Fault::camera_unreachable: return "camera_unreachable";
         case Fault::camera_busy: return "camera_busy";
@@ -682,6 +683,17 @@ Diagnosis diagnose_board(const Status& status) {
     return conclude(Fault::none, board_remark(status), known, in_time);
 }
 
+Diagnosis diagnose_seconds(const clock::PpsReport& pps) {
+    if (pps.second_difference == 0) return {};
+    return conclude(Fault::seconds_differ,
+                    fmt::format("the receiver at the board is {} s {} the host: has it received "
+                                "the leap seconds, and reports UTC? Is the host's clock right? "
+                                "Then set 'on_second_conflict' of [clock]",
+                                std::abs(pps.second_difference),
+                                pps.second_difference > 0 ? "ahead of" : "behind"),
+                    true, false);
+}
+
 Diagnosis diagnose_clock(const Status& status) {
     const bool in_time = young(status.started, status.now);
     const Fault cause = status.board_diagnosis.fault;
@@ -692,7 +704,7 @@ Diagnosis diagnose_clock(const Status& status) {
         return conclude(cause, "no exchanges: see the board's hint", status.clock.slots > 0,
                         in_time);
     switch (state) {
-        case ClockState::locked: return {};
+        case ClockState::locked: return diagnose_seconds(status.clock.pps);
         case ClockState::init:
         case ClockState::reset:
             return conclude(Fault::clock_unknown,

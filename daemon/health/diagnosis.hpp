@@ -34,6 +34,7 @@ enum class Fault {
     clock_unknown,
     clock_holdover,
     clock_step,
+    seconds_differ,
     // Of a camera: it cannot be had.
     camera_absent,
     camera_unreachable,

@@ -115,6 +115,7 @@ json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
             {"pps_residual_ns", clock.pps.residual.ns},
             {"pps_pulses", clock.pps.pulses},
             {"pps_rejected", clock.pps.rejected},
+            {"second_difference_s", clock.pps.second_difference},
             {"grid_aligned", grid.aligned},
             {"grid_error_ns", grid.error.ns}};
 }

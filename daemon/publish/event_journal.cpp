@@ -19,6 +19,7 @@ void EventJournal::add(const JournalEntry& entry) {
     metadata.host_time = stamp->host;
     metadata.sigma_ns = entry.suspect ? sigma_unknown : stamp->sigma_ns;
     if (entry.suspect) metadata.flags |= flag_suspect;
+    if (stamp->second_doubted) metadata.flags |= flag_second_doubted;
     metadata.epoch = stamp->epoch;
     entry.source_name.copy(metadata.source_name, sizeof metadata.source_name - 1);
     const std::lock_guard lock(mutex_);

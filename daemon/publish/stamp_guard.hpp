@@ -30,6 +30,7 @@ class StampGuard {
         GuardedStamp guarded{stamp.output, sigma_ns, 0};
         if (stamp.state == ClockState::holdover || stamp.state == ClockState::step)
             guarded.flags |= flag_holdover;
+        if (stamp.second_doubted) guarded.flags |= flag_second_doubted;
         if (suspect) return guarded;
         if (last_ && epoch_ == stamp.epoch && stamp.output <= *last_) {
             guarded.time = *last_ + nanoseconds(1);

@@ -46,6 +46,7 @@ struct ClockConfiguration {
     bool align = false;        ///< the board's grid lies on whole seconds of the output clock
     double max_slew_ppm = 20;  ///< it is moved there no faster
     clock::PpsLabels pps = clock::PpsLabels::off;
+    clock::SecondConflict on_second_conflict = clock::SecondConflict::flag;
 };
 
 enum class TriggerSource { board, free_run };

@@ -228,6 +228,7 @@ const Keys<ClockConfiguration>& keys<ClockConfiguration>() {
     using Clock = ClockConfiguration;
     using clock::OutputClockKind;
     using clock::PpsLabels;
+    using clock::SecondConflict;
     static const Keys<Clock> all{
         {"output",
          choice(&Clock::output, {{"realtime", OutputClockKind::realtime},
@@ -243,7 +244,12 @@ const Keys<ClockConfiguration>& keys<ClockConfiguration>() {
         {"pps",
          choice(&Clock::pps,
                 {{"off", PpsLabels::off}, {"host", PpsLabels::host}, {"nmea", PpsLabels::nmea}}),
-         "stamp by PPS at the board instead of by messages over USB"}};
+         "stamp by PPS at the board instead of by messages over USB"},
+        {"on_second_conflict",
+         choice(&Clock::on_second_conflict, {{"flag", SecondConflict::flag},
+                                             {"receiver", SecondConflict::receiver},
+                                             {"host", SecondConflict::host}}),
+         "whose whole seconds are right"}};
     return all;
 }
 

@@ -30,6 +30,8 @@ constexpr Field frame_fields[] = {
      flag_sensor_error},
     {"camera_length", offsetof(FrameMetadata, flags), Type::flag, If::never, 6, 1,
      flag_camera_length},
+    {"second_doubted", offsetof(FrameMetadata, flags), Type::flag, If::never, 7, 1,
+     flag_second_doubted},
     {"flags", offsetof(FrameMetadata, flags), Type::u32},
     {"trigger", offsetof(FrameMetadata, trigger), Type::u64, If::zero},
     {"tick", offsetof(FrameMetadata, tick_low), Type::tick, If::without_trigger},
@@ -57,6 +59,8 @@ constexpr Field imu_fields[] = {
     {"clamped", offsetof(ImuMetadata, flags), Type::flag, If::never, 0, 1, flag_clamped},
     {"sensor_error", offsetof(ImuMetadata, flags), Type::flag, If::never, 0, 1, flag_sensor_error},
     {"repeated", offsetof(ImuMetadata, flags), Type::flag, If::never, 4, 1, flag_repeated},
+    {"second_doubted", offsetof(ImuMetadata, flags), Type::flag, If::never, 7, 1,
+     flag_second_doubted},
     {"flags", offsetof(ImuMetadata, flags), Type::u32},
     {"sample", offsetof(ImuMetadata, number), Type::u64},
     {"board_time_ns", offsetof(ImuMetadata, board_time), Type::i64},
@@ -84,6 +88,8 @@ constexpr Field event_fields[] = {
     {"board_time_ns", offsetof(EventMetadata, board_time), Type::i64, If::zero},
     {"host_time_ns", offsetof(EventMetadata, host_time), Type::i64},
     {"suspect", offsetof(EventMetadata, flags), Type::flag, If::never, 0, 1, flag_suspect},
+    {"second_doubted", offsetof(EventMetadata, flags), Type::flag, If::never, 7, 1,
+     flag_second_doubted},
     {"flags", offsetof(EventMetadata, flags), Type::u32},
 };
 

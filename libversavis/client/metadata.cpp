@@ -43,6 +43,7 @@ const char* to_string(EventKind kind) {
         case EventKind::sync_lost: return "sync_lost";
         case EventKind::sync_taken: return "sync_taken";
         case EventKind::configuration_stored: return "configuration_stored";
+        case EventKind::seconds_differ: return "seconds_differ";
     }
     return "unknown";
 }

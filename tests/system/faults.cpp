@@ -238,7 +238,8 @@ TEST_CASE("faults: the manual has those of this table, and of those without a ri
         "starting",      "wrong_size",     "camera_silent",  "board_refuses",    "too_slow",
         "clock_unknown", "clock_holdover", "clock_step",     "camera_failed",    "link_full",
         "no_buffer",     "no_triggers",    "wrong_exposure", "line_delays",      "imu_failed",
-        "block_ids",     "camera_clock",   "double_frames",  "triggers_ignored", "board_stamps"};
+        "block_ids",     "camera_clock",   "double_frames",  "triggers_ignored", "board_stamps",
+        "seconds_differ"};
     for (const Case& c : cases) words.insert(c.fault);
     std::set<std::string> rows;
     std::ifstream manual(VERSAVIS_SOURCE_DIR "/docs/user/troubleshooting.md");

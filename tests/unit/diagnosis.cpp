@@ -201,6 +201,13 @@ TEST_CASE("diagnosis: the clock says what its state means") {
         bench.status.clock.state = state;
         check(diagnose_clock(bench.status), fault, "");
     }
+    bench.status.clock.state = clock::ClockState::locked;
+    CHECK(diagnose_clock(bench.status).health == Health::ok);
+    bench.status.clock.pps.second_difference = -1;
+    check(diagnose_clock(bench.status), Fault::seconds_differ, "is 1 s behind the host: has it");
+    bench.status.clock.pps.second_difference = 18;
+    check(diagnose_clock(bench.status), Fault::seconds_differ, "is 18 s ahead of the host: has it");
+    bench.status.clock.pps.second_difference = 0;
     bench.status.clock.state = clock::ClockState::reset;
     check(bench.camera(), Fault::clock_unknown, "withheld");
 }

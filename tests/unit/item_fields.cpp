@@ -186,17 +186,19 @@ TEST_CASE("item_fields: a frame says all that is known") {
     const json line = as_json(ring::StreamKind::frames, known_frame(), pack(SensorState{6.5F, 41}));
     CHECK(line == json::parse(R"({"epoch": 18, "sigma_ns": 14, "kind": "predicted",
         "suspect": false, "holdover": true, "clamped": false, "sensor_error": false,
-        "camera_length": true, "flags": 265, "trigger": 7, "tick": 5000000000, "block_id": 8,
+        "camera_length": true, "second_doubted": false, "flags": 265, "trigger": 7, "tick": 5000000000, "block_id": 8,
         "board_time_ns": 9, "host_time_ns": 10, "arrival_ns": 11, "camera_time_ns": 13,
         "exposure_ns": 12, "delay_ns": -19, "width": 15, "height": 16, "stride": 17,
         "pixel_format": 17301505, "format": "Mono8", "gain": 6.5, "temperature_c": 41.0})"));
     CHECK(field_columns(ring::StreamKind::frames) ==
-          ",epoch,sigma_ns,kind,suspect,holdover,clamped,sensor_error,camera_length,flags,trigger,"
-          "tick,block_id,board_time_ns,host_time_ns,arrival_ns,camera_time_ns,exposure_ns,delay_ns,"
+          ",epoch,sigma_ns,kind,suspect,holdover,clamped,sensor_error,camera_length,second_doubted,"
+          "flags,trigger,tick,block_id,board_time_ns,host_time_ns,arrival_ns,camera_time_ns,"
+          "exposure_ns,delay_ns,"
           "width,height,stride,pixel_format,format,gain,temperature_c");
-    CHECK(field_row(ring::StreamKind::frames, pack(known_frame()), pack(SensorState{6.5F, 41})) ==
-          ",18,14,predicted,0,1,0,0,1,265,7,5000000000,8,9,10,11,13,12,-19,15,16,17,17301505,Mono8,"
-          "6.5,41");
+    CHECK(
+        field_row(ring::StreamKind::frames, pack(known_frame()), pack(SensorState{6.5F, 41})) ==
+        ",18,14,predicted,0,1,0,0,1,0,265,7,5000000000,8,9,10,11,13,12,-19,15,16,17,17301505,Mono8,"
+        "6.5,41");
 }
 
 TEST_CASE("item_fields: what is unknown is null, and empty in CSV") {
@@ -210,23 +212,24 @@ TEST_CASE("item_fields: what is unknown is null, and empty in CSV") {
     CHECK(line.at("kind") == "arrival");
     CHECK(line.at("suspect") == true);
     CHECK(field_row(ring::StreamKind::frames, pack(frame), pack(SensorState{})) ==
-          ",0,,arrival,1,0,0,0,0,7,,,0,,0,0,,,0,0,0,0,0,unknown,,");
+          ",0,,arrival,1,0,0,0,0,0,7,,,0,,0,0,,,0,0,0,0,0,unknown,,");
 }
 
 TEST_CASE("item_fields: an IMU sample says all that is known") {
     const json line = as_json(ring::StreamKind::imu, known_sample());
     CHECK(line == json::parse(R"({"epoch": 1, "sigma_ns": 2, "suspect": false, "holdover": true,
-        "clamped": false, "sensor_error": false, "repeated": true, "flags": 200, "sample": 5,
+        "clamped": false, "sensor_error": false, "repeated": true, "second_doubted": false, "flags": 200, "sample": 5,
         "board_time_ns": 6, "host_time_ns": 7, "filter_delay_ns": 8, "accel_age_ns": -300,
         "gyro_rad_s": [0.5, 0.25, -2.0], "accel_m_s2": [0.0, 9.75, 1.0],
         "magnetic_t": [1.5, 2.5, 3.5], "temperature_c": 25.0, "pressure_pa": 101325.0})"));
     CHECK(field_columns(ring::StreamKind::imu) ==
-          ",epoch,sigma_ns,suspect,holdover,clamped,sensor_error,repeated,flags,sample,"
+          ",epoch,sigma_ns,suspect,holdover,clamped,sensor_error,repeated,second_doubted,flags,"
+          "sample,"
           "board_time_ns,host_time_ns,filter_delay_ns,accel_age_ns,gyro_rad_s_x,gyro_rad_s_y,"
           "gyro_rad_s_z,accel_m_s2_x,accel_m_s2_y,accel_m_s2_z,magnetic_t_x,magnetic_t_y,"
           "magnetic_t_z,temperature_c,pressure_pa");
     CHECK(field_row(ring::StreamKind::imu, pack(known_sample()), 0) ==
-          ",1,2,0,1,0,0,1,200,5,6,7,8,-300,0.5,0.25,-2,0,9.75,1,1.5,2.5,3.5,25,101325");
+          ",1,2,0,1,0,0,1,0,200,5,6,7,8,-300,0.5,0.25,-2,0,9.75,1,1.5,2.5,3.5,25,101325");
 }
 
 TEST_CASE("item_fields: what is unknown of an IMU sample is null, and empty in CSV") {
@@ -240,7 +243,7 @@ TEST_CASE("item_fields: what is unknown of an IMU sample is null, and empty in C
     for (const char* name : {"temperature_c", "pressure_pa", "sigma_ns", "accel_age_ns"})
         CHECK(line.at(name).is_null());
     CHECK(field_row(ring::StreamKind::imu, pack(sample), 0) ==
-          ",1,,0,0,0,0,0,0,5,6,7,8,,0.5,0.25,-2,0,9.75,1,,,,,");
+          ",1,,0,0,0,0,0,0,0,5,6,7,8,,0.5,0.25,-2,0,9.75,1,,,,,");
 }
 
 TEST_CASE("item_fields: an event says all that is known, with quotes in CSV where it needs them") {
@@ -261,12 +264,12 @@ TEST_CASE("item_fields: an event says all that is known, with quotes in CSV wher
           json::parse(R"({"epoch": 9, "sigma_ns": 6, "kind": "triggers_skipped",
         "reason": "camera_busy", "source": 2, "source_name": "le\"ft,1", "value": -4,
         "expected": -10, "count": 11, "board_time_ns": 7, "host_time_ns": 8, "suspect": true,
-        "flags": 4})"));
+        "second_doubted": false, "flags": 4})"));
     CHECK(field_columns(ring::StreamKind::events) ==
           ",epoch,sigma_ns,kind,reason,source,source_name,value,expected,count,board_time_ns,"
-          "host_time_ns,suspect,flags");
+          "host_time_ns,suspect,second_doubted,flags");
     CHECK(field_row(ring::StreamKind::events, pack(event), 0) ==
-          ",9,6,triggers_skipped,camera_busy,2,\"le\"\"ft,1\",-4,-10,11,7,8,1,4");
+          ",9,6,triggers_skipped,camera_busy,2,\"le\"\"ft,1\",-4,-10,11,7,8,1,0,4");
     std::memset(event.source_name, 'x', sizeof event.source_name);
     CHECK(as_json(ring::StreamKind::events, event).at("source_name") ==
           std::string(sizeof event.source_name, 'x'));
@@ -278,7 +281,7 @@ TEST_CASE("item_fields: what is unknown of an event is null, and empty in CSV") 
     const json line = as_json(ring::StreamKind::events, event);
     for (const char* name : {"sigma_ns", "board_time_ns"}) CHECK(line.at(name).is_null());
     CHECK(field_row(ring::StreamKind::events, pack(event), 0) ==
-          ",0,,unknown,none,0,,0,0,0,,0,0,0");
+          ",0,,unknown,none,0,,0,0,0,,0,0,0,0");
 }
 
 TEST_CASE("item_fields: the contract has the same names, places, types and unknown values") {

@@ -56,7 +56,8 @@ TEST_CASE(
                                                           "triggers_skipped",
                                                           "sync_lost",
                                                           "sync_taken",
-                                                          "configuration_stored"});
+                                                          "configuration_stored",
+                                                          "seconds_differ"});
 }
 
 TEST_CASE("metadata: each reason has its name, and none that is no longer used") {

@@ -130,3 +130,12 @@ TEST_CASE("stamp_guard: an estimate that goes back further than its sigma explai
     CHECK_FALSE(publish({begin_ns + 300'100'000}));
     CHECK(publish({begin_ns + 302'000'000})->flags == 0);
 }
+
+TEST_CASE("stamp_guard: a stamp whose second is doubted says so") {
+    StampGuard guard;
+    clock::Stamp doubted = stamp(1000, 1);
+    CHECK(guard.guard(doubted, 10)->flags == 0);
+    doubted.second_doubted = true;
+    doubted.output = {2000};
+    CHECK(guard.guard(doubted, 10)->flags == flag_second_doubted);
+}

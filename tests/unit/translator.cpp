@@ -93,8 +93,9 @@ namespace {
 /// A board whose link is longer to the host by twice `asymmetry`, with PPS; its clock equals the
 /// host's.
 struct PpsMachine {
-    explicit PpsMachine(PpsLabels labels)
-        : translator(*OutputClock::create(OutputClockKind::realtime, false, clocks), labels) {
+    explicit PpsMachine(PpsLabels labels, SecondConflict on_conflict = SecondConflict::flag)
+        : translator(*OutputClock::create(OutputClockKind::realtime, false, clocks), labels, 0,
+                     on_conflict) {
         clocks->kernel.synchronised = true;
     }
 
@@ -173,6 +174,69 @@ TEST_CASE(
     // Host time is the link's: pairing waits for frames by it.
     CHECK(absolute(machine.translator.translate(now)->host - HostTime{now.ns}) < microseconds(50));
     CHECK(machine.translator.report().pps.residual < -seconds(6));
+}
+
+namespace {
+
+/// A receiver that is `ahead` of the host, heard for so many seconds; what each label changed.
+std::vector<std::optional<std::int64_t>> hear(PpsMachine& machine, Duration ahead, int times) {
+    std::vector<std::optional<std::int64_t>> changes;
+    for (int i = 0; i < times; ++i) {
+        machine.pass_second(false);
+        const std::int64_t utc_ns = machine.clocks->value_ns(SystemClock::realtime) + ahead.ns;
+        const std::int64_t past = utc_ns % 1'000'000'000;
+        changes.push_back(machine.translator.pps_label(
+            {machine.clocks->value_ns(SystemClock::monotonic_raw) - past}, utc_ns - past));
+    }
+    return changes;
+}
+
+bool second_doubted(PpsMachine& machine) {
+    const BoardTime now{machine.clocks->value_ns(SystemClock::monotonic_raw)};
+    const bool doubted = machine.translator.translate(now)->second_doubted;
+    CHECK(machine.translator.translate(HostTime{now.ns}, {}).second_doubted == doubted);
+    return doubted;
+}
+
+using Changes = std::vector<std::optional<std::int64_t>>;
+
+}  // namespace
+
+TEST_CASE(
+    "translator: a receiver that is off from the host by whole seconds is named, and marked") {
+    const int off = GENERATE(-1, 1, 2, 18, -37, 3600);
+    const SecondConflict on_conflict =
+        GENERATE(SecondConflict::flag, SecondConflict::receiver, SecondConflict::host);
+    PpsMachine machine(PpsLabels::nmea, on_conflict);
+    for (int i = 0; i < 20; ++i) machine.pass_second(false);
+    CHECK(hear(machine, {}, 6) == Changes(6));
+    CHECK_FALSE(second_doubted(machine));
+    CHECK(hear(machine, seconds(off), 2) == Changes(2));  // it may be a label that came late
+    CHECK(hear(machine, {}, 1) == Changes(1));
+    CHECK(hear(machine, seconds(off), 8) == Changes{{}, {}, off, {}, {}, {}, {}, {}});
+    CHECK(machine.translator.report().pps.second_difference == off);
+    CHECK(second_doubted(machine) == (on_conflict == SecondConflict::flag));
+    const Duration used = seconds(on_conflict == SecondConflict::host ? 0 : off);
+    CHECK(absolute(machine.error() - used) < microseconds(50));
+    CHECK(hear(machine, {}, 4) == Changes{{}, {}, 0, {}});
+    CHECK_FALSE(second_doubted(machine));
+    hear(machine, seconds(off), 4);
+    machine.translator.board_restarted();
+    CHECK(machine.translator.report().pps.second_difference == 0);
+}
+
+TEST_CASE("translator: a host that nobody disciplines denies only what is no accident") {
+    for (const auto& [ahead, difference] :
+         {std::pair{seconds(7), 7}, std::pair{seconds(40), 40}, std::pair{seconds(41), 0},
+          std::pair{seconds(7) + milliseconds(9), 7}, std::pair{seconds(7) - milliseconds(9), 7},
+          std::pair{seconds(7) + milliseconds(11), 0}, std::pair{milliseconds(7300), 0}}) {
+        PpsMachine machine(PpsLabels::nmea, GENERATE(SecondConflict::flag, SecondConflict::host));
+        machine.clocks->kernel.synchronised = false;
+        for (int i = 0; i < 20; ++i) machine.pass_second(false);
+        hear(machine, ahead, 6);
+        CHECK(machine.translator.report().pps.second_difference == difference);
+        CHECK(absolute(machine.error() - ahead) < microseconds(50));  // the receiver's in any case
+    }
 }
 
 TEST_CASE("translator: a stored asymmetry is used until PPS measures another") {

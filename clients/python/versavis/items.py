@@ -25,6 +25,7 @@ class Flags(enum.IntFlag):
     REPEATED = 1 << 6
     ACCEL_AGE = 1 << 7
     CAMERA_LENGTH = 1 << 8
+    SECOND_DOUBTED = 1 << 9
 
 
 class Held:

@@ -145,6 +145,7 @@ constexpr std::array clock_facts{
               "newest pulse by messages and host, minus its second"},
     ClockFact{"pps_pulses", "PPS pulses", "with a known second"},
     ClockFact{"pps_rejected", "PPS rejected", "did not fit the others"},
+    ClockFact{"second_difference_s", "receiver minus host", "whole seconds"},
     ClockFact{"grid_aligned", "grid aligned", "to whole seconds of the output clock"},
     ClockFact{"grid_error_ns", "grid error", "from the measured exposures"},
 };

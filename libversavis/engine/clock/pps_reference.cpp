@@ -34,6 +34,18 @@ constexpr double slowest_gain = 1.0 / 64;
 // corrected estimate is too small. Twice: it is 6 us where 3 us would do.
 constexpr Duration measurement_floor = microseconds(3);
 
+// Labels in a row that must agree about the seconds. Half: one label that comes late flags stamps
+// for a second. Twice: a wrong second is not flagged for three seconds more.
+constexpr int labels_to_agree = 3;
+
+// How far off a whole number of seconds a clock that nobody disciplines may be for that to be no
+// accident. Half: the link's asymmetry hides a conflict. Twice: one such host in 25 is flagged.
+constexpr Duration whole_seconds = milliseconds(10);
+
+// Seconds between UTC, GPS time and TAI, with room for leap seconds to come: what receivers and
+// hosts confuse. Half: TAI is not recognised. Twice: more accidents.
+constexpr std::int64_t most_confused_seconds = 40;
+
 /// The whole second nearest to an instant, on the output clock.
 OutputTime nearest_second(OutputTime at) { return {at.ns - past_nearest_second_ns(at.ns)}; }
 
@@ -63,9 +75,23 @@ void PpsReference::pulse(BoardTime at, const HostEstimate& by_link, const Output
 }
 
 void PpsReference::label(BoardTime at, OutputTime second, const HostEstimate& by_link,
-                         const OutputReading& output) {
+                         const OutputReading& output, bool disciplined) {
     if (labels_ != PpsLabels::nmea) return;
-    add(at, second, OutputTime{by_link.time.ns + output.minus_host.ns} - second);
+    const OutputTime by_host{by_link.time.ns + output.minus_host.ns};
+    if (by_link.state == ClockState::locked) compare(by_host - second, disciplined);
+    const bool host_decides = on_conflict_ == SecondConflict::host && disciplined;
+    const OutputTime used = host_decides ? nearest_second(by_host) : second;
+    add(at, used, by_host - used);
+}
+
+void PpsReference::compare(Duration by_host_less_label, bool disciplined) {
+    const std::int64_t past_ns = past_nearest_second_ns(by_host_less_label.ns);
+    std::int64_t difference = (past_ns - by_host_less_label.ns) / seconds(1).ns;
+    const bool whole = std::abs(past_ns) <= whole_seconds.ns;
+    if (!disciplined && (!whole || std::abs(difference) > most_confused_seconds)) difference = 0;
+    labels_agree_ = difference == newest_difference_ ? labels_agree_ + 1 : 1;
+    newest_difference_ = difference;
+    if (labels_agree_ >= labels_to_agree) second_difference_ = difference;
 }
 
 void PpsReference::add(BoardTime at, OutputTime second, Duration residual) {
@@ -102,6 +128,8 @@ std::optional<OutputEstimate> PpsReference::translate(BoardTime board, BoardTime
 void PpsReference::board_restarted() {
     map_ = {};
     trusted_at_.reset();
+    second_difference_ = newest_difference_ = 0;
+    labels_agree_ = 0;
 }
 
 PpsReport PpsReference::report(BoardTime now) const {
@@ -109,6 +137,7 @@ PpsReport PpsReference::report(BoardTime now) const {
     report.residual = residual_;
     report.pulses = map_.pulses();
     report.rejected = map_.rejected();
+    report.second_difference = second_difference_;
     if (labels_ == PpsLabels::off)
         report.state = PpsState::off;
     else if (translate(now, now))

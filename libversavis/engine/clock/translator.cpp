@@ -86,12 +86,16 @@ void Translator::pps_pulse(BoardTime at) {
     correct_link();
 }
 
-void Translator::pps_label(BoardTime at, std::int64_t utc_ns) {
+std::optional<std::int64_t> Translator::pps_label(BoardTime at, std::int64_t utc_ns) {
     const std::lock_guard lock(mutex_);
-    if (!filter_.confirmed()) return;
+    if (!filter_.confirmed()) return std::nullopt;
     const bool tai = output_.kind() == OutputClockKind::tai;
     const Duration ahead = tai ? seconds(output_.kernel_state().tai_offset_s) : Duration{};
-    pps_.label(at, OutputTime{utc_ns} + ahead, filter_.translate(at), output_.read());
+    const std::int64_t before = pps_.second_difference();
+    pps_.label(at, OutputTime{utc_ns} + ahead, filter_.translate(at), output_.read(),
+               output_.kernel_state().synchronised);
+    const std::int64_t now = pps_.second_difference();
+    return now == before ? std::nullopt : std::optional(now);
 }
 
 void Translator::use_asymmetry(const std::optional<Asymmetry>& stored) {
@@ -134,10 +138,10 @@ std::optional<Stamp> Translator::translate(BoardTime board) {
     const OutputTime by_link{estimate.time.ns + output.minus_host.ns};
     if (const auto pps = by_pps(board, by_link))
         // The output clock may be off from what PPS makes of it: the host's own time is the link's.
-        return Stamp{pps->time, estimate.time, saturated(pps->sigma), epoch(output),
-                     ClockState::locked};
-    return Stamp{by_link, estimate.time, saturated(widened(estimate.sigma, output)), epoch(output),
-                 estimate.state};
+        return Stamp{pps->time,     estimate.time,      saturated(pps->sigma),
+                     epoch(output), ClockState::locked, pps_.second_doubted()};
+    return Stamp{by_link,       estimate.time,  saturated(widened(estimate.sigma, output)),
+                 epoch(output), estimate.state, pps_.second_doubted()};
 }
 
 std::optional<BoardSecond> Translator::next_second(HostTime now) {
@@ -168,7 +172,8 @@ Stamp Translator::translate(HostTime host, Duration sigma) {
             host,
             saturated(widened(sigma, output)),
             epoch(output),
-            ClockState::locked};
+            ClockState::locked,
+            pps_.second_doubted()};
 }
 
 OutputRelation Translator::output_now() {

@@ -21,6 +21,7 @@ struct Stamp {
     std::uint32_t sigma_ns = 0;
     std::uint32_t epoch = 0;
     ClockState state = ClockState::init;
+    bool second_doubted = false;  ///< off by whole seconds, perhaps: see SecondConflict
 };
 
 /// Where a whole second of the output clock lies on the board's.
@@ -88,8 +89,9 @@ class Translator {
  public:
     /// `first_epoch`: the number of the first one, before the board was met.
     explicit Translator(OutputClock output, PpsLabels labels = PpsLabels::off,
-                        std::uint32_t first_epoch = 0)
-        : first_epoch_(first_epoch), output_(std::move(output)), pps_(labels) {}
+                        std::uint32_t first_epoch = 0,
+                        SecondConflict on_conflict = SecondConflict::flag)
+        : first_epoch_(first_epoch), output_(std::move(output)), pps_(labels, on_conflict) {}
 
     /// The board restarted: what was known about its clock is void, and a new epoch begins.
     void board_restarted();
@@ -105,9 +107,9 @@ class Translator {
     void clock_continues();
 
     /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse
-    /// began.
+    /// began. The latter returns by how many seconds labels and host differ, when that changes.
     void pps_pulse(BoardTime at);
-    void pps_label(BoardTime at, std::int64_t utc_ns);
+    std::optional<std::int64_t> pps_label(BoardTime at, std::int64_t utc_ns);
 
     /// What an earlier measurement at this port said; none: nothing is known of this port.
     void use_asymmetry(const std::optional<Asymmetry>& stored);

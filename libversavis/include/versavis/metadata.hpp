@@ -27,10 +27,12 @@ enum ItemFlag : std::uint32_t {
     flag_holdover =
         1U << 3U,             ///< the clocks lost contact, or messages contradict them: sigma grows
     flag_clamped = 1U << 4U,  ///< the stamp was held so that it did not go backwards
-    flag_sensor_error = 1U << 5U,   ///< the sensor reported a fault, or its checksum was wrong
-    flag_repeated = 1U << 6U,       ///< an IMU sample with the data of the one before
-    flag_accel_age = 1U << 7U,      ///< accel_age_ns is measured
-    flag_camera_length = 1U << 8U,  ///< the exposure's length is by the camera's own events
+    flag_sensor_error = 1U << 5U,    ///< the sensor reported a fault, or its checksum was wrong
+    flag_repeated = 1U << 6U,        ///< an IMU sample with the data of the one before
+    flag_accel_age = 1U << 7U,       ///< accel_age_ns is measured
+    flag_camera_length = 1U << 8U,   ///< the exposure's length is by the camera's own events
+    flag_second_doubted = 1U << 9U,  ///< the output time may be off by whole seconds, as receiver
+                                     ///< and host differ; sigma does not include that
 };
 
 /// A stamp of sigma `sigma_unknown` has no known accuracy.
@@ -118,6 +120,7 @@ enum class EventKind : std::uint32_t {
     sync_lost = 26,         ///< pulses of the sync input do not fit the grid; value: ns off it
     sync_taken = 27,        ///< the grid follows the sync pulses; value: ns that it moves for that
     configuration_stored = 28,  ///< on the board; value: 1 when it is safe, 0 when that failed
+    seconds_differ = 29,  ///< value: whole seconds of the receiver at the board less the host's
 };
 
 /// Why a trigger has no frame, or a frame no trigger.
