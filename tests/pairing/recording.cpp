@@ -2,6 +2,10 @@
 #include "engine/pairing/recording.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
 
 #include "pairing_bench.hpp"
 
@@ -162,4 +166,66 @@ TEST_CASE("recording: a replay leaves out the exposure of a record that it doubt
     replay.finish();
     REQUIRE(told.pulses.size() == (judged ? 1 : 2));
     CHECK(told.pulses[0].trigger == 1);
+}
+
+TEST_CASE("recording: what no service can have recorded is refused with its name") {
+    const auto field = [](const Evidence& evidence) {
+        const auto read = from_metadata(to_metadata(evidence));
+        REQUIRE_FALSE(read);
+        const std::string text = read.error().message();
+        return text.substr(text.find('\'') + 1, text.rfind('\'') - text.find('\'') - 1);
+    };
+    const auto with = [](auto item, auto change) {
+        REQUIRE(from_metadata(to_metadata(item)));
+        change(item);
+        return Evidence(item);
+    };
+    constexpr std::int64_t lowest = std::numeric_limits<std::int64_t>::min();
+    for (const Duration period : {Duration{}, -nanoseconds(1), Duration{lowest}, seconds(86'401)}) {
+        CHECK(field(with(Limits{}, [&](auto& l) { l.period = period; })) == "period_ns");
+        CHECK(field(with(RecordLimits{}, [&](auto& l) { l.period = period; })) == "period_ns");
+    }
+    for (const Duration wait : {-nanoseconds(1), Duration{lowest}, seconds(86'401)}) {
+        CHECK(field(with(Limits{}, [&](auto& l) { l.latest_arrival = wait; })) ==
+              "latest_arrival_ns");
+        CHECK(field(with(Limits{}, [&](auto& l) { l.exposure_wait = wait; })) ==
+              "exposure_wait_ns");
+        CHECK(field(with(Limits{}, [&](auto& l) { l.pattern_duration = wait; })) ==
+              "pattern_duration_ns");
+        CHECK(field(with(RecordLimits{}, [&](auto& l) { l.latency = wait; })) == "latency_ns");
+        CHECK(field(with(RecordLimits{}, [&](auto& l) { l.exposure = wait; })) == "exposure_ns");
+        CHECK(field(with(RecordLimits{}, [&](auto& l) { l.max_exposure = wait; })) ==
+              "max_exposure_ns");
+        CHECK(field(with(ReceivedRecord{}, [&](auto& r) { r.commanded = wait; })) ==
+              "commanded_ns");
+    }
+    for (const Duration early : {Duration{lowest}, seconds(86'401)})
+        CHECK(field(with(Limits{}, [&](auto& l) { l.earliest_arrival = early; })) ==
+              "earliest_arrival_ns");
+    CHECK(field(with(Limits{}, [](auto& l) { l.frames_held = 60'001; })) == "frames_held");
+    for (const double slew : {-1.0, 1e7, std::nan("")})
+        CHECK(field(with(RecordLimits{}, [&](auto& l) { l.grid_slew_ppm = slew; })) ==
+              "grid_slew_ppm");
+    for (const std::int64_t ns : {lowest, std::int64_t{1} << 61U, -(std::int64_t{1} << 61U)}) {
+        CHECK(field(with(Exposure{}, [&](auto& e) { e.start.ns = ns; })) == "start_ns");
+        CHECK(field(with(Exposure{}, [&](auto& e) { e.end.ns = ns; })) == "end_ns");
+        CHECK(field(with(Exposure{}, [&](auto& e) { e.end_on_host.ns = ns; })) == "end_on_host_ns");
+        CHECK(field(with(Exposure{}, [&](auto& e) { e.earliest_on_host.ns = ns; })) ==
+              "earliest_on_host_ns");
+        CHECK(field(with(Exposure{}, [&](auto& e) { e.recorded.ns = ns; })) == "recorded_ns");
+        CHECK(field(with(Arrival{}, [&](auto& a) { a.camera_time.ns = ns; })) == "camera_time_ns");
+        CHECK(field(with(Arrival{}, [&](auto& a) { a.arrived.ns = ns; })) == "arrived_ns");
+        CHECK(field(with(Arrival{}, [&](auto& a) { a.exposure.ns = ns; })) == "exposure_ns");
+        CHECK(field(with(Advance{}, [&](auto& a) { a.now.ns = ns; })) == "now_ns");
+        CHECK(field(with(StartRequest{}, [&](auto& r) { r.now.ns = ns; })) == "now_ns");
+        CHECK(field(with(ReceivedRecord{}, [&](auto& r) { r.record.trigger_ns = ns; })) ==
+              "trigger_ns");
+    }
+    ReceivedRecord unknown;
+    unknown.record.start_ns = unknown.record.end_ns = wire::no_time;
+    CHECK(from_metadata(to_metadata(unknown)));
+    for (const std::int64_t ns : {std::int64_t{1} << 61U, -(std::int64_t{1} << 61U)}) {
+        CHECK(field(with(unknown, [&](auto& r) { r.record.start_ns = ns; })) == "start_ns");
+        CHECK(field(with(unknown, [&](auto& r) { r.record.end_ns = ns; })) == "end_ns");
+    }
 }

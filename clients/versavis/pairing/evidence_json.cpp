@@ -192,7 +192,7 @@ json to_json(const Evidence& evidence) {
 
 Expected<Evidence> to_evidence(const json& line) {
     try {
-        return read(line);
+        return checked(read(line));
     } catch (const std::exception& error) {
         return failure("evidence", error.what());
     }

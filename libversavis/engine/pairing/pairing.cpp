@@ -26,10 +26,6 @@ constexpr std::size_t most_exposures = 1024;
 // before the start.
 constexpr int early_to_step = 3;
 
-// No honest time of board or host is further from 0: 73 years. Differences of two such times fit in
-// 64 bits.
-constexpr std::int64_t furthest_ns = std::int64_t{1} << 61U;
-
 // Exposures that a search keeps even when no frame of them can arrive any more. At half slow
 // patterns may lose their beginning; at twice more old ones compete.
 constexpr std::size_t exposures_for_search = 32;
@@ -203,10 +199,7 @@ void Pairing::add(const Exposure& exposure) {
 
 /// The filter of records lets no other pass, but not each recording went through it.
 bool Pairing::follows(const Exposure& exposure) const {
-    const auto possible = [](auto time) { return std::abs(time.ns) < furthest_ns; };
-    if (!possible(exposure.start) || !possible(exposure.end) || exposure.end < exposure.start ||
-        !possible(exposure.end_on_host) || !possible(exposure.earliest_on_host))
-        return false;
+    if (exposure.end < exposure.start) return false;
     if (exposures_.empty()) return true;
     const Exposure& newest = exposures_.back().exposure;
     return exposure.trigger > newest.trigger && exposure.start > newest.start;

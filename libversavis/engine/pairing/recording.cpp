@@ -51,6 +51,81 @@ void make_bools(std::array<unsigned char, size>& bytes) {
         make(offsetof(ReceivedRecord, clock_contradicted));
 }
 
+/// No honest time is further from 0: 73 years. Differences of two such times fit in 64 bits.
+constexpr std::int64_t furthest_ns = std::int64_t{1} << 61U;
+
+/// No period, delay or wait of a camera is longer.
+constexpr Duration longest = seconds(86'400);
+
+/// A minute of frames at 1 kHz; a service holds as many as its ring has slots.
+constexpr std::uint32_t most_frames_held = 60'000;
+
+template <class Time>
+bool possible(Time time) {
+    return time.ns > -furthest_ns && time.ns < furthest_ns;
+}
+
+bool possible_or_unknown(std::int64_t board_ns) {
+    return board_ns == wire::no_time || possible(BoardTime{board_ns});
+}
+
+bool is_length(Duration duration) { return duration >= Duration{} && duration <= longest; }
+bool is_period(Duration duration) { return is_length(duration) && duration.ns > 0; }
+
+/// Name of a field that no service can have recorded; null: there is none.
+const char* impossible(const Limits& limits) {
+    if (!is_period(limits.period)) return "period_ns";
+    if (limits.earliest_arrival < -longest || limits.earliest_arrival > longest)
+        return "earliest_arrival_ns";
+    if (!is_length(limits.latest_arrival)) return "latest_arrival_ns";
+    if (!is_length(limits.exposure_wait)) return "exposure_wait_ns";
+    if (!is_length(limits.pattern_duration)) return "pattern_duration_ns";
+    return limits.frames_held > most_frames_held ? "frames_held" : nullptr;
+}
+
+const char* impossible(const Exposure& exposure) {
+    if (!possible(exposure.start)) return "start_ns";
+    if (!possible(exposure.end)) return "end_ns";
+    if (!possible(exposure.end_on_host)) return "end_on_host_ns";
+    if (!possible(exposure.earliest_on_host)) return "earliest_on_host_ns";
+    return possible(exposure.recorded) ? nullptr : "recorded_ns";
+}
+
+const char* impossible(const Arrival& arrival) {
+    if (!possible(arrival.camera_time)) return "camera_time_ns";
+    if (!possible(arrival.arrived)) return "arrived_ns";
+    return possible(arrival.exposure) ? nullptr : "exposure_ns";
+}
+
+const char* impossible(const Advance& advance) {
+    return possible(advance.now) ? nullptr : "now_ns";
+}
+
+const char* impossible(const StartRequest& request) {
+    return possible(request.now) ? nullptr : "now_ns";
+}
+
+const char* impossible(const RecordLimits& limits) {
+    if (!is_period(limits.period)) return "period_ns";
+    if (!is_length(limits.latency)) return "latency_ns";
+    if (!is_length(limits.exposure)) return "exposure_ns";
+    if (!is_length(limits.max_exposure)) return "max_exposure_ns";
+    const bool slews = limits.grid_slew_ppm >= 0 && limits.grid_slew_ppm <= 1e6;
+    return slews ? nullptr : "grid_slew_ppm";
+}
+
+const char* impossible(const ReceivedRecord& received) {
+    if (!possible(BoardTime{received.record.trigger_ns})) return "trigger_ns";
+    if (!possible_or_unknown(received.record.start_ns)) return "start_ns";
+    if (!possible_or_unknown(received.record.end_ns)) return "end_ns";
+    return is_length(received.commanded) ? nullptr : "commanded_ns";
+}
+
+template <class Item>
+const char* impossible(const Item& /*any*/) {
+    return nullptr;
+}
+
 template <std::size_t index = 0>
 Expected<Evidence> read(const EvidenceMetadata& metadata) {
     if constexpr (index == std::variant_size_v<Evidence>) {
@@ -84,7 +159,17 @@ EvidenceMetadata to_metadata(const Evidence& evidence) {
     return metadata;
 }
 
-Expected<Evidence> from_metadata(const EvidenceMetadata& metadata) { return read(metadata); }
+Expected<Evidence> from_metadata(const EvidenceMetadata& metadata) {
+    const auto evidence = read(metadata);
+    return evidence ? checked(*evidence) : evidence;
+}
+
+Expected<Evidence> checked(const Evidence& evidence) {
+    const char* field = std::visit([](const auto& item) { return impossible(item); }, evidence);
+    if (field == nullptr) return evidence;
+    return failure("evidence", fmt::format("no service recorded this '{}'", field),
+                   "the recording is damaged: record again");
+}
 
 void apply(Pairing& pairing, const Evidence& evidence) {
     std::visit(

@@ -52,8 +52,12 @@ using EvidenceStream = Stream<EvidenceItem, ring::StreamKind::evidence>;
 
 EvidenceMetadata to_metadata(const Evidence& evidence);
 
-/// Errors: a kind that this version does not know.
+/// Errors: a kind that this version does not know; as for checked().
 Expected<Evidence> from_metadata(const EvidenceMetadata& metadata);
+
+/// What a file says, as long as a pairing can calculate with it. Error: a field that no service can
+/// have recorded.
+Expected<Evidence> checked(const Evidence& evidence);
 
 /// Applies one item of evidence to the pairing; Limits are left to the caller.
 void apply(Pairing& pairing, const Evidence& evidence);
