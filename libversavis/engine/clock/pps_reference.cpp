@@ -80,6 +80,7 @@ void PpsReference::label(BoardTime at, OutputTime second, const HostEstimate& by
     const OutputTime by_host{by_link.time.ns + output.minus_host.ns};
     if (by_link.state == ClockState::locked) compare(by_host - second, disciplined);
     const bool host_decides = on_conflict_ == SecondConflict::host && disciplined;
+    if (host_decides && by_link.state != ClockState::locked) return;  // the nearest may be another
     const OutputTime used = host_decides ? nearest_second(by_host) : second;
     add(at, used, by_host - used);
 }

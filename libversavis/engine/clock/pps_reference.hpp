@@ -54,8 +54,8 @@ class PpsReference {
                bool disciplined);
 
     /// A receiver says that the pulse at `at` began this second. The host's clock has a second
-    /// opinion while it is disciplined; and otherwise where the two differ by whole seconds so
-    /// exactly that it is no accident.
+    /// opinion while it is disciplined, and otherwise only where the two differ by whole seconds
+    /// so exactly that it is no accident.
     void label(BoardTime at, OutputTime second, const HostEstimate& by_link,
                const OutputReading& output, bool disciplined);
 
@@ -63,7 +63,7 @@ class PpsReference {
     /// not, or the host has no opinion.
     std::int64_t second_difference() const { return second_difference_; }
 
-    /// Stamps by the pulses may be off by whole seconds.
+    /// Output times may be off by whole seconds.
     bool second_doubted() const {
         return second_difference_ != 0 && on_conflict_ == SecondConflict::flag;
     }

@@ -77,7 +77,7 @@ class Replay {
     /// Limits came.
     bool begun() const { return pairing_.has_value(); }
 
-    /// The verdict on the newest record; null: none came, as in recordings of versavis 0.1.
+    /// The verdict on the newest record; null: none came, as before ring ABI 1.7.
     const RecordVerdict* record_verdict() const;
 
     /// Gives back everything that is not decided.
