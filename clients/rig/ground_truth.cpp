@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ground_truth.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+
+#include <cstdio>
+
+#include "posix/file.hpp"
 
 namespace versavis::rig {
 
@@ -20,10 +25,10 @@ std::string json(const std::vector<Tone>& tones) {
 Expected<std::unique_ptr<GroundTruth>> GroundTruth::create(const std::string& path) {
     auto truth = std::make_unique<GroundTruth>();
     if (path.empty()) return truth;
-    truth->file_.open(path, std::ios::trunc);
-    if (!truth->file_)
-        return failure(path, "the ground truth cannot be written",
-                       "choose another file with --truth");
+    truth->path_ = path;
+    truth->file_ =
+        FileDescriptor(::open(path.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644));
+    if (!truth->file_) return not_written(path);
     return truth;
 }
 
@@ -60,7 +65,11 @@ void GroundTruth::add(const Motion& motion) {
 
 void GroundTruth::write(const std::string& line) {
     const std::lock_guard lock(mutex_);
-    if (file_.is_open()) file_ << line << '\n' << std::flush;
+    if (!file_) return;
+    if (const auto written = write_all(file_, path_, line + '\n'); !written) {
+        fmt::print(stderr, "{}\n", written.error().message());
+        file_ = {};
+    }
 }
 
 }  // namespace versavis::rig

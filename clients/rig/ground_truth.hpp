@@ -3,12 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <memory>
 #include <mutex>
 #include <string>
 
 #include "motion.hpp"
+#include "posix/file_descriptor.hpp"
 #include "versavis/error.hpp"
 #include "versavis/time.hpp"
 
@@ -47,7 +47,8 @@ struct TrueImuSample {
     HostTime at;
 };
 
-/// Thread-safe. Each record is one line, written immediately.
+/// Thread-safe. Each record is one line, written immediately, since judges read along. Where a line
+/// cannot be written, the file ends and standard error says why.
 class GroundTruth {
  public:
     /// Empty path: nothing is written.
@@ -63,7 +64,8 @@ class GroundTruth {
     void write(const std::string& line);
 
     std::mutex mutex_;
-    std::ofstream file_;
+    std::string path_;
+    FileDescriptor file_;  ///< none: nothing is written
 };
 
 }  // namespace versavis::rig

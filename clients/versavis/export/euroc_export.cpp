@@ -8,8 +8,9 @@
 #include <system_error>
 #include <tuple>
 
+#include "base/task_queue.hpp"
+#include "export/export_image.hpp"
 #include "export/metadata_csv.hpp"
-#include "export/png_encoder_pool.hpp"
 #include "posix/file.hpp"
 
 namespace versavis::client {
@@ -108,7 +109,7 @@ class EurocExport {
         if (auto written = write_yaml(calibration); !written) return written;
         if (auto opened = open_files(); !opened) return opened;
         if (auto written = write_items(); !written) return written;
-        if (auto written = crew_.finish(); !written) return written;
+        if (auto written = finish_images(); !written) return written;
         for (NewFile& file : files_)
             if (auto closed = file.close(); !closed) return closed;
         return write_lists();
@@ -221,7 +222,20 @@ class EurocExport {
             return failure(item.stream,
                            fmt::format("the pixels of frame {} are damaged", item.number),
                            "record again, or leave this camera out");
-        return crew_.write(path, format, data.width, data.height, std::move(pixels));
+        if (images_.full())
+            if (auto written = *images_.take(true); !written) return written;
+        images_.push([path, format, data, pixels = std::move(pixels)] {
+            return write_png(path, format, data.width, data.height, pixels);
+        });
+        return {};
+    }
+
+    /// Error: of the first image that could not be written.
+    Expected<> finish_images() {
+        Expected<> result;
+        while (auto written = images_.take(true))
+            if (result && !*written) result = *written;
+        return result;
     }
 
     void write_sample(std::uint32_t imu, const RecordedItem& item) {
@@ -247,7 +261,7 @@ class EurocExport {
     const fs::path mav_;
     const ExportWatch& watch_;
     std::vector<NewFile> files_;
-    PngEncoderPool crew_;
+    TaskQueue<Expected<>> images_{1};
     std::uint64_t frames_ = 0;
     std::vector<std::uint64_t> without_exposure_;  ///< frames of each camera
 };

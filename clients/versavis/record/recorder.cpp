@@ -17,8 +17,9 @@
 #include <random>
 #include <utility>
 
-#include "record/frame_packer.hpp"
+#include "base/task_queue.hpp"
 #include "record/item_writer.hpp"
+#include "record/png_encoder.hpp"
 #include "record/write_back.hpp"
 #include "recording/kalibr_yaml.hpp"
 #include "status/status_document.hpp"
@@ -42,6 +43,9 @@ constexpr Duration longest_wait = milliseconds(100);
 
 /// Items of one stream in a row, while others wait.
 constexpr int in_a_row = 64;
+
+/// Encoded at a time.
+constexpr std::size_t frames_per_processor = 4;
 
 constexpr std::uint32_t slipped = static_cast<std::uint32_t>(EventKind::pairing_slipped);
 
@@ -68,7 +72,7 @@ struct Source {
     /// What is older is not wanted, and what was overwritten before the first item not missed.
     std::optional<OutputTime> from{};
     /// Gaps before the first item: they have no time until it comes.
-    std::vector<std::pair<GapReason, std::uint64_t>> untold{};
+    std::vector<std::pair<GapReason, std::uint64_t>> unreported{};
 
     ring::StreamKind kind() const { return reader.kind(); }
 };
@@ -127,6 +131,12 @@ struct Content {
     std::string bytes;
 };
 
+struct PngFrame {
+    std::string stream;
+    ring::Item item;
+    std::vector<std::byte> png;
+};
+
 class Recorder {
  public:
     explicit Recorder(const RecordSettings& settings) : settings_(settings) {}
@@ -150,9 +160,9 @@ class Recorder {
     void take_pause(Source& source, const ring::NoItem& none);
     Expected<> take_item(Source& source, ring::Item item);
     Expected<> take_frame(Source& source, ring::Item item);
-    Expected<> write_packed(bool all);
+    Expected<> write_png_frames(bool all);
     void lose(Source& source, std::uint64_t items);
-    void tell_gap(Source& source, GapReason reason, std::uint64_t items);
+    void report_gap(Source& source, GapReason reason, std::uint64_t items);
     void begin(Source& source, const ring::Item& item);
     void count(const std::string& stream, OutputTime time);
     void stop_early(const Error& why);
@@ -169,7 +179,7 @@ class Recorder {
     std::optional<ItemWriter> writer_;
     bool file_open_ = false;
     WriteBack write_back_;
-    std::optional<FramePacker> packer_;
+    std::optional<TaskQueue<PngFrame>> png_frames_;
     std::vector<Content> attachments_;
     std::map<std::string, RosLens> lenses_;
     std::map<std::string, std::uint64_t> in_chunk_;  ///< items in the chunk that is open
@@ -373,24 +383,24 @@ Expected<> Recorder::end_file() {
 void Recorder::lose(Source& source, std::uint64_t items) {
     if (source.from) return;
     report_.streams[source.name].lost += items;
-    tell_gap(source, GapReason::lost, items);
+    report_gap(source, GapReason::lost, items);
 }
 
-void Recorder::tell_gap(Source& source, GapReason reason, std::uint64_t items) {
+void Recorder::report_gap(Source& source, GapReason reason, std::uint64_t items) {
     const OutputTime last = source.last;
     if (source.begun)
         writer_->write_gap(source.name, reason, items, last, last, source.epoch);
     else
-        source.untold.emplace_back(reason, items);
+        source.unreported.emplace_back(reason, items);
 }
 
 void Recorder::take_pause(Source& source, const ring::NoItem& none) {
     if (none.why == ring::Pause::lost) lose(source, none.lost);
     if (none.why == ring::Pause::restarted) {
         ++report_.streams[source.name].restarts;
-        tell_gap(source, GapReason::restarted, 0);
+        report_gap(source, GapReason::restarted, 0);
     }
-    if (none.why == ring::Pause::gone) tell_gap(source, GapReason::gone, 0);
+    if (none.why == ring::Pause::gone) report_gap(source, GapReason::gone, 0);
 }
 
 /// The first item of a stream, and each of another epoch.
@@ -401,7 +411,7 @@ void Recorder::begin(Source& source, const ring::Item& item) {
         ++report_.streams[source.name].epochs;
         writer_->write_gap(source.name, GapReason::epoch, 0, source.last, source.last, epoch);
     }
-    for (const auto& [reason, items] : std::exchange(source.untold, {}))
+    for (const auto& [reason, items] : std::exchange(source.unreported, {}))
         writer_->write_gap(source.name, reason, items, {}, item.time, epoch);
     source.epoch = epoch;
 }
@@ -431,13 +441,19 @@ Expected<> Recorder::take_item(Source& source, ring::Item item) {
 
 Expected<> Recorder::take_frame(Source& source, ring::Item item) {
     const OutputTime time = item.time;
-    if (packer_ && can_be_png(unpack<FrameMetadata>(item.metadata), item.payload.size())) {
-        if (packer_->full())
-            if (auto written = write_packed(false); !written) return written;
-        if (!packer_->push(source.name, std::move(item))) {
+    const auto frame = unpack<FrameMetadata>(item.metadata);
+    if (png_frames_ && can_be_png(frame, item.payload.size())) {
+        if (png_frames_->full())
+            if (auto written = write_png_frames(false); !written) return written;
+        std::vector<std::byte> pixels(item.payload.size());
+        if (!item.payload.copy_to(pixels.data())) {
             lose(source, 1);
             return {};
         }
+        png_frames_->push([stream = source.name, item = std::move(item), frame,
+                           pixels = std::move(pixels)]() mutable {
+            return PngFrame{std::move(stream), std::move(item), encode_png(frame, pixels)};
+        });
     } else {
         const auto outcome = writer_->write_frame(source.name, item);
         if (!outcome) {
@@ -455,18 +471,18 @@ Expected<> Recorder::take_frame(Source& source, ring::Item item) {
     return {};
 }
 
-/// Those that are ready, in the order of their arrival; at least one if the packer is full; `all`:
+/// Those that are ready, in the order of their arrival; at least one if the queue is full; `all`:
 /// waits for each.
-Expected<> Recorder::write_packed(bool all) {
-    while (packer_) {
-        auto packed = packer_->take(all || packer_->full());
-        if (!packed) break;
-        auto written = writer_->write_png(packed->stream, packed->item, packed->png);
+Expected<> Recorder::write_png_frames(bool all) {
+    while (png_frames_) {
+        auto encoded = png_frames_->take(all || png_frames_->full());
+        if (!encoded) break;
+        auto written = writer_->write_png(encoded->stream, encoded->item, encoded->png);
         if (!written) {
-            ++report_.streams[packed->stream].lost;
+            ++report_.streams[encoded->stream].lost;
             return written;
         }
-        count(packed->stream, packed->item.time);
+        count(encoded->stream, encoded->item.time);
     }
     return {};
 }
@@ -523,7 +539,7 @@ Expected<> Recorder::take_all() {
         if (auto taken = take(*source); !taken) return taken;
         if (auto ended = end_chunk_if_due(host_now()); !ended) return ended;
     }
-    return write_packed(false);
+    return write_png_frames(false);
 }
 
 /// The file ends before the chunk that is open. What was in that, or on its way there, is lost.
@@ -534,10 +550,10 @@ void Recorder::stop_early(const Error& why) {
         report_.streams[stream].items -= items;
         report_.streams[stream].lost += items;
     }
-    while (packer_) {
-        const auto packed = packer_->take(true);
-        if (!packed) break;
-        ++report_.streams[packed->stream].lost;
+    while (png_frames_) {
+        const auto encoded = png_frames_->take(true);
+        if (!encoded) break;
+        ++report_.streams[encoded->stream].lost;
     }
     if (!file_open_) return;
     if (!writer_->file().close_before_chunk())
@@ -549,7 +565,7 @@ Expected<RecordReport> Recorder::run() {
     if (auto read = read_calibration(); !read) return Unexpected(read.error());
     if (auto opened = open_streams(); !opened) return Unexpected(opened.error());
     if (auto chosen = choose_file(); !chosen) return Unexpected(chosen.error());
-    if (settings_.png) packer_.emplace();
+    if (settings_.png) png_frames_.emplace(frames_per_processor);
     if (auto made = begin_file(); !made) return Unexpected(made.error());
     begun_ = round_begun_ = chunk_begun_ = host_now();
     Expected<> done;
@@ -558,7 +574,7 @@ Expected<RecordReport> Recorder::run() {
         done = take_all();
         end_each_round(host_now());
     }
-    if (done) done = write_packed(true);
+    if (done) done = write_png_frames(true);
     if (done) done = end_file();
     if (!done) stop_early(done.error());
     report_.duration = host_now() - begun_;
