@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# What is installed, and where. The prefix may change when `cmake --install` is told another.
+# What is installed, and where. The prefix may change with `cmake --install --prefix`.
 include(GNUInstallDirs)
 set(package_directory ${CMAKE_INSTALL_LIBDIR}/cmake/versavis)
 

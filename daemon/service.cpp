@@ -226,7 +226,7 @@ void Service::tick() {
     if (status_.due(now)) status_.publish(collect_status(now), translator_);
 }
 
-void Service::tell_output_step(const OutputStep& step) {
+void Service::report_output_step(const OutputStep& step) {
     const Duration by = step.after - step.before;
     log(LogLevel::warning, "clock",
         "the output clock stepped by {} ns, from {} to {} ns after the host's: a new epoch begins",
@@ -248,7 +248,7 @@ Status Service::collect_status(HostTime now) {
         status.board.hint = missing_capability(configuration_, status.board.capabilities);
     status.clock = translator_.report();
     asymmetry_.keep(status.clock);
-    if (const auto step = output_steps_.see(status.clock)) tell_output_step(*step);
+    if (const auto step = output_steps_.see(status.clock)) report_output_step(*step);
     status.grid = alignment_.report(now);
     status.cameras = cameras_->status();
     status.streams = cameras_->streams();

@@ -55,7 +55,7 @@ class Service final : private BoardListener {
     void align_grid(HostTime now);
     void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
-    void tell_output_step(const OutputStep& step);
+    void report_output_step(const OutputStep& step);
 
     // On the link's thread.
     void board_restarted() override;

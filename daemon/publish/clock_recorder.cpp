@@ -34,19 +34,19 @@ void ClockRecorder::tick(HostTime now) {
     const std::lock_guard lock(mutex_);
     ring_.heartbeat(now);
     const clock::OutputRelation relation = translator_.output_now();
-    if (relation.epoch != epoch_ || relation.host >= next_output_) tell_output(relation);
+    if (relation.epoch != epoch_ || relation.host >= next_output_) record_output(relation);
 }
 
 /// `recorded_at`: none for now. A step of the output clock precedes the first item that is stamped
 /// by it.
 void ClockRecorder::publish(const clock::ClockItem& item, std::optional<HostTime> recorded_at) {
     const clock::OutputRelation relation = translator_.output_now();
-    if (relation.epoch != epoch_) tell_output(relation);
+    if (relation.epoch != epoch_) record_output(relation);
     const HostTime at = recorded_at.value_or(relation.host);
     ring_.publish({at.ns + relation.minus_host.ns}, pack(clock::to_metadata(item)));
 }
 
-void ClockRecorder::tell_output(const clock::OutputRelation& relation) {
+void ClockRecorder::record_output(const clock::OutputRelation& relation) {
     epoch_ = relation.epoch;
     next_output_ = relation.host + output_interval;
     const clock::RecordedOutput output{relation.epoch, relation.host, relation.minus_host,

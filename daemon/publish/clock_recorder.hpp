@@ -35,7 +35,7 @@ class ClockRecorder {
 
  private:
     void publish(const clock::ClockItem& item, std::optional<HostTime> recorded_at = {});
-    void tell_output(const clock::OutputRelation& relation);
+    void record_output(const clock::OutputRelation& relation);
 
     std::mutex mutex_;
     ring::Writer ring_;

@@ -19,7 +19,7 @@ constexpr Nanoseconds start_timeout_limit = 50'000'000;
 constexpr Nanoseconds latest_trigger = 1'000'000;
 
 /// Most that the detail of an event can count.
-constexpr std::int64_t most_told = 65'535;
+constexpr std::int64_t most_reported = 65'535;
 
 Nanoseconds max(Nanoseconds a, Nanoseconds b) { return a > b ? a : b; }
 Nanoseconds min(Nanoseconds a, Nanoseconds b) { return a < b ? a : b; }
@@ -157,7 +157,7 @@ void CameraChannel::skip(wire::SkipReason reason) {
 
 /// The next trigger, and those after it that have passed as well.
 void CameraChannel::skip_late(Nanoseconds late_by) {
-    const std::int64_t ticks = min(late_by / period() + 1, most_told);
+    const std::int64_t ticks = min(late_by / period() + 1, most_reported);
     const std::int64_t skipped = wanted_among(grid_.tick() - first_tick_, ticks);
     if (ticks == 1 && skipped == 1) {
         skip(wire::SkipReason::late);

@@ -159,8 +159,8 @@ bool NmeaReader::finish(UtcLabel& label) {
     if (!nmea_utc(line_, size, utc_s)) return false;
     const Nanoseconds pulse = newest_ <= began_ ? newest_ : before_;
     if (pulse > began_ || began_ - pulse >= oldest_pulse) return false;
-    if (pulse == told_.pulse && utc_s == told_.utc_s) return false;
-    label = told_ = {pulse, utc_s};
+    if (pulse == reported_.pulse && utc_s == reported_.utc_s) return false;
+    label = reported_ = {pulse, utc_s};
     return true;
 }
 

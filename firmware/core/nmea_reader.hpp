@@ -47,7 +47,7 @@ class NmeaReader {
     Nanoseconds byte_duration_ = 0;
     Nanoseconds newest_ = long_ago;
     Nanoseconds before_ = long_ago;  ///< the bytes of a sentence may be read after the next pulse
-    UtcLabel told_{};
+    UtcLabel reported_{};
     char line_[longest];
 };
 

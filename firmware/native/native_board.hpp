@@ -160,7 +160,7 @@ class NativeBoard final : public VirtualBoard,
     bool watchdog_bit_ = false;
     bool attention_ = true;  ///< the core has something to do at once
     std::deque<Word> words_;
-    bool words_full_ = false;  ///< and the core was told so
+    bool words_full_ = false;  ///< and the core was notified
     Nanoseconds last_word_ = INT64_MIN / 2;
     std::uint32_t levels_ = 0;  ///< of the schedule
     bool driven_ = false;       ///< the outputs drive their pins
@@ -185,7 +185,7 @@ class NativeBoard final : public VirtualBoard,
     std::deque<Packet> received_;
     std::vector<std::uint8_t> transmitted_;
     std::size_t link_capacity_ = std::size_t{64} * 1024;
-    bool link_full_ = false;      ///< and the core was told so
+    bool link_full_ = false;      ///< and the core was notified
     std::uint64_t written_ = 0;   ///< bytes for the host since boot
     std::uint64_t consumed_ = 0;  ///< of them
     std::optional<std::uint64_t> watched_;

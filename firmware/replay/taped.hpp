@@ -80,7 +80,7 @@ void pass_results(Tape& tape, T& value) {
     Words([&tape](std::uint32_t word) { return tape.result(word); }).pass(value);
 }
 
-/// The signature of a method tells what goes where. Values and references to constants are
+/// The signature of a method determines what goes where. Values and references to constants are
 /// arguments; so are constant bytes, whose size follows. Other references are filled, and so are
 /// bytes: as many as the call returns, and no more than the capacity that may follow them. A call
 /// that returns 0 or false fills nothing.

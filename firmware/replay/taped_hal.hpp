@@ -205,7 +205,7 @@ class TapedHal {
     TapedWatchdog<Tape> watchdog_;
 };
 
-/// What the board is told before its life begins, such as its identity.
+/// What the board is given before its life begins, such as its identity.
 template <class T, class Tape>
 T taped_value(Tape& tape, const char* name, T value = {}) {
     tape.begin(name);

@@ -227,7 +227,7 @@ class Frame(Item):
 
 def escaped(window):
     """True if something still refers to the memory. numpy makes memoryviews of its own of what it
-    is given, so that releasing ours does not tell; but all of them keep the memory's object."""
+    is given, so that releasing ours shows nothing; but all of them keep the memory's object."""
     if window() is None:
         return False
     gc.collect()  # what refers to it may be garbage, in a cycle

@@ -42,7 +42,7 @@ class Source:
         self.restarts = 0  # of the service, so far
         self._handle = handle
         self._lock = threading.RLock()  # the library takes one thread at a time
-        self._gone = False  # that was told
+        self._gone = False  # and it was reported
         self._callback = None
 
     def close(self):
@@ -96,10 +96,10 @@ class Source:
             left = remaining(deadline)
             with self._opened() as pointer:
                 result = call(pointer, nanoseconds(left))
-            told = self._gone
+            reported = self._gone
             if result != library.NOTHING:
                 self._gone = result == library.GONE
-            waiting = result == library.NOTHING or (result == library.GONE and told)
+            waiting = result == library.NOTHING or (result == library.GONE and reported)
             if not waiting or left < SLICE:
                 return result
 
@@ -224,7 +224,7 @@ def open(name, instance=None, start="next", after_loss=None, owner=None, sealed_
 
 
 def wait(streams, timeout=None):
-    """Sleeps until next() of one of the streams has something to tell, up to timeout seconds.
+    """Sleeps until next() of one of the streams has something to return, up to timeout seconds.
 
     Returns the list of those that have; empty: nothing in time."""
     streams = list(streams)

@@ -69,9 +69,9 @@ std::uint16_t McapWriter::add(const McapTopic& topic) {
                            mcap_text(topic.schema_text);
     summary_.channels[id] = number + number + mcap_text(topic.name) + mcap_text(topic.encoding) +
                             mcap_map(topic.metadata);
-    untold_[id] = mcap_record(McapOpcode::schema, summary_.schemas[id]) +
-                  mcap_record(McapOpcode::channel, summary_.channels[id]);
-    summary_room_ += untold_[id].size() + summary_entry;
+    unwritten_channels_[id] = mcap_record(McapOpcode::schema, summary_.schemas[id]) +
+                              mcap_record(McapOpcode::channel, summary_.channels[id]);
+    summary_room_ += unwritten_channels_[id].size() + summary_entry;
     return id;
 }
 
@@ -89,9 +89,10 @@ Expected<> McapWriter::write(const MessageHead& message, const std::string& data
 
 void McapWriter::begin_message(const MessageHead& message, std::uint64_t length) {
     if (!chunk_open_) begin_chunk();
-    if (const auto untold = untold_.find(message.channel); untold != untold_.end()) {
-        pending_ += untold->second;
-        untold_.erase(untold);
+    if (const auto channel = unwritten_channels_.find(message.channel);
+        channel != unwritten_channels_.end()) {
+        pending_ += channel->second;
+        unwritten_channels_.erase(channel);
     }
     sum();
     mark_ = {size(), crc_, message.channel, first_time_, last_time_};

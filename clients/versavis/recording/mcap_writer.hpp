@@ -108,8 +108,8 @@ class McapWriter {
     std::string pending_;         ///< follows it
     std::size_t summed_ = 0;      ///< bytes of it that the chunk's checksum has
     McapSummary summary_;
-    std::uint64_t summary_room_;                   ///< bytes that it takes, and a little more
-    std::map<std::uint16_t, std::string> untold_;  ///< channels without a message yet
+    std::uint64_t summary_room_;  ///< bytes that it takes, and a little more
+    std::map<std::uint16_t, std::string> unwritten_channels_;  ///< channels without a message yet
     std::uint16_t channels_ = 0;
 
     bool chunk_open_ = false;

@@ -10,7 +10,7 @@ namespace versavis::firmware::replay {
 
 extern "C" {
 
-/// The linker tells its size, which is that of the board.
+/// The linker reports its size, which is that of the board.
 alignas(Board) unsigned char board_storage[sizeof(Board)];
 
 void replay_main() {

@@ -15,7 +15,7 @@ struct Window {
     volatile std::uint32_t result;         ///< read, one after the other
 };
 
-/// Where it lies is told by the linker script.
+/// The linker script says where it lies.
 extern "C" Window replay_window;
 
 /// A tape that replays.
