@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <deque>
 #include <future>
+#include <memory>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -23,10 +24,13 @@ class TaskQueue {
     /// No more tasks may be pushed: take() a result first.
     bool full() const { return results_.size() >= limit_; }
 
-    /// Without a launch policy, take() does the work if no thread can be started.
+    /// If no thread can be started, take() does the work.
     template <class Task>
     void push(Task task) {
-        results_.push_back(std::async(std::move(task)));
+        // What std::async has tried to start is moved away when it falls back: it gets a copy.
+        const auto shared = std::make_shared<Task>(std::move(task));
+        const auto run = [shared] { return (*shared)(); };
+        results_.push_back(std::async(run));
     }
 
     /// The oldest result; none if it is not ready, unless `wait`, or if there is none.
