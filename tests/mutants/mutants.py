@@ -69,7 +69,6 @@ AREAS = [
     Area("libversavis/engine/ring", "ring_tests"),
     Area("libversavis/client", "ring_tests"),
     Area("libversavis/include/versavis/ring", "ring_tests"),
-    Area("libversavis/posix", "ring_tests"),
 ]
 
 STATUSES = {

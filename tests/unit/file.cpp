@@ -54,9 +54,14 @@ TEST_CASE("file: a whole one takes the place of the old one when it is finished"
 }
 
 TEST_CASE("file: a device is written as it is") {
-    CHECK(write_whole_file("/dev/null", "text"));
-    CHECK(std::filesystem::is_character_file("/dev/null"));
-    const auto full = write_whole_file("/dev/full", "text");
+    // By links, so that a fault replaces them and not the machine's devices.
+    const test::TemporaryDirectory directory;
+    for (const auto* name : {"null", "full"})
+        std::filesystem::create_symlink(std::filesystem::path("/dev") / name,
+                                        directory.path() / name);
+    CHECK(write_whole_file(directory.path() / "null", "text"));
+    CHECK(std::filesystem::is_character_file(directory.path() / "null"));
+    const auto full = write_whole_file(directory.path() / "full", "text");
     REQUIRE_FALSE(full);
     CHECK_THAT(full.error().message(), Contains("No space left on device; free some of the disk"));
 }
