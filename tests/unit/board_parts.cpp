@@ -109,7 +109,7 @@ TEST_CASE("board_parts: a missing port") {
             "light output; set cameras = [], or use another board"},
            {camera + "[board]\nkeep_configuration = true\n", wire::present_memory,
             "5:22: 'keep_configuration' of [board] is true: the board (v1, serial B7) has no "
-            "memory for it; set keep_configuration = false, or use another board"},
+            "memory to store it; set keep_configuration = false, or use another board"},
            {ports + "sync_rate_hz = 2.5\n", wire::present_sync_output,
             "5:16: 'sync_rate_hz' of [ports] is 2.5 Hz: the board (v1, serial B7) has no sync "
             "output; set sync_rate_hz = 0, or use another board"},
@@ -121,7 +121,7 @@ TEST_CASE("board_parts: a missing port") {
             "output; choose another 'test_output', or use another board"},
            {ports + "test_rate_hz = 1\ntest_output = 'sync'\n", wire::present_sync_output,
             "6:15: 'test_output' of [ports] is \"sync\": the board (v1, serial B7) has no sync "
-            "output; choose another, or use another board"},
+            "output; choose another output, or use another board"},
            {ports + "test_rate_hz = 1\ntest_output = 'trigger3'\n", outputs(0b1000),
             "6:15: 'test_output' of [ports] is \"trigger3\": the board (v1, serial B7) has outputs "
             "0, 1 and 2; choose one that it has, or use another board"},
@@ -209,7 +209,7 @@ TEST_CASE("board_parts: a part that the board refuses is named by its key") {
              "output = 2\n[[imu]]\ndata_ready = true\n[illumination]\ncameras = ['left']\n"
              "[ports]\ninputs = ['pps', 'aux1']\nsync_rate_hz = 1\n");
     const std::string unused =
-        "the board lacks a part that the configuration does not ask for: update its firmware";
+        "the board reports a missing part that the configuration does not use: update its firmware";
     const struct {
         Part part;
         unsigned index;
@@ -318,10 +318,10 @@ TEST_CASE("board_parts: what an older firmware cannot do is named by its key") {
     };
     CHECK(message(wire::capability_host_grid | wire::capability_nmea).empty());
     CHECK(message(wire::capability_nmea) ==
-          "5:9: 'align' of [clock] is true: the board's firmware does not let the host place its "
-          "grid; flash a newer one, or set align = false");
+          "5:9: 'align' of [clock] is true: the board's firmware does not support moving its grid; "
+          "update it, or set align = false");
     CHECK(message(wire::capability_host_grid) ==
-          "8:8: 'nmea' of [ports] is true: the board's firmware does not read NMEA; flash a newer "
-          "one, or set nmea = false");
+          "8:8: 'nmea' of [ports] is true: the board's firmware does not support NMEA; update it, "
+          "or set nmea = false");
     CHECK(missing_capability(load(camera), 0).empty());
 }

@@ -78,23 +78,24 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
     };
     CHECK(load_presets(directory.path()).error().message() ==
           directory.path().string() +
-              ": there are no camera presets; install them, or set 'preset_directory' in the "
-              "configuration");
+              ": there are no camera presets in this directory; install them, or set "
+              "'preset_directory' in the configuration");
     test::check_messages(
         error,
         {{"[[trigger]]\nsteps = [{ set = ['A'], to = ['B'], neded = true }]\n",
           "2:37: unknown key 'neded'; did you mean 'needed'?"},
          {"[[trigger]]\nsteps = [{ set = ['A'] }]\n",
           "2:18: a step needs 'set' and 'to'; give a list of names for each"},
-         {"[[trigger]]\nset = ['A']\n", "1:1: there are no 'steps'; give a list of them"},
+         {"[[trigger]]\nset = ['A']\n", "1:1: 'steps' is missing or empty; give a list of them"},
          {"[[trigger]]\nselect = ['A']\n",
           "2:10: 'select' needs a selector and its value; see docs/user/cameras.md"},
          {"stamp_instant = 'dawn'\n",
-          "1:17: 'stamp_instant' must be one of start, middle, end, and is 'dawn'; see "
+          "1:17: 'stamp_instant' must be one of start, middle, end, but is 'dawn'; see "
           "docs/user/cameras.md"},
-         {"[[line]]\nkind = 'direct'\n", "1:1: a line needs a 'name'; see docs/user/cameras.md"},
+         {"[[line]]\nkind = 'direct'\n",
+          "1:1: a [[line]] needs a 'name'; see docs/user/cameras.md"},
          {"[[line]]\nname = 'Line1'\nkind = 'opt'\n",
-          "3:8: 'kind' must be one of opto, direct, and is 'opt'; did you mean \"opto\"?"}});
+          "3:8: 'kind' must be one of opto, direct, but is 'opt'; did you mean \"opto\"?"}});
     const std::string two_numbers =
         "4:20: 'output_rising_us' must be a list of 2 numbers from 0 to 1000; see "
         "docs/user/cameras.md";

@@ -275,93 +275,91 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
         errors_after(camera),
         {{"rate_hzz = 20\n", "4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"},
          {"rate_hz = 2000\n",
-          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is 2000" + see_manual},
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is 2000" + see_manual},
          {"rate_hz = '20'\n",
-          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is '20'" + see_manual},
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is '20'" + see_manual},
          {"rate_hz = nan\n",
-          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is nan" + see_manual},
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is nan" + see_manual},
          {"output = 4\n",
-          "4:10: 'output' must be a whole number from 0 to 3, and is 4" + see_manual},
+          "4:10: 'output' must be a whole number from 0 to 3, but is 4" + see_manual},
          {"packet_size = 20\n",
-          "4:15: 'packet_size' must be a whole number from 576 to 16000 bytes, and is 20" +
+          "4:15: 'packet_size' must be a whole number from 576 to 16000 bytes, but is 20" +
               see_manual},
          {"trigger = 'bord'\n",
-          "4:11: 'trigger' must be one of board, free, and is 'bord'; did you mean \"board\"?"},
+          "4:11: 'trigger' must be one of board, free, but is 'bord'; did you mean \"board\"?"},
          {"strobe = 1\n",
-          "4:10: 'strobe' must be one of active_high, active_low, none, and is 1" + see_manual},
+          "4:10: 'strobe' must be one of active_high, active_low, none, but is 1" + see_manual},
          {"glitch_us = 0\n",
-          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, and is 0" + see_manual},
+          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, but is 0" + see_manual},
          {"glitch_us = 26\n",
-          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, and is 26" + see_manual},
+          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, but is 26" + see_manual},
          {"glitch = 5\n", "4:1: unknown key 'glitch'; did you mean 'glitch_us'?"},
          {"chunk = true\n", "4:1: unknown key 'chunk'; did you mean 'chunks'?"},
          {"history_s = -1\n",
-          "4:13: 'history_s' must be a number from 0 to 3600 s, and is -1" + see_manual},
+          "4:13: 'history_s' must be a number from 0 to 3600 s, but is -1" + see_manual},
          {"slots = 20\nhistory_s = 1\n",
-          "5:13: 'slots' and 'history_s' both say how many frames the ring holds; keep one of "
-          "them"},
+          "5:13: 'slots' and 'history_s' both set the size of the ring; remove one of the two"},
          {"slots = 10\n",
-          "4:9: 'slots' must be a whole number from 14 to 1024, and is 10" + see_manual},
+          "4:9: 'slots' must be a whole number from 14 to 1024, but is 10" + see_manual},
          {"strobe_rising_us = [36, 9]\n",
-          "4:20: the delays of both edges of the exposure line are needed; set 'strobe_rising_us' "
-          "and 'strobe_falling_us', each [value, sigma]"},
+          "4:20: the delay of the other edge of the exposure line is missing; set "
+          "'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]"},
          {"strobe_rising_us = 36\n",
           "4:20: 'strobe_rising_us' must be a list of 2 numbers from 0 to 1000" + see_manual},
          {"[camera.features]\nrate_hz = 30\n",
-          "5:11: 'rate_hz' is a key of the camera, and no feature; move it above "
-          "[camera.features]"},
+          "5:11: 'rate_hz' is a key of the camera, not a feature; move it above [camera.features]"},
          {"[camera.features]\nTriggerMode = 'Off'\n",
-          "5:15: 'TriggerMode' is set by the service, as 'trigger' says; set 'trigger' of the "
-          "camera instead"},
+          "5:15: 'TriggerMode' is set by the service, from 'trigger'; set 'trigger' of the camera "
+          "instead"},
          {"[camera.features]\nTriggerSource = 'Line1'\n",
-          "5:17: 'TriggerSource' is set by the service, as 'trigger_line' says; set 'trigger_line' "
-          "of the camera instead"},
+          "5:17: 'TriggerSource' is set by the service, from 'trigger_line'; set 'trigger_line' of "
+          "the camera instead"},
          {"[camera.features]\nGain = [1]\n",
-          "5:8: feature 'Gain' must be a text, a number, true or false" + see_manual},
+          "5:8: feature 'Gain' must be a string, a number, true or false" + see_manual},
          {"[camera.features]\nGain = nan\n",
-          "5:8: feature 'Gain' must be a text, a number, true or false" + see_manual},
+          "5:8: feature 'Gain' must be a string, a number, true or false" + see_manual},
          {"[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
-          "5:14: 'percentile' must be a number from 0 to 100, and is 101; see "
+          "5:14: 'percentile' must be a number from 0 to 100, but is 101; see "
           "docs/user/configuration.md\n"
-          "6:16: 'largest_step' must be a number from 1.01 to 10, and is 1" +
+          "6:16: 'largest_step' must be a number from 1.01 to 10, but is 1" +
               see_manual},
          {"[ports]\npps = 'on'\n",
           "5:1: unknown key 'pps'; remove it; the keys are in docs/user/configuration.md"},
          {"[ports]\ntest_rate_hz = 10001\n",
-          "5:16: 'test_rate_hz' must be a number from 0 to 10000 Hz, and is 10001" + see_manual},
+          "5:16: 'test_rate_hz' must be a number from 0 to 10000 Hz, but is 10001" + see_manual},
          {"[ports]\ntest_rate = 10\n",
           "5:1: unknown key 'test_rate'; did you mean 'test_rate_hz'?"},
          {"[ports]\ntest_output = 'trigger4'\n",
           "5:15: 'test_output' must be one of test, sync, trigger0, trigger1, trigger2, trigger3, "
-          "and is 'trigger4'; did you mean \"trigger0\"?"},
+          "but is 'trigger4'; did you mean \"trigger0\"?"},
          {"[clock]\npps = 'on'\n",
-          "5:7: 'pps' must be one of off, host, nmea, and is 'on'" + see_manual},
+          "5:7: 'pps' must be one of off, host, nmea, but is 'on'" + see_manual},
          {"[clock]\nmax_slew_ppm = 0\n",
-          "5:16: 'max_slew_ppm' must be a number from 0.1 to 500 ppm, and is 0" + see_manual},
+          "5:16: 'max_slew_ppm' must be a number from 0.1 to 500 ppm, but is 0" + see_manual},
          {"[illumination]\ncameras = 'cam0'\n",
-          "5:11: 'cameras' must be a list of strings in quotes: [\"...\", \"...\"], and is 'cam0'" +
+          "5:11: 'cameras' must be a list of strings in quotes: [\"...\", \"...\"], but is 'cam0'" +
               see_manual},
          {"[memory]\nlocked = true\n", "5:1: unknown key 'locked'; did you mean 'lock'?"},
          {"[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n",
           "5:29: 'inputs' must be a list of 4 numbers from 0 to 100000" + see_manual},
-         {"[[board]]\n", "4:1: 'board' must be a table: [board], and is a list" + see_manual}});
+         {"[[board]]\n", "4:1: 'board' must be a table: [board], but is a list" + see_manual}});
     test::check_messages(
         errors_after("[[imu]]\n"),
-        {{"bus = 'usb'\n", "2:7: 'bus' must be one of spi, i2c, and is 'usb'" + see_manual},
+        {{"bus = 'usb'\n", "2:7: 'bus' must be one of spi, i2c, but is 'usb'" + see_manual},
          {"busses = 'spi'\n", "2:1: unknown key 'busses'; did you mean 'bus'?"},
          {"i2c_adress = 0x69\n", "2:1: unknown key 'i2c_adress'; did you mean 'i2c_address'?"},
          {"i2c_address = '0x68'\n",
-          "2:15: 'i2c_address' must be a whole number from 0 to 255, and is '0x68'" + see_manual},
-         {"accel_ready = 1\n", "2:15: 'accel_ready' must be true or false, and is 1" + see_manual},
+          "2:15: 'i2c_address' must be a whole number from 0 to 255, but is '0x68'" + see_manual},
+         {"accel_ready = 1\n", "2:15: 'accel_ready' must be true or false, but is 1" + see_manual},
          {"history_s = 3601\n",
-          "2:13: 'history_s' must be a number from 0 to 3600 s, and is 3601" + see_manual},
+          "2:13: 'history_s' must be a number from 0 to 3600 s, but is 3601" + see_manual},
          {"model = 'mpu'\n",
           "2:9: 'model' must be one of adis16448b, adis16448a, adis16445, adis16460, adis16470, "
-          "icm42688p, bmi088, vn100, and is 'mpu'" +
+          "icm42688p, bmi088, vn100, but is 'mpu'" +
               see_manual}});
     const std::string nothing =
-        "1:1: there is nothing to serve; write a table [[camera]] with 'name' and 'device', or "
-        "[[imu]] with 'model'";
+        "1:1: there is no camera and no IMU to serve; add a [[camera]] with 'name' and 'device', "
+        "or an [[imu]] with 'model'";
     test::check_messages(
         errors_after(""),
         {{"", nothing},
@@ -369,7 +367,7 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
          {"# nothing yet\n", nothing},
          {"[ports]\ninputs = ['pps']\n", nothing},
          {"camera = 3\n",
-          "1:10: 'camera' must be an array of tables: [[camera]], and is 3" + see_manual}});
+          "1:10: 'camera' must be an array of tables: [[camera]], but is 3" + see_manual}});
     // The words are the parser's, the place and the cure are ours.
     for (const auto& [text, place] :
          {std::pair("instance = \n", "1:"), {"[[camera]]\nGain = 1\nGain = 2\n", "3:"}})
@@ -392,7 +390,7 @@ TEST_CASE("configuration: windows line ends and a byte order mark change nothing
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2)
         text.insert(at, "\r");
     CHECK(errors_of(text) ==
-          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is 2000; see "
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is 2000; see "
           "docs/user/configuration.md");
 }
 

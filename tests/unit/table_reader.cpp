@@ -86,11 +86,11 @@ TEST_CASE("table_reader: problems are collected with place, table and key") {
     REQUIRE(file.problems.size() == 3);
     CHECK(width == 1);
     CHECK(file.problems[0].message() ==
-          "t.toml:2:12: 'width_us' must be a number from 0 to 2 us, and is 3; see manual");
+          "t.toml:2:12: 'width_us' must be a number from 0 to 2 us, but is 3; see manual");
     CHECK(file.problems[0].key == "width_us");
     CHECK(file.problems[0].range.maximum == 2);
     CHECK(file.problems[1].message() ==
-          "t.toml:4:8: 'kind' must be one of round, flat, and is 'rond'; did you mean \"round\"?");
+          "t.toml:4:8: 'kind' must be one of round, flat, but is 'rond'; did you mean \"round\"?");
     CHECK(file.problems[2].message() == "t.toml:3:1: unknown key 'hight'; did you mean 'height'?");
     CHECK(file.problems[2].table == "[t]");
     CHECK(file.result().error().message() == file.problems[0].message());

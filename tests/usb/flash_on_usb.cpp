@@ -319,7 +319,7 @@ TEST_CASE("flash: a Pico 2 is refused, and does not stand in the way of a board"
          {std::vector<std::string>{}, {"--port", "usb:1-2"}, {"--all"}}) {
         CHECK(bench.flash(more) == 69);
         CHECK_THAT(bench.said, Contains("board at usb:1-2: is a Pico 2") && Contains("RP2350") &&
-                                   Contains("take a board with an RP2040"));
+                                   Contains("use a board with an RP2040"));
     }
     const SimulatedPico pico(bench.testbed.get(), {});
     CHECK(bench.flash() == 0);
