@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes mutants of the sources and tells which of them no test notices.
+"""Makes mutants of the sources and reports which of them no test notices.
 
 The tracked files are copied to build/mutants/source and built once. Each worker has a copy of the
 sources of its own, in which one mutant at a time replaces a file. Only objects that depend on that
@@ -58,8 +58,8 @@ class Area:
     program: str
     # A file of test cases that takes long, and the only modules for which it runs.
     only_for: dict = dataclasses.field(default_factory=dict)
-    # Its named constants are none of ours: ./dev sensitivity halves and doubles them, and tells what
-    # that costs.
+    # Its named constants are none of ours: ./dev sensitivity halves and doubles them, and shows
+    # what that costs.
     is_tuned: bool = False
 
 
@@ -707,7 +707,7 @@ def changed_lines(root, base):
 
 
 def in_order(mutants, seed):
-    """At random, so that those of any part of the time tell about all of them."""
+    """At random, so that those of any part of the time stand for all of them."""
     return random.Random(seed).sample(mutants, len(mutants))
 
 
@@ -758,7 +758,7 @@ def read_entries(text):
     return entries
 
 
-# What is told
+# Report
 
 def survivors_text(results):
     lines = []
@@ -816,7 +816,7 @@ def parse(arguments):
     parser.add_argument("--changed", nargs="?", const="", metavar="BASE",
                         help="only on lines that differ from this commit (default HEAD~1)")
     parser.add_argument("--limit", type=float, metavar="MINUTES",
-                        help="stop in time, and tell how many were not run")
+                        help="stop in time, and report how many were not run")
     parser.add_argument("--seed", type=int, default=1, metavar="N",
                         help="of the order in which they run (default 1)")
     parser.add_argument("--jobs", type=int, default=2, metavar="N",
@@ -902,7 +902,7 @@ class Tool:
             if mutants and not interrupted:
                 interrupted = not self.run(area, mutants, results)
         wrong = self.judge_entries(entries, results)
-        self.tell(results)
+        self.report(results)
         if self.options.json:
             self.options.json.write_text(to_json(results))
         if interrupted:
@@ -967,7 +967,7 @@ class Tool:
                 wrong.append(entry)
         return wrong
 
-    def tell(self, results):
+    def report(self, results):
         if not results:
             print("mutants: there are none" if self.options.changed is None else
                   "mutants: there are none on lines that changed")

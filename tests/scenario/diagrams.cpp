@@ -79,14 +79,14 @@ Diagram overlong() {
     world.configuration.cameras[0].max_exposure_ns = 100 * ms;
     run(world, 0, second);
     const Nanoseconds from = world.grid_time(0, 2);
-    return {
-        "overlong",
-        world.trace().svg({"Longer than the period: triggers are skipped and told, the grid stays",
-                           from,
-                           from + 300 * ms,
-                           50 * ms,
-                           {"trigger0", "exposure0"},
-                           grid_points(world, 0, 20)})};
+    return {"overlong",
+            world.trace().svg(
+                {"Longer than the period: triggers are skipped and reported, the grid stays",
+                 from,
+                 from + 300 * ms,
+                 50 * ms,
+                 {"trigger0", "exposure0"},
+                 grid_points(world, 0, 20)})};
 }
 
 Diagram master_slave() {

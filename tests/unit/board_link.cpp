@@ -176,7 +176,7 @@ class PlayedBoard final : public ByteStream {
     std::deque<Arriving> packets_;
 };
 
-/// Counts what it is told; the test waits for counts.
+/// Counts its calls; the test waits for counts.
 class Listener final : public BoardListener {
  public:
     struct Counts {
@@ -247,7 +247,7 @@ clock::ClockReport connect(const Manner& manner) {
     return clock.translator.report();
 }
 
-/// What is told of a board of which nothing can be made.
+/// What is reported of a board of which nothing can be made.
 BoardReport end_of_connection(const Configuration& configuration, const Manner& manner,
                               std::vector<wire::Type>* heard = nullptr) {
     Clock clock;
@@ -330,7 +330,7 @@ class NativeStream final : public ByteStream {
     }
     std::string port() const override { return "native"; }
 
-    /// A new life, of which the link tells nothing.
+    /// A new life, that the link does not report.
     void boot() {
         const std::lock_guard lock(mutex_);
         booted_ = host_now();
@@ -355,7 +355,7 @@ wire::ImuSample sample_at(std::int64_t ns) {
 
 }  // namespace
 
-TEST_CASE("board_link: an exchange ends when the answer truly left, if the board tells") {
+TEST_CASE("board_link: an exchange ends when the answer truly left, if the board reports it") {
     const clock::ClockReport clock = connect({});
     CHECK(clock.exchanges == 4);
     CHECK(clock.round_trip < on_the_way / 2);
@@ -497,7 +497,7 @@ TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
     CHECK(given.get() == BoardState::running);
 }
 
-TEST_CASE("board_link: what the board refuses is told in the words of the file") {
+TEST_CASE("board_link: what the board refuses is reported in the words of the file") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.write(
         "v.toml", "[[camera]]\nname = \"left\"\ndevice = \"x\"\nrate_hz = 50\nlatency_us = 60\n");
@@ -512,7 +512,7 @@ TEST_CASE("board_link: what the board refuses is told in the words of the file")
             "change the configuration");
 }
 
-TEST_CASE("board_link: what the board lacks is told with what it has, and it is not asked") {
+TEST_CASE("board_link: what the board lacks is reported with what it has, and it is not asked") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.write(
         "v.toml",

@@ -145,7 +145,7 @@ TEST_CASE("configuration: the output clock") {
     CHECK(configuration->clock.force_tai);
 }
 
-TEST_CASE("configuration: what the board is told") {
+TEST_CASE("configuration: what is sent to the board") {
     const auto configuration = load(camera +
                                     "output = 2\nrate_hz = 29.97\nstrobe = "
                                     "\"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
@@ -160,7 +160,7 @@ TEST_CASE("configuration: what the board is told") {
     CHECK(board.imus[1].kind == wire::ImuKind::none);
 }
 
-TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is told") {
+TEST_CASE("configuration: slaves, light, ports and both IMUs, as sent to the board") {
     const auto configuration =
         load(camera +
              "rate_hz = 50\n[[camera]]\nname = \"cam1\"\ndevice = \"x\"\noutput = 3\nmaster = "
@@ -207,7 +207,7 @@ TEST_CASE("configuration: the filter of an exposure line, in the board's unit") 
     CHECK(glitch("glitch_us = 7.24\n") == 72);
 }
 
-TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the board is told") {
+TEST_CASE("configuration: a part on I2C, and a second data-ready line, as sent to the board") {
     const auto first = [](const std::string& table) {
         return board_configuration(*load("[[imu]]\n" + table)).imus[0].options;
     };
@@ -221,7 +221,7 @@ TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the bo
           (wire::imu_data_ready | wire::imu_accel_ready));
 }
 
-TEST_CASE("configuration: test pulses of their own, as the board is told") {
+TEST_CASE("configuration: test pulses of their own, as sent to the board") {
     const auto ports = [](const std::string& keys) {
         return board_configuration(*load(camera + "[ports]\n" + keys)).ports;
     };
@@ -376,7 +376,7 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
                        Catch::EndsWith("; the file must be TOML in UTF-8: https://toml.io"));
 }
 
-TEST_CASE("configuration: all errors are told at once, in the order of the file") {
+TEST_CASE("configuration: all errors are reported at once, in the order of the file") {
     const auto configuration = load("instance = \"a b\"\n" + camera +
                                     "rate_hzz = 1\npulse_us = 0\n[ports]\ntest = \"x\"\n");
     REQUIRE_FALSE(configuration);

@@ -411,7 +411,8 @@ TEST_CASE("configuration_check: what a model of IMU can do is what its part does
     }
 }
 
-TEST_CASE("configuration_check: the board takes what is at a limit, and tells what is beyond it") {
+TEST_CASE(
+    "configuration_check: the board takes what is at a limit, and refuses what is beyond it") {
     using Part = wire::ConfigurationPart;
     using Field = wire::ConfigurationField;
     struct Limit {
@@ -630,7 +631,7 @@ TEST_CASE("configuration_check: memory is a port, and an input that does not exi
     CHECK(refusals_of(all, 0).size() == 1);
 }
 
-TEST_CASE("configuration_check: what does not fit something else is told, with what would") {
+TEST_CASE("configuration_check: what does not fit something else is refused, with what would") {
     using Part = wire::ConfigurationPart;
     using Field = wire::ConfigurationField;
     struct Case {
