@@ -46,7 +46,7 @@ Expected<std::optional<clock::Asymmetry>> AsymmetryStore::load(const std::string
     if (document.is_object() && entry == document.end()) return std::nullopt;
     if (document.is_null() || !plausible(*entry))
         return failure(path_.string(), "is not a valid asymmetry file",
-                       "remove it: PPS measures the asymmetries again");
+                       "remove it: the asymmetries are measured again by PPS");
     return clock::Asymmetry{{(*entry)["offset_ns"]},
                             Duration{(*entry)["sigma_ns"]} * 2 + another_day};
 }
@@ -56,7 +56,7 @@ Expected<> AsymmetryStore::save(const std::string& port, const clock::Asymmetry&
     if (document.is_null()) document = nlohmann::json::object();
     document[port] = {{"offset_ns", asymmetry.offset.ns}, {"sigma_ns", asymmetry.sigma.ns}};
     auto written = write_whole_file(path_, document.dump(2) + '\n', 0640);
-    if (!written) written.error().cure = "make its directory, or set 'state_directory'";
+    if (!written) written.error().cure = "create its directory, or set 'state_directory'";
     return written;
 }
 

@@ -76,18 +76,16 @@ std::optional<BoardRemark> remark(const wire::Event& event) {
         case wire::BoardEventKind::sync_lost:
             return BoardRemark{
                 LogLevel::warning,
-                fmt::format("a pulse of the sync input is {:.3f} us off the grid, which does not "
-                            "follow it: check its cable, and that 'sync_rate_hz' is that of the "
-                            "board which sends the pulses",
+                fmt::format("a pulse at the sync input is {:.3f} us off the grid and was ignored: "
+                            "check the cable, and that 'sync_rate_hz' is the same as on the board "
+                            "that sends the pulses",
                             us)};
         case wire::BoardEventKind::sync_taken:
             return BoardRemark{
                 LogLevel::info,
-                fmt::format("the grid follows the pulses of the sync input, and moves by {:.3f} us "
-                            "for that",
-                            us)};
+                fmt::format("the grid now follows the sync input and moves by {:.3f} us", us)};
         case wire::BoardEventKind::stored:
-            if (event.value != 0) return BoardRemark{LogLevel::info, "it keeps its configuration"};
+            if (event.value != 0) return BoardRemark{LogLevel::info, "it stored its configuration"};
             return BoardRemark{LogLevel::warning, unkept_configuration};
         default: return std::nullopt;
     }

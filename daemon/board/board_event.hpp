@@ -20,7 +20,7 @@ std::uint64_t skipped_triggers(const wire::Event& event);
 
 /// What to do about a configuration that the board was to keep, and does not.
 inline constexpr const char* unkept_configuration =
-    "it could not keep its configuration, and begins with an older one at its next power-up: "
+    "it could not store its configuration and will start with an older one at its next power-up: "
     "restart the service to try again, or set keep_configuration = false";
 
 /// What the log has of an event about the board itself.

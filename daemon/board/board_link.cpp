@@ -49,13 +49,13 @@ constexpr std::uint8_t all_cameras = 0xFF;
 /// Why a board of another major version cannot be used, and what to do.
 std::string describe_mismatch(const wire::BoardHello& hello) {
     const bool older = hello.major < wire::protocol_major;
-    return fmt::format("it speaks protocol {}.{}, this service {}.{}: {}", hello.major, hello.minor,
-                       wire::protocol_major, wire::protocol_minor,
-                       older ? "flash the firmware of this release of the service: stop it, then "
-                               "run 'versavis flash " +
+    return fmt::format("its protocol is {}.{}, the service's is {}.{}: {}", hello.major,
+                       hello.minor, wire::protocol_major, wire::protocol_minor,
+                       older ? "stop the service, then flash the firmware of this release with "
+                               "'versavis flash " +
                                    board::firmware_file().string() + "'"
-                             : "install the service of its firmware's release, or flash the "
-                               "firmware of this one");
+                             : "install the release of the service that matches the firmware, or "
+                               "flash the firmware of this release");
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ BoardReport BoardLink::report() const {
 }
 
 void BoardLink::run() {
-    set_state(BoardState::absent, "looking for it");
+    set_state(BoardState::absent, "searching");
     for (bool go_on = true; go_on;) {
         auto stream = open_();
         if (!stream) {
@@ -160,7 +160,7 @@ Expected<> BoardLink::serve() {
         if (was_connected) listener_.board_lost();
         // A board that does not get as far as to run is given a pause.
         if (ended || !anew_ || !was_connected) return ended;
-        log(LogLevel::warning, "board", "{}: greeting it again", ended.error().message());
+        log(LogLevel::warning, "board", "{}: reconnecting", ended.error().message());
     }
 }
 
@@ -227,22 +227,22 @@ Expected<> BoardLink::configure() {
     // The board would refuse it, too, but cannot say what it has instead.
     if (const auto missing = missing_parts(file_, greeting_.hello); !missing.empty()) {
         set_state(BoardState::refused, fmt::format("{}", fmt::join(missing, "; ")));
-        return failure("board", "lacks what its configuration asks for");
+        return failure("board", "lacks parts that the configuration uses");
     }
     answered_ = false;
     refusals_.clear();
     ++configuration_.id;
     if (auto sent = send(configuration_); !sent) return sent;
     if (auto done = read_until([this] { return answered_; }, answer_timeout,
-                               "does not answer its configuration");
+                               "does not answer the configuration");
         !done)
         return done;
     if (answer_.status == wire::ConfigurationStatus::taken) return {};
     refusals_.emplace_back(answer_.status == wire::ConfigurationStatus::running
-                               ? "its cameras are running: reset it"
+                               ? "its cameras are already running: reset the board"
                                : "change the configuration");
     set_state(BoardState::refused, fmt::format("{}", fmt::join(refusals_, "; ")));
-    return failure("board", "rejected its configuration");
+    return failure("board", "refused the configuration");
 }
 
 /// A few exchanges in a row, so that the first frame can be stamped.
@@ -284,7 +284,8 @@ Expected<> BoardLink::read(Duration timeout) {
     if (anew_) return failure("board", "was reset");
     const std::uint64_t dropped = reader_->dropped();
     if (dropped > dropped_bytes_)
-        log(LogLevel::warning, "board", "{} bytes came faster than they were taken, and are lost",
+        log(LogLevel::warning, "board",
+            "{} bytes lost: they arrived faster than they were processed",
             dropped - dropped_bytes_);
     const std::lock_guard lock(report_mutex_);
     report_.malformed = decoder_.errors();

@@ -28,7 +28,7 @@ void ask_for_realtime() {
     const int error = ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &wanted);
     if (error != 0)
         log(LogLevel::debug, "board",
-            "its bytes are stamped at ordinary priority: {}; LimitRTPRIO={} allows more",
+            "its bytes are timestamped without real-time priority: {}; set LimitRTPRIO={}",
             std::strerror(error), realtime_priority);
 }
 
@@ -36,7 +36,7 @@ void give_realtime_back() {
     const sched_param ordinary{};
     ::pthread_setschedparam(::pthread_self(), SCHED_OTHER, &ordinary);
     log(LogLevel::debug, "board",
-        "its link never sleeps: its bytes are stamped at ordinary priority");
+        "its link keeps the CPU busy: its bytes are timestamped without real-time priority");
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ void StampingReader::run() {
         keep(std::span(buffer).first(chunk->size), chunk->received);
         consumer_.signal();
     }
-    if (!error_) error_ = Error{"board", "its link was given up", ""};
+    if (!error_) error_ = Error{"board", "its link was closed", ""};
     ended_.store(true, std::memory_order_release);
     consumer_.signal();
 }

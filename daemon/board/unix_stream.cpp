@@ -73,8 +73,9 @@ Expected<std::unique_ptr<ByteStream>> open_unix_stream(const std::string& path) 
     if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0) {
         const int error = errno;
         if (error == EAGAIN)
-            return failure(path, "the board's process does not accept the connection",
-                           "another program may hold it: stop that, or restart the process");
+            return failure(
+                path, "the board's process does not accept the connection",
+                "another program may be connected: stop it, or restart the board's process");
         return failure(path,
                        fmt::format("cannot connect: {}", std::generic_category().message(error)),
                        "is the board's process (versavis-rig) running?");

@@ -172,13 +172,14 @@ class UsbStream final : public ByteStream {
 std::optional<Error> boot_loader(const device::UsbBus& bus) {
     if (const auto found = bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2040);
         !found.empty())
-        return Error{"", "a board waits in its boot loader at " + found.front().port(),
-                     "put firmware into it with 'versavis flash', or start what it has with "
+        return Error{"", "a board is in its boot loader at " + found.front().port(),
+                     "flash it with 'versavis flash', or start its current firmware with "
                      "'versavis board reset'"};
     if (const auto found = bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2350);
         !found.empty())
-        return Error{"", "there is a Pico 2, whose chip is another, at " + found.front().port(),
-                     "take a board with an RP2040: a Pico, Pico H, Pico W or Pico WH"};
+        return Error{
+            "", "there is a Pico 2 (RP2350), which is not supported, at " + found.front().port(),
+            "use a board with an RP2040: a Pico, Pico H, Pico W or Pico WH"};
     return std::nullopt;
 }
 
@@ -204,13 +205,13 @@ Expected<device::UsbHandle> find_board(const device::UsbBus& bus,
     if (refused) return usb_failure("cannot be opened", *refused);
     if (hangs)
         return failure("USB board", "does not answer; it was reset",
-                       "unplug it if it does not come back");
+                       "replug it if it does not come back");
     const auto waiting = boot_loader(bus);
     return failure("USB board",
                    fmt::format("no device {:04x}:{:04x}{}{}", wanted.usb_vendor, wanted.usb_product,
                                wanted.serial.empty() ? "" : " with serial " + wanted.serial,
                                waiting ? ", but " + waiting->what : ""),
-                   waiting ? waiting->cure : "plug it in; 'lsusb' lists what is there");
+                   waiting ? waiting->cure : "plug it in; 'lsusb' lists connected devices");
 }
 
 }  // namespace

@@ -140,7 +140,7 @@ std::string allowed(const Configuration& configuration, const wire::Refusal& ref
 std::string describe_options(const wire::Refusal& refusal, const TomlEntry& entry) {
     const std::int64_t refused = refusal.value & ~refusal.maximum;
     const auto refused_by_key = [&](const char* key, const char* value) {
-        return fmt::format("{} is {}: the board does not take that of this part, as it is wired",
+        return fmt::format("{} is {}: the board does not support that for this IMU",
                            entry.reference(key), value);
     };
     if ((refused & wire::imu_accel_ready) != 0) return refused_by_key("accel_ready", "true");
@@ -208,13 +208,13 @@ std::string describe(const Configuration& configuration, const wire::Refusal& re
     const std::string name = named(configuration, refusal.field, refusal.value);
     const std::string value = board_units != 0
                                   ? quantity(key, static_cast<double>(refusal.value) / board_units)
-                              : name.empty() ? "not known to it"
+                              : name.empty() ? "not known to the board"
                                              : fmt::format("\"{}\"", name);
     const TomlEntry* found = refused_entry(configuration, refusal);
     const TomlEntry entry = found == nullptr ? TomlEntry{} : *found;
     if (refusal.field == wire::ConfigurationField::imu_options)
         return describe_options(refusal, entry);
-    return fmt::format("{} is {}: the board takes {}", entry.reference(key), value,
+    return fmt::format("{} is {}: the board accepts {}", entry.reference(key), value,
                        allowed(configuration, refusal));
 }
 

@@ -149,7 +149,7 @@ void Needs::of_test_pulses(const PortConfiguration& ports) {
                     "choose another 'test_output', or use another board");
     if (ports.test_output == wire::test_at_sync)
         return need(wire::present_sync_output, "test_output", "is \"sync\"", "sync output", "",
-                    "choose another, or use another board");
+                    "choose another output, or use another board");
     const unsigned output = ports.test_output - unsigned{wire::test_at_camera0};
     need(wire::present_camera0 << output, "test_output", fmt::format("is \"trigger{}\"", output),
          fmt::format("output {}", output), outputs_there(present_),
@@ -184,7 +184,7 @@ void Needs::of_ports(const PortConfiguration& ports) {
 void Needs::of_board(const BoardConfiguration& board) {
     if (board.keep_configuration)
         needs_.push_back({wire::present_memory, Part::ports, 0, &board.entry, "keep_configuration",
-                          "is true", "memory for it", "",
+                          "is true", "memory to store it", "",
                           "set keep_configuration = false, or use another board"});
 }
 
@@ -234,7 +234,7 @@ std::string describe_missing(const Configuration& configuration, const wire::Ref
     const auto need = std::find_if(needs.begin(), needs.end(),
                                    [&](const Need& one) { return means(refusal, one); });
     if (need == needs.end())
-        return "the board lacks a part that the configuration does not ask for: update its "
+        return "the board reports a missing part that the configuration does not use: update its "
                "firmware";
     return message(*need, "the board");
 }
@@ -242,14 +242,13 @@ std::string describe_missing(const Configuration& configuration, const wire::Ref
 std::string missing_capability(const Configuration& configuration, std::uint32_t capabilities) {
     const auto lacks = [](const TomlEntry& entry, const char* key, const char* what) {
         return fmt::format(
-            "{} is true: the board's firmware does not {}; flash a newer one, or set "
-            "{} = false",
+            "{} is true: the board's firmware does not support {}; update it, or set {} = false",
             entry.reference(key), what, key);
     };
     if (configuration.clock.align && !has(capabilities, wire::capability_host_grid))
-        return lacks(configuration.clock.entry, "align", "let the host place its grid");
+        return lacks(configuration.clock.entry, "align", "moving its grid");
     if (configuration.ports.nmea && !has(capabilities, wire::capability_nmea))
-        return lacks(configuration.ports.entry, "nmea", "read NMEA");
+        return lacks(configuration.ports.entry, "nmea", "NMEA");
     return "";
 }
 

@@ -40,10 +40,11 @@ std::optional<EdgeDelay> read_edge(TableReader& reader, std::string_view key) {
 PresetLine read_line(TableReader& reader) {
     PresetLine line;
     reader.read("name", line.name);
-    if (line.name.empty()) reader.fail("name", "a line needs a 'name'");
+    if (line.name.empty()) reader.fail("name", "a [[line]] needs a 'name'");
     reader.choose<LineKind>("kind", line.kind,
                             {{"opto", LineKind::opto}, {"direct", LineKind::direct}});
-    if (!reader.has("kind")) reader.fail("kind", "a line needs a 'kind'", "\"opto\" or \"direct\"");
+    if (!reader.has("kind"))
+        reader.fail("kind", "a [[line]] needs a 'kind'", "\"opto\" or \"direct\"");
     line.input_rising = read_edge(reader, "input_rising_us");
     line.input_falling = read_edge(reader, "input_falling_us");
     line.output_rising = read_edge(reader, "output_rising_us");
@@ -80,7 +81,7 @@ std::vector<PresetStep> read_steps(TomlFile& file, const toml::table& table) {
         steps.back().selector = selection[0];
         steps.back().selected = selection[1];
     }
-    if (steps.empty()) reader.fail("steps", "there are no 'steps'", "give a list of them");
+    if (steps.empty()) reader.fail("steps", "'steps' is missing or empty", "give a list of them");
     reader.finish();
     return steps;
 }
@@ -174,7 +175,7 @@ Expected<std::vector<CameraPreset>> load_presets(const std::filesystem::path& di
         presets.push_back(std::move(*preset));
     }
     if (presets.empty())
-        return failure(directory.string(), "there are no camera presets",
+        return failure(directory.string(), "there are no camera presets in this directory",
                        "install them, or set 'preset_directory' in the configuration");
     const auto base = load_base(directory);
     if (!base) return Unexpected(base.error());

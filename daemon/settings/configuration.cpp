@@ -42,11 +42,11 @@ const std::pair<std::string_view, const char*> own_features[]{
 void check_feature_name(TableReader& reader, const TableReader& camera_keys, std::string_view key,
                         const CameraConfiguration& camera) {
     if (camera_keys.knows(key))
-        return reader.fail(key, fmt::format("'{}' is a key of the camera, and no feature", key),
+        return reader.fail(key, fmt::format("'{}' is a key of the camera, not a feature", key),
                            "move it above [camera.features]");
     for (const auto& [feature, own] : own_features)
         if (key == feature && camera.trigger == TriggerSource::board)
-            reader.fail(key, fmt::format("'{}' is set by the service, as '{}' says", key, own),
+            reader.fail(key, fmt::format("'{}' is set by the service, from '{}'", key, own),
                         fmt::format("set '{}' of the camera instead", own));
 }
 
@@ -62,7 +62,7 @@ void read_features(TableReader& reader, const TableReader& camera_keys,
             text << toml::node_view(node);
         else
             reader.fail(key.str(),
-                        fmt::format("feature '{}' must be a text, a number, true or false",
+                        fmt::format("feature '{}' must be a string, a number, true or false",
                                     clipped(key.str())));
         camera.features.emplace_back(key.str(), text.str());
     }

@@ -47,7 +47,7 @@ class Findings {
                const std::string& reason, const std::string& cure) {
         if (value > maximum)
             add(entry, key,
-                fmt::format("'{}' is {}, and must be at most {} ({})", key, quantity(key, value),
+                fmt::format("'{}' is {}, but must be at most {} ({})", key, quantity(key, value),
                             quantity(key, maximum), reason),
                 cure, TomlRange{std::nullopt, maximum});
     }
@@ -62,7 +62,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 /// The entry in words, with its line.
 std::string at_line(const TomlEntry& entry) {
-    return fmt::format("{} in line {}", entry.title, entry.place.line);
+    return fmt::format("{} on line {}", entry.title, entry.place.line);
 }
 
 /// Reports each that agrees with one before it, with the first of them.
@@ -87,14 +87,14 @@ void check_instance(const Configuration& configuration, Findings& findings) {
     if (!valid_name(configuration.instance))
         findings.add(configuration.entry, "instance",
                      fmt::format("'{}' is not a valid name", clipped(configuration.instance)),
-                     "use up to 31 letters, digits, '_' and '-'");
+                     "use at most 31 letters, digits, '_' and '-'");
 }
 
 void check_that_it_serves(const Configuration& configuration, Findings& findings) {
     const auto& keys = configuration.entry;
     if (!keys.has("camera") && !keys.has("imu"))
-        findings.add(configuration.entry, "", "there is nothing to serve",
-                     "write a table [[camera]] with 'name' and 'device', or [[imu]] with 'model'");
+        findings.add(configuration.entry, "", "there is no camera and no IMU to serve",
+                     "add a [[camera]] with 'name' and 'device', or an [[imu]] with 'model'");
 }
 
 void check_link(const Configuration& configuration, Findings& findings) {
@@ -108,8 +108,8 @@ void check_link(const Configuration& configuration, Findings& findings) {
                      "use \"usb\" or \"unix:/path/of/socket\"");
     else if (is_unix && board.link.size() - prefix.size() > longest)
         findings.add(board.entry, "link",
-                     fmt::format("the path of a socket has {} characters at most", longest),
-                     "use a shorter one");
+                     fmt::format("a socket path can have at most {} characters", longest),
+                     "use a shorter path");
 }
 
 void check_pps(const Configuration& configuration, Findings& findings) {
@@ -118,12 +118,12 @@ void check_pps(const Configuration& configuration, Findings& findings) {
     if (clock.pps == PpsLabels::off) return;
     if (clock.output == clock::OutputClockKind::monotonic_raw)
         findings.add(clock.entry, "pps", "PPS cannot label CLOCK_MONOTONIC_RAW",
-                     "choose output = \"realtime\" or \"tai\", or pps = \"off\"");
+                     "set output = \"realtime\" or \"tai\", or pps = \"off\"");
     if (!contains(configuration.ports.inputs, "pps"))
         findings.add(clock.entry, "pps", "'pps' needs the PPS input, which is not enabled",
                      "add \"pps\" to 'inputs' of [ports]");
     if (clock.pps == PpsLabels::nmea && !configuration.ports.nmea)
-        findings.add(clock.entry, "pps", "pps = \"nmea\" needs a receiver at the board's UART",
+        findings.add(clock.entry, "pps", "pps = \"nmea\" needs a GNSS receiver at the board's UART",
                      "set nmea = true in [ports], or pps = \"host\"");
 }
 
@@ -140,22 +140,22 @@ void check_names(const Configuration& configuration, Findings& findings) {
     for (const auto& [entry, name] : all) {
         const std::size_t stem = name.size() - std::min(name.size(), evidence_suffix.size());
         if (name.empty())
-            findings.add(entry, "name", "a 'name' is needed", "give one, such as \"cam0\"");
+            findings.add(entry, "name", "'name' is missing", "set one, such as \"cam0\"");
         else if (!valid_name(name))
             findings.add(entry, "name", fmt::format("'{}' is not a valid name", clipped(name)),
-                         "use up to 31 letters, digits, '_' and '-'");
+                         "use at most 31 letters, digits, '_' and '-'");
         else if (contains(taken, name) || name.substr(stem) == evidence_suffix)
             findings.add(entry, "name",
-                         fmt::format("the name '{}' is taken by a stream of the service", name),
-                         "choose another");
+                         fmt::format("the name '{}' is reserved for a stream of the service", name),
+                         "choose another name");
     }
     find_repeated(
         all, [](const NamedEntry& a, const NamedEntry& b) { return a.name == b.name; },
         [&](const NamedEntry& first, const NamedEntry& second) {
-            findings.add(
-                second.entry, "name",
-                fmt::format("the name '{}' is taken by {}", second.name, at_line(first.entry)),
-                "choose another");
+            findings.add(second.entry, "name",
+                         fmt::format("the name '{}' is already used by {}", second.name,
+                                     at_line(first.entry)),
+                         "choose another name");
         });
 }
 
@@ -170,8 +170,9 @@ bool is_broken_address(const std::string& device) {
 void check_devices(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras) {
         if (camera.device.empty())
-            findings.add(camera.entry, "device", "a camera needs a 'device'",
-                         "give its IP address, serial number or name; arv-tool-0.8 lists them");
+            findings.add(
+                camera.entry, "device", "'device' is missing",
+                "set the camera's IP address, serial number or name; arv-tool-0.8 lists them");
         if (is_broken_address(camera.device))
             findings.add(camera.entry, "device",
                          fmt::format("'{}' is not an IP address", clipped(camera.device)),
@@ -184,9 +185,9 @@ void check_devices(const Configuration& configuration, Findings& findings) {
         },
         [&](const CameraConfiguration& first, const CameraConfiguration& second) {
             findings.add(second.entry, "device",
-                         fmt::format("'{}' is the device of {}", clipped(second.device),
-                                     at_line(first.entry)),
-                         "one camera has one table: give another device, or remove the table");
+                         fmt::format("the device '{}' is already used by {}",
+                                     clipped(second.device), at_line(first.entry)),
+                         "set another device, or remove one of the two tables");
         });
 }
 
@@ -194,12 +195,13 @@ void check_devices(const Configuration& configuration, Findings& findings) {
 void check_receive(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras)
         if (camera.receive == ReceiveMode::packet && !packet_socket_suits(camera))
-            findings.add(camera.entry, "receive",
-                         fmt::format("\"packet\" delivers frames up to {} ms late, too much for a "
-                                     "period of {:g} ms",
-                                     packet_socket_lateness.ns / 1'000'000,
-                                     static_cast<double>(period_of(camera).ns) * 1e-6),
-                         "use \"auto\" or \"socket\"");
+            findings.add(
+                camera.entry, "receive",
+                fmt::format("receive = \"packet\" may delay frames by {} ms, too much for a "
+                            "period of {:g} ms",
+                            packet_socket_lateness.ns / 1'000'000,
+                            static_cast<double>(period_of(camera).ns) * 1e-6),
+                "set receive = \"auto\" or \"socket\"");
 }
 
 void check_outputs(const Configuration& configuration, Findings& findings) {
@@ -219,9 +221,9 @@ void check_outputs(const Configuration& configuration, Findings& findings) {
         [&](const CameraConfiguration& first, const CameraConfiguration& second) {
             findings.add(
                 second.entry, "output",
-                fmt::format("output {} is taken by {}", second.output, at_line(first.entry)),
-                free.empty() ? "the board triggers four cameras at most"
-                             : fmt::format("free: {}", fmt::join(free, ", ")));
+                fmt::format("output {} is already used by {}", second.output, at_line(first.entry)),
+                free.empty() ? "the board triggers at most four cameras: remove one"
+                             : fmt::format("free outputs: {}", fmt::join(free, ", ")));
         });
 }
 
@@ -229,8 +231,8 @@ void check_history(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras)
         if (camera.entry.has("slots") && camera.entry.has("history_s"))
             findings.add(camera.entry, "history_s",
-                         "'slots' and 'history_s' both say how many frames the ring holds",
-                         "keep one of them");
+                         "'slots' and 'history_s' both set the size of the ring",
+                         "remove one of the two");
 }
 
 bool can_be_master(const CameraConfiguration& camera) {
@@ -244,10 +246,10 @@ std::string wrong_with_master(const Configuration& configuration,
     const auto& cameras = configuration.cameras;
     const auto master = std::find_if(cameras.begin(), cameras.end(),
                                      [&](const auto& c) { return c.name == slave.master; });
-    if (master == cameras.end()) return "there is no camera of that name";
-    if (master->name == slave.name) return "it is this camera itself";
+    if (master == cameras.end()) return "there is no camera with that name";
+    if (master->name == slave.name) return "it is the slave itself";
     if (master->trigger != TriggerSource::board) return "the board does not trigger it";
-    if (!master->master.empty()) return "it has a master itself";
+    if (!master->master.empty()) return "it is a slave itself";
     return master->strobe == Strobe::none ? "it has no exposure line" : "";
 }
 
@@ -255,11 +257,11 @@ void check_master(const Configuration& configuration, const CameraConfiguration&
                   Findings& findings) {
     if (slave.trigger == TriggerSource::free_run)
         return findings.add(slave.entry, "master",
-                            "a camera with trigger = \"free\" has no 'master'",
+                            "a camera with trigger = \"free\" cannot have a 'master'",
                             "remove one of the two");
     for (const char* key : {"rate_hz", "phase_us", "max_exposure_us"})
         if (slave.entry.has(key))
-            findings.add(slave.entry, key, fmt::format("a slave has the '{}' of its master", key),
+            findings.add(slave.entry, key, fmt::format("a slave takes '{}' from its master", key),
                          "remove the key, or 'master'");
     const std::string wrong = wrong_with_master(configuration, slave);
     if (wrong.empty()) return;
@@ -268,8 +270,8 @@ void check_master(const Configuration& configuration, const CameraConfiguration&
         if (can_be_master(camera) && camera.name != slave.name) possible.push_back(camera.name);
     findings.add(slave.entry, "master",
                  fmt::format("'{}' cannot be the master: {}", clipped(slave.master), wrong),
-                 possible.empty() ? "no other camera has an exposure line and no master: remove it"
-                                  : fmt::format("possible: {}", fmt::join(possible, ", ")));
+                 possible.empty() ? "no other camera can be one: remove 'master'"
+                                  : fmt::format("possible masters: {}", fmt::join(possible, ", ")));
 }
 
 void check_masters(const Configuration& configuration, Findings& findings) {
@@ -288,8 +290,9 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
             findings.limit(camera.entry, key, value, maximum, reason, cure);
         };
         limit("latest_arrival_ms", camera.latest_arrival_ms, longest_arrival_ms(camera),
-              camera.camera_clock ? "the service remembers no more exposures at this rate"
-                                  : "without 'camera_clock' the start sends one pulse a second",
+              camera.camera_clock
+                  ? "exposures are kept no longer at this rate"
+                  : "without 'camera_clock', cameras start at one trigger per second",
               camera.camera_clock ? slower : "lower it, or set camera_clock = true");
         if (camera.trigger == TriggerSource::free_run) continue;
         limit("phase_us", camera.phase_us, before_next, "less than the period", slower);
@@ -297,7 +300,7 @@ void check_camera_times(const Configuration& configuration, Findings& findings) 
         limit("gap_us", camera.gap_us, before_next, "less than the period", slower);
         limit("pulse_us", camera.pulse_us, period / 2, "half the period", slower);
         limit("exposure_us", camera.exposure_us, period - camera.latency_us - camera.gap_us,
-              "with 'latency_us' and 'gap_us' it must end before the next trigger", slower);
+              "the period less 'latency_us' and 'gap_us'", slower);
         limit("exposure_us", camera.exposure_us, camera.max_exposure_us, "'max_exposure_us'",
               "lower it, or raise 'max_exposure_us'");
     }
@@ -308,7 +311,7 @@ void check_line_delays(const Configuration& configuration, Findings& findings) {
         const bool rising = camera.entry.has("strobe_rising_us");
         if (rising != camera.entry.has("strobe_falling_us"))
             findings.add(camera.entry, rising ? "strobe_rising_us" : "strobe_falling_us",
-                         "the delays of both edges of the exposure line are needed",
+                         "the delay of the other edge of the exposure line is missing",
                          "set 'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]");
     }
 }
@@ -341,9 +344,10 @@ void check_auto_exposure(const Configuration& configuration, Findings& findings)
         findings.limit(control.entry, "min_us", control.min_us, control.max_us, "'max_us'",
                        "lower it, or raise 'max_us'");
         if (camera.exposure_by_pulse)
-            findings.add(camera.entry, "auto_exposure",
-                         "the length of the trigger sets the exposure: auto exposure cannot",
-                         "set exposure = \"timed\", or remove [camera.auto_exposure]");
+            findings.add(
+                camera.entry, "auto_exposure",
+                "with exposure = \"pulse\" the trigger sets the exposure, so auto exposure cannot",
+                "set exposure = \"timed\", or remove [camera.auto_exposure]");
     }
 }
 
@@ -366,7 +370,7 @@ void check_preset(const CameraConfiguration& camera, const std::vector<CameraPre
     for (const auto& [key, group, wanted] : asked)
         if (wanted && preset->groups.at(group).empty())
             findings.add(camera.entry, key,
-                         fmt::format("cameras of preset '{}' have no '{}'", preset->name, group),
+                         fmt::format("the preset '{}' does not support '{}'", preset->name, group),
                          "remove the key, or set the features by name in [camera.features]");
 }
 
@@ -388,28 +392,29 @@ void check_imu_wiring(const ImuConfiguration& imu, Findings& findings) {
     const bool serial = imu.port() == 1;
     const bool has_i2c = model.fastest_i2c_hz > 0;
     if (imu.entry.has("bus") && serial)
-        findings.add(imu.entry, "bus", fmt::format("the {} is on the UART", model.name),
+        findings.add(imu.entry, "bus", fmt::format("the {} is always on the UART", model.name),
                      "remove the key");
     else if (imu.bus == ImuBus::i2c && !has_i2c)
-        findings.add(imu.entry, "bus", fmt::format("the {} has no I2C", model.name),
-                     "set bus = \"spi\"; of all parts only the icm42688p can be on I2C");
+        findings.add(imu.entry, "bus", fmt::format("the {} is not supported on I2C", model.name),
+                     "set bus = \"spi\"; only the icm42688p can be on I2C");
     else if (imu.bus == ImuBus::i2c && !imu.data_ready)
         findings.add(imu.entry, "bus",
-                     "a reading takes so long on I2C that the data-ready line must begin it",
-                     "wire that line and set data_ready = true, or put the part on the SPI");
+                     "reads over I2C are slow, so the data-ready line must start them",
+                     "wire that line and set data_ready = true, or connect the part to SPI");
     if (imu.entry.has("i2c_address") && imu.bus != ImuBus::i2c)
-        findings.add(imu.entry, "i2c_address", "'i2c_address' is of a part on I2C",
+        findings.add(imu.entry, "i2c_address", "'i2c_address' is only for a part on I2C",
                      has_i2c ? "set bus = \"i2c\", or remove the key" : "remove the key");
     if (imu.i2c_address != first_i2c_address && imu.i2c_address != second_i2c_address)
         findings.add(imu.entry, "i2c_address",
-                     fmt::format("'i2c_address' is 0x{:02X}, and must be 0x{:02X} or 0x{:02X}",
+                     fmt::format("'i2c_address' is 0x{:02X}, but must be 0x{:02X} or 0x{:02X}",
                                  imu.i2c_address, first_i2c_address, second_i2c_address),
-                     "see which of them its address pin chooses");
+                     "the address pin of the part selects which");
     if (!imu.accel_ready) return;
     if (!model.accel_ready)
-        findings.add(imu.entry, "accel_ready",
-                     fmt::format("the {} has no data-ready line of its accelerometer", model.name),
-                     "remove the key; of all parts only the bmi088 has one");
+        findings.add(
+            imu.entry, "accel_ready",
+            fmt::format("the {} has no separate data-ready line for its accelerometer", model.name),
+            "remove the key; only the bmi088 has one");
     else if (!imu.data_ready)
         findings.add(imu.entry, "accel_ready",
                      "'accel_ready' needs the data-ready line of the gyro, which paces the samples",
@@ -422,15 +427,16 @@ void check_imus(const Configuration& configuration, Findings& findings) {
         check_imu_wiring(imu, findings);
         if (imu.bus == ImuBus::i2c && model.fastest_i2c_hz > 0)
             findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_i2c_hz,
-                           fmt::format("the fastest of the {} on I2C", model.name),
-                           "lower it, or put the part on the SPI");
+                           fmt::format("the maximum of the {} on I2C", model.name),
+                           "lower it, or connect the part to SPI");
         findings.limit(imu.entry, "rate_hz", imu.rate_hz, model.fastest_hz,
-                       fmt::format("the fastest of the {}", model.name), "lower it");
+                       fmt::format("the maximum of the {}", model.name), "lower it");
         if (!imu.data_ready)
             findings.limit(imu.entry, "rate_hz", imu.rate_hz, fastest_on_grid_hz,
-                           "faster only with the data-ready line", "lower it, or wire that line");
+                           "without the data-ready line",
+                           "lower it, or wire that line and set data_ready = true");
         findings.limit(imu.entry, "filter", imu.filter, model.strongest_filter,
-                       fmt::format("the strongest of the {}", model.name), "lower it");
+                       fmt::format("the maximum of the {}", model.name), "lower it");
     }
     find_repeated(
         configuration.imus,
@@ -438,10 +444,10 @@ void check_imus(const Configuration& configuration, Findings& findings) {
         [&](const ImuConfiguration& first, const ImuConfiguration& second) {
             findings.add(
                 second.entry, "model",
-                fmt::format("the board has one port for IMUs on {}, taken by {}",
+                fmt::format("the board has one IMU port on {}, already used by {}",
                             second.port() == 0 ? "SPI or I2C" : "the UART", at_line(first.entry)),
-                "a vn100 is on the UART, all others on SPI or I2C; remove one of the "
-                "tables");
+                "remove one of the two tables; a vn100 is on the UART, all others are on SPI or "
+                "I2C");
         });
 }
 
@@ -450,7 +456,7 @@ void check_illumination(const Configuration& configuration, Findings& findings) 
         if (find_triggered_camera(configuration, name) == nullptr)
             findings.add(configuration.illumination.entry, "cameras",
                          fmt::format("'{}' is not a camera that the board triggers", clipped(name)),
-                         "use the 'name' of a table [[camera]]");
+                         "use the 'name' of a [[camera]]");
 }
 
 void check_inputs(const Configuration& configuration, Findings& findings) {
@@ -460,11 +466,11 @@ void check_inputs(const Configuration& configuration, Findings& findings) {
         for (const std::string& name : *names)
             if (!contains(pulse_input_names, name))
                 findings.add(ports.entry, key, fmt::format("'{}' is not an input", clipped(name)),
-                             fmt::format("use some of: {}", fmt::join(pulse_input_names, ", ")));
+                             fmt::format("use any of: {}", fmt::join(pulse_input_names, ", ")));
     for (const std::string& name : ports.falling)
         if (!contains(ports.inputs, name))
             findings.add(ports.entry, "falling",
-                         fmt::format("'{}' is not enabled: its edges are no events", clipped(name)),
+                         fmt::format("the input '{}' is not enabled", clipped(name)),
                          "add it to 'inputs', or remove it");
 }
 
@@ -472,14 +478,14 @@ void check_uart_and_imu_output(const Configuration& configuration, Findings& fin
     const PortConfiguration& ports = configuration.ports;
     if (ports.nmea && !contains(ports.inputs, "pps"))
         findings.add(ports.entry, "nmea",
-                     "'nmea' names the pulses of the PPS input, which is not enabled",
+                     "'nmea' labels the pulses of the PPS input, which is not enabled",
                      "add \"pps\" to 'inputs'");
     if (ports.nmea && find_imu_at(configuration, 1) != nullptr)
-        findings.add(ports.entry, "nmea", "'nmea' needs the UART, which the vn100 has",
-                     "remove one of them");
+        findings.add(ports.entry, "nmea", "'nmea' needs the UART, which the vn100 uses",
+                     "remove one of the two");
     if (ports.imu_output && find_imu_at(configuration, 0) == nullptr)
         findings.add(ports.entry, "imu_output", "'imu_output' needs an IMU on SPI or I2C",
-                     "add a table [[imu]] of any model but vn100, or remove the key");
+                     "add an [[imu]] of any model but vn100, or remove the key");
 }
 
 /// Outputs that nothing else uses, as `test_output` names them.
@@ -496,46 +502,48 @@ std::vector<std::string> free_test_outputs(const Configuration& configuration) {
 void check_test_rate(const Configuration& configuration, Findings& findings) {
     const PortConfiguration& ports = configuration.ports;
     if (ports.test_rate_hz == 0 && ports.test_output != wire::test_at_test)
-        findings.add(
-            ports.entry, "test_output",
-            "'test_output' is where the pulses of 'test_rate_hz' leave, and there are none",
-            "set 'test_rate_hz', or remove the key");
+        findings.add(ports.entry, "test_output",
+                     "'test_output' has no effect without 'test_rate_hz'",
+                     "set 'test_rate_hz', or remove the key");
     if (ports.test_rate_hz == 0) return;
     if (ports.test_rate_hz < slowest_test_hz)
         findings.add(ports.entry, "test_rate_hz",
-                     "'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz", "raise it",
-                     TomlRange{slowest_test_hz, fastest_test_hz});
+                     "'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz",
+                     "raise it, or set it to 0", TomlRange{slowest_test_hz, fastest_test_hz});
     if (!ports.test.empty())
-        findings.add(ports.entry, "test_rate_hz",
-                     fmt::format("the test pulses show '{}' already ('test')", clipped(ports.test)),
-                     "remove one of the two keys");
+        findings.add(
+            ports.entry, "test_rate_hz",
+            fmt::format("the test output already shows '{}' ('test')", clipped(ports.test)),
+            "remove one of the two keys");
     if (ports.test_output == wire::test_at_sync && ports.sync_rate_hz != 0)
-        findings.add(ports.entry, "test_output", "the sync output has the pulses of 'sync_rate_hz'",
+        findings.add(ports.entry, "test_output", "the sync output is used by 'sync_rate_hz'",
                      "set sync_rate_hz = 0, or choose another output");
     if (ports.test_output < wire::test_at_camera0 || ports.test_output >= wire::test_at_sync)
         return;
     const unsigned output = ports.test_output - unsigned{wire::test_at_camera0};
     if (const CameraConfiguration* camera = find_camera_at(configuration, output))
-        findings.add(ports.entry, "test_output",
-                     fmt::format("output {} triggers {}", output, at_line(camera->entry)),
-                     fmt::format("free: {}", fmt::join(free_test_outputs(configuration), ", ")));
+        findings.add(
+            ports.entry, "test_output",
+            fmt::format("output {} is already used by {}", output, at_line(camera->entry)),
+            fmt::format("free outputs: {}", fmt::join(free_test_outputs(configuration), ", ")));
 }
 
 void check_pulse_outputs(const Configuration& configuration, Findings& findings) {
     const PortConfiguration& ports = configuration.ports;
     if (ports.sync_rate_hz != 0 && ports.sync_rate_hz < slowest_sync_hz)
         findings.add(ports.entry, "sync_rate_hz",
-                     "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz", "raise it",
-                     TomlRange{slowest_sync_hz, fastest_sync_hz});
+                     "'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz",
+                     "raise it, or set it to 0", TomlRange{slowest_sync_hz, fastest_sync_hz});
     const ImuConfiguration* uart = find_imu_at(configuration, 1);
     if (!test_source(configuration))
         findings.add(
             ports.entry, "test",
             fmt::format("'{}' is neither a triggered camera nor an IMU", clipped(ports.test)),
-            "use the 'name' of a table [[camera]] or [[imu]], or \"\" for none");
+            "use the 'name' of a [[camera]] or [[imu]], or \"\" for none");
     else if (uart != nullptr && uart->name == ports.test && !uart->data_ready)
-        findings.add(ports.entry, "test", "the ticks of a vn100 are known by its data-ready line",
-                     "wire that line and set data_ready = true, or test something else");
+        findings.add(ports.entry, "test",
+                     "without its data-ready line, the samples of a vn100 cannot be shown",
+                     "wire that line and set data_ready = true, or choose another 'test'");
     if (const double rate = test_pulse_rate_hz(configuration); rate != 0)
         findings.limit(ports.entry, "pulse_us", ports.pulse_us, 1e6 / rate / 2,
                        ports.test.empty()
@@ -573,10 +581,10 @@ std::optional<HiddenExposure> hidden_exposure(const CameraConfiguration& camera,
     const bool watched = camera.trigger == TriggerSource::board && camera.strobe != Strobe::none;
     if (!watched || us >= camera.glitch_us) return std::nullopt;
     return HiddenExposure{
-        fmt::format("'{}' is {:.10g} us, and must be at least {:.10g} us ('glitch_us'): the board "
-                    "takes what is shorter on the exposure line for a disturbance",
+        fmt::format("'{}' is {:.10g} us, but must be at least {:.10g} us ('glitch_us'): the board "
+                    "ignores shorter pulses on the exposure line",
                     key, us, camera.glitch_us),
-        "lower 'glitch_us', or expose for longer"};
+        "lower 'glitch_us', or expose longer"};
 }
 
 double longest_arrival_ms(const CameraConfiguration& camera) {

@@ -188,13 +188,13 @@ const Keys<Configuration>& keys<Configuration>() {
         {"preset_directory", plain(&Top::preset_directory, "path").usually("as installed"),
          "directory of the camera presets"},
         {"state_directory", plain(&Top::state_directory, "path").usually("systemd's"),
-         "measurements that are reused after a restart"},
+         "measurements to reuse after a restart"},
         {"log_level",
          choice(&Top::log_level, {{"error", LogLevel::error},
                                   {"warning", LogLevel::warning},
                                   {"info", LogLevel::info},
                                   {"debug", LogLevel::debug}}),
-         "for the journal, or standard error"}};
+         "of messages to journal or standard error"}};
     return all;
 }
 
@@ -240,7 +240,7 @@ const Keys<ClockConfiguration>& keys<ClockConfiguration>() {
          "how often board and host clock are compared"},
         {"align", flag(&Clock::align), "put grid points on whole seconds of the output clock"},
         {"max_slew_ppm", number(&Clock::max_slew_ppm, 0.1, 500),
-         "limit for moving a grid on which cameras run"},
+         "limit for adjusting the grid while cameras run"},
         {"pps",
          choice(&Clock::pps,
                 {{"off", PpsLabels::off}, {"host", PpsLabels::host}, {"nmea", PpsLabels::nmea}}),
@@ -249,7 +249,7 @@ const Keys<ClockConfiguration>& keys<ClockConfiguration>() {
          choice(&Clock::on_second_conflict, {{"flag", SecondConflict::flag},
                                              {"receiver", SecondConflict::receiver},
                                              {"host", SecondConflict::host}}),
-         "whose whole seconds are right"}};
+         "which source of whole seconds to trust"}};
     return all;
 }
 
@@ -262,7 +262,7 @@ Keys<CameraConfiguration> trigger_keys() {
         {"trigger",
          choice(&Camera::trigger,
                 {{"board", TriggerSource::board}, {"free", TriggerSource::free_run}}),
-         "triggered by the board, or running freely"},
+         "triggered by the board, or free-running"},
         {"output", number(&Camera::output, 0, wire::camera_count - 1).also("unique"),
          "trigger output of the board, and input of the exposure line"},
         {"master", plain(&Camera::master, "name of a camera").usually("").on_board(Field::master),
@@ -287,7 +287,7 @@ Keys<CameraConfiguration> trigger_keys() {
          number(&Camera::max_exposure_us, limits::shortest_max_exposure_ns / ns_per_us, longest_us)
              .usually("the period")
              .on_board(Field::max_exposure, ns_per_us),
-         "an exposure that lasts longer is given up"},
+         "longer exposures are given up"},
         {"latency_us",
          number(&Camera::latency_us, 0, limits::longest_latency_ns / ns_per_us)
              .usually("by preset")
@@ -307,13 +307,13 @@ Keys<CameraConfiguration> trigger_keys() {
              .on_board(Field::pulse, ns_per_us),
          "width of the trigger pulse"},
         {"trigger_inverted", flag(&Camera::trigger_inverted),
-         "the pulse is low; the camera uses the falling edge"},
+         "active-low pulse; the camera uses the falling edge"},
         {"strobe",
          choice(&Camera::strobe, {{"active_high", Strobe::active_high},
                                   {"active_low", Strobe::active_low},
                                   {"none", Strobe::none}}),
          "level of the exposure line"},
-        {"preset", plain(&Camera::preset, "auto, or a name"), "how cameras of its kind are set up"},
+        {"preset", plain(&Camera::preset, "auto, or a name"), "how the camera is set up"},
         {"trigger_line", plain(&Camera::trigger_line, "text").usually("by preset"),
          "the camera's trigger input, as in TriggerSource"},
         {"strobe_line", plain(&Camera::strobe_line, "text").usually("by preset"),
@@ -321,17 +321,17 @@ Keys<CameraConfiguration> trigger_keys() {
         {"strobe_rising_us",
          numbers(&Camera::strobe_rising_us, 2, "[value, sigma], ", slowest_edge_us)
              .usually("by preset"),
-         "how late its line rises"},
+         "delay of its rising edge"},
         {"strobe_falling_us",
          numbers(&Camera::strobe_falling_us, 2, "[value, sigma], ", slowest_edge_us)
              .usually("by preset"),
-         "how late its line falls"},
+         "delay of its falling edge"},
         {"glitch_us",
          number(&Camera::glitch_us, glitch_step_us, longest_glitch_us)
              .on_board(Field::glitch, 1 / glitch_step_us),
-         "shorter pulses of the exposure line do not count"},
+         "shorter pulses on the exposure line are ignored"},
         {"exposure", choice(&Camera::exposure_by_pulse, {{"timed", false}, {"pulse", true}}),
-         "`pulse`: it exposes while its trigger lasts"}};
+         "`pulse`: exposes as long as the trigger pulse"}};
 }
 
 Keys<CameraConfiguration> frame_keys() {
@@ -339,13 +339,13 @@ Keys<CameraConfiguration> frame_keys() {
     using pairing::Instant;
     const auto fewest_slots = [](const Camera& camera) { return camera.buffers + spare_slots; };
     return {
-        {"buffers", number(&Camera::buffers, 2, 64), "frames the camera may be filling at a time"},
+        {"buffers", number(&Camera::buffers, 2, 64), "frames that can be in transfer at a time"},
         {"slots",
          number(&Camera::slots, fewest_slots, 1024, "`buffers` + 8 to 1024")
              .usually("by `rate_hz`"),
          "frames in the ring"},
         {"history_s", number(&Camera::history_s, 0, longest_history_s).also("not with `slots`"),
-         "how old frames may be and still be read"},
+         "how long frames stay readable"},
         {"packet_size", number(&Camera::packet_size, 576, 16000).usually("the largest that passes"),
          "GigE Vision packet size, bytes"},
         {"receive",
@@ -355,7 +355,7 @@ Keys<CameraConfiguration> frame_keys() {
          "how GigE Vision packets are received"},
         {"latest_arrival_ms",
          number(&Camera::latest_arrival_ms, 1, 60000).usually("500, or less").also("less if fast"),
-         "when a frame is given up"},
+         "how late a frame may arrive"},
         {"on_unproved",
          choice(&Camera::on_unproved,
                 {{"withhold", OnUnproved::withhold}, {"flag", OnUnproved::flag}}),
@@ -368,11 +368,11 @@ Keys<CameraConfiguration> frame_keys() {
                                          {"end", Instant::end}}),
          "which instant the camera stamps"},
         {"check_exposure", flag(&Camera::check_exposure),
-         "compare the camera's exposure time with the measured"},
+         "compare the camera's exposure time with the measured one"},
         {"chunks", flag(&Camera::chunks).usually("by exposure"),
          "the camera sends its exposure time with each frame"},
         {"keep_settings", flag(&Camera::keep_settings),
-         "begin with the camera's settings, not its defaults"},
+         "start from the camera's settings, not its defaults"},
         {"ptp", flag(&Camera::ptp), "the camera's clock follows PTP"},
         {"max_temperature_c", number(&Camera::max_temperature_c, 0, 200),
          "warn when the camera is hotter"},
@@ -394,9 +394,9 @@ template <>
 const Keys<AutoExposureConfiguration>& keys<AutoExposureConfiguration>() {
     using Control = AutoExposureConfiguration;
     static const Keys<Control> all{{"target", number(&Control::target, 0.01, 0.99),
-                                    "brightness aimed at, from 0 black to 1 saturated"},
+                                    "target brightness, from 0 (black) to 1 (saturated)"},
                                    {"percentile", number(&Control::percentile, 0, 100),
-                                    "which percentile of the pixels is the brightness; 0: mean"},
+                                    "percentile of the pixels taken as brightness; 0: mean"},
                                    {"min_us",
                                     number(&Control::min_us, 1, longest_us)
                                         .usually("50, at most `max_us`")
@@ -410,7 +410,7 @@ const Keys<AutoExposureConfiguration>& keys<AutoExposureConfiguration>() {
                                    {"largest_step", number(&Control::largest_step, 1.01, 10),
                                     "largest factor from one exposure to the next"},
                                    {"delay_frames", number(&Control::delay_frames, 0, 10),
-                                    "frames from setting an exposure to the first that has it"}};
+                                    "frames until a new exposure takes effect"}};
     return all;
 }
 
@@ -434,7 +434,7 @@ const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
              .on_board(Field::imu_kind),
          "the part"},
         {"bus", choice(&Imu::bus, {{"spi", ImuBus::spi}, {"i2c", ImuBus::i2c}}),
-         "bus of the board that the part is on; not for the vn100"},
+         "bus that connects the part; not for the vn100"},
         {"i2c_address", number(&Imu::i2c_address, 0, 0xFF).usually("0x68").within("0x68, 0x69"),
          "its address, with `bus = \"i2c\"`"},
         {"rate_hz",
@@ -443,17 +443,18 @@ const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
              .on_board(Field::imu_rate, 1e3),
          "samples per second"},
         {"data_ready", flag(&Imu::data_ready).on_board(Field::imu_options),
-         "the data-ready line is wired: it paces and stamps samples"},
-        {"accel_ready", flag(&Imu::accel_ready), "so is the accelerometer's own line; bmi088 only"},
+         "data-ready line wired: it paces and timestamps samples"},
+        {"accel_ready", flag(&Imu::accel_ready),
+         "the accelerometer's own line is wired, too; bmi088 only"},
         {"filter",
          number(&Imu::filter, 0, strongest_filter)
              .within("0 to the strongest of the part")
              .on_board(Field::imu_filter, 1),
          "strength of the part's own filter"},
         {"history_s", number(&Imu::history_s, 0, longest_history_s).usually("16384 samples"),
-         "how old samples may be; 128 bytes each"},
+         "how long samples stay readable; 128 bytes each"},
         {"filter_delay_us", number(&Imu::filter_delay_us, 0, longest_filter_us).usually("by part"),
-         "delay of that filter; 0: stamps are not corrected"}};
+         "delay of that filter; 0: timestamps are not corrected"}};
     return all;
 }
 
@@ -469,14 +470,14 @@ const Keys<IlluminationConfiguration>& keys<IlluminationConfiguration>() {
         {"lead_us",
          number(&Light::lead_us, 0, limits::longest_lead_ns / ns_per_us)
              .on_board(Field::lead, ns_per_us),
-         "how long before an exposure the light goes on"},
+         "how long the light leads the exposure"},
         {"max_on_us",
          number(&Light::max_on_us, shortest_on, limits::longest_light_ns / ns_per_us,
                 "10 + `lead_us` to 10^6")
              .on_board(Field::max_on, ns_per_us),
          "longest time on"},
         {"duty_percent", number(&Light::duty_percent, 0.0001, 100).on_board(Field::duty, 1e4),
-         "largest part of the time on"},
+         "largest share of the time on"},
         {"inverted", flag(&Light::inverted), "the output is low while the light is on"}};
     return all;
 }
@@ -489,7 +490,7 @@ const Keys<PortConfiguration>& keys<PortConfiguration>() {
          "inputs whose edges become events"},
         {"falling", plain(&Ports::falling, "some of `inputs`"), "inputs whose falling edge counts"},
         {"imu_output", flag(&Ports::imu_output), "serve the IMU to a flight controller"},
-        {"nmea", flag(&Ports::nmea), "a GNSS receiver at the UART names the PPS pulses"},
+        {"nmea", flag(&Ports::nmea), "a GNSS receiver at the UART labels the PPS pulses"},
         {"nmea_baud",
          number(&Ports::nmea_baud, limits::slowest_nmea_baud, limits::fastest_nmea_baud)
              .on_board(Field::nmea_baud, 1),
@@ -524,7 +525,7 @@ template <>
 const Keys<MemoryConfiguration>& keys<MemoryConfiguration>() {
     using Memory = MemoryConfiguration;
     static const Keys<Memory> all{
-        {"lock", flag(&Memory::lock), "all memory of the service, rings included, stays in RAM"},
+        {"lock", flag(&Memory::lock), "keep all memory of the service, rings included, in RAM"},
         {"sealed", flag(&Memory::sealed), "nobody, not even the service, can truncate a ring"}};
     return all;
 }

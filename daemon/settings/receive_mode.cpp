@@ -26,7 +26,7 @@ bool packet_socket_allowed() {
 Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, bool allowed,
                                           bool plain_images) {
     if (camera.receive == ReceiveMode::packet && !allowed)
-        return failure("receive", "\"packet\" needs CAP_NET_RAW, which the service lacks",
+        return failure("receive", "\"packet\" needs CAP_NET_RAW, which the service does not have",
                        "grant it, as the systemd unit does, or set receive = \"auto\"");
     const bool packet =
         plain_images &&

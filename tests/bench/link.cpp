@@ -169,9 +169,9 @@ std::vector<double> delays_us(const test::Stack& stack, bool own_thread) {
     std::vector<double> delays;
     for (auto item = test::look(reader->next()); item.found == test::Found::item;
          item = test::look(reader->next())) {
-        const auto told = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
-        if (!told || !std::holds_alternative<clock::RecordedMessage>(*told)) continue;
-        const auto& message = std::get<clock::RecordedMessage>(*told);
+        const auto recorded = clock::from_metadata(unpack<clock::ClockMetadata>(item.metadata));
+        if (!recorded || !std::holds_alternative<clock::RecordedMessage>(*recorded)) continue;
+        const auto& message = std::get<clock::RecordedMessage>(*recorded);
         delays.push_back(static_cast<double>(message.arrived.ns - message.departed.ns) * 1e-3);
     }
     if (delays.size() < 1000) throw std::runtime_error("too few samples came");

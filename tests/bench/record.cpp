@@ -422,7 +422,7 @@ class Bench {
         metrics_.push_back({"record, raw rate to highest", raw / highest, "ratio", 1 / 0.9});
     }
 
-    /// Missing numbers are those that the file tells.
+    /// Missing numbers are those that the file reports.
     void measure_stop() {
         const Streams streams(instance_, frame_hz, flat_);
         const double length = std::max(seconds_, 6.0);
@@ -433,9 +433,9 @@ class Bench {
             process.signal(SIGCONT);
         });
         const auto recording = checked(client::Recording::open(file("stopped.mcap")));
-        std::uint64_t told = 0;
+        std::uint64_t reported = 0;
         for (const auto& gap : checked(recording.gaps()))
-            if (gap.reason == "lost") told += gap.items;
+            if (gap.reason == "lost") reported += gap.items;
         std::map<std::string, std::uint64_t> next;
         std::uint64_t missing = 0;
         const auto glanced = recording.glance({}, [&](const client::RecordedItem& item) {
@@ -445,10 +445,12 @@ class Bench {
             return true;
         });
         if (!glanced) throw std::runtime_error(glanced.error().message());
-        const double untold = std::abs(static_cast<double>(missing) - static_cast<double>(told));
+        const double unreported =
+            std::abs(static_cast<double>(missing) - static_cast<double>(reported));
         metrics_.push_back(
-            {"record, stopped for 2 s: lost", static_cast<double>(told), "items", {}});
-        metrics_.push_back({"record, stopped for 2 s: lost and not told", untold, "items", 0});
+            {"record, stopped for 2 s: lost", static_cast<double>(reported), "items", {}});
+        metrics_.push_back(
+            {"record, stopped for 2 s: lost and not reported", unreported, "items", 0});
         const double expected = (length - 1) * frame_hz * cameras;
         metrics_.push_back({"record, stopped for 2 s: frames the service published, of what is due",
                             expected / static_cast<double>(streams.frames()), "ratio", 1});

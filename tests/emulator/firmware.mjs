@@ -18,7 +18,7 @@ function hang(machine) {
     machine.bus.ram[(address & ~1) + 1 - 0x20000000] = branch_to_itself >> 8;
 }
 
-/// Runs until the board stops by itself, and tells why.
+/// Runs until the board stops by itself, and says why.
 function end_of(rig, limit_ms) {
     return rig.machine.run_until(rig.machine.now + limit_ms * 125_000);
 }
@@ -430,7 +430,7 @@ const tests = {
         check(samples.every(({ flags }) => flags === 8), 'a sample is flagged');
     },
 
-    'an I2C bus without a part is told, and harms nothing else': () => {
+    'an I2C bus without a part is reported, and harms nothing else': () => {
         const rig = new Rig(image, quick_usb);
         const camera = rig.add_camera(0);
         rig.connect();
@@ -440,7 +440,7 @@ const tests = {
         });
         rig.host.start();
         rig.run_ms(300);
-        check(rig.host.has_event(11) || rig.host.has_event(12), 'the IMU is not told as missing');
+        check(rig.host.has_event(11) || rig.host.has_event(12), 'a missing IMU is not reported');
         check(camera.triggers.length >= 12, `${camera.triggers.length} triggers`);
     },
 
@@ -618,7 +618,7 @@ const tests = {
         rig.connect();
     },
 
-    'halts of endpoints are set, told and cleared; nothing is lost by it': () => {
+    'halts of endpoints are set, reported and cleared; nothing is lost by it': () => {
         const rig = busy_rig(image, 1, 152_439);
         const { usb } = rig.machine;
         const asked = (request) => {
@@ -684,7 +684,7 @@ const tests = {
         rig.run_ms(120);
         const zero = zero_of(rig, camera);
         for (const { event, edges } of inputs) {
-            const stamps = rig.host.all('event').filter((told) => told.event === event);
+            const stamps = rig.host.all('event').filter((sent) => sent.event === event);
             check(stamps.length === edges.length, `${stamps.length} events ${event}`);
             stamps.forEach(({ time }, index) =>
                 check_within(time - (edges[index] - zero) * cycle_ns, -48, 48, `event ${event}`),
@@ -708,7 +708,7 @@ const tests = {
         check(measured.length >= camera.triggers.length - 2, `${measured.length} exposures`);
     },
 
-    'what a host did not read in time is told, and nothing else is wrong': () => {
+    'what a host did not read in time is reported, and nothing else is wrong': () => {
         const rig = new Rig(image, quick_usb);
         rig.add_camera(0, { exposure: () => 12_500 });
         rig.connect();
@@ -727,7 +727,7 @@ const tests = {
         const triggers = rig.host.all('exposure').map(({ trigger }) => trigger);
         const missing = triggers.at(-1) - triggers.length;
         const { replaced } = rig.host.last('health');
-        check(missing > 50 && missing === replaced, `${missing} missing, ${replaced} told`);
+        check(missing > 50 && missing === replaced, `${missing} missing, ${replaced} reported`);
     },
 
     'the serial number is the one of the flash chip': () => {
@@ -738,7 +738,7 @@ const tests = {
         check(serial === id, `the serial number is ${serial}, not ${id}`);
     },
 
-    'a board restarts when told to, and says so': () => {
+    'a board restarts on request, and says so': () => {
         const rig = new Rig(image, quick_usb);
         rig.connect();
         const { serial } = rig.host.last('hello');
@@ -748,7 +748,7 @@ const tests = {
         check(hello.reset_cause === 4 && hello.serial === serial, JSON.stringify(hello));
     },
 
-    'the boot loader comes when told to': () => {
+    'the boot loader comes on request': () => {
         const rig = new Rig(image, quick_usb);
         rig.connect();
         rig.host.reboot(true);

@@ -376,7 +376,7 @@ function i2c() {
             ['stop', 57],
         ],
     );
-    check('the stop is told', peek(made, i2c0 + 0x34) & 0x200, 0x200);
+    check('the stop is reported', peek(made, i2c0 + 0x34) & 0x200, 0x200);
     for (const command of [0x20, 0x77 | 0x200]) poke(made, i2c0 + 0x10, command);
     made.run_for(30 * bit);
     check('written', device.registers[0x20], 0x77);

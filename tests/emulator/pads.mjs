@@ -198,7 +198,7 @@ function send_pulses(rig, count, period, width) {
 }
 
 const events_of = (rig, { event, source }) =>
-    rig.host.all('event').filter((told) => told.event === event && told.source === source);
+    rig.host.all('event').filter((sent) => sent.event === event && sent.source === source);
 
 const check_nothing_lost = (rig) => {
     rig.run_until('health', () => rig.host.last('health') !== undefined, 1100);
@@ -261,13 +261,13 @@ class AnyPhase {
         this.judge_stamp(record.end, edges[2 * record.trigger - 1], 'end');
     }
 
-    judge_event(told) {
+    judge_event(sent) {
         const input = this.rig.inputs.find(
-            ({ event, source }) => event === told.event && source === told.source,
+            ({ event, source }) => event === sent.event && source === sent.source,
         );
-        check(input !== undefined || told.event === 15, `event ${told.event}`); // no sync signal
+        check(input !== undefined || sent.event === 15, `event ${sent.event}`); // no sync signal
         if (input === undefined) return;
-        this.judge_stamp(told.time, input.path.edges[2 * told.value - 2], `event ${told.event}`);
+        this.judge_stamp(sent.time, input.path.edges[2 * sent.value - 2], `event ${sent.event}`);
     }
 
     judge_stamp(stamp, { at }, what) {
@@ -414,11 +414,11 @@ const tests = {
             check_within(error_of(record.end, of_line[2 * record.trigger - 1]), -48, 48, 'end');
         }
         for (const input of rig.inputs) {
-            const told = events_of(rig, input);
-            check(told.length >= input.edges.length, `${told.length} events ${input.event}`);
+            const sent = events_of(rig, input);
+            check(sent.length >= input.edges.length, `${sent.length} events ${input.event}`);
             // A pulse of an auxiliary input that bounces at its end is two.
             const rises = input.path.edges.filter(({ level }) => level === 1);
-            for (const { time } of told) {
+            for (const { time } of sent) {
                 const errors = rises.map(({ at }) => time - (at - zero) * cycle_ns);
                 check_within(nearest(errors), -48, 48, `event ${input.event}`);
             }
@@ -492,10 +492,10 @@ const tests = {
         }
         for (const input of rig.inputs) {
             const passed = input.path.edges.filter(({ level }) => level === 1);
-            const told = events_of(rig, input);
+            const sent = events_of(rig, input);
             check(passed.length < 180, `${passed.length} passed`);
-            check(told.length === passed.length, `${told.length} events of ${passed.length}`);
-            told.forEach(({ time, value }) => {
+            check(sent.length === passed.length, `${sent.length} events of ${passed.length}`);
+            sent.forEach(({ time, value }) => {
                 const { at } = passed[value - 1];
                 check_within(time - (at - zero) * cycle_ns, -48, 48, `event ${input.event}`);
             });

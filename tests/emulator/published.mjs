@@ -69,7 +69,7 @@ const asked = [];
 for (let id = 1; id <= 5; ++id) {
     asked.push(pico.clock.nanos);
     host.ask_time(id);
-    check(`time is told, ${id}`, pico.run_until(answers('clock', id), 10 * ms), true);
+    check(`time is reported, ${id}`, pico.run_until(answers('clock', id), 10 * ms), true);
     pico.run_until(() => false, 3 * ms);
 }
 const times = host.all('clock');

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The core on the chip's instruction set; what it costs there is told by `./dev bench firmware`.
+// The core on the chip's instruction set; what it costs there is measured by `./dev bench
+// firmware`.
 #include "replay.hpp"
 
 #include <algorithm>
@@ -42,7 +43,7 @@ TEST_CASE("replay: a profile accounts for each cycle once") {
     CHECK(poll == measured);
 }
 
-TEST_CASE("replay: a call that differs is told, with both calls") {
+TEST_CASE("replay: a call that differs is reported, with both calls") {
     const auto lived = live(load("long_start"), 0);
     auto recording = lived->recorder.words();
     // At the end stand what the last poll wanted, in two words, and that no poll follows, with the
@@ -55,7 +56,7 @@ TEST_CASE("replay: a call that differs is told, with both calls") {
                                              Catch::Contains(where));
 }
 
-TEST_CASE("replay: a core that goes on when the recording ends, or ends before it, is told") {
+TEST_CASE("replay: a core that goes on when the recording ends, or ends before it, is reported") {
     auto recording = live(load("long_start"), 0)->recorder.words();
     auto longer = recording;
     longer.back() = firmware::replay::poll_again;

@@ -39,7 +39,7 @@ class Failure(Exception):
 
 
 def camera(index, rig, service):
-    """A camera on the rig, and what the service is told of it."""
+    """A camera on the rig, and what the service is configured with."""
     name, address = f"cam{index}", f"127.0.0.{index + 2}"
     scenario = {"name": name, "address": address, "output": index, "width": 640, "height": 480,
                 "noise": 2.0} | rig
@@ -153,8 +153,8 @@ class Evaluation:
         self.what = ""
 
     @contextlib.contextmanager
-    def told(self, detail=""):
-        """What cannot be measured is told, and the rest goes on."""
+    def reported(self, detail=""):
+        """What cannot be measured is reported, and the rest goes on."""
         try:
             yield
         except Failure as failure:
@@ -185,7 +185,7 @@ class Evaluation:
         self.total = sum(len(part) for part in parts)
         for part in parts:
             for measure in part:
-                with self.told():
+                with self.reported():
                     measure()
                 self.save()
         return self.found
@@ -203,9 +203,9 @@ class Evaluation:
 
     def measure_leds(self, name, light, rig, service):
         boards = ([95.0, 300.0, 545.0, 330.0], [480.0, 140.0, 160.0, 120.0])
-        told = {"rate_hz": float(LED_FPS), "exposure_us": light["exposure_us"]}
+        triggered = {"rate_hz": float(LED_FPS), "exposure_us": light["exposure_us"]}
         cameras = [camera(i, {"exposure_us": light["exposure_us"], "leds": leds}
-                          | (rig if i == 1 else {}), told | (service if i == 1 else {}))
+                          | (rig if i == 1 else {}), triggered | (service if i == 1 else {}))
                    for i, leds in enumerate(boards)]
         setup = Setup(cameras, rig="[motion]\nrate_rad_s = [0.3, 0.3, 0.3]\n[leds]\n",
                       service=f"[ports]\ntest_rate_hz = {light['rate_hz']}\n")
@@ -247,7 +247,7 @@ class Evaluation:
         with self.bench(f"camera and IMU, filter {strength}, {mode}, run {run + 1}") as bench:
             recording = bench.record(setup, self.options.seconds)
             for index, exposure_ms in enumerate(report.EXPOSURES_MS):
-                with self.told(f"cam{index}"):
+                with self.reported(f"cam{index}"):
                     seen = bench.evaluate("imu", recording, "--camera", f"cam{index}",
                                           "--focal", 200)
                     self.found.setdefault("imu", {}).setdefault(mode, {}).setdefault(
@@ -255,7 +255,7 @@ class Evaluation:
                             {key: seen[key] for key in ("timeshift_cam_imu_s",
                                                         "timeshift_cam_imu_sigma_s")})
 
-    # Clock: whole seconds of a GNSS receiver tell the true error.
+    # Clock: whole seconds of a GNSS receiver show the true error.
     def clock(self):
         return [self.measure_clock]
 

@@ -27,10 +27,10 @@ LED_PAIRS = 400
 # Pictures of an instant at which all LEDs change cannot be read for certain. Half: four in 400.
 # Twice: a board that is hard to read passes.
 LED_AMBIGUOUS = 0.02
-# Goals for sub-step offsets, and for camera and IMU. Half: noise is told as an error. Twice: errors
+# Goals for sub-step offsets, and for camera and IMU. Half: noise looks like an error. Twice: errors
 # pass that the tools could show.
 LED_LIMIT_US, IMU_LIMIT_MS = 5, 0.06
-# Errors against the sigma that was told. Half: of all runs some fail by chance. Twice: a sigma
+# Errors against the sigma that was reported. Half: of all runs some fail by chance. Twice: a sigma
 # passes that promises more than is true.
 HONEST = 1.5
 # True error of stamps, rms. Half: less than the link of a busy host allows. Twice: as large as what

@@ -10,7 +10,7 @@ namespace versavis::liar {
 
 namespace {
 
-/// Messages that a lasting lie covers: more than a witness needs to see that they agree among
+/// Messages that a lasting lie covers: more than a majority needs to see that they agree among
 /// themselves. At half it ends about when the service believes it, at twice it says no more.
 constexpr unsigned lasting_messages = 20;
 
@@ -143,10 +143,10 @@ const Kind* find_kind(std::string_view name) {
     return found == kinds().end() ? nullptr : &*found;
 }
 
-std::string to_text(const Told& told) {
-    return fmt::format("{} {} {}{}: {}", told.kind->name, to_text(told.type), told.number,
-                       told.type == Type::exposure ? fmt::format(" of cam{}", told.camera) : "",
-                       told.what);
+std::string to_text(const Damage& damage) {
+    return fmt::format("{} {} {}{}: {}", damage.kind->name, to_text(damage.type), damage.number,
+                       damage.type == Type::exposure ? fmt::format(" of cam{}", damage.camera) : "",
+                       damage.what);
 }
 
 Liar::Liar(std::uint64_t seed, Duration period) : period_(period), random_(seed) {}
@@ -176,9 +176,9 @@ HostTime Liar::last_lie() const {
     return last_lie_;
 }
 
-std::vector<Told> Liar::told_since(std::size_t begin) const {
+std::vector<Damage> Liar::damages_since(std::size_t begin) const {
     const std::lock_guard lock(mutex_);
-    return {told_.begin() + static_cast<long>(std::min(begin, told_.size())), told_.end()};
+    return {damages_.begin() + static_cast<long>(std::min(begin, damages_.size())), damages_.end()};
 }
 
 std::optional<std::uint64_t> Liar::true_tick(unsigned camera, std::uint64_t trigger) const {
@@ -236,11 +236,11 @@ std::vector<Packet> Liar::pass(Packet packet, HostTime now) {
             const auto victim =
                 std::find_if(kind->victims.begin(), kind->victims.end(),
                              [&](const Victim& v) { return v.type == packet.type; });
-            for (Packet& told : lie(*kind, *victim, std::move(packet), now))
-                out.push_back(std::move(told));
+            for (Packet& damaged : lie(*kind, *victim, std::move(packet), now))
+                out.push_back(std::move(damaged));
         }
     }
-    for (Packet& told : out) told.sequence = (*sequence_)++;
+    for (Packet& passed : out) passed.sequence = (*sequence_)++;
     return out;
 }
 
@@ -435,7 +435,8 @@ bool Liar::shift(const std::vector<Field>& fields, std::int64_t by_ns, Packet& p
 }
 
 void Liar::note(const Kind& kind, const Packet& packet, HostTime now, std::string what) {
-    told_.push_back({now, &kind, packet.type, present_.camera, present_.number, std::move(what)});
+    damages_.push_back(
+        {now, &kind, packet.type, present_.camera, present_.number, std::move(what)});
 }
 
 void Liar::damage_counted(HostTime now) {

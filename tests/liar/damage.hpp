@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a liar between board and service can tell: each kind of lie, and the liar who tells them.
+// Damage that a liar between board and service can do to messages: each kind, and the liar.
 #pragma once
 
 #include <deque>
@@ -50,8 +50,8 @@ struct Kind {
 const std::vector<Kind>& kinds();
 const Kind* find_kind(std::string_view name);
 
-/// One lie, for the log. Fields that do not apply are 0 or empty.
-struct Told {
+/// One damaged message, for the log. Fields that do not apply are 0 or empty.
+struct Damage {
     HostTime at;
     const Kind* kind = nullptr;
     Type type{};
@@ -60,7 +60,7 @@ struct Told {
     std::string what;
 };
 
-std::string to_text(const Told& told);
+std::string to_text(const Damage& damage);
 
 /// What the liar may do from now on.
 struct Orders {
@@ -85,7 +85,7 @@ class Liar {
 
     std::uint64_t damaged() const;  ///< messages
     HostTime last_lie() const;      ///< when the last damaged message left
-    std::vector<Told> told_since(std::size_t begin) const;
+    std::vector<Damage> damages_since(std::size_t begin) const;
     std::optional<std::uint64_t> true_tick(unsigned camera, std::uint64_t trigger) const;
 
  private:
@@ -142,7 +142,7 @@ class Liar {
     std::map<std::pair<unsigned, std::uint64_t>, std::uint64_t> ticks_;
     std::uint64_t damaged_ = 0;
     HostTime last_lie_;
-    std::vector<Told> told_;
+    std::vector<Damage> damages_;
 };
 
 /// The true number of a sample, which the liar writes into its magnetic field: no part of the

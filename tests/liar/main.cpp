@@ -91,7 +91,7 @@ class Run {
             const bool last = kind == chosen.back();
             judge_->set_edge_floor(kind->edge_floor);
             phase(
-                row, [&] { tell(*kind, row); }, !settings_.brief || last);
+                row, [&] { inject(*kind, row); }, !settings_.brief || last);
             judge_->set_edge_floor({});
         }
         std::erase_if(chosen, [](const Kind* kind) {
@@ -172,8 +172,8 @@ class Run {
         const HostTime end = host_now() + time;
         while (host_now() < end) {
             const std::vector<Wrong> wrongs = judge_->poll();
-            for (const Told& told : liar_.told_since(logged_)) {
-                write_log(to_text(told));
+            for (const Damage& damage : liar_.damages_since(logged_)) {
+                write_log(to_text(damage));
                 ++logged_;
             }
             for (const Wrong& wrong : wrongs) blame(wrong);
@@ -187,7 +187,7 @@ class Run {
         row_ = &row;
         const HostTime begin = host_now();
         const std::uint64_t damaged_before = liar_.damaged();
-        told_before_ = liar_.told_since(0).size();
+        damages_before_ = liar_.damages_since(0).size();
         judge_->take_worst();
         lies();
         liar_.obey({});
@@ -210,7 +210,7 @@ class Run {
     }
 
     /// One at a time, then at rates that leave the service less and less of the truth.
-    void tell(const Kind& kind, const Row&) {
+    void inject(const Kind& kind, const Row&) {
         if (kind.way == Way::regular) {
             liar_.obey({{&kind}});
             return watch(settings_.brief ? milliseconds(1000) : seconds(4));
@@ -274,17 +274,17 @@ class Run {
 
     /// The lie about the same exposure or sample, else the last one; and the last about the clock.
     std::string suspects(const Wrong& wrong) const {
-        const std::vector<Told> told = liar_.told_since(told_before_);
+        const std::vector<Damage> damages = liar_.damages_since(damages_before_);
         const auto last = [&](auto condition) {
-            const auto found = std::find_if(told.rbegin(), told.rend(), condition);
-            return found == told.rend() ? "" : "; " + to_text(*found);
+            const auto found = std::find_if(damages.rbegin(), damages.rend(), condition);
+            return found == damages.rend() ? "" : "; " + to_text(*found);
         };
-        const std::string about = last([&](const Told& t) {
+        const std::string about = last([&](const Damage& t) {
             return t.number == wrong.number && t.camera == wrong.camera &&
                    (t.type == Type::exposure || t.type == Type::imu_sample);
         });
-        const std::string any = last([](const Told&) { return true; });
-        const std::string clock = last([](const Told& t) {
+        const std::string any = last([](const Damage&) { return true; });
+        const std::string clock = last([](const Damage& t) {
             return t.type == Type::clock_answer || t.type == Type::clock_follow_up;
         });
         return (about.empty() ? any : about) + (clock == any ? "" : clock);
@@ -357,7 +357,7 @@ class Run {
     std::ofstream log_;
     std::vector<Row> rows_;
     Row* row_ = nullptr;
-    std::size_t told_before_ = 0;
+    std::size_t damages_before_ = 0;
     std::size_t logged_ = 0;
 };
 

@@ -116,8 +116,8 @@ bool Proxy::pass_to_service() {
     for (auto end = std::find(begin, unfinished_.end(), 0); end != unfinished_.end();
          end = std::find(begin, unfinished_.end(), 0)) {
         if (const auto packet = decode({begin, end}))
-            for (const Packet& told : liar_.pass(*packet, now)) {
-                const Bytes encoded = encode(told);
+            for (const Packet& passed : liar_.pass(*packet, now)) {
+                const Bytes encoded = encode(passed);
                 out.insert(out.end(), encoded.begin(), encoded.end());
             }
         begin = end + 1;

@@ -16,7 +16,7 @@ constexpr int most_silent_steps = 1000;
 
 struct Successor {
     State state;
-    std::string text;  ///< only when it is told
+    std::string text;  ///< only for the report
     std::string violation;
 };
 
@@ -52,7 +52,7 @@ class Stepper {
     void advance(State next, const std::string& text);
     void settle(Successor& successor);
     bool silent_step(Successor& successor);
-    void tell(Successor& successor, const std::string& text) const;
+    void describe(Successor& successor, const std::string& text) const;
 
     const Model& model_;
     bool telling_;
@@ -87,7 +87,7 @@ int Stepper::value(const State& state) const {
     return instruction(state).value(state.threads[thread_].registers);
 }
 
-void Stepper::tell(Successor& successor, const std::string& text) const {
+void Stepper::describe(Successor& successor, const std::string& text) const {
     if (telling_) successor.text += text;
 }
 
@@ -97,7 +97,7 @@ bool Stepper::silent_step(Successor& successor) {
     switch (now.action) {
         case Action::fence:
             fence(successor.state, thread_, now.order);
-            tell(successor, std::string("; fence (") + name_of(now.order) + ")");
+            describe(successor, std::string("; fence (") + name_of(now.order) + ")");
             break;
         case Action::set:
             thread.registers[now.into] = static_cast<std::int8_t>(now.value(thread.registers));
@@ -128,7 +128,7 @@ void Stepper::settle(Successor& successor) {
 void Stepper::advance(State next, const std::string& text) {
     ++next.threads[thread_].counter;
     Successor successor{next, {}, {}};
-    tell(successor, model_.programs()[thread_].name() + " " + text);
+    describe(successor, model_.programs()[thread_].name() + " " + text);
     settle(successor);
     forget(successor.state);
     found_.push_back(std::move(successor));
@@ -195,10 +195,10 @@ void Stepper::wait_on(const State& state, const std::vector<Word>& words, std::s
     if (which == words.size()) {
         Successor asleep{state, {}, {}};
         asleep.state.threads[thread_].activity = Activity::asleep;
-        tell(asleep, model_.programs()[thread_].name() + " sleeps");
+        describe(asleep, model_.programs()[thread_].name() + " sleeps");
         for (const Word& word : words)
-            tell(asleep, ", " + place(location(state, word.location)) + " is " +
-                             number(word.expected(state.threads[thread_].registers)));
+            describe(asleep, ", " + place(location(state, word.location)) + " is " +
+                                 number(word.expected(state.threads[thread_].registers)));
         forget(asleep.state);
         found_.push_back(std::move(asleep));
         return;
@@ -249,12 +249,13 @@ void Stepper::wake_these(const State& state, std::size_t word, unsigned sleepers
     Location& of = next.locations[word];
     of.kernel = std::max(of.kernel, next.threads[waker].current[word]);
     Successor woken{next, {}, {}};
-    tell(woken, model_.programs()[waker].name() + " wakes " + number(count) + " on " + place(word));
+    describe(woken,
+             model_.programs()[waker].name() + " wakes " + number(count) + " on " + place(word));
     for (std::size_t i = 0; i < state.thread_count; ++i) {
         if ((sleepers >> i & 1U) == 0) continue;
         get_up(woken.state.threads[i]);
         ++woken.state.threads[i].counter;
-        tell(woken, ", " + model_.programs()[i].name());
+        describe(woken, ", " + model_.programs()[i].name());
         thread_ = i;
         settle(woken);
     }
@@ -294,7 +295,7 @@ void Stepper::kill(const State& state) {
         if (counter < range.from || counter >= range.to) continue;
         Successor killed{state, {}, {}};
         killed.state.threads[thread_].counter = static_cast<std::uint8_t>(range.then);
-        tell(killed, model_.programs()[thread_].name() + " is killed");
+        describe(killed, model_.programs()[thread_].name() + " is killed");
         settle(killed);
         forget(killed.state);
         found_.push_back(std::move(killed));
@@ -362,7 +363,7 @@ class Search {
     bool expand(std::uint32_t node);
     void find_hopeless();
     void fail(std::uint32_t node, const std::string& violation);
-    std::string tell(std::uint32_t parent, std::uint32_t choice) const;
+    std::string describe(std::uint32_t parent, std::uint32_t choice) const;
 
     const Model& model_;
     const std::function<void(const State&)>& at_end_;
@@ -383,7 +384,7 @@ void Search::add(const State& state, std::uint32_t parent, std::uint32_t choice)
     if (parent != nowhere) edges_.emplace_back(entry->second, parent);
 }
 
-std::string Search::tell(std::uint32_t parent, std::uint32_t choice) const {
+std::string Search::describe(std::uint32_t parent, std::uint32_t choice) const {
     Stepper teller(model_, true);
     return teller.successors(decode(*nodes_[parent].code))[choice].text;
 }
@@ -391,7 +392,7 @@ std::string Search::tell(std::uint32_t parent, std::uint32_t choice) const {
 void Search::fail(std::uint32_t node, const std::string& violation) {
     result_.violation = violation;
     for (; nodes_[node].parent != nowhere; node = nodes_[node].parent)
-        result_.trace.push_back(tell(nodes_[node].parent, nodes_[node].choice));
+        result_.trace.push_back(describe(nodes_[node].parent, nodes_[node].choice));
     std::reverse(result_.trace.begin(), result_.trace.end());
 }
 
@@ -402,7 +403,7 @@ bool Search::expand(std::uint32_t node) {
     for (std::uint32_t i = 0; i < successors.size(); ++i) {
         if (!successors[i].violation.empty()) {
             fail(node, successors[i].violation);
-            result_.trace.push_back(tell(node, i));
+            result_.trace.push_back(describe(node, i));
             return false;
         }
         add(successors[i].state, node, i);

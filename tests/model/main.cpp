@@ -31,7 +31,7 @@ const Subject* find(const Collection& all, const std::string& name) {
 
 std::string name_of(const Change& change) { return change.subject + ": " + change.name; }
 
-void tell(const Result& result) {
+void print(const Result& result) {
     for (const std::string& step : result.trace) std::cout << "    " << step << '\n';
     std::cout << "    => " << result.violation << '\n';
 }
@@ -44,7 +44,7 @@ bool judge(const Subject& subject) {
               << subject.name << std::right << std::setw(8) << result.states << " states "
               << std::fixed << std::setprecision(1) << std::setw(5) << took.count() << " s  "
               << subject.what << std::endl;
-    if (!result.holds()) tell(result);
+    if (!result.holds()) print(result);
     return result.holds();
 }
 
@@ -102,7 +102,7 @@ int trace(const Collection& all, const std::string& name) {
     if (result.holds())
         std::cout << "    it holds\n";
     else
-        tell(result);
+        print(result);
     return 0;
 }
 

@@ -269,7 +269,7 @@ Program services(const Succession& all, const Twist& twist) {
     return writer.label("done").set(choice, 0);
 }
 
-/// Whether the writer lives, as far as `state` does not tell: as writer_lives().
+/// Whether the writer lives, as far as `state` does not show: as writer_lives().
 void look_for_life(Program& reader, const Succession& all, const Twist& twist) {
     if (all.ending == Ending::killed && !twist("no look for a dead writer"))
         reader.load(value, all.death, acquire)
@@ -296,7 +296,7 @@ void hand_over(Program& reader, const Succession& all, const Twist& twist) {
             [all](const State& memory, const Registers& r) {
                 return r[next] >= published(all.first, all.reading, memory, r);
             },
-            "an item is skipped, and nobody is told")
+            "an item is skipped, and nobody notices")
         .set(which, 1)
         .set(next, 0)
         .go("turn")

@@ -758,7 +758,7 @@ def read_entries(text):
     return entries
 
 
-# What is told
+# Report
 
 def survivors_text(results):
     lines = []

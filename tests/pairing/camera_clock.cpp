@@ -12,7 +12,7 @@ namespace {
 /// Exposures at 20 Hz of a camera that stamps one of their instants, by a clock 80 ppm fast.
 class Bench {
  public:
-    Bench(Instant stamps, Instant told) : clock(told), stamps_(stamps) {}
+    Bench(Instant stamps, Instant assumed) : clock(assumed), stamps_(stamps) {}
 
     Record expose(Duration length, StampKind kind = StampKind::measured_middle) {
         at_ = at_ + milliseconds(50);

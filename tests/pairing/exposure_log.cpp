@@ -80,7 +80,7 @@ TEST_CASE("exposure_log: an end that nobody saw is likelier after as long as las
     ExposureLog log(milliseconds(50));
     for (int i = 0; i < 5; ++i) {
         Exposure next = exposure(static_cast<std::uint64_t>(i) + 1, 50 * i);
-        if (i == 2) {  // told as late as it may be, three periods on
+        if (i == 2) {  // reported as late as it may be, three periods on
             next.kind = StampKind::predicted_middle;
             next.end = next.start + milliseconds(150);
             next.end_on_host = HostTime{next.end.ns + 5'000'000'000};
@@ -160,7 +160,7 @@ TEST_CASE("exposure_log: held up together means within three quarters of a perio
     }
 }
 
-TEST_CASE("exposure_log: the first exposure that lies behind tells whether one is lost") {
+TEST_CASE("exposure_log: the first exposure that lies behind shows whether one is lost") {
     ExposureLog log(milliseconds(50));
     for (const std::uint64_t trigger : {5U, 6U, 8U})
         log.add(exposure(trigger, static_cast<std::int64_t>(trigger) * 50));

@@ -15,7 +15,7 @@ namespace versavis::test {
 using namespace versavis::pairing;
 
 /// All that pairing decided, in order.
-class Told final : public Outcome {
+class Decisions final : public Outcome {
  public:
     struct Frame {
         std::uint64_t id;
@@ -47,10 +47,10 @@ class Told final : public Outcome {
     std::vector<std::uint64_t> slips;
 };
 
-inline bool operator==(const Told::Pulse& a, const Told::Pulse& b) {
+inline bool operator==(const Decisions::Pulse& a, const Decisions::Pulse& b) {
     return a.trigger == b.trigger && a.reason == b.reason;
 }
-inline std::ostream& operator<<(std::ostream& out, const Told::Pulse& pulse) {
+inline std::ostream& operator<<(std::ostream& out, const Decisions::Pulse& pulse) {
     return out << pulse.trigger << ": " << to_string(pulse.reason);
 }
 
@@ -63,7 +63,7 @@ inline constexpr std::uint64_t pattern[] = {1, 2, 4, 5, 8, 9, 11, 12, 15, 17, 18
 
 /// One camera that takes each trigger, its board, and pairing.
 struct Bench {
-    explicit Bench(const Limits& limits = made()) : pairing(limits, told) {}
+    explicit Bench(const Limits& limits = made()) : pairing(limits, decided) {}
 
     static Limits made() {
         Limits limits;
@@ -115,13 +115,13 @@ struct Bench {
         REQUIRE(pairing.state() == State::locked);
         pairing.start_requested(Start::steady, now);
         for (int i = 0; i < 10; ++i) take();
-        REQUIRE(told.slips.empty());
-        told = {};
+        REQUIRE(decided.slips.empty());
+        decided = {};
     }
 
     Duration frame_after = milliseconds(20);  ///< the end of the exposure
     Duration camera_ahead = seconds(7);       ///< of the board
-    Told told;
+    Decisions decided;
     Pairing pairing;
     std::uint64_t next_trigger = 1;
     std::uint64_t next_id = 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Cameras without a clock: ids and arrivals alone tell what a frame is of.
+// Cameras without a clock: ids and arrivals alone show what a frame is of.
 #include <catch2/catch.hpp>
 
 #include "pairing_bench.hpp"
@@ -22,10 +22,10 @@ TEST_CASE("pairing_by_arrival: a frame waits for its record, and is no slip") {
     bench.lock_slowly();
     const Exposure one = bench.next();
     bench.pairing.add(bench.frame(bench.next_id, one));
-    CHECK(bench.told.slips.empty());
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.slips.empty());
+    CHECK(bench.decided.frames.empty());
     bench.pairing.add(one);
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_by_arrival: a frame that comes once more is out of order, however late") {
@@ -37,21 +37,21 @@ TEST_CASE("pairing_by_arrival: a frame that comes once more is out of order, how
         Arrival again = bench.frame(bench.next_id - 1, one);
         again.arrived = again.arrived + period * periods;
         bench.pairing.add(again);
-        REQUIRE(bench.told.frames.size() == 1);
-        CHECK(bench.told.frames[0].reason == EventReason::out_of_order);
-        CHECK(bench.told.slips.empty());
+        REQUIRE(bench.decided.frames.size() == 1);
+        CHECK(bench.decided.frames[0].reason == EventReason::out_of_order);
+        CHECK(bench.decided.slips.empty());
     }
 }
 
-TEST_CASE("pairing_by_arrival: ids must count each trigger, for nothing else would tell") {
+TEST_CASE("pairing_by_arrival: ids must count each trigger, for nothing else would show it") {
     Bench bench(without_clock());
     bench.lock_slowly();
     Exposure silent = bench.next();
     silent.exposed = false;
     bench.pairing.add(silent);
     bench.take();  // its id counts what was taken
-    CHECK(bench.told.pairs.empty());
-    CHECK(bench.told.slips.size() == 1);
+    CHECK(bench.decided.pairs.empty());
+    CHECK(bench.decided.slips.size() == 1);
 }
 
 TEST_CASE("pairing_by_arrival: one late frame says little of the next") {
@@ -61,21 +61,21 @@ TEST_CASE("pairing_by_arrival: one late frame says little of the next") {
     bench.take();
     bench.frame_after = milliseconds(6);
     bench.take();
-    CHECK(bench.told.pairs.size() == 2);
-    CHECK(bench.told.slips.empty());
+    CHECK(bench.decided.pairs.size() == 2);
+    CHECK(bench.decided.slips.empty());
 }
 
 TEST_CASE("pairing_by_arrival: when frames come too irregularly, none is published") {
     Bench bench(without_clock());
     bench.lock_slowly();
-    for (int i = 0; i < 200 && bench.told.slips.empty(); ++i) {
+    for (int i = 0; i < 200 && bench.decided.slips.empty(); ++i) {
         bench.frame_after = milliseconds(i % 2 == 0 ? 30 : 10);
         bench.take();
     }
-    CHECK(bench.told.slips.size() == 1);
+    CHECK(bench.decided.slips.size() == 1);
 }
 
-TEST_CASE("pairing_by_arrival: a counter that began anew is told by more than 16 ids") {
+TEST_CASE("pairing_by_arrival: a counter that began anew is recognised by more than 16 ids") {
     for (const auto& [jump, followed] :
          {std::pair{3U, false}, {16U, false}, {17U, true}, {1000U, true}}) {
         Bench bench(without_clock());
@@ -86,9 +86,9 @@ TEST_CASE("pairing_by_arrival: a counter that began anew is told by more than 16
             bench.take();
             ++frames;
         } while (bench.pairing.state() == State::checking);
-        CHECK(bench.told.slips.size() == 1);
+        CHECK(bench.decided.slips.size() == 1);
         CHECK((bench.pairing.state() == State::locked) == followed);
-        CHECK(bench.told.pairs.size() == (followed ? 1 : 0));
+        CHECK(bench.decided.pairs.size() == (followed ? 1 : 0));
         // 0.3 s are waited for before it is given up.
         CHECK(frames == (followed ? 3 : 7));
     }
@@ -100,14 +100,14 @@ TEST_CASE("pairing_by_arrival: a single frame that agrees ends no check, three d
     bench.next_id += 3;
     bench.take();
     bench.next_id -= 3;
-    CHECK(bench.told.slips.size() == 1);
+    CHECK(bench.decided.slips.size() == 1);
     for (int i = 0; i < 2; ++i) {
         bench.take();
         CHECK(bench.pairing.state() == State::checking);
     }
     bench.take();
     CHECK(bench.pairing.state() == State::locked);
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_by_arrival: frames without a time end the search by times") {
@@ -119,7 +119,7 @@ TEST_CASE("pairing_by_arrival: frames without a time end the search by times") {
     Arrival frame = bench.frame(bench.next_id++, one);
     frame.camera_time = {};
     bench.pairing.add(frame);
-    REQUIRE(bench.told.frames.size() == 2);
-    CHECK(bench.told.frames[0].reason == EventReason::unproved);
+    REQUIRE(bench.decided.frames.size() == 2);
+    CHECK(bench.decided.frames[0].reason == EventReason::unproved);
     CHECK(bench.pairing.first_start() == Start::slow);
 }

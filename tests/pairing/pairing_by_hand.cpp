@@ -22,12 +22,12 @@ TEST_CASE("pairing_by_hand: each state has its name") {
 TEST_CASE("pairing_by_hand: a camera that takes all is paired from its first frame on") {
     Bench bench;
     bench.lock();
-    REQUIRE(bench.told.pairs.size() == 22);
-    for (const auto& [id, trigger] : bench.told.pairs) CHECK(id == trigger);
-    CHECK(bench.told.locks == std::vector<std::uint64_t>{1});
-    CHECK(bench.told.frames.empty());
-    CHECK(bench.told.pulses.empty());
-    CHECK(bench.told.slips.empty());
+    REQUIRE(bench.decided.pairs.size() == 22);
+    for (const auto& [id, trigger] : bench.decided.pairs) CHECK(id == trigger);
+    CHECK(bench.decided.locks == std::vector<std::uint64_t>{1});
+    CHECK(bench.decided.frames.empty());
+    CHECK(bench.decided.pulses.empty());
+    CHECK(bench.decided.slips.empty());
 }
 
 TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the life before") {
@@ -39,24 +39,24 @@ TEST_CASE("pairing_by_hand: a reset gives all back, and what was known of the li
     bench.pairing.add(waits);
     const Exposure late = bench.next();
     bench.pairing.add(bench.frame(24, late));  // its record has not come
-    bench.told = {};
+    bench.decided = {};
     bench.pairing.reset();
     CHECK(bench.pairing.state() == State::searching);
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].id == 24);
-    CHECK(bench.told.frames[0].reason == EventReason::reset);
-    CHECK(bench.told.pulses == std::vector<Told::Pulse>{{23, EventReason::reset}});
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].id == 24);
+    CHECK(bench.decided.frames[0].reason == EventReason::reset);
+    CHECK(bench.decided.pulses == std::vector<Decisions::Pulse>{{23, EventReason::reset}});
     CHECK_FALSE(bench.pairing.due(bench.now + seconds(60)));
     // The next life counts, and stamps, in its own way.
-    bench.told = {};
+    bench.decided = {};
     bench.tick = 0;
     bench.next_trigger = 1;
     bench.next_id = 1'000;
     bench.camera_ahead = seconds(90);
     bench.lock();
-    CHECK(bench.told.pairs.size() == 22);
-    CHECK(bench.told.frames.empty());
-    CHECK(bench.told.slips.empty());
+    CHECK(bench.decided.pairs.size() == 22);
+    CHECK(bench.decided.frames.empty());
+    CHECK(bench.decided.slips.empty());
 }
 
 TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one") {
@@ -82,13 +82,13 @@ TEST_CASE("pairing_by_hand: limits of a new stream replace those of the old one"
         bench.pairing.add(one);
         bench.pairing.add(bench.frame(i + 1, one));
     }
-    CHECK(bench.told.pulses.empty());
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.pulses.empty());
+    CHECK(bench.decided.frames.empty());
     CHECK(bench.pairing.state() == State::locked);
     bench.pairing.reset();
-    bench.told = {};
+    bench.decided = {};
     for (std::uint64_t i = 1; i <= 6; ++i) bench.pairing.add(bench.frame(i, Bench::exposure(i, i)));
-    CHECK(bench.told.frames.size() == 1);
+    CHECK(bench.decided.frames.size() == 1);
 }
 
 TEST_CASE(
@@ -99,7 +99,7 @@ TEST_CASE(
     for (std::uint64_t id = 1; id < 30; ++id)
         bench.pairing.add(Shortfall{id, EventReason::no_buffer});
     bench.pairing.reset();
-    bench.told = {};
+    bench.decided = {};
     bench.next_trigger = bench.next_id = 1;
     bench.tick = 0;
     SECTION("records") {
@@ -108,14 +108,15 @@ TEST_CASE(
         lie.start = lie.start + seconds(1);
         bench.pairing.add(lie);
         bench.pairing.add(Bench::exposure(3, 3));
-        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{2, EventReason::mismatch}});
+        CHECK(bench.decided.pulses == std::vector<Decisions::Pulse>{{2, EventReason::mismatch}});
     }
     SECTION("losses") {
         bench.lock();
         bench.pairing.add(bench.next());
         ++bench.next_id;
         bench.take();
-        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{23, EventReason::frame_missing}});
+        CHECK(bench.decided.pulses ==
+              std::vector<Decisions::Pulse>{{23, EventReason::frame_missing}});
     }
     SECTION("pauses between starts") {
         for (std::uint64_t i = 1; i <= 5; ++i)
@@ -146,16 +147,16 @@ TEST_CASE("pairing_by_hand: a first frame that was late has no exposure to guess
     bench.camera_ahead = {};  // the camera's clock is the board's
     bench.lock();
     bench.pairing.reset();
-    bench.told = {};
+    bench.decided = {};
     const std::uint64_t base = bench.tick;
     for (const std::uint64_t at : pattern) {
         bench.frame_after = milliseconds(at == 1 ? 55 : 20);
         bench.take(base + at - bench.tick);
     }
     REQUIRE(bench.pairing.state() == State::locked);
-    REQUIRE_FALSE(bench.told.frames.empty());
-    CHECK(bench.told.frames[0].id == 23);
-    CHECK(bench.told.frames[0].guess == 0);
+    REQUIRE_FALSE(bench.decided.frames.empty());
+    CHECK(bench.decided.frames[0].id == 23);
+    CHECK(bench.decided.frames[0].guess == 0);
 }
 
 TEST_CASE("pairing_by_hand: ids that leave out ignored triggers explain the lost ones as well") {
@@ -168,16 +169,16 @@ TEST_CASE("pairing_by_hand: ids that leave out ignored triggers explain the lost
         return silent.trigger;
     };
     const auto lose = [&](std::uint64_t id) {
-        bench.told = {};
+        bench.decided = {};
         const std::uint64_t ignored = ignore();
         const Exposure lost = bench.next();
         bench.pairing.add(lost);
         ++bench.next_id;
         bench.pairing.add(Shortfall{id, EventReason::no_buffer});
         bench.take();
-        REQUIRE(bench.told.pulses.size() == 2);
-        CHECK(bench.told.pulses[0] == Told::Pulse{ignored, EventReason::trigger_ignored});
-        return bench.told.pulses[1].reason;
+        REQUIRE(bench.decided.pulses.size() == 2);
+        CHECK(bench.decided.pulses[0] == Decisions::Pulse{ignored, EventReason::trigger_ignored});
+        return bench.decided.pulses[1].reason;
     };
     CHECK(lose(bench.next_id) == EventReason::no_buffer);
     CHECK(lose(bench.next_id + 1) == EventReason::no_buffer);  // it may count them, too
@@ -188,16 +189,16 @@ TEST_CASE("pairing_by_hand: a trigger without frame says what became of the fram
     Bench bench;
     bench.lock();
     const auto lost = [&](const std::vector<Shortfall>& shortfalls, unsigned count) {
-        bench.told = {};
+        bench.decided = {};
         for (unsigned i = 0; i < count; ++i) {
             bench.pairing.add(bench.next());
             ++bench.next_id;
         }
         for (const Shortfall& shortfall : shortfalls) bench.pairing.add(shortfall);
         bench.take();
-        REQUIRE(bench.told.pairs.size() == 1);
+        REQUIRE(bench.decided.pairs.size() == 1);
         std::vector<EventReason> reasons;
-        for (const auto& pulse : bench.told.pulses) reasons.push_back(pulse.reason);
+        for (const auto& pulse : bench.decided.pulses) reasons.push_back(pulse.reason);
         return reasons;
     };
     using Reasons = std::vector<EventReason>;
@@ -215,15 +216,15 @@ TEST_CASE("pairing_by_hand: of frames known to be lost, the newest 32 are rememb
     for (const unsigned later : {31U, 32U}) {
         Bench bench;
         bench.lock();
-        bench.told = {};
+        bench.decided = {};
         bench.pairing.add(Shortfall{bench.next_id, EventReason::wrong_size});
         for (unsigned i = 0; i < later; ++i)
             bench.pairing.add(Shortfall{bench.next_id + 1000 + i, EventReason::no_buffer});
         bench.pairing.add(bench.next());
         ++bench.next_id;
         bench.take();
-        REQUIRE(bench.told.pulses.size() == 1);
-        CHECK(bench.told.pulses[0].reason ==
+        REQUIRE(bench.decided.pulses.size() == 1);
+        CHECK(bench.decided.pulses[0].reason ==
               (later == 31 ? EventReason::wrong_size : EventReason::frame_missing));
     }
 }
@@ -231,38 +232,38 @@ TEST_CASE("pairing_by_hand: of frames known to be lost, the newest 32 are rememb
 TEST_CASE("pairing_by_hand: frames that wait are bounded, and the oldest goes first") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     std::vector<Exposure> held_up;
     for (std::uint64_t i = 0; i < 9; ++i) {
         held_up.push_back(bench.next());
         bench.pairing.add(bench.frame(bench.next_id++, held_up.back()));
-        CHECK(bench.told.frames.size() == (i < 8 ? 0 : 1));
+        CHECK(bench.decided.frames.size() == (i < 8 ? 0 : 1));
     }
-    CHECK(bench.told.frames[0].id == 23);
-    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
+    CHECK(bench.decided.frames[0].id == 23);
+    CHECK(bench.decided.frames[0].reason == EventReason::exposure_missing);
     CHECK(bench.pairing.state() == State::locked);
     // While nothing is known, it is unproved.
     Bench other;
     for (std::uint64_t i = 1; i <= 9; ++i) other.pairing.add(other.frame(i, Bench::exposure(i, i)));
-    REQUIRE(other.told.frames.size() == 1);
-    CHECK(other.told.frames[0].reason == EventReason::unproved);
-    CHECK(other.told.frames[0].guess == 0);
+    REQUIRE(other.decided.frames.size() == 1);
+    CHECK(other.decided.frames[0].reason == EventReason::unproved);
+    CHECK(other.decided.frames[0].guess == 0);
 }
 
 TEST_CASE("pairing_by_hand: a frame waits for its record as long as the limits say") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Arrival waits = bench.frame(bench.next_id++, bench.next());
     bench.pairing.add(waits);
     const HostTime until = waits.arrived + usual_exposure_wait;
     CHECK_FALSE(bench.pairing.due(until));
     bench.pairing.advance(until);
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.frames.empty());
     CHECK(bench.pairing.due(until + nanoseconds(1)));
     bench.pairing.advance(until + nanoseconds(1));
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::exposure_missing);
 }
 
 TEST_CASE("pairing_by_hand: while it searches, frames wait for ten seconds and ten periods") {
@@ -273,34 +274,35 @@ TEST_CASE("pairing_by_hand: while it searches, frames wait for ten seconds and t
     CHECK_FALSE(bench.pairing.due(until));
     CHECK(bench.pairing.due(until + nanoseconds(1)));
     bench.pairing.advance(until + nanoseconds(1));
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::unproved);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::unproved);
 }
 
 TEST_CASE(
     "pairing_by_hand: a trigger waits for its frame, and knows whether the camera is silent") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure waits = bench.next();
     bench.pairing.add(waits);
     const Duration patience = usual_latest_arrival + usual_exposure_wait;
     const HostTime until = waits.earliest_on_host + patience;
     bench.pairing.advance(until);
-    CHECK(bench.told.pulses.empty());
+    CHECK(bench.decided.pulses.empty());
     CHECK(bench.pairing.due(until + nanoseconds(1)));
     SECTION("nothing came since") {
         bench.pairing.advance(until + nanoseconds(1));
-        CHECK(bench.told.pulses ==
-              std::vector<Told::Pulse>{{waits.trigger, EventReason::camera_silent}});
+        CHECK(bench.decided.pulses ==
+              std::vector<Decisions::Pulse>{{waits.trigger, EventReason::camera_silent}});
     }
     SECTION("a frame came, of another exposure") {
         Arrival other = bench.frame(bench.next_id + 1, bench.next());
         other.arrived = until - patience + milliseconds(1);
         bench.pairing.add(other);
         bench.pairing.advance(until + nanoseconds(1));
-        REQUIRE_FALSE(bench.told.pulses.empty());
-        CHECK(bench.told.pulses[0] == Told::Pulse{waits.trigger, EventReason::frame_missing});
+        REQUIRE_FALSE(bench.decided.pulses.empty());
+        CHECK(bench.decided.pulses[0] ==
+              Decisions::Pulse{waits.trigger, EventReason::frame_missing});
     }
 }
 
@@ -310,9 +312,9 @@ TEST_CASE("pairing_by_hand: a search keeps 32 exposures, however old") {
     const HostTime later = Bench::exposure(33, 33).end_on_host + seconds(60);
     CHECK(bench.pairing.due(later));
     bench.pairing.advance(later);
-    REQUIRE(bench.told.pulses.size() == 1);
-    CHECK(bench.told.pulses[0].trigger == 1);
-    CHECK(bench.told.pulses[0].reason == EventReason::unproved);
+    REQUIRE(bench.decided.pulses.size() == 1);
+    CHECK(bench.decided.pulses[0].trigger == 1);
+    CHECK(bench.decided.pulses[0].reason == EventReason::unproved);
     CHECK_FALSE(bench.pairing.due(later + seconds(60)));
 }
 
@@ -321,7 +323,7 @@ TEST_CASE("pairing_by_hand: a record that no exposure can have is refused, and c
     bench.lock();
     const Exposure newest = bench.next();
     bench.pairing.add(newest);
-    bench.told = {};
+    bench.decided = {};
     const auto with = [&](auto change) {
         Exposure lie = Bench::exposure(newest.trigger + 1, newest.tick + 1);
         change(lie);
@@ -335,13 +337,14 @@ TEST_CASE("pairing_by_hand: a record that no exposure can have is refused, and c
     };
     for (const Exposure& lie : lies) {
         bench.pairing.add(lie);
-        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{lie.trigger, EventReason::mismatch}});
-        bench.told = {};
+        CHECK(bench.decided.pulses ==
+              std::vector<Decisions::Pulse>{{lie.trigger, EventReason::mismatch}});
+        bench.decided = {};
     }
     bench.pairing.add(bench.frame(bench.next_id++, newest));
     bench.take();
     CHECK(bench.pairing.state() == State::locked);
-    CHECK(bench.told.pairs.size() == 2);
+    CHECK(bench.decided.pairs.size() == 2);
 }
 
 TEST_CASE("pairing_by_hand: three records in a row that come too early are a step") {
@@ -349,25 +352,25 @@ TEST_CASE("pairing_by_hand: three records in a row that come too early are a ste
     bench.lock();
     const Exposure waits = bench.next();
     bench.pairing.add(waits);
-    bench.told = {};
+    bench.decided = {};
     const auto early = [&] {
         Exposure one = bench.next();
         one.earliest_on_host = one.end_on_host = one.end_on_host + seconds(3);
         bench.pairing.add(one);
-        return Told::Pulse{one.trigger, EventReason::mismatch};
+        return Decisions::Pulse{one.trigger, EventReason::mismatch};
     };
-    std::vector<Told::Pulse> expected{early(), early()};
+    std::vector<Decisions::Pulse> expected{early(), early()};
     bench.pairing.add(bench.next());  // one that does not: it was no step
     expected.push_back(early());
     expected.push_back(early());
     CHECK(bench.pairing.state() == State::locked);
-    CHECK(bench.told.pulses == expected);
-    bench.told = {};
-    const Told::Pulse third = early();
+    CHECK(bench.decided.pulses == expected);
+    bench.decided = {};
+    const Decisions::Pulse third = early();
     CHECK(bench.pairing.state() == State::searching);
-    REQUIRE(bench.told.pulses.size() == 3);
-    CHECK(bench.told.pulses[0] == third);
-    CHECK(bench.told.pulses[1] == Told::Pulse{waits.trigger, EventReason::reset});
+    REQUIRE(bench.decided.pulses.size() == 3);
+    CHECK(bench.decided.pulses[0] == third);
+    CHECK(bench.decided.pulses[1] == Decisions::Pulse{waits.trigger, EventReason::reset});
     CHECK(bench.pairing.wanted_start(bench.now + seconds(60)) == Start::pattern);
 }
 
@@ -422,7 +425,7 @@ TEST_CASE(
     "pairing_by_hand: frames that come once more, or after newer ones, are no loss of others") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure first = bench.next();
     const Exposure second = bench.next();
     bench.pairing.add(first);
@@ -430,36 +433,36 @@ TEST_CASE(
     bench.pairing.add(bench.frame(bench.next_id + 1, second));
     bench.pairing.add(bench.frame(bench.next_id + 1, second));
     bench.pairing.add(bench.frame(bench.next_id, first));
-    CHECK(bench.told.pairs.size() == 1);
-    REQUIRE(bench.told.frames.size() == 2);
-    for (const auto& frame : bench.told.frames) CHECK(frame.reason == EventReason::out_of_order);
-    CHECK(bench.told.slips.empty());
+    CHECK(bench.decided.pairs.size() == 1);
+    REQUIRE(bench.decided.frames.size() == 2);
+    for (const auto& frame : bench.decided.frames) CHECK(frame.reason == EventReason::out_of_order);
+    CHECK(bench.decided.slips.empty());
     // They explain no trigger that has no frame.
     bench.next_id += 2;
     bench.pairing.add(bench.next());
     ++bench.next_id;
     bench.take();
-    CHECK(bench.told.pulses.back().reason == EventReason::frame_missing);
+    CHECK(bench.decided.pulses.back().reason == EventReason::frame_missing);
 }
 
-TEST_CASE("pairing_by_hand: a silent exposure line tells that a trigger was ignored") {
+TEST_CASE("pairing_by_hand: a silent exposure line shows that a trigger was ignored") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     Exposure silent = bench.next();
     silent.exposed = false;
     bench.pairing.add(silent);
     bench.take();
-    CHECK(bench.told.pairs.size() == 1);
-    CHECK(bench.told.pulses ==
-          std::vector<Told::Pulse>{{silent.trigger, EventReason::trigger_ignored}});
+    CHECK(bench.decided.pairs.size() == 1);
+    CHECK(bench.decided.pulses ==
+          std::vector<Decisions::Pulse>{{silent.trigger, EventReason::trigger_ignored}});
 }
 
 TEST_CASE(
     "pairing_by_hand: frames of another stamp than any exposure's are a slip, then a search") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     // The clock jumps by 2.4 periods and the ids by 300: nothing is left to go by.
     bench.next_id += 300;
     for (int i = 0; i < 30 && bench.pairing.state() != State::searching; ++i) {
@@ -471,28 +474,28 @@ TEST_CASE(
         bench.pairing.add(arrival);
     }
     CHECK(bench.pairing.state() == State::searching);
-    CHECK(bench.told.pairs.empty());
-    CHECK(bench.told.slips.size() == 1);
-    REQUIRE_FALSE(bench.told.frames.empty());
-    CHECK(bench.told.frames.size() == 5);
-    for (std::size_t i = 0; i + 1 < bench.told.frames.size(); ++i)
-        CHECK(bench.told.frames[i].reason == EventReason::unproved);
-    CHECK(bench.told.frames.back().reason == EventReason::mismatch);
+    CHECK(bench.decided.pairs.empty());
+    CHECK(bench.decided.slips.size() == 1);
+    REQUIRE_FALSE(bench.decided.frames.empty());
+    CHECK(bench.decided.frames.size() == 5);
+    for (std::size_t i = 0; i + 1 < bench.decided.frames.size(); ++i)
+        CHECK(bench.decided.frames[i].reason == EventReason::unproved);
+    CHECK(bench.decided.frames.back().reason == EventReason::mismatch);
 }
 
 TEST_CASE("pairing_by_hand: what was given up explains the trigger whose record comes at last") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure late = bench.next();
     const Arrival frame = bench.frame(bench.next_id++, late);
     bench.pairing.add(frame);
     bench.pairing.advance(frame.arrived + usual_exposure_wait + nanoseconds(1));
-    REQUIRE(bench.told.frames.size() == 1);
+    REQUIRE(bench.decided.frames.size() == 1);
     bench.pairing.add(late);
     bench.take();
-    CHECK(bench.told.pulses ==
-          std::vector<Told::Pulse>{{late.trigger, EventReason::exposure_missing}});
+    CHECK(bench.decided.pulses ==
+          std::vector<Decisions::Pulse>{{late.trigger, EventReason::exposure_missing}});
 }
 
 TEST_CASE("pairing_by_hand: a start is wanted once five frames came that prove nothing") {

@@ -37,77 +37,77 @@ TEST_CASE(
     "pairing_slips: a late frame needs one on time behind it, where triggers may be ignored") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure one = unseen(bench.next());
     const Exposure two = unseen(bench.next());
     bench.pairing.add(one);
     bench.pairing.add(late_frame(bench, one));
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.pairs.empty());
     bench.pairing.add(two);
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.pairs.empty());
     bench.pairing.add(bench.frame(bench.next_id++, two));
-    CHECK(bench.told.pairs.size() == 2);
-    CHECK(bench.told.slips.empty());
+    CHECK(bench.decided.pairs.size() == 2);
+    CHECK(bench.decided.slips.empty());
 }
 
 TEST_CASE("pairing_slips: a late frame needs none where each exposure was measured") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure one = bench.next();
     bench.pairing.add(one);
     bench.pairing.add(late_frame(bench, one));
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
     // ... but a missing record in between leaves a choice.
     bench.next();
     const Exposure two = bench.next();
     bench.pairing.add(two);
     bench.next_id += 1;
     bench.pairing.add(late_frame(bench, two));
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_slips: frames that stay late are a slip, and each wait is its own") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure one = unseen(bench.next());
     bench.pairing.add(one);
     const Arrival late = late_frame(bench, one);
     bench.pairing.add(late);
     bench.pairing.advance(late.arrived + usual_exposure_wait + nanoseconds(1));
-    CHECK(bench.told.slips.size() == 1);
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::unproved);
+    CHECK(bench.decided.slips.size() == 1);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::unproved);
     CHECK(bench.pairing.state() == State::checking);
     bench.tick += 10;
     bench.take();
     REQUIRE(bench.pairing.state() == State::locked);
     // The next one that waits does so for its record alone.
-    bench.told = {};
+    bench.decided = {};
     const Arrival waits = bench.frame(bench.next_id++, bench.next());
     bench.pairing.add(waits);
     bench.pairing.advance(waits.arrived + usual_exposure_wait + nanoseconds(1));
-    CHECK(bench.told.slips.empty());
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
+    CHECK(bench.decided.slips.empty());
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::exposure_missing);
 }
 
-TEST_CASE("pairing_slips: frames that come later and later are witnesses for none") {
+TEST_CASE("pairing_slips: frames that come later and later are evidence for none") {
     Bench bench;
     bench.lock();
     for (int i = 0; i < 400; ++i) {  // they wait for each other somewhere
         bench.frame_after = milliseconds(20) + microseconds(120) * i;
         bench.take();
     }
-    REQUIRE(bench.told.slips.empty());
-    bench.told = {};
+    REQUIRE(bench.decided.slips.empty());
+    bench.decided = {};
     for (int i = 0; i < 3; ++i) {
         const Exposure one = unseen(bench.next());
         bench.pairing.add(one);
         bench.pairing.add(bench.frame(bench.next_id++, one));
     }
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.pairs.empty());
 }
 
 TEST_CASE("pairing_slips: what agreed at an earlier slip counts for nothing at the next") {
@@ -122,12 +122,12 @@ TEST_CASE("pairing_slips: what agreed at an earlier slip counts for nothing at t
         bench.take();
         CHECK(bench.pairing.state() == State::locked);
     };
-    bench.told = {};
+    bench.decided = {};
     take_two();
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
     take_two();
-    CHECK(bench.told.pairs.size() == 2);
-    CHECK(bench.told.slips.size() == 2);
+    CHECK(bench.decided.pairs.size() == 2);
+    CHECK(bench.decided.slips.size() == 2);
 }
 
 TEST_CASE("pairing_slips: frames of an earlier slip are not counted at the next") {
@@ -150,36 +150,36 @@ TEST_CASE("pairing_slips: three frames in a row must agree, and one without a ti
     bench.camera_ahead = -(Bench::exposure(0, at + 2).start - BoardTime{});
     bench.lock();
     REQUIRE(bench.tick == static_cast<std::uint64_t>(at));
-    bench.told = {};
+    bench.decided = {};
     bench.next_id += 3;
     for (int i = 1; i <= 5; ++i) {
-        CHECK(bench.told.pairs.empty());
+        CHECK(bench.decided.pairs.empty());
         bench.take();
     }
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_slips: a clock that steps by whole periods hits other exposures, and is lost") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     bench.camera_ahead = bench.camera_ahead - period * 2;
     for (int i = 0; i < 5; ++i) {
         CHECK(bench.pairing.state() != State::searching);
         bench.take();
     }
     CHECK(bench.pairing.state() == State::searching);
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.pairs.empty());
 }
 
 TEST_CASE("pairing_slips: a clock that steps is followed over pauses, and from the first record") {
     Bench bench;
     bench.lock();
     bench.pairing.advance(bench.now + seconds(2));  // all that was recorded is given up
-    bench.told = {};
+    bench.decided = {};
     bench.camera_ahead = bench.camera_ahead + seconds(11);
     for (int i = 0; i < 3; ++i) bench.take(60);
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_slips: a clock that steps is not followed while ids leave a choice") {
@@ -187,12 +187,12 @@ TEST_CASE("pairing_slips: a clock that steps is not followed while ids leave a c
         Bench bench;
         bench.frame_after = milliseconds(60);
         bench.lock();
-        bench.told = {};
+        bench.decided = {};
         bench.camera_ahead = bench.camera_ahead + seconds(11);
         bench.next();  // without record
         if (taken) ++bench.next_id;
         for (int i = 0; i < 8; ++i) bench.take();
-        CHECK(bench.told.pairs.empty());
+        CHECK(bench.decided.pairs.empty());
         CHECK(bench.pairing.state() == State::searching);
     }
 }
@@ -205,18 +205,18 @@ TEST_CASE("pairing_slips: while it checks, frames of before are out of order") {
     bench.next_id += 3;
     bench.take();
     REQUIRE(bench.pairing.state() == State::checking);
-    bench.told = {};
+    bench.decided = {};
     // It waits for a record, as does the one behind it; both are decided when that comes.
     const Exposure one = bench.next();
     Arrival repeated = again;
     repeated.arrived = bench.frame(0, one).arrived;
     bench.pairing.add(repeated);
     bench.pairing.add(bench.frame(bench.next_id - 3, one));
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.frames.empty());
     bench.pairing.add(one);
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::out_of_order);
-    CHECK(bench.told.pairs.size() == 1);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::out_of_order);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_slips: one record decides all frames that waited for it") {
@@ -227,23 +227,23 @@ TEST_CASE("pairing_slips: one record decides all frames that waited for it") {
     const Exposure one = bench.next();
     bench.pairing.add(one);
     REQUIRE(bench.pairing.state() == State::checking);
-    bench.told = {};
+    bench.decided = {};
     SECTION("the first ends the check") {
         const Exposure two = bench.next();
         for (const Exposure& of : {one, two}) bench.pairing.add(bench.frame(bench.next_id++, of));
-        CHECK(bench.told.pairs.empty());
+        CHECK(bench.decided.pairs.empty());
         bench.pairing.add(two);
-        CHECK(bench.told.pairs.size() == 2);
+        CHECK(bench.decided.pairs.size() == 2);
     }
     SECTION("the first is given up") {
         Arrival stray = bench.frame(bench.next_id + 500, one);
         stray.camera_time = stray.camera_time + seconds(40);
         bench.pairing.add(stray);
         bench.pairing.add(bench.frame(bench.next_id++, one));
-        CHECK(bench.told.frames.empty());
+        CHECK(bench.decided.frames.empty());
         bench.pairing.add(bench.next());
-        CHECK(bench.told.frames.size() == 1);
-        CHECK(bench.told.pairs.size() == 1);
+        CHECK(bench.decided.frames.size() == 1);
+        CHECK(bench.decided.pairs.size() == 1);
     }
 }
 
@@ -252,12 +252,12 @@ TEST_CASE("pairing_slips: without any record, a frame that is checked waits") {
     bench.lock();
     take_stray(bench);
     bench.pairing.advance(bench.now + seconds(3));
-    bench.told = {};
+    bench.decided = {};
     const Exposure one = bench.next(60);
     bench.pairing.add(bench.frame(bench.next_id++, one));
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.frames.empty());
     bench.pairing.add(one);
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_slips: two instants that name two exposures are a slip") {
@@ -265,7 +265,7 @@ TEST_CASE("pairing_slips: two instants that name two exposures are a slip") {
     limits.stamped = Instant::unknown;
     Bench bench(limits);
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     bench.next();  // without record: the ids leave a choice
     Exposure before = bench.next();
     before.end = before.start + milliseconds(43);
@@ -278,16 +278,16 @@ TEST_CASE("pairing_slips: two instants that name two exposures are a slip") {
     }
     // Its time is the start of one, and close to the end of the other.
     bench.pairing.add(bench.frame(bench.next_id + 1, after));
-    CHECK(bench.told.slips.size() == 1);
+    CHECK(bench.decided.slips.size() == 1);
     // Only with the arrival there is one that all agree on.
-    CHECK(bench.told.pairs == decltype(bench.told.pairs){{24, 25}});
+    CHECK(bench.decided.pairs == decltype(bench.decided.pairs){{24, 25}});
 }
 
 TEST_CASE("pairing_slips: what is lost while nothing is known is unproved, and of no exposure") {
     Bench bench;
     bench.lock();
     while (bench.pairing.state() != State::searching) take_stray(bench);
-    bench.told = {};
+    bench.decided = {};
     Exposure one;
     for (int i = 0; i < 40; ++i) {
         one = bench.next();
@@ -296,11 +296,11 @@ TEST_CASE("pairing_slips: what is lost while nothing is known is unproved, and o
     const Arrival frame = bench.frame(bench.next_id, one);
     bench.pairing.add(frame);
     bench.pairing.advance(frame.arrived + seconds(20));
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::unproved);
-    CHECK(bench.told.frames[0].guess == 0);
-    REQUIRE_FALSE(bench.told.pulses.empty());
-    for (const auto& pulse : bench.told.pulses) CHECK(pulse.reason == EventReason::unproved);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::unproved);
+    CHECK(bench.decided.frames[0].guess == 0);
+    REQUIRE_FALSE(bench.decided.pulses.empty());
+    for (const auto& pulse : bench.decided.pulses) CHECK(pulse.reason == EventReason::unproved);
 }
 
 TEST_CASE("pairing_slips: a search learns anew how soon records come") {
@@ -327,11 +327,11 @@ TEST_CASE("pairing_slips: a search learns anew how soon records come") {
         take(milliseconds(45));
     }
     REQUIRE(bench.pairing.state() == State::searching);
-    bench.told = {};
+    bench.decided = {};
     // The estimate of the board's clock has moved: none of these is odd.
     for (int i = 0; i < 2; ++i) take(milliseconds(2));
     take(milliseconds(45));
-    for (const auto& pulse : bench.told.pulses) CHECK(pulse.reason != EventReason::mismatch);
+    for (const auto& pulse : bench.decided.pulses) CHECK(pulse.reason != EventReason::mismatch);
 }
 
 TEST_CASE("pairing_slips: after a step of the board's time a start is wanted without frames") {

@@ -16,9 +16,9 @@ TEST_CASE("pairing_verdicts: exposures are kept for as long as their frames may 
         limits.latest_arrival = latest;
         Bench bench(limits);
         for (unsigned i = 0; i < kept; ++i) bench.pairing.add(bench.next());
-        CHECK(bench.told.pulses.empty());
+        CHECK(bench.decided.pulses.empty());
         bench.pairing.add(bench.next());
-        CHECK(bench.told.pulses == std::vector<Told::Pulse>{{1, EventReason::unproved}});
+        CHECK(bench.decided.pulses == std::vector<Decisions::Pulse>{{1, EventReason::unproved}});
     }
 }
 
@@ -28,11 +28,11 @@ TEST_CASE("pairing_verdicts: a lock begins with its first frame, and gives up wh
     bench.next_id = 50;
     const std::uint64_t base = bench.tick;
     for (const std::uint64_t at : pattern) bench.take(base + at - bench.tick);
-    CHECK(bench.told.locks == std::vector<std::uint64_t>{4});
-    CHECK(bench.told.pulses == std::vector<Told::Pulse>{{1, EventReason::unproved},
-                                                        {2, EventReason::unproved},
-                                                        {3, EventReason::unproved}});
-    CHECK(bench.told.pairs.front() == std::pair<std::uint64_t, std::uint64_t>{50, 4});
+    CHECK(bench.decided.locks == std::vector<std::uint64_t>{4});
+    CHECK(bench.decided.pulses == std::vector<Decisions::Pulse>{{1, EventReason::unproved},
+                                                                {2, EventReason::unproved},
+                                                                {3, EventReason::unproved}});
+    CHECK(bench.decided.pairs.front() == std::pair<std::uint64_t, std::uint64_t>{50, 4});
 }
 
 TEST_CASE("pairing_verdicts: a search waits until no record can be missing") {
@@ -61,7 +61,7 @@ TEST_CASE("pairing_verdicts: three frames a second apart prove a slow start") {
             bench.take(20);
         }
         CHECK(bench.pairing.state() == State::locked);
-        CHECK(bench.told.pairs.size() == 3);
+        CHECK(bench.decided.pairs.size() == 3);
         CHECK(bench.pairing.wanted_start(bench.now) == Start::steady);
         bench.pairing.start_requested(Start::steady, bench.now);
         CHECK_FALSE(bench.pairing.wanted_start(bench.now));
@@ -75,43 +75,43 @@ TEST_CASE("pairing_verdicts: three frames a second apart prove a slow start") {
 TEST_CASE("pairing_verdicts: a frame of a silent exposure is ignored by the camera, it is said") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     Exposure silent = bench.next();
     silent.exposed = false;
     bench.pairing.add(silent);
     bench.pairing.add(bench.frame(bench.next_id++, silent));
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::trigger_ignored);
-    CHECK(bench.told.frames[0].guess == silent.trigger);
-    CHECK(bench.told.slips.empty());
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::trigger_ignored);
+    CHECK(bench.decided.frames[0].guess == silent.trigger);
+    CHECK(bench.decided.slips.empty());
 }
 
 TEST_CASE("pairing_verdicts: a record that was lost holds up nothing behind its frame") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     const Exposure lost = bench.next();
     const Exposure next = bench.next();
     bench.pairing.add(bench.frame(bench.next_id++, lost));
     bench.pairing.add(bench.frame(bench.next_id++, next));
-    CHECK(bench.told.frames.empty());
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.frames.empty());
+    CHECK(bench.decided.pairs.empty());
     bench.pairing.add(next);
-    REQUIRE(bench.told.frames.size() == 1);
-    CHECK(bench.told.frames[0].reason == EventReason::exposure_missing);
-    CHECK(bench.told.pairs.size() == 1);
+    REQUIRE(bench.decided.frames.size() == 1);
+    CHECK(bench.decided.frames[0].reason == EventReason::exposure_missing);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_verdicts: without any exposure left, a frame waits for its record") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     bench.pairing.advance(bench.now + seconds(2));
     const Exposure one = bench.next(60);
     bench.pairing.add(bench.frame(bench.next_id++, one));
-    CHECK(bench.told.frames.empty());
+    CHECK(bench.decided.frames.empty());
     bench.pairing.add(one);
-    CHECK(bench.told.pairs.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
 }
 
 TEST_CASE("pairing_verdicts: a frame is early that comes two thirds of a period before any did") {
@@ -119,14 +119,14 @@ TEST_CASE("pairing_verdicts: a frame is early that comes two thirds of a period 
         Bench bench;
         bench.frame_after = milliseconds(60);
         bench.lock();
-        bench.told = {};
+        bench.decided = {};
         const Exposure one = bench.next();
         bench.pairing.add(one);
         Arrival frame = bench.frame(bench.next_id++, one);
         frame.arrived = frame.arrived - nanoseconds(sooner_ns);
         bench.pairing.add(frame);
-        CHECK(bench.told.slips.size() == (early ? 1 : 0));
-        CHECK(bench.told.pairs.size() == (early ? 0 : 1));
+        CHECK(bench.decided.slips.size() == (early ? 1 : 0));
+        CHECK(bench.decided.pairs.size() == (early ? 0 : 1));
     }
 }
 
@@ -138,19 +138,19 @@ TEST_CASE("pairing_verdicts: out of order is up to 16 ids back, and as long as f
         Bench bench(limits);
         bench.lock();
         for (int i = 0; i < 40; ++i) bench.take();
-        bench.told = {};
+        bench.decided = {};
         const Exposure newest = Bench::exposure(bench.next_trigger - 1, bench.tick);
         Arrival frame = bench.frame(bench.next_id - 1 - back, newest);
         frame.camera_time = frame.camera_time - period * behind;
         bench.pairing.add(frame);
         if (disorder) {
-            REQUIRE(bench.told.frames.size() == 1);
-            CHECK(bench.told.frames[0].reason == EventReason::out_of_order);
+            REQUIRE(bench.decided.frames.size() == 1);
+            CHECK(bench.decided.frames[0].reason == EventReason::out_of_order);
         } else {
-            for (const auto& one : bench.told.frames)
+            for (const auto& one : bench.decided.frames)
                 CHECK(one.reason != EventReason::out_of_order);
         }
-        CHECK(bench.told.slips.size() == (disorder ? 0 : 1));
+        CHECK(bench.decided.slips.size() == (disorder ? 0 : 1));
     }
 }
 
@@ -161,35 +161,35 @@ TEST_CASE("pairing_verdicts: while it checks, a frame waits for records that may
     bench.next_id += 3;
     bench.take();
     REQUIRE(bench.pairing.state() == State::checking);
-    bench.told = {};
+    bench.decided = {};
     const Exposure one = bench.next();
     bench.pairing.add(bench.frame(bench.next_id++, one));
-    CHECK(bench.told.frames.empty());
-    CHECK(bench.told.pairs.empty());
+    CHECK(bench.decided.frames.empty());
+    CHECK(bench.decided.pairs.empty());
     bench.pairing.add(one);
     bench.take();
     CHECK(bench.pairing.state() == State::locked);
     // Clock and arrival agreed on three frames: the third is published, the others were not.
-    CHECK(bench.told.pairs.size() == 1);
-    CHECK(bench.told.locks.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
+    CHECK(bench.decided.locks.size() == 1);
     bench.take();
-    CHECK(bench.told.pairs.size() == 2);
+    CHECK(bench.decided.pairs.size() == 2);
 }
 
 TEST_CASE("pairing_verdicts: each slip is given as long as the one before") {
     Bench bench;
     bench.lock();
     for (int round = 0; round < 3; ++round) {
-        bench.told = {};
+        bench.decided = {};
         bench.next_id += 3;
         for (int i = 0; i < 3; ++i) {
-            CHECK(bench.told.pairs.empty());
+            CHECK(bench.decided.pairs.empty());
             bench.take();
         }
-        CHECK(bench.told.pairs.size() == 1);
-        CHECK(bench.told.slips.size() == 1);
+        CHECK(bench.decided.pairs.size() == 1);
+        CHECK(bench.decided.slips.size() == 1);
         for (int i = 0; i < 4; ++i) bench.take();
-        CHECK(bench.told.pairs.size() == 5);
+        CHECK(bench.decided.pairs.size() == 5);
     }
 }
 
@@ -198,7 +198,7 @@ TEST_CASE("pairing_verdicts: a search is given up for after five frames, and a t
          {std::pair{milliseconds(25), 5U}, {milliseconds(24), 6U}, {milliseconds(50), 5U}}) {
         Bench bench;
         bench.lock();
-        bench.told = {};
+        bench.decided = {};
         bench.next_id += 300;
         // Stamps of no exposure, ids of none either, and arrivals between those that are usual.
         const Exposure newest = Bench::exposure(bench.next_trigger - 1, bench.tick);
@@ -211,7 +211,7 @@ TEST_CASE("pairing_verdicts: a search is given up for after five frames, and a t
             bench.pairing.add(arrival);
         }
         CHECK(bench.pairing.state() == State::searching);
-        CHECK(bench.told.frames.size() == frames);
+        CHECK(bench.decided.frames.size() == frames);
     }
 }
 
@@ -219,14 +219,14 @@ TEST_CASE(
     "pairing_verdicts: a camera that steps its clock is followed when ids and arrival agree") {
     Bench bench;
     bench.lock();
-    bench.told = {};
+    bench.decided = {};
     bench.camera_ahead = bench.camera_ahead + seconds(11);
     for (int i = 0; i < 3; ++i) bench.take();
-    CHECK(bench.told.slips.size() == 1);
-    CHECK(bench.told.locks.size() == 1);
-    CHECK(bench.told.pairs.size() == 1);
-    CHECK(bench.told.frames.size() == 2);
+    CHECK(bench.decided.slips.size() == 1);
+    CHECK(bench.decided.locks.size() == 1);
+    CHECK(bench.decided.pairs.size() == 1);
+    CHECK(bench.decided.frames.size() == 2);
     for (int i = 0; i < 5; ++i) bench.take();
-    CHECK(bench.told.pairs.size() == 6);
-    CHECK(bench.told.slips.size() == 1);
+    CHECK(bench.decided.pairs.size() == 6);
+    CHECK(bench.decided.slips.size() == 1);
 }

@@ -113,7 +113,7 @@ TEST_CASE("recording: an older one, whose resets say nothing of records, forgets
     CHECK_FALSE(std::get<Reset>(*read).records_too);
 }
 
-TEST_CASE("recording: what is recorded tells another pairing the same") {
+TEST_CASE("recording: what is recorded makes another pairing decide the same") {
     test::Bench live;
     test::Bench replayed;
     const auto both = [&](const Evidence& evidence) {
@@ -133,18 +133,18 @@ TEST_CASE("recording: what is recorded tells another pairing the same") {
     const Exposure lost = live.next(20);
     both(lost);
     both(Advance{lost.end_on_host + seconds(5)});
-    REQUIRE(replayed.told.pulses.size() == 1);
-    CHECK(replayed.told.pulses[0].reason == EventReason::no_buffer);
+    REQUIRE(replayed.decided.pulses.size() == 1);
+    CHECK(replayed.decided.pulses[0].reason == EventReason::no_buffer);
     both(Reset{});
     CHECK(replayed.pairing.state() == State::searching);
-    CHECK(replayed.told.pairs == live.told.pairs);
-    CHECK(replayed.told.pulses == live.told.pulses);
+    CHECK(replayed.decided.pairs == live.decided.pairs);
+    CHECK(replayed.decided.pulses == live.decided.pulses);
 }
 
-TEST_CASE("recording: a replay leaves out the exposure of a record that it doubts") {
+TEST_CASE("recording: a replay leaves out the exposure of an implausible record") {
     const bool judged = GENERATE(true, false);
-    test::Told told;
-    Replay replay(told);
+    test::Decisions decided;
+    Replay replay(decided);
     const test::Bench bench;
     CHECK_FALSE(replay.begun());
     replay.apply(test::Bench::exposure(9, 9));  // before the beginning
@@ -164,8 +164,8 @@ TEST_CASE("recording: a replay leaves out the exposure of a record that it doubt
         replay.apply(exposure);
     }
     replay.finish();
-    REQUIRE(told.pulses.size() == (judged ? 1 : 2));
-    CHECK(told.pulses[0].trigger == 1);
+    REQUIRE(decided.pulses.size() == (judged ? 1 : 2));
+    CHECK(decided.pulses[0].trigger == 1);
 }
 
 TEST_CASE("recording: what no service can have recorded is refused with its name") {

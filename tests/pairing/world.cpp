@@ -413,7 +413,7 @@ class World final : private pairing::Outcome {
             case FaultKind::clock_jump: {
                 const Duration step = clock_step();
                 camera_offset_ += step.ns;
-                // Only the pattern can tell that it is the clock: the others could have stepped
+                // Only the pattern can show that it is the clock: the others could have stepped
                 // together.
                 if (step.ns % period_.ns == 0)
                     grace_.back().second += std::uint64_t{frames_of_pattern};

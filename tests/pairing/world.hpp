@@ -47,7 +47,7 @@ struct WorldSettings {
     std::uint64_t seed = 1;
     double rate_hz = 20;
     CameraClock clock = CameraClock::good;
-    bool clock_known_absent = true;  ///< the service was told, or found out from the camera
+    bool clock_known_absent = true;  ///< the service was reported, or found out from the camera
     bool wide_ids = false;           ///< 64 bits, else 16
     std::uint64_t first_id = 1;
     bool strobe = true;              ///< the exposure line is wired

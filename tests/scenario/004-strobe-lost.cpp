@@ -5,7 +5,7 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "004-strobe-lost: a trigger without edges, with one, or none at all, is told as what it is",
+    "004-strobe-lost: a trigger without edges, with one, or none at all, is reported as what it is",
     "[native]") {
     const auto seed = GENERATE(range(1U, 9U));
     Scenario world(seed);

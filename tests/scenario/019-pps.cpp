@@ -5,7 +5,7 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "019-pps: each pulse is an event with its number, they tell how fast the board's clock runs") {
+    "019-pps: each pulse is an event with its number, they show how fast the board's clock runs") {
     const double ppm = GENERATE(-107.0, -3.2, 0.0, 41.5);
     Scenario world;
     world.add_camera(0);

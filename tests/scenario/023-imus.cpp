@@ -54,8 +54,8 @@ TEST_CASE(
     CHECK(static_cast<double>(samples.size()) == Approx(4.4 * part.true_rate_hz).epsilon(0.08));
     for (std::size_t i = 0; i < samples.size(); ++i) {
         // A port that is too slow for the part says so.
-        const unsigned told = world.is_slow() ? samples[i].flags & wire::imu_overrun : 0U;
-        REQUIRE(samples[i].flags == expected_flags(samples, i, wire::imu_stamped | told));
+        const unsigned overrun = world.is_slow() ? samples[i].flags & wire::imu_overrun : 0U;
+        REQUIRE(samples[i].flags == expected_flags(samples, i, wire::imu_stamped | overrun));
     }
 }
 

@@ -37,7 +37,7 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "024-vn100-still-streaming: a part that still talks as fast as it was told before is found",
+    "024-vn100-still-streaming: a part that still talks as fast as it was set before is found",
     "[native]") {
     Scenario world;
     world.add_vn100(800, true);

@@ -43,7 +43,7 @@ TEST_CASE("025-self-test: what the part says of itself is passed on") {
 }
 
 TEST_CASE(
-    "025-unplugged: a part that comes off is told, flagged, and set up again when it is back, "
+    "025-unplugged: a part that comes off is reported, flagged, and set up again when it is back, "
     "cameras go "
     "on") {
     Scenario world;
@@ -84,7 +84,8 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "025-dead-bus: zeros or ones are no data, whatever the part, it is told, and set up again") {
+    "025-dead-bus: zeros or ones are no data, whatever the part, it is reported, and set up "
+    "again") {
     const std::uint8_t level = GENERATE(std::uint8_t{0x00}, std::uint8_t{0xFF});
     const bool data_ready = GENERATE(true, false);
     for (const wire::ImuKind kind : spi_imu_kinds) {

@@ -5,7 +5,8 @@ using namespace versavis;
 using namespace versavis::scenario;
 
 TEST_CASE(
-    "029-board-stalls: code that stands still past its triggers skips them, tells, and goes on at "
+    "029-board-stalls: code that stands still past its triggers skips them, reports it, and goes "
+    "on at "
     "once",
     "[native]") {
     const Nanoseconds stall = GENERATE(500 * us, 3 * ms, 30 * ms, 130 * ms);
@@ -44,7 +45,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("029-watchdog: code that stands still for good is reset, and the host is told why",
+TEST_CASE("029-watchdog: code that stands still for good is reset, and the host learns why",
           "[native]") {
     Scenario world;
     world.add_camera(0);

@@ -42,7 +42,8 @@ TEST_CASE(
     CHECK(std::memcmp(&answer.taken, &good, sizeof good) == 0);  // what was in force stays
 }
 
-TEST_CASE("031-disabled-nonsense: what a camera that is not enabled is told does not matter") {
+TEST_CASE(
+    "031-disabled-nonsense: what a camera that is not enabled is configured with does not matter") {
     Scenario world;
     world.add_camera(0);
     world.configuration.cameras[2].flags = wire::camera_slave;

@@ -56,7 +56,7 @@ Nanoseconds off_grid(Nanoseconds at, Nanoseconds phase, Nanoseconds period) {
 }  // namespace
 
 TEST_CASE(
-    "036-host-aligned: a board that is told before its cameras start exposes on the host's "
+    "036-host-aligned: a board that is aligned before its cameras start exposes on the host's "
     "seconds") {
     const double ppm = GENERATE(-60.0, 0.0, 35.0);
     Aligned board(1, ppm, 2 * second + 345'678'901);

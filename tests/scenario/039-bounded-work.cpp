@@ -16,7 +16,7 @@ std::size_t skipped(World& world) {
 
 }  // namespace
 
-TEST_CASE("039-long-announcement: what is skipped at once is told at once") {
+TEST_CASE("039-long-announcement: what is skipped at once is reported at once") {
     Scenario world;
     CameraSettings settings;
     settings.exposure = [](auto, auto) { return 300 * us; };

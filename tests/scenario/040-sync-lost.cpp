@@ -57,7 +57,8 @@ TEST_CASE("040-sync-gap: a sender that drifted while it was silent is followed a
     CHECK(furthest(records, pulses) < 1'000 + world.rounding());
 }
 
-TEST_CASE("040-sync-began-anew: a sender with another phase is told, and the grid slews to it") {
+TEST_CASE(
+    "040-sync-began-anew: a sender with another phase is reported, and the grid slews to it") {
     Follower world;
     world.run(20 * second);
     world.stop_pulses();

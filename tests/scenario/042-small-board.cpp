@@ -14,7 +14,7 @@ constexpr unsigned bit_of(std::uint32_t present) {
 
 }  // namespace
 
-TEST_CASE("042-small-board: what a board does not have is told in hello, and refused by name",
+TEST_CASE("042-small-board: what a board does not have is reported in hello, and refused by name",
           "[native]") {
     struct Use {
         std::uint32_t missing;
@@ -77,7 +77,7 @@ TEST_CASE("042-small-board: what a board does not have is told in hello, and ref
     }
 }
 
-TEST_CASE("042-slow-board: the fastest IMU that it can read is told, and is the limit",
+TEST_CASE("042-slow-board: the fastest IMU that it can read is reported, and is the limit",
           "[native]") {
     firmware::PortModel model;
     model.fastest_imu_millihertz = 2'000'000;

@@ -43,8 +43,8 @@ TEST_CASE(
     const auto& samples = world.inbox().samples[0];
     CHECK(samples.size() > 4800);
     for (const wire::ImuSample& sample : samples) {
-        const unsigned told = world.is_slow() ? sample.flags & wire::imu_overrun : 0U;
-        REQUIRE((sample.flags & ~wire::imu_repeated) == (wire::imu_stamped | told));
+        const unsigned overrun = world.is_slow() ? sample.flags & wire::imu_overrun : 0U;
+        REQUIRE((sample.flags & ~wire::imu_repeated) == (wire::imu_stamped | overrun));
     }
     CHECK(world.inbox().events_of(wire::BoardEventKind::imu_ready).size() == 1);
     CHECK(world.inbox().healths.back().imu_errors[0] == 0);
@@ -52,7 +52,8 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "043-imu-i2c-address: a part at another address is told as silent, tried again every second, "
+    "043-imu-i2c-address: a part at another address is reported as silent, tried again every "
+    "second, "
     "and sampled once it is there") {
     Scenario world;
     devices::Icm42688pDevice& part = add_on_i2c(world, first_address + 1, false);
@@ -75,7 +76,8 @@ TEST_CASE(
 }
 
 TEST_CASE(
-    "043-imu-i2c-held: a bus that another part holds is told, holds up nothing else, and is used "
+    "043-imu-i2c-held: a bus that another part holds is reported, holds up nothing else, and is "
+    "used "
     "again when it is released") {
     const Nanoseconds length = GENERATE(30 * ms, 3 * second);
     Scenario world;
@@ -95,14 +97,15 @@ TEST_CASE(
     CHECK(samples.size() > before + 1800);
     CHECK(std::any_of(samples.begin() + static_cast<std::ptrdiff_t>(before), samples.end(),
                       [](const auto& sample) { return (sample.flags & wire::imu_overrun) != 0; }));
-    const bool told = !world.inbox().events_of(wire::BoardEventKind::imu_silent).empty();
-    CHECK(told == (length > second));  // a short one restarts nothing
-    world.drops_allowed = true;        // the time without it has no samples
+    const bool reported = !world.inbox().events_of(wire::BoardEventKind::imu_silent).empty();
+    CHECK(reported == (length > second));  // a short one restarts nothing
+    world.drops_allowed = true;            // the time without it has no samples
     CHECK(world.judge() == "");
     CHECK(on_grid(world));
 }
 
-TEST_CASE("043-imu-i2c-unplugged: a part that comes off is told and set up again when it is back") {
+TEST_CASE(
+    "043-imu-i2c-unplugged: a part that comes off is reported and set up again when it is back") {
     Scenario world;
     devices::Icm42688pDevice& part = add_on_i2c(world, first_address, false, 500);
     REQUIRE(world.begin());

@@ -82,10 +82,10 @@ TEST_CASE("046-ready-lost: after lost edges the numbers go on, and no stamp is a
         world.run(50 * ms);
         const auto& samples = world.inbox().samples[0];
         REQUIRE(samples.size() > before);
-        const bool told =
+        const bool reported =
             std::any_of(samples.begin() + static_cast<std::ptrdiff_t>(before), samples.end(),
                         [](const auto& sample) { return (sample.flags & wire::imu_overrun) != 0; });
-        REQUIRE(told);
+        REQUIRE(reported);
     }
     world.run(second);
     CHECK(world.inbox().healths.back().lost_edges > lost);

@@ -52,7 +52,7 @@ Score run_jittery(unsigned seeds) {
 
 Score run_usb(unsigned seeds) { return score<EnvelopeFilter>({}, seeds); }
 
-/// With an IMU, which tells of the clock, too, and a host that is busy for a while.
+/// With an IMU, whose samples are messages for the clock, too, and a host that is busy for a while.
 Score run_imu(unsigned seeds) {
     Settings settings;
     settings.imu_hz = 200;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Halves and doubles each constant of pairing and clock, and tells what that does.
+"""Halves and doubles each constant of pairing and clock, and reports what that does.
 
 The tracked files are copied to build/sensitivity/source. There each `constexpr T name = value;`
 becomes a variable that an environment variable scales, so that one build serves all runs.

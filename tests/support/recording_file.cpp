@@ -128,14 +128,15 @@ std::string RecordingFile::record(std::uint8_t opcode, const std::string& conten
 
 RecordingFile::RecordingFile(const std::string& part, const std::string& recording) {
     bytes_ = "\x89MCAP0\r\n" + record(1, text("ros2") + text("a test"));
-    const std::string told = record(0x0C, text("versavis") + map_text({{"version", "1"},
-                                                                       {"instance", "test"},
-                                                                       {"output_clock", "realtime"},
-                                                                       {"part", part},
-                                                                       {"recording", recording},
-                                                                       {"recorder", "0"}}));
-    summary_.metadata.push_back({bytes_.size(), told.size(), "versavis"});
-    bytes_ += told;
+    const std::string metadata =
+        record(0x0C, text("versavis") + map_text({{"version", "1"},
+                                                  {"instance", "test"},
+                                                  {"output_clock", "realtime"},
+                                                  {"part", part},
+                                                  {"recording", recording},
+                                                  {"recorder", "0"}}));
+    summary_.metadata.push_back({bytes_.size(), metadata.size(), "versavis"});
+    bytes_ += metadata;
 }
 
 std::uint16_t RecordingFile::channel(const std::string& topic, const std::string& encoding,

@@ -36,7 +36,8 @@ struct StackSettings {
     std::string imu_extra{};               ///< more keys of the IMU
     unsigned absent = 0;                   ///< cameras, the last ones, that the rig lacks
     std::string board = "native";          ///< of the rig
-    /// What the service is told of the cameras' exposure lines: those of the rig are prompt.
+    /// What the service is configured with for the cameras' exposure lines: those of the rig are
+    /// prompt.
     std::string lines = "strobe_rising_us = [0, 0]\nstrobe_falling_us = [0, 0]\n";
 };
 

@@ -213,7 +213,7 @@ TEST_CASE("cameras: two frames of every trigger are never published, and said fr
     stack.wait_for_status([&](const auto& s) {
         INFO(s["cameras"][0].dump(1));
         CHECK(said(s));
-        // Which of the two is the first, nobody can tell.
+        // Which of the two is the first, nobody can know.
         CHECK(s["cameras"][0]["frames_published"] == 0);
         return s["cameras"][0]["frames_received"] > 200;
     });
@@ -311,7 +311,7 @@ TEST_CASE("cameras: the service exposes by the brightness it sees, and the board
     CHECK(judge(stack, 2).ok);
 }
 
-TEST_CASE("cameras: events of the camera witness the length, and name a trigger that it missed") {
+TEST_CASE("cameras: events of the camera confirm the length, and name a trigger that it missed") {
     StackSettings settings{
         "events",
         57,
@@ -347,7 +347,7 @@ TEST_CASE("cameras: one whose clock loses PTP says so, until it has it again") {
     judge(stack, 1);
 }
 
-TEST_CASE("cameras: without an exposure line, its events tell how long it exposed") {
+TEST_CASE("cameras: without an exposure line, its events show how long it exposed") {
     StackSettings settings{"no-line", 65, 3, 20, "exposure_us = 8000", "", "strobe = \"none\""};
     settings.scenarios = {"", "exposure_swing = 0.5", "events = false"};
     Stack stack(settings);
@@ -552,7 +552,7 @@ TEST_CASE("cameras: an address in no network of this host is unreachable") {
                Catch::Contains("in the subnet of its address"));
 }
 
-TEST_CASE("cameras: frames say gain and temperature as far as the camera tells") {
+TEST_CASE("cameras: frames say gain and temperature as far as the camera reports them") {
     StackSettings settings{"sensor", 64, 3, 20, "", "", ""};
     settings.scenarios = {"auto_gain = true\nexposure_swing = 0.5\ntemperature_c = 51.5",
                           "auto_gain = true", ""};

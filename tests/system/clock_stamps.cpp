@@ -24,9 +24,9 @@ ClockItem next(ClockStream& stream) {
     while (host_now() < deadline) {
         const auto item = test::look(stream.next(milliseconds(200)));
         if (item.found != test::Found::item) continue;
-        const auto told = from_metadata(item.data);
-        REQUIRE(told);
-        return *told;
+        const auto recorded = from_metadata(item.data);
+        REQUIRE(recorded);
+        return *recorded;
     }
     throw std::runtime_error("no clock stamps arrived in time");
 }

@@ -118,7 +118,7 @@ TEST_CASE("end to end: the emulated board restarts, and its stamps are right aga
     CHECK(judge(stack, 3).ok);
 }
 
-TEST_CASE("end to end: an image that does not start is told by its name", "[emulator]") {
+TEST_CASE("end to end: an image that does not start is reported by its name", "[emulator]") {
     Stack stack({"noimage", 99, 1, 20, "", "", ""});
     const std::string image = GENERATE(VERSAVIS_SOURCE_DIR "/README.md", "/nowhere/versavis.uf2");
     std::string output;
@@ -439,7 +439,7 @@ TEST_CASE("end to end: without a board the service says so and waits, it also st
     CHECK(stack.service().terminate() == 0);
 }
 
-TEST_CASE("end to end: the service manager is told of readiness, life, health and the end") {
+TEST_CASE("end to end: the service manager is notified of readiness, life, health and the end") {
     Stack stack({"notify", 25, 1, 20, "", "", ""});
     const std::string path = stack.log_path("notify");
     sockaddr_un address{};

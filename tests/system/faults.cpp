@@ -213,7 +213,7 @@ std::string run_and_catch(const Case& c, unsigned number) {
 
 }  // namespace
 
-TEST_CASE("faults: each is told with its cause and its cure, and is forgotten when it ends") {
+TEST_CASE("faults: each is reported with its cause and its cure, and is forgotten when it ends") {
     std::atomic<std::size_t> next{0};
     std::mutex mutex;
     std::vector<std::string> wrong;
@@ -261,7 +261,7 @@ TEST_CASE("faults: a service that was killed is said to be dead at once") {
     CHECK_THAT(output, Catch::Contains("died"));
 }
 
-TEST_CASE("faults: who reads the stream of an absent camera is told that it is absent") {
+TEST_CASE("faults: who reads the stream of an absent camera learns that it is absent") {
     StackSettings settings{"noring", first_subnet + 98, 1, 20, "", "", ""};
     settings.devices = {"127.0.99.98"};
     Stack stack(settings);

@@ -81,16 +81,16 @@ TEST_CASE("hostile cameras: none ends, stalls or bloats the service, and the oth
     Stack stack(settings);
     stack.start_rig();
     stack.start_service();
-    const auto told = [&](const auto& s) {
+    const auto reported = [&](const auto& s) {
         return s["cameras"][1]["state"] == hostile.state &&
                s["cameras"][1]["hint"].template get<std::string>().find(hostile.hint) !=
                    std::string::npos;
     };
-    auto status =
-        stack.wait_for_status([&](const auto& s) { return streams(s["cameras"][0]) && told(s); });
+    auto status = stack.wait_for_status(
+        [&](const auto& s) { return streams(s["cameras"][0]) && reported(s); });
     const auto before = status["cameras"][0]["frames_published"].get<std::uint64_t>();
     stack.wait_for_status([&](const auto& s) {  // the other one goes on
-        return told(s) && s["cameras"][0]["frames_published"] >= before + 20;
+        return reported(s) && s["cameras"][0]["frames_published"] >= before + 20;
     });
     CHECK(peak_memory(stack.service()) < 256);
     CHECK(time_to_end(stack.service()) < seconds(2));

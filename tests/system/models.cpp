@@ -52,13 +52,13 @@ unsigned frames_to_lock(const Stack& stack, const std::string& camera) {
     return 0;
 }
 
-/// All that the presets want is so, and the lengths of exposures are witnessed.
-void check_setup(const nlohmann::json& status, const std::vector<std::string>& witnesses) {
+/// All that the presets want is so, and the lengths of exposures have these sources.
+void check_setup(const nlohmann::json& status, const std::vector<std::string>& sources) {
     for (std::size_t i = 0; i < std::size(models); ++i) {
         const auto& camera = status["cameras"][i];
         INFO(camera.dump(1));
         CHECK(camera["preset"] == models[i].preset);
-        CHECK(camera["exposure_source"] == witnesses[i]);
+        CHECK(camera["exposure_source"] == sources[i]);
         CHECK(camera["setup"].size() >= 15);
         for (const auto& step : camera["setup"]) {
             INFO(step.dump());

@@ -284,7 +284,7 @@ TEST_CASE("adis: a bus that is dead gives two equal readings, and no sample") {
     CHECK(flags(kind, {words, words}) == 0);
 }
 
-TEST_CASE("adis: the part's own diagnosis is told, by whichever reading had it") {
+TEST_CASE("adis: the part's own diagnosis is reported, by whichever reading had it") {
     const auto [kind, failures] =
         GENERATE(table<ImuKind, unsigned>({{ImuKind::adis16445, 0xFC64U},
                                            {ImuKind::adis16448a, 0xFC67U},

@@ -173,7 +173,7 @@ TEST_CASE("allan: lost samples are interpolated while they are few", "[allan]") 
     CHECK_THAT(result.error().message(), Contains("33 of 20000 samples are missing"));
 }
 
-TEST_CASE("allan: motion is told with its time", "[allan]") {
+TEST_CASE("allan: motion is reported with its time", "[allan]") {
     RestingImu imu = resting(60, 4e-5, 4e-4);
     for (std::size_t i = 0; i < 100; ++i) imu.gyro[1][8250 + i] += i % 40 < 20 ? 0.1F : -0.1F;
     const auto result = evaluate_allan(imu);

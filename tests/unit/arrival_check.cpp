@@ -12,9 +12,9 @@ TEST_CASE("arrival_check: nothing comes from the future, and nothing from long a
     test::Pipelines bench;
     const HostTime now{90'000'000'000};
     const auto check = [&](Duration age) {
-        const auto doubt =
+        const auto implausible =
             contradicts_arrival(test::Pipelines::to_board(now - age), now, bench.translator);
-        return doubt ? doubt->reason : EventReason::none;
+        return implausible ? implausible->reason : EventReason::none;
     };
     CHECK(check(-seconds(1000)) == EventReason::none);  // the clock is unknown
     bench.synchronise(now);

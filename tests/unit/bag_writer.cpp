@@ -12,7 +12,7 @@
 using namespace versavis;
 using namespace versavis::client;
 
-TEST_CASE("bag_writer: the header takes 4096 bytes, and times that ROS cannot hold are told") {
+TEST_CASE("bag_writer: the header takes 4096 bytes, and times that ROS cannot hold are reported") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.path() / "a.bag";
     auto bag = BagWriter::create(path, BagCompression::none);

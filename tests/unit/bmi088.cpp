@@ -125,7 +125,7 @@ TEST_CASE("bmi088: a chip that is not there, or has lost its settings, fails the
     CHECK(replies.read().flags == wire::imu_check_failed);
 }
 
-TEST_CASE("bmi088: the accelerometer's own diagnosis is told") {
+TEST_CASE("bmi088: the accelerometer's own diagnosis is reported") {
     for (unsigned bit = 0; bit < 8; ++bit) {
         Replies replies;
         replies.set(1, 2 + 0x02, {1 << bit});

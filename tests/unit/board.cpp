@@ -30,7 +30,7 @@ TEST_CASE("board: it says who it is, and what it can do") {
     CHECK(hello.reset_cause == wire::ResetCause::power_on);
 }
 
-TEST_CASE("board: a host of another major version is told who is there, and nothing more") {
+TEST_CASE("board: a host of another major version learns who is there, and nothing more") {
     World world;
     world.send(wire::HostHello{wire::protocol_major + 1, 0, {}});
     world.run(100 * ms);
@@ -64,7 +64,8 @@ TEST_CASE("board: its health comes once a second") {
 }
 
 TEST_CASE(
-    "board: when a clock answer left is told after it, also when the host was slow to take it") {
+    "board: when a clock answer left is reported after it, also when the host was slow to take "
+    "it") {
     World world;
     world.connect();
     for (const Nanoseconds stall : {Nanoseconds{0}, 300 * ms}) {
@@ -75,11 +76,11 @@ TEST_CASE(
         world.run(stall + 10 * ms);
         REQUIRE(world.inbox().clock_answers.size() == 1);
         REQUIRE(world.inbox().follow_ups.size() == 1);
-        const wire::ClockFollowUp& told = world.inbox().follow_ups[0];
-        CHECK(told.id == 77);
+        const wire::ClockFollowUp& follow_up = world.inbox().follow_ups[0];
+        CHECK(follow_up.id == 77);
         CHECK(world.inbox().clock_answers[0].sent_ns - asked < ms);
-        CHECK(told.sent_ns >= asked + stall);
-        CHECK(told.sent_ns <= asked + stall + ms);
+        CHECK(follow_up.sent_ns >= asked + stall);
+        CHECK(follow_up.sent_ns <= asked + stall + ms);
     }
 }
 
@@ -94,7 +95,7 @@ TEST_CASE("board: an announced exposure out of range is ignored and counted") {
     CHECK(world.inbox().healths.back().ignored == 2);
 }
 
-TEST_CASE("board: its hello tells of the port, the firmware and this life") {
+TEST_CASE("board: its hello names the port, the firmware and this life") {
     BenchPort port;
     port.time = 7 * second;
     port.facts.present = wire::present_all & ~(one_camera << 1U);
@@ -152,7 +153,7 @@ TEST_CASE("board: before it is greeted, and to an unknown version, it only says 
     }
 }
 
-TEST_CASE("board: it reboots when it is told so by the right word") {
+TEST_CASE("board: it reboots on the right word") {
     Bench bench;
     bench.send(wire::Reboot{wire::reboot_magic + 1, 0});
     bench.send(wire::Reboot{0, 1});
@@ -213,7 +214,7 @@ TEST_CASE("board: a hello ends what the host before began, and leaves the config
     CHECK(bench.pulsed() == 1U << output_sync);
 }
 
-TEST_CASE("board: what waited for the host before is not told to the next one") {
+TEST_CASE("board: what waited for the host before is not sent to the next one") {
     Bench bench;
     bench.port.room = 0;
     for (std::uint32_t id = 0; id < 5; ++id) bench.send(wire::ClockRequest{id, 0});
@@ -269,7 +270,7 @@ TEST_CASE("board: health counts what both IMUs did, and what the cameras skipped
     CHECK(bench.health().skipped_triggers == 20);
 }
 
-TEST_CASE("board: health tells what its inputs, its outputs and the link count") {
+TEST_CASE("board: health reports what its inputs, its outputs and the link count") {
     Bench bench;
     bench.add_camera(0);
     bench.configuration.imus[0] = {wire::ImuKind::bmi088, 0, wire::imu_data_ready, 0, 400'000};

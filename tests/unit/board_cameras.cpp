@@ -51,7 +51,7 @@ TEST_CASE(
     CHECK(world.judge() == "");
 }
 
-TEST_CASE("board: an alignment out of range is ignored, counted and told") {
+TEST_CASE("board: an alignment out of range is ignored, counted and reported") {
     World world;
     world.add_camera(0);
     REQUIRE(world.begin());

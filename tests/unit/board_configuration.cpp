@@ -26,7 +26,7 @@ wire::Refusal refusal(Part part, unsigned index, Field field, std::int64_t value
 }
 
 /// What is said of a refusal, for a file with all tables.
-std::string told(const wire::Refusal& refused) {
+std::string description(const wire::Refusal& refused) {
     static const test::TemporaryDirectory directory;
     const auto configuration = load_configuration(directory.write(
         "versavis.toml",
@@ -41,40 +41,41 @@ std::string told(const wire::Refusal& refused) {
 }  // namespace
 
 TEST_CASE("board_configuration: a refusal names place, key, table, value and range of the file") {
-    CHECK(told(refusal(Part::camera, 2, Field::pulse, 70'000, 1'000, 60'500)) ==
-          "versavis.toml:5:12: 'pulse_us' of [[camera]] \"left\" is 70 us: the board takes 1 to "
+    CHECK(description(refusal(Part::camera, 2, Field::pulse, 70'000, 1'000, 60'500)) ==
+          "versavis.toml:5:12: 'pulse_us' of [[camera]] \"left\" is 70 us: the board accepts 1 to "
           "60.5 us");
-    CHECK(told(refusal(Part::imu, 0, Field::imu_rate, 400'000, 1'000, 200'000)) ==
-          "versavis.toml:14:11: 'rate_hz' of [[imu]] \"inertial\" is 400 Hz: the board takes 1 to "
-          "200 Hz");
-    CHECK(told(refusal(Part::camera, 3, Field::rate, 29'970'000, 100'000, 10'000'000)) ==
-          "versavis.toml:6:1: 'rate_hz' of [[camera]] \"right\" is 29.97 Hz: the board takes 0.1 "
+    CHECK(
+        description(refusal(Part::imu, 0, Field::imu_rate, 400'000, 1'000, 200'000)) ==
+        "versavis.toml:14:11: 'rate_hz' of [[imu]] \"inertial\" is 400 Hz: the board accepts 1 to "
+        "200 Hz");
+    CHECK(description(refusal(Part::camera, 3, Field::rate, 29'970'000, 100'000, 10'000'000)) ==
+          "versavis.toml:6:1: 'rate_hz' of [[camera]] \"right\" is 29.97 Hz: the board accepts 0.1 "
           "to 10 Hz");
-    CHECK(told(refusal(Part::illumination, 0, Field::duty, 500'000, 1, 200'000)) ==
-          "versavis.toml:17:16: 'duty_percent' of [illumination] is 50 %: the board takes 0.0001 "
+    CHECK(description(refusal(Part::illumination, 0, Field::duty, 500'000, 1, 200'000)) ==
+          "versavis.toml:17:16: 'duty_percent' of [illumination] is 50 %: the board accepts 0.0001 "
           "to 20 %");
-    CHECK(told(refusal(Part::ports, 0, Field::sync_rate, 10'000'000, 100'000, 1'000'000)) ==
-          "versavis.toml:20:16: 'sync_rate_hz' of [ports] is 10 Hz: the board takes 0.1 to 1 Hz");
+    CHECK(description(refusal(Part::ports, 0, Field::sync_rate, 10'000'000, 100'000, 1'000'000)) ==
+          "versavis.toml:20:16: 'sync_rate_hz' of [ports] is 10 Hz: the board accepts 0.1 to 1 Hz");
 }
 
-TEST_CASE("board_configuration: a refused name is told by name, and what would do") {
-    CHECK(told(refusal(Part::camera, 3, Field::master, 2, 0, -1)) ==
-          "versavis.toml:10:10: 'master' of [[camera]] \"right\" is \"left\": the board takes no "
+TEST_CASE("board_configuration: a refused name is reported by name, and what would do") {
+    CHECK(description(refusal(Part::camera, 3, Field::master, 2, 0, -1)) ==
+          "versavis.toml:10:10: 'master' of [[camera]] \"right\" is \"left\": the board accepts no "
           "value");
-    CHECK(told(refusal(Part::imu, 0, Field::imu_kind,
-                       static_cast<std::int64_t>(wire::ImuKind::bmi088), 1, 2)) ==
-          "versavis.toml:13:9: 'model' of [[imu]] \"inertial\" is \"bmi088\": the board takes "
+    CHECK(description(refusal(Part::imu, 0, Field::imu_kind,
+                              static_cast<std::int64_t>(wire::ImuKind::bmi088), 1, 2)) ==
+          "versavis.toml:13:9: 'model' of [[imu]] \"inertial\" is \"bmi088\": the board accepts "
           "adis16448b, adis16448a");
-    CHECK(told(refusal(Part::ports, 0, Field::test, wire::test_camera0 + 2, wire::test_imu0,
-                       wire::test_imu0)) ==
-          "versavis.toml:19:8: 'test' of [ports] is \"left\": the board takes inertial");
+    CHECK(description(refusal(Part::ports, 0, Field::test, wire::test_camera0 + 2, wire::test_imu0,
+                              wire::test_imu0)) ==
+          "versavis.toml:19:8: 'test' of [ports] is \"left\": the board accepts inertial");
 }
 
-TEST_CASE("board_configuration: refused options of an IMU are told by their keys") {
+TEST_CASE("board_configuration: refused options of an IMU are reported by their keys") {
     const auto options = [](unsigned value, unsigned possible) {
-        return told(refusal(Part::imu, 0, Field::imu_options, value, 0, possible));
+        return description(refusal(Part::imu, 0, Field::imu_options, value, 0, possible));
     };
-    const std::string why = ": the board does not take that of this part, as it is wired";
+    const std::string why = ": the board does not support that for this IMU";
     CHECK(options(wire::imu_data_ready | wire::imu_accel_ready, wire::imu_data_ready) ==
           "versavis.toml:11:1: 'accel_ready' of [[imu]] \"inertial\" is true" + why);
     CHECK_THAT(options(wire::imu_i2c | wire::imu_data_ready, wire::imu_data_ready),

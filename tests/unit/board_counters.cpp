@@ -21,7 +21,7 @@ wire::Health report(std::uint32_t lost_edges, std::uint32_t imu_errors) {
 
 TEST_CASE("board_counters: what was counted before the service looked is taken off") {
     BoardCounters counters;
-    counters.board_restarted();  // the first hello tells a life that may be old
+    counters.board_restarted();  // the life of the first hello may be old
     CHECK(counters.since_start(report(1000, 5)).lost_edges == 0);
     const wire::Health later = counters.since_start(report(1003, 7));
     CHECK(later.lost_edges == 3);

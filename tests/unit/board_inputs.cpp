@@ -75,19 +75,19 @@ TEST_CASE("board_inputs: each pulse is an event, with the number of its input") 
         bench.edge(input, at + 100 * us, false);
         bench.poll(at + ms);
     }
-    struct Told {
+    struct Pulse {
         wire::BoardEventKind kind;
         std::uint8_t source;
         std::int64_t number;
         Nanoseconds at;
     };
-    const Told expected[] = {{wire::BoardEventKind::pps, 0, 1, 2 * ms},
-                             {wire::BoardEventKind::aux_pulse, 0, 1, 5 * ms},
-                             {wire::BoardEventKind::aux_pulse, 1, 1, 8 * ms + 100 * us},
-                             {wire::BoardEventKind::sync_pulse, 0, 1, 11 * ms},
-                             {wire::BoardEventKind::pps, 0, 2, 14 * ms},
-                             {wire::BoardEventKind::aux_pulse, 1, 2, 17 * ms + 100 * us},
-                             {wire::BoardEventKind::aux_pulse, 1, 3, 20 * ms + 100 * us}};
+    const Pulse expected[] = {{wire::BoardEventKind::pps, 0, 1, 2 * ms},
+                              {wire::BoardEventKind::aux_pulse, 0, 1, 5 * ms},
+                              {wire::BoardEventKind::aux_pulse, 1, 1, 8 * ms + 100 * us},
+                              {wire::BoardEventKind::sync_pulse, 0, 1, 11 * ms},
+                              {wire::BoardEventKind::pps, 0, 2, 14 * ms},
+                              {wire::BoardEventKind::aux_pulse, 1, 2, 17 * ms + 100 * us},
+                              {wire::BoardEventKind::aux_pulse, 1, 3, 20 * ms + 100 * us}};
     const auto events = bench.all<wire::Event>();
     REQUIRE(events.size() == std::size(expected));
     for (std::size_t i = 0; i < events.size(); ++i) {
@@ -346,7 +346,7 @@ TEST_CASE("board_inputs: edges that wait for too long behind a line that bounces
     }
 }
 
-TEST_CASE("board_inputs: a noisy input is told, and spoils the exposures only of the cameras") {
+TEST_CASE("board_inputs: a noisy input is reported, and spoils the exposures only of the cameras") {
     for (const std::uint8_t input : {std::uint8_t{0}, std::uint8_t{input_imu_ready}, aux0}) {
         Running world;
         world.edge(0, world.began);
@@ -449,7 +449,7 @@ TEST_CASE("board_inputs: what is on the grid goes on from a sync pulse") {
     CHECK(synced);
 }
 
-TEST_CASE("board_inputs: sync pulses that no longer fit the grid are told, and then followed") {
+TEST_CASE("board_inputs: sync pulses that no longer fit the grid are reported, and then followed") {
     Bench bench;
     bench.add_camera(0);
     bench.configure();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The link against a board that is played: what it makes of answers, follow-ups and other versions.
 #include "board/board_link.hpp"
+#include "engine/board/firmware_file.hpp"
 
 #include <fmt/format.h>
 
@@ -175,7 +176,7 @@ class PlayedBoard final : public ByteStream {
     std::deque<Arriving> packets_;
 };
 
-/// Counts what it is told; the test waits for counts.
+/// Counts its calls; the test waits for counts.
 class Listener final : public BoardListener {
  public:
     struct Counts {
@@ -246,7 +247,7 @@ clock::ClockReport connect(const Manner& manner) {
     return clock.translator.report();
 }
 
-/// What is told of a board of which nothing can be made.
+/// What is reported of a board of which nothing can be made.
 BoardReport end_of_connection(const Configuration& configuration, const Manner& manner,
                               std::vector<wire::Type>* heard = nullptr) {
     Clock clock;
@@ -329,7 +330,7 @@ class NativeStream final : public ByteStream {
     }
     std::string port() const override { return "native"; }
 
-    /// A new life, of which the link tells nothing.
+    /// A new life, that the link does not report.
     void boot() {
         const std::lock_guard lock(mutex_);
         booted_ = host_now();
@@ -354,7 +355,7 @@ wire::ImuSample sample_at(std::int64_t ns) {
 
 }  // namespace
 
-TEST_CASE("board_link: an exchange ends when the answer truly left, if the board tells") {
+TEST_CASE("board_link: an exchange ends when the answer truly left, if the board reports it") {
     const clock::ClockReport clock = connect({});
     CHECK(clock.exchanges == 4);
     CHECK(clock.round_trip < on_the_way / 2);
@@ -496,7 +497,7 @@ TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
     CHECK(given.get() == BoardState::running);
 }
 
-TEST_CASE("board_link: what the board refuses is told in the words of the file") {
+TEST_CASE("board_link: what the board refuses is reported in the words of the file") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.write(
         "v.toml", "[[camera]]\nname = \"left\"\ndevice = \"x\"\nrate_hz = 50\nlatency_us = 60\n");
@@ -504,13 +505,14 @@ TEST_CASE("board_link: what the board refuses is told in the words of the file")
     configuration.cameras[0].rate_hz = 2000;  // past the check of the file
     const BoardReport report = end_of_connection(configuration, {});
     CHECK(report.state == BoardState::refused);
-    CHECK(report.hint ==
-          path +
-              ":4:11: 'rate_hz' of [[camera]] \"left\" is 2000 Hz: the board takes 0.1 to 1000 Hz; "
-              "change the configuration");
+    CHECK(
+        report.hint ==
+        path +
+            ":4:11: 'rate_hz' of [[camera]] \"left\" is 2000 Hz: the board accepts 0.1 to 1000 Hz; "
+            "change the configuration");
 }
 
-TEST_CASE("board_link: what the board lacks is told with what it has, and it is not asked") {
+TEST_CASE("board_link: what the board lacks is reported with what it has, and it is not asked") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.write(
         "v.toml",
@@ -531,7 +533,7 @@ TEST_CASE("board_link: what the board lacks is told with what it has, and it is 
     CHECK(std::count(heard.begin(), heard.end(), wire::Type::configuration) == 0);
 }
 
-TEST_CASE("board_link: a board of another major version is told by it, and what to do") {
+TEST_CASE("board_link: a board of another major version is reported, with what to do") {
     const auto hint = [](std::uint8_t major, std::uint8_t minor, std::size_t size) {
         Manner manner;
         manner.version = {major, minor};
@@ -542,11 +544,13 @@ TEST_CASE("board_link: a board of another major version is told by it, and what 
     };
     const std::string own = fmt::format("{}.{}", wire::protocol_major, wire::protocol_minor);
     for (const std::size_t size : {std::size_t{48}, sizeof(wire::BoardHello)})
-        CHECK_THAT(hint(2, 2, size),
-                   Catch::StartsWith("it speaks protocol 2.2, this service " + own +
-                                     ": flash the firmware of this release of the service") &&
-                       Catch::Contains("'versavis flash /"));
-    CHECK(hint(9, 1, 80) == "it speaks protocol 9.1, this service " + own +
-                                ": install the service of its firmware's release, or flash the "
-                                "firmware of this one");
+        CHECK(hint(2, 2, size) ==
+              "its protocol is 2.2, the service's is " + own +
+                  ": stop the service, then flash the firmware of this release with 'versavis "
+                  "flash " +
+                  board::firmware_file().string() + "'");
+    CHECK(hint(9, 1, 80) ==
+          "its protocol is 9.1, the service's is " + own +
+              ": install the release of the service that matches the firmware, or flash the "
+              "firmware of this release");
 }

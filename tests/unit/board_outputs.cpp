@@ -161,7 +161,7 @@ TEST_CASE("board: the test output shows the middles of a camera's exposures") {
     }
 }
 
-TEST_CASE("board: pulses at a rate of their own leave where they are told to") {
+TEST_CASE("board: pulses at a rate of their own leave where they are configured to") {
     const std::pair<std::uint8_t, unsigned> places[] = {{wire::test_at_test, output_test},
                                                         {wire::test_at_sync, output_sync},
                                                         {wire::test_at_camera0, 0},

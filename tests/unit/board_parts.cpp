@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <set>
@@ -24,13 +23,12 @@ wire::BoardHello board_without(std::uint32_t parts) {
     wire::BoardHello board{};
     board.cameras = wire::camera_count;
     board.present = wire::present_all & ~parts;
-    std::strcpy(board.firmware, "versavis 0.1.0");
+    std::strcpy(board.firmware, "v1");
     std::strcpy(board.serial, "B7");
     return board;
 }
 
-const std::string camera = "[[camera]]\nname = \"left\"\ndevice = \"a\"\n";
-const std::string own_name = "the board (versavis 0.1.0, serial B7)";
+const std::string camera = "[[camera]]\nname = 'left'\ndevice = 'a'\n";
 
 Configuration load(const std::string& text) {
     static const test::TemporaryDirectory directory;
@@ -40,171 +38,214 @@ Configuration load(const std::string& text) {
     return *configuration;
 }
 
-/// All that is missing, one message a line, without the directory.
-std::string missing(const std::string& text, std::uint32_t parts) {
-    std::string all;
-    for (const std::string& message : missing_parts(load(text), board_without(parts)))
-        all += message.substr(std::min(message.size(), message.find("v.toml"))) + "\n";
-    return all;
+/// A message from the place in its file on.
+std::string from_place(const std::string& message) {
+    const std::string file = "v.toml:";
+    const auto at = message.find(file);
+    return at == std::string::npos ? message : message.substr(at + file.size());
 }
+
+struct Lack {
+    std::string text;     ///< of the configuration
+    std::uint32_t parts;  ///< that the board lacks
+    std::string message;  ///< the whole of it; several: one a line; empty: none
+};
+
+void check(const std::vector<Lack>& rows) {
+    for (const auto& [text, parts, message] : rows) {
+        INFO(text);
+        INFO("without " << fmt::format("{}", fmt::join(board::part_names(parts), ", ")));
+        std::vector<std::string> all;
+        for (const std::string& one : missing_parts(load(text), board_without(parts)))
+            all.push_back(from_place(one));
+        CHECK(fmt::format("{}", fmt::join(all, "\n")) == message);
+    }
+}
+
+constexpr std::uint32_t outputs(unsigned mask) { return wire::present_camera0 * mask; }
+constexpr std::uint32_t inputs(unsigned mask) { return wire::present_pulse0 * mask; }
 
 }  // namespace
 
-TEST_CASE("board_parts: a board that has all lacks nothing, whatever is asked for") {
-    CHECK(
-        missing(camera +
-                    "[[imu]]\nmodel = \"bmi088\"\ndata_ready = true\naccel_ready = true\n"
-                    "[[imu]]\nname = \"b\"\nmodel = \"vn100\"\ndata_ready = true\n"
-                    "[illumination]\ncameras = [\"left\"]\n[board]\nkeep_configuration = true\n"
-                    "[ports]\ninputs = [\"pps\", \"aux0\", \"aux1\", \"sync\"]\nimu_output = true\n"
-                    "test = \"left\"\nsync_rate_hz = 1\n",
-                0)
-            .empty());
+TEST_CASE("board_parts: what is not used may be missing") {
+    const std::string all =
+        "[[imu]]\nmodel = 'bmi088'\ndata_ready = true\naccel_ready = true\n"
+        "[[imu]]\nname = 'b'\nmodel = 'vn100'\ndata_ready = true\n"
+        "[illumination]\ncameras = ['left']\n[board]\nkeep_configuration = true\n"
+        "[ports]\ninputs = ['pps', 'aux0', 'aux1', 'sync']\nimu_output = true\n"
+        "test = 'left'\nsync_rate_hz = 1\n";
+    check({{camera + all, 0, ""},
+           {camera + "output = 1\n", ~outputs(0b0010), ""},
+           {"[[imu]]\n", ~std::uint32_t{wire::present_spi}, ""},
+           {camera + "trigger = 'free'\n[[imu]]\n", ~std::uint32_t{wire::present_spi}, ""}});
 }
 
-TEST_CASE("board_parts: what is not asked for may be missing") {
-    const std::uint32_t needed = wire::present_camera0 << 1U;
-    CHECK(missing(camera + "output = 1\n", ~needed).empty());
-    CHECK(missing("[[imu]]\n", ~std::uint32_t{wire::present_spi}).empty());
-    CHECK(missing(camera + "trigger = \"free\"\n[[imu]]\n", ~std::uint32_t{wire::present_spi})
-              .empty());
-}
-
-TEST_CASE("board_parts: an output that the board lacks, and those that it has") {
+TEST_CASE("board_parts: a missing trigger output, with those that the board has") {
     const std::string text = camera + "output = 2\n";
-    const auto outputs = [](unsigned mask) { return wire::present_camera0 * mask; };
-    CHECK(missing(text, outputs(0b1100)) ==
-          "v.toml:4:10: 'output' of [[camera]] \"left\" is 2: " + own_name +
-              " has outputs 0 and 1; use one that it has, or another board\n");
-    CHECK_THAT(missing(text, outputs(0b0100)), Catch::Contains("has outputs 0, 1 and 3;"));
-    CHECK_THAT(missing(text, outputs(0b1110)), Catch::Contains("has output 0;"));
-    CHECK_THAT(missing(text, outputs(0b1111)), Catch::Contains("has no output 2;"));
-    CHECK(missing(text, outputs(0b1011)).empty());
-    // Where the file leaves it at its default, the table is its place.
-    CHECK_THAT(missing(camera, outputs(1)),
-               Catch::StartsWith("v.toml:1:1: 'output' of [[camera]]"));
+    check({{text, outputs(0b1100),
+            "4:10: 'output' of [[camera]] \"left\" is 2: the board (v1, serial B7) has outputs 0 "
+            "and 1; use one that it has, or another board"},
+           {text, outputs(0b0100),
+            "4:10: 'output' of [[camera]] \"left\" is 2: the board (v1, serial B7) has outputs 0, "
+            "1 and 3; use one that it has, or another board"},
+           {text, outputs(0b1110),
+            "4:10: 'output' of [[camera]] \"left\" is 2: the board (v1, serial B7) has output 0; "
+            "use one that it has, or another board"},
+           {text, outputs(0b1111),
+            "4:10: 'output' of [[camera]] \"left\" is 2: the board (v1, serial B7) has no output "
+            "2; use one that it has, or another board"},
+           {text, outputs(0b1011), ""},
+           // Where the key is not in the file, its table is the place.
+           {camera, outputs(0b0001),
+            "1:1: 'output' of [[camera]] \"left\" is 0: the board (v1, serial B7) has outputs 1, 2 "
+            "and 3; use one that it has, or another board"}});
 }
 
-TEST_CASE("board_parts: each port that the board lacks") {
-    const auto told = [](const std::string& tables, std::uint32_t part) {
-        return missing(camera + tables, part);
-    };
-    CHECK(told("[illumination]\ncameras = [\"left\"]\n", wire::present_light) ==
-          "v.toml:5:11: 'cameras' of [illumination] is [\"left\"]: " + own_name +
-              " has no light output; set cameras = [], or use another board\n");
-    CHECK(told("[ports]\nsync_rate_hz = 2.5\n", wire::present_sync_output) ==
-          "v.toml:5:16: 'sync_rate_hz' of [ports] is 2.5 Hz: " + own_name +
-              " has no sync output; set sync_rate_hz = 0, or use another board\n");
-    CHECK(told("[ports]\ntest = \"left\"\n", wire::present_test_output) ==
-          "v.toml:5:8: 'test' of [ports] is \"left\": " + own_name +
-              " has no test output; set test = \"\", or use another board\n");
-    CHECK(told("[ports]\ntest_rate_hz = 1000\n", wire::present_test_output) ==
-          "v.toml:5:16: 'test_rate_hz' of [ports] is 1000 Hz: " + own_name +
-              " has no test output; choose another 'test_output', or use another board\n");
-    CHECK(told("[ports]\ntest_rate_hz = 1\ntest_output = \"sync\"\n", wire::present_sync_output) ==
-          "v.toml:6:15: 'test_output' of [ports] is \"sync\": " + own_name +
-              " has no sync output; choose another, or use another board\n");
-    CHECK(told("[ports]\ntest_rate_hz = 1\ntest_output = \"trigger3\"\n",
-               wire::present_camera0 << 3U) ==
-          "v.toml:6:15: 'test_output' of [ports] is \"trigger3\": " + own_name +
-              " has outputs 0, 1 and 2; choose one that it has, or use another board\n");
-    CHECK(told("[ports]\nimu_output = true\n[[imu]]\n", wire::present_imu_output) ==
-          "v.toml:5:14: 'imu_output' of [ports] is true: " + own_name +
-              " has no IMU output; set imu_output = false, or use another board\n");
-    CHECK(told("[ports]\ninputs = [\"pps\"]\nnmea = true\n", wire::present_uart) ==
-          "v.toml:6:8: 'nmea' of [ports] is true: " + own_name +
-              " has no UART; set nmea = false, or use another board\n");
-    CHECK(told("[board]\nkeep_configuration = true\n", wire::present_memory) ==
-          "v.toml:5:22: 'keep_configuration' of [board] is true: " + own_name +
-              " has no memory for it; set keep_configuration = false, or use another board\n");
+TEST_CASE("board_parts: a missing port") {
+    const std::string ports = camera + "[ports]\n";
+    const std::string three = ports + "inputs = ['aux1', 'pps', 'sync']\n";
+    check({{camera + "[illumination]\ncameras = ['left']\n", wire::present_light,
+            "5:11: 'cameras' of [illumination] is [\"left\"]: the board (v1, serial B7) has no "
+            "light output; set cameras = [], or use another board"},
+           {camera + "[board]\nkeep_configuration = true\n", wire::present_memory,
+            "5:22: 'keep_configuration' of [board] is true: the board (v1, serial B7) has no "
+            "memory to store it; set keep_configuration = false, or use another board"},
+           {ports + "sync_rate_hz = 2.5\n", wire::present_sync_output,
+            "5:16: 'sync_rate_hz' of [ports] is 2.5 Hz: the board (v1, serial B7) has no sync "
+            "output; set sync_rate_hz = 0, or use another board"},
+           {ports + "test = 'left'\n", wire::present_test_output,
+            "5:8: 'test' of [ports] is \"left\": the board (v1, serial B7) has no test output; set "
+            "test = \"\", or use another board"},
+           {ports + "test_rate_hz = 1000\n", wire::present_test_output,
+            "5:16: 'test_rate_hz' of [ports] is 1000 Hz: the board (v1, serial B7) has no test "
+            "output; choose another 'test_output', or use another board"},
+           {ports + "test_rate_hz = 1\ntest_output = 'sync'\n", wire::present_sync_output,
+            "6:15: 'test_output' of [ports] is \"sync\": the board (v1, serial B7) has no sync "
+            "output; choose another output, or use another board"},
+           {ports + "test_rate_hz = 1\ntest_output = 'trigger3'\n", outputs(0b1000),
+            "6:15: 'test_output' of [ports] is \"trigger3\": the board (v1, serial B7) has outputs "
+            "0, 1 and 2; choose one that it has, or use another board"},
+           {ports + "imu_output = true\n[[imu]]\n", wire::present_imu_output,
+            "5:14: 'imu_output' of [ports] is true: the board (v1, serial B7) has no IMU output; "
+            "set imu_output = false, or use another board"},
+           {ports + "inputs = ['pps']\nnmea = true\n", wire::present_uart,
+            "6:8: 'nmea' of [ports] is true: the board (v1, serial B7) has no UART; set nmea = "
+            "false, or use another board"},
+           {three, wire::present_pulse0 << wire::pulse_pps,
+            "5:10: 'inputs' of [ports] has \"pps\": the board (v1, serial B7) has inputs aux0, "
+            "aux1 and sync; remove it, or use another board"},
+           {three, wire::present_pulse0 << wire::pulse_aux0, ""},
+           {three, wire::present_pulse0 << wire::pulse_aux1,
+            "5:10: 'inputs' of [ports] has \"aux1\": the board (v1, serial B7) has inputs pps, "
+            "aux0 and sync; remove it, or use another board"},
+           {three, wire::present_pulse0 << wire::pulse_sync,
+            "5:10: 'inputs' of [ports] has \"sync\": the board (v1, serial B7) has inputs pps, "
+            "aux0 and aux1; remove it, or use another board"},
+           {three, inputs(0b1110),
+            "5:10: 'inputs' of [ports] has \"aux1\": the board (v1, serial B7) has input pps; "
+            "remove it, or use another board\n"
+            "5:10: 'inputs' of [ports] has \"sync\": the board (v1, serial B7) has input pps; "
+            "remove it, or use another board"},
+           {three, inputs(0b1111),
+            "5:10: 'inputs' of [ports] has \"pps\": the board (v1, serial B7) has no input pps; "
+            "remove it, or use another board\n"
+            "5:10: 'inputs' of [ports] has \"aux1\": the board (v1, serial B7) has no input aux1; "
+            "remove it, or use another board\n"
+            "5:10: 'inputs' of [ports] has \"sync\": the board (v1, serial B7) has no input sync; "
+            "remove it, or use another board"}});
 }
 
-TEST_CASE("board_parts: each input by its name, and those that the board has") {
-    const std::string text = camera + "[ports]\ninputs = [\"aux1\", \"pps\", \"sync\"]\n";
-    for (const auto& [name, input] : {std::pair("pps", wire::pulse_pps),
-                                      {"aux1", wire::pulse_aux1},
-                                      {"sync", wire::pulse_sync}})
-        CHECK_THAT(missing(text, wire::present_pulse0 << input),
-                   Catch::StartsWith(fmt::format("v.toml:5:10: 'inputs' of [ports] has \"{}\": {} "
-                                                 "has inputs ",
-                                                 name, own_name)));
-    CHECK_THAT(missing(text, wire::present_pulse0 * 0b1110U),
-               Catch::Contains("has \"aux1\": " + own_name +
-                               " has input pps; remove it, or use another board\n") &&
-                   Catch::Contains("has \"sync\": ") && !Catch::Contains("has \"pps\""));
-    CHECK_THAT(missing(text, wire::present_pulse0 * 0b1111U), Catch::Contains("has no input pps;"));
-    CHECK(missing(text, wire::present_pulse0 << wire::pulse_aux0).empty());
+TEST_CASE("board_parts: a missing bus or data-ready line of an IMU") {
+    const std::string icm = "[[imu]]\nmodel = 'icm42688p'\n";
+    const std::string bmi = "[[imu]]\nmodel = 'bmi088'\ndata_ready = true\naccel_ready = true\n";
+    const std::string vn = "[[imu]]\nmodel = 'vn100'\n";
+    check({{icm, wire::present_spi,
+            "1:1: 'bus' of [[imu]] is \"spi\": the board (v1, serial B7) has I2C and a UART for "
+            "IMUs; set bus = \"i2c\" and rewire the part, or use another board"},
+           {icm + "data_ready = true\nbus = 'i2c'\n", wire::present_i2c,
+            "4:7: 'bus' of [[imu]] is \"i2c\": the board (v1, serial B7) has SPI and a UART for "
+            "IMUs; set bus = \"spi\" and rewire the part, or use another board"},
+           {icm, wire::present_spi | wire::present_i2c,
+            "1:1: 'bus' of [[imu]] is \"spi\": the board (v1, serial B7) has a UART for IMUs; use "
+            "another part, or another board"},
+           {"[[imu]]\n", wire::present_spi,
+            "1:1: 'bus' of [[imu]] is \"spi\": the board (v1, serial B7) has I2C and a UART for "
+            "IMUs; use another part, or another board"},  // it cannot be on I2C
+           {"[[imu]]\n", wire::present_spi | wire::present_i2c | wire::present_uart,
+            "1:1: 'bus' of [[imu]] is \"spi\": the board (v1, serial B7) has no SPI for IMUs; use "
+            "another part, or another board"},
+           {vn, wire::present_uart,
+            "2:9: 'model' of [[imu]] is \"vn100\": the board (v1, serial B7) has SPI and I2C for "
+            "IMUs; use another part, or another board"},
+           {vn + "data_ready = true\n", wire::present_ready0 << 1U,
+            "3:14: 'data_ready' of [[imu]] is true: the board (v1, serial B7) has no data-ready "
+            "input for it; set data_ready = false, or use another board"},
+           {bmi, wire::present_ready0,
+            "3:14: 'data_ready' of [[imu]] is true: the board (v1, serial B7) has no data-ready "
+            "input for it; set data_ready = false, or use another board"},
+           {bmi, wire::present_accel_ready,
+            "4:15: 'accel_ready' of [[imu]] is true: the board (v1, serial B7) has no data-ready "
+            "input for its accelerometer; set accel_ready = false, or use another board"},
+           {bmi, wire::present_ready0 << 1U, ""}});
 }
 
-TEST_CASE("board_parts: the bus of an IMU, and its data-ready lines") {
-    const std::string icm = "[[imu]]\nmodel = \"icm42688p\"\n";
-    CHECK(missing(icm, wire::present_spi) ==
-          "v.toml:1:1: 'bus' of [[imu]] is \"spi\": " + own_name +
-              " has I2C and a UART for IMUs; set bus = \"i2c\" and rewire the part, or use another "
-              "board\n");
-    CHECK(missing(icm + "data_ready = true\nbus = \"i2c\"\n", wire::present_i2c) ==
-          "v.toml:4:7: 'bus' of [[imu]] is \"i2c\": " + own_name +
-              " has SPI and a UART for IMUs; set bus = \"spi\" and rewire the part, or use another "
-              "board\n");
-    CHECK_THAT(missing(icm, wire::present_spi | wire::present_i2c),
-               Catch::Contains("has a UART for IMUs; use another part, or another board"));
-    CHECK_THAT(missing("[[imu]]\n", wire::present_spi),  // it cannot be on I2C
-               Catch::Contains("for IMUs; use another part, or another board"));
-    CHECK_THAT(missing("[[imu]]\n", wire::present_spi | wire::present_i2c | wire::present_uart),
-               Catch::Contains("has no SPI for IMUs;"));
-    CHECK(missing("[[imu]]\nmodel = \"vn100\"\n", wire::present_uart) ==
-          "v.toml:2:9: 'model' of [[imu]] is \"vn100\": " + own_name +
-              " has SPI and I2C for IMUs; use another part, or another board\n");
-    const std::string bmi = "[[imu]]\nmodel = \"bmi088\"\ndata_ready = true\naccel_ready = true\n";
-    CHECK(missing(bmi, wire::present_ready0) ==
-          "v.toml:3:14: 'data_ready' of [[imu]] is true: " + own_name +
-              " has no data-ready input for it; set data_ready = false, or use another board\n");
-    CHECK(missing(bmi, wire::present_accel_ready) ==
-          "v.toml:4:15: 'accel_ready' of [[imu]] is true: " + own_name +
-              " has no data-ready input for its accelerometer; set accel_ready = false, or use "
-              "another board\n");
-    CHECK(missing(bmi, wire::present_ready0 << 1U).empty());
-    CHECK_THAT(
-        missing("[[imu]]\nmodel = \"vn100\"\ndata_ready = true\n", wire::present_ready0 << 1U),
-        Catch::Contains("'data_ready'"));
-}
-
-TEST_CASE("board_parts: a board without name is told as such, and all that it lacks at once") {
-    wire::BoardHello bare{};
+TEST_CASE("board_parts: a board without a name, and all that it lacks at once") {
+    const wire::BoardHello bare{};
     const auto messages = missing_parts(load(camera + "[[imu]]\n"), bare);
     REQUIRE(messages.size() == 2);
-    CHECK_THAT(messages[0], Catch::Contains("is 0: the board has no output 0; "));
-    CHECK_THAT(messages[1], Catch::Contains("the board has no SPI for IMUs; "));
+    CHECK(from_place(messages[0]) ==
+          "1:1: 'output' of [[camera]] \"left\" is 0: the board has no output 0; use one that it "
+          "has, or another board");
+    CHECK(from_place(messages[1]) ==
+          "4:1: 'bus' of [[imu]] is \"spi\": the board has no SPI for IMUs; use another part, or "
+          "another board");
     CHECK(missing_parts({}, bare).empty());
 }
 
-TEST_CASE("board_parts: a part that the board refuses is told by its key") {
+TEST_CASE("board_parts: a part that the board refuses is named by its key") {
+    using Part = wire::ConfigurationPart;
     const Configuration configuration =
         load(camera +
-             "output = 2\n[[imu]]\ndata_ready = true\n[illumination]\ncameras = [\"left\"]\n"
-             "[ports]\ninputs = [\"pps\", \"aux1\"]\nsync_rate_hz = 1\n");
-    const auto told = [&](wire::ConfigurationPart part, unsigned index, std::int64_t value) {
+             "output = 2\n[[imu]]\ndata_ready = true\n[illumination]\ncameras = ['left']\n"
+             "[ports]\ninputs = ['pps', 'aux1']\nsync_rate_hz = 1\n");
+    const std::string unused =
+        "the board reports a missing part that the configuration does not use: update its firmware";
+    const struct {
+        Part part;
+        unsigned index;
+        std::int64_t value;
+        std::string message;
+    } rows[]{{Part::camera, 2, 2,
+              "4:10: 'output' of [[camera]] \"left\" is 2: the board has no output 2; use one that "
+              "it has, or another board"},
+             {Part::imu, 0, 11,
+              "5:1: 'bus' of [[imu]] is \"spi\": the board has no SPI for IMUs; use another part, "
+              "or another board"},
+             {Part::imu, 0, 13,
+              "6:14: 'data_ready' of [[imu]] is true: the board has no data-ready input for it; "
+              "set data_ready = false, or use another board"},
+             {Part::illumination, 0, 4,
+              "8:11: 'cameras' of [illumination] is [\"left\"]: the board has no light output; set "
+              "cameras = [], or use another board"},
+             {Part::ports, 0, 5,
+              "11:16: 'sync_rate_hz' of [ports] is 1 Hz: the board has no sync output; set "
+              "sync_rate_hz = 0, or use another board"},
+             {Part::ports, 0, 9,
+              "10:10: 'inputs' of [ports] has \"aux1\": the board has no input aux1; remove it, or "
+              "use another board"},
+             {Part::ports, 0, -1, unused},
+             {Part::ports, 0, 17, unused},
+             {Part::ports, 0, 64, unused},
+             {Part::camera, 1, 1, unused}};
+    for (const auto& [part, index, value, message] : rows) {
         wire::Refusal refusal{};
         refusal.part = part;
         refusal.index = static_cast<std::uint8_t>(index);
         refusal.field = wire::ConfigurationField::present;
         refusal.value = value;
-        return describe(configuration, refusal);
-    };
-    using Part = wire::ConfigurationPart;
-    CHECK_THAT(
-        told(Part::camera, 2, 2),
-        Catch::Contains("v.toml:4:10: 'output' of [[camera]] \"left\" is 2: the board has no "
-                        "output 2; use one that it has, or another board"));
-    CHECK_THAT(told(Part::imu, 0, 11), Catch::Contains("'bus' of [[imu]] is \"spi\""));
-    CHECK_THAT(told(Part::imu, 0, 13), Catch::Contains("'data_ready' of [[imu]] is true"));
-    CHECK_THAT(told(Part::illumination, 0, 4), Catch::Contains("the board has no light output;"));
-    CHECK_THAT(told(Part::ports, 0, 5), Catch::Contains("'sync_rate_hz' of [ports] is 1 Hz"));
-    CHECK_THAT(told(Part::ports, 0, 9), Catch::Contains("'inputs' of [ports] has \"aux1\""));
-    const std::string unasked =
-        "the board lacks a part that the configuration does not ask for: update its firmware";
-    for (const std::int64_t odd : {-1, 17, 64}) CHECK(told(Part::ports, 0, odd) == unasked);
-    CHECK(told(Part::camera, 1, 1) == unasked);
+        CAPTURE(part, index, value);
+        CHECK(from_place(describe(configuration, refusal)) == message);
+    }
 }
 
 namespace {
@@ -269,19 +310,18 @@ TEST_CASE("board_parts: each bit has a name of its own, and those of newer board
     CHECK(board::part_names(0).empty());
 }
 
-TEST_CASE("board_parts: what an older firmware cannot do is told by its key") {
+TEST_CASE("board_parts: what an older firmware cannot do is named by its key") {
     const std::string text =
-        camera + "[clock]\nalign = true\n[ports]\ninputs = [\"pps\"]\nnmea = true\n";
-    const auto told = [&](std::uint32_t capabilities) {
-        return missing_capability(load(text), capabilities);
+        camera + "[clock]\nalign = true\n[ports]\ninputs = ['pps']\nnmea = true\n";
+    const auto message = [&](std::uint32_t capabilities) {
+        return from_place(missing_capability(load(text), capabilities));
     };
-    CHECK(told(wire::capability_host_grid | wire::capability_nmea).empty());
-    CHECK_THAT(told(wire::capability_nmea),
-               Catch::EndsWith("v.toml:5:9: 'align' of [clock] is true: the board's firmware does "
-                               "not let the host place its grid; flash a newer one, or set align = "
-                               "false"));
-    CHECK_THAT(told(wire::capability_host_grid),
-               Catch::EndsWith("v.toml:8:8: 'nmea' of [ports] is true: the board's firmware does "
-                               "not read NMEA; flash a newer one, or set nmea = false"));
+    CHECK(message(wire::capability_host_grid | wire::capability_nmea).empty());
+    CHECK(message(wire::capability_nmea) ==
+          "5:9: 'align' of [clock] is true: the board's firmware does not support moving its grid; "
+          "update it, or set align = false");
+    CHECK(message(wire::capability_host_grid) ==
+          "8:8: 'nmea' of [ports] is true: the board's firmware does not support NMEA; update it, "
+          "or set nmea = false");
     CHECK(missing_capability(load(camera), 0).empty());
 }

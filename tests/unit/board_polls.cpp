@@ -93,7 +93,8 @@ TEST_CASE("board: a queue of the hardware that is full is not asked again before
     CHECK(bench.pulses(output_sync)[0] == 100 * ms);
 }
 
-TEST_CASE("board: an output that is late is told, counted, and moves the record of its trigger") {
+TEST_CASE(
+    "board: an output that is late is reported, counted, and moves the record of its trigger") {
     for (const std::uint32_t flags : {0U, std::uint32_t{wire::camera_trigger_inverted}}) {
         Cameras bench(4, wire::camera_no_strobe | flags);
         bench.configure();
@@ -152,7 +153,7 @@ TEST_CASE("board: what is due leaves before the edges that a late poll has to lo
     CHECK(bench.port.pushed[0] == due - 10 * us);
 }
 
-TEST_CASE("board: an exposure that does not come is told as soon as all edges are known") {
+TEST_CASE("board: an exposure that does not come is reported as soon as all edges are known") {
     const auto told_after = [](Nanoseconds edge_lag) {
         Cameras bench(1);
         bench.port.edge_lag = edge_lag;
@@ -202,7 +203,7 @@ TEST_CASE("board: after a pause, nobody waits for what a trigger did that has no
     CHECK(records[0].flags == (wire::exposure_measured | wire::exposure_late));
 }
 
-TEST_CASE("board: stray edges are all counted, and told ten times a second") {
+TEST_CASE("board: stray edges are all counted, and reported ten times a second") {
     Bench bench;
     bench.add_camera(0);
     bench.configure();
@@ -210,10 +211,10 @@ TEST_CASE("board: stray edges are all counted, and told ten times a second") {
         bench.edge(0, at, (at / ms) % 40 == 10);
         bench.poll(at + ms);
     }
-    std::vector<Nanoseconds> told;
+    std::vector<Nanoseconds> reported;
     const auto events = bench.events(wire::BoardEventKind::stray_edge);
-    for (const wire::Event& event : events) told.push_back(event.time_ns);
-    CHECK(told == std::vector<Nanoseconds>{10 * ms, 110 * ms, 210 * ms});
+    for (const wire::Event& event : events) reported.push_back(event.time_ns);
+    CHECK(reported == std::vector<Nanoseconds>{10 * ms, 110 * ms, 210 * ms});
     for (std::size_t i = 0; i < events.size(); ++i) CHECK(events[i].sequence == i);
     CHECK(bench.health().stray_edges == 11);
 }

@@ -55,7 +55,7 @@ TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
         const std::size_t before = world.inbox().events_of(wire::BoardEventKind::pps).size();
         while (world.inbox().events_of(wire::BoardEventKind::pps).size() == before) world.run(ms);
         pulses.push_back(world.inbox().events_of(wire::BoardEventKind::pps).back().time_ns);
-        // It begins 200 ms after the pulse, and is told of as a whole.
+        // It begins 200 ms after the pulse, and is reported as a whole.
         const auto lasts = static_cast<Nanoseconds>(line.size()) * 10 * second / 9600;
         const std::vector<std::uint8_t> bytes(line.begin(), line.end());
         world.board().uart_receive(bytes, pulses.back() + 200 * ms + lasts);
@@ -85,7 +85,7 @@ TEST_CASE("board: NMEA is refused where an IMU has the UART, or at a baud rate t
     CHECK(world.inbox().refusals[1].field == wire::ConfigurationField::port_options);
 }
 
-TEST_CASE("board: a configuration that is refused changes nothing, and tells each reason") {
+TEST_CASE("board: a configuration that is refused changes nothing, and reports each reason") {
     Bench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
@@ -278,7 +278,7 @@ TEST_CASE("board: pulses of the old configuration end before the new one is in f
     CHECK(bench.pulses(output_test).back() == 200 * ms);
 }
 
-TEST_CASE("board: a configuration that is to be kept is stored, and told when it is safe") {
+TEST_CASE("board: a configuration that is to be kept is stored, and reported when it is safe") {
     Bench bench;
     bench.configure();
     CHECK(bench.port.stored.empty());

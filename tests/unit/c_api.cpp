@@ -399,7 +399,7 @@ TEST_CASE_METHOD(CApi, "c_api: root is an owner, too") {
     CHECK_THAT(error.message, Catch::Contains("not to user 0"));
 }
 
-TEST_CASE_METHOD(CApi, "c_api: where memory is short, that is what is told") {
+TEST_CASE_METHOD(CApi, "c_api: where memory is short, that is what is reported") {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     return;  // there, a program ends that asks for too much
 #elif defined(__has_feature)
@@ -557,7 +557,7 @@ TEST_CASE_METHOD(CApi, "c_api: samples between two instants") {
 }
 
 TEST_CASE_METHOD(CApi,
-                 "c_api: of a service that was restarted, samples are told once to be others") {
+                 "c_api: of a service that was restarted, samples are reported once to be others") {
     auto first = std::make_unique<ring::Writer>(make_imu());
     versavis_imu_window* window = nullptr;
     REQUIRE(versavis_imu_window_open(instance.c_str(), "imu0", nullptr, &window, nullptr) ==
@@ -689,7 +689,7 @@ TEST_CASE_METHOD(CApi, "c_api: sets that lack something, by the options") {
     for (versavis_sets* sets : {strict, alone, lenient}) versavis_sets_close(sets);
 }
 
-TEST_CASE_METHOD(CApi, "c_api: a set waits for its samples, unless told not to") {
+TEST_CASE_METHOD(CApi, "c_api: a set waits for its samples, unless asked not to") {
     const auto other = make("cam1");
     const ring::Writer imu = make_imu();
     versavis_sets_options options = VERSAVIS_SETS_OPTIONS_INIT;

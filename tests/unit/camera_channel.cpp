@@ -341,7 +341,7 @@ TEST_CASE("camera_channel: a late trigger is sent within a sixteenth of the peri
         }
 }
 
-TEST_CASE("camera_channel: triggers in a row that were too late are told together") {
+TEST_CASE("camera_channel: triggers in a row that were too late are reported together") {
     using Events = std::vector<Event>;
     const auto kind = wire::BoardEventKind::triggers_skipped;
     struct Case {
@@ -395,11 +395,11 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
                 const bool single = ticks == 1 && skipped == 1;
                 REQUIRE(bench.reports.events.size() == (skipped > 0 ? 1 : 0));
                 if (skipped == 0) continue;
-                const Event& told = bench.reports.events[0];
-                REQUIRE(told.kind == (single ? wire::BoardEventKind::trigger_skipped
-                                             : wire::BoardEventKind::triggers_skipped));
-                REQUIRE(told.value == since + 1);
-                REQUIRE(told.detail == static_cast<int>(single ? 1 : skipped));
+                const Event& event = bench.reports.events[0];
+                REQUIRE(event.kind == (single ? wire::BoardEventKind::trigger_skipped
+                                              : wire::BoardEventKind::triggers_skipped));
+                REQUIRE(event.value == since + 1);
+                REQUIRE(event.detail == static_cast<int>(single ? 1 : skipped));
             }
 }
 
@@ -438,7 +438,7 @@ TEST_CASE("camera_channel: an inverted trigger is low, and one that leaves late 
     CHECK(world.reports.exposures[0].flags == (wire::exposure_measured | wire::exposure_late));
 }
 
-TEST_CASE("camera_channel: what is announced is expected from its trigger on, and told") {
+TEST_CASE("camera_channel: what is announced is expected from its trigger on, and reported") {
     Running world;
     world.expose(48 * ms, 4 * ms);
     world.channel.announce(3, 10 * ms);

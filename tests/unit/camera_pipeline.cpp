@@ -166,7 +166,7 @@ TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") 
 }
 
 TEST_CASE(
-    "camera_pipeline: an exposure line that shows another exposure than the camera tells proves "
+    "camera_pipeline: an exposure line that shows another exposure than the camera reports proves "
     "nothing") {
     auto configuration = camera(20);
     configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);

@@ -110,7 +110,8 @@ TEST_CASE("camera_view: LEDs are where the scenario says, as bright as they were
     for (const double dark : {0.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 8.5}) CHECK(at(dark) == 20);
 }
 
-TEST_CASE("camera_view: brightness follows the exposure, and noise is as strong as it is told") {
+TEST_CASE(
+    "camera_view: brightness follows the exposure, and noise is as strong as it is configured") {
     CameraScenario camera = small();
     Scenario scenario = scenario_of(camera, true, false);
     const Surroundings surroundings(zero, scenario);

@@ -66,7 +66,7 @@ TEST_CASE("clock_evaluation: errors by messages, without PPS") {
     CHECK_THAT(to_text(*found), Contains("innovation"));
 }
 
-TEST_CASE("clock_evaluation: PPS tells the true error") {
+TEST_CASE("clock_evaluation: PPS shows the true error") {
     const Duration off = GENERATE(microseconds(0), microseconds(-300), microseconds(40));
     const auto found = evaluate_clock(clocks(120, off, true));
     REQUIRE(found);
@@ -95,7 +95,7 @@ TEST_CASE("clock_evaluation: pulses of another life of the board are not transla
     CHECK(found->pps_smoothed.most < 50e3);
 }
 
-TEST_CASE("clock_evaluation: exchanges that ended before they began tell nothing") {
+TEST_CASE("clock_evaluation: exchanges that ended before they began show nothing") {
     RecordedClocks wrong = clocks(60, {}, true);
     for (TimedMessage& message : wrong.lives[0].stamps.messages) {
         auto& exchange = std::get<clock::Exchange>(message.message);
@@ -106,7 +106,7 @@ TEST_CASE("clock_evaluation: exchanges that ended before they began tell nothing
     CHECK_THAT(found.error().message(), Contains("none has a positive round trip"));
 }
 
-TEST_CASE("clock_evaluation: nothing to judge is told") {
+TEST_CASE("clock_evaluation: nothing to judge is reported") {
     CHECK_FALSE(evaluate_clock({}));
     const auto brief = evaluate_clock(clocks(5, {}, false));
     REQUIRE_FALSE(brief);

@@ -92,7 +92,7 @@ TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
     CHECK(bench.exchanges() == 0);
 }
 
-TEST_CASE("clock_exchange: a sample tells of the clock only if it says when it left") {
+TEST_CASE("clock_exchange: a sample is used for the clock only if it says when it left") {
     Bench bench;
     wire::ImuSample sample{};
     sample.time_ns = Bench::to_board(host_now()).ns;

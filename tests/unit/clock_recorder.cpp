@@ -64,7 +64,7 @@ struct Recording {
 }  // namespace
 
 TEST_CASE(
-    "clock_recorder: what it is told is in the ring, with the board's nonce and the output time") {
+    "clock_recorder: what it is given is in the ring, with the board's nonce and the output time") {
     Recording recording;
     recording.recorder.board_restarted(77);
     CHECK(recording.expect<RecordedOutput>().epoch == 0);
@@ -89,7 +89,7 @@ TEST_CASE(
     CHECK(recording.recorder.items() == 4);
 }
 
-TEST_CASE("clock_recorder: the output clock is told once a second, and at each step") {
+TEST_CASE("clock_recorder: the output clock is reported once a second, and at each step") {
     Recording recording;
     for (int i = 0; i < 30; ++i) {
         recording.tick();
@@ -111,7 +111,7 @@ TEST_CASE("clock_recorder: the output clock is told once a second, and at each s
     CHECK_FALSE(recording.next());
 }
 
-TEST_CASE("clock_recorder: a step is told before the first item that is stamped after it") {
+TEST_CASE("clock_recorder: a step is reported before the first item that is stamped after it") {
     Recording recording;
     recording.tick();
     recording.expect<RecordedOutput>();

@@ -8,7 +8,7 @@
 using namespace versavis;
 using namespace versavis::clock;
 
-TEST_CASE("clock_step_detector: a step is told once, with the offset before and after") {
+TEST_CASE("clock_step_detector: a step is reported once, with the offset before and after") {
     const auto clocks = std::make_shared<test::SimulatedClocks>();
     Translator translator{*OutputClock::create(OutputClockKind::realtime, false, clocks)};
     daemon::ClockStepDetector watch;

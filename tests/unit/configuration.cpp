@@ -11,6 +11,7 @@
 #include <regex>
 #include <sstream>
 
+#include "../support/message_table.hpp"
 #include "../support/temporary_directory.hpp"
 #include "settings/board_configuration.hpp"
 
@@ -24,13 +25,20 @@ Expected<Configuration, TomlProblems> load(const std::string& text) {
     return load_configuration(directory.write("versavis.toml", text));
 }
 
-/// All messages, one a line.
+/// All messages from their places on, one a line.
 std::string errors_of(const std::string& text) {
     const auto configuration = load(text);
-    if (configuration) return "no error";
     std::string all;
-    for (const TomlProblem& problem : configuration.error()) all += problem.message() + "\n";
+    for (const TomlProblem& problem : configuration ? TomlProblems{} : configuration.error()) {
+        const std::string message = problem.message();
+        all += (all.empty() ? "" : "\n") + message.substr(problem.place.path.size() + 1);
+    }
     return all;
+}
+
+/// The errors of a file that begins with `before`.
+auto errors_after(const std::string& before) {
+    return [before](const std::string& text) { return errors_of(before + text); };
 }
 
 const std::string camera = "[[camera]]\nname = \"cam0\"\ndevice = \"10.0.0.2\"\n";
@@ -50,13 +58,6 @@ std::string example() {
 }
 
 }  // namespace
-
-TEST_CASE("configuration: a file without cameras and IMUs serves nothing, and says what to write") {
-    for (const char* text : {"", "\n\n", "# nothing yet\n", "[ports]\ninputs = [\"pps\"]\n"}) {
-        CHECK_THAT(errors_of(text), Catch::Contains("nothing to serve; write a table [[camera]]"));
-        CHECK_THAT(errors_of(text), Catch::Contains("versavis.toml:1:1: "));
-    }
-}
 
 TEST_CASE("configuration: the manual has each key, with its default, range and meaning") {
     const std::string text = manual();
@@ -90,10 +91,6 @@ TEST_CASE("configuration: each field that the board may refuse is of one key") {
     CHECK(daemon::find_key(Field::imu_rate)->key == "rate_hz");
     CHECK(daemon::find_key(Field::imu_rate)->board_units == 1e3);
     CHECK(daemon::find_key(Field::glitch)->board_units == 10);
-}
-
-TEST_CASE("configuration: an optional key is known when it is mistyped") {
-    CHECK_THAT(errors_of(camera + "chunk = true\n"), Catch::Contains("did you mean 'chunks'?"));
 }
 
 TEST_CASE("configuration: defaults") {
@@ -148,7 +145,7 @@ TEST_CASE("configuration: the output clock") {
     CHECK(configuration->clock.force_tai);
 }
 
-TEST_CASE("configuration: what the board is told") {
+TEST_CASE("configuration: what is sent to the board") {
     const auto configuration = load(camera +
                                     "output = 2\nrate_hz = 29.97\nstrobe = "
                                     "\"active_low\"\nlatency_us = 12.5\n[[imu]]\nrate_hz = 200\n");
@@ -163,7 +160,7 @@ TEST_CASE("configuration: what the board is told") {
     CHECK(board.imus[1].kind == wire::ImuKind::none);
 }
 
-TEST_CASE("configuration: slaves, light, ports and both IMUs, as the board is told") {
+TEST_CASE("configuration: slaves, light, ports and both IMUs, as sent to the board") {
     const auto configuration =
         load(camera +
              "rate_hz = 50\n[[camera]]\nname = \"cam1\"\ndevice = \"x\"\noutput = 3\nmaster = "
@@ -210,7 +207,7 @@ TEST_CASE("configuration: the filter of an exposure line, in the board's unit") 
     CHECK(glitch("glitch_us = 7.24\n") == 72);
 }
 
-TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the board is told") {
+TEST_CASE("configuration: a part on I2C, and a second data-ready line, as sent to the board") {
     const auto first = [](const std::string& table) {
         return board_configuration(*load("[[imu]]\n" + table)).imus[0].options;
     };
@@ -224,7 +221,7 @@ TEST_CASE("configuration: a part on I2C, and a second data-ready line, as the bo
           (wire::imu_data_ready | wire::imu_accel_ready));
 }
 
-TEST_CASE("configuration: test pulses of their own, as the board is told") {
+TEST_CASE("configuration: test pulses of their own, as sent to the board") {
     const auto ports = [](const std::string& keys) {
         return board_configuration(*load(camera + "[ports]\n" + keys)).ports;
     };
@@ -273,61 +270,113 @@ TEST_CASE("configuration: features are kept in text, in their own types") {
 }
 
 TEST_CASE("configuration: errors name line, column, key, value, range, unit and cure") {
-    const auto check = [](const std::string& text, const std::string& expected) {
-        INFO(text);
-        CHECK_THAT(errors_of(text), Catch::Contains(expected));
-    };
-    check("instance = \n", "versavis.toml:1:");
-    check(camera + "rate_hzz = 20\n",
-          "versavis.toml:4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?");
-    check(camera + "rate_hz = 2000\n",
-          "versavis.toml:4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, and is 2000; see");
-    check(camera + "rate_hz = \"20\"\n", "must be a number from 0.1 to 1000 Hz, and is '20'");
-    check(camera + "rate_hz = nan\n", "must be a number from 0.1 to 1000 Hz, and is nan");
-    check(camera + "output = 4\n", "'output' must be a whole number from 0 to 3, and is 4");
-    check(camera + "packet_size = 20\n", "from 576 to 16000 bytes, and is 20");
-    check(camera + "trigger = \"bord\"\n",
-          "must be one of board, free, and is 'bord'; did you mean \"board\"?");
-    check(camera + "strobe = 1\n", "must be one of active_high, active_low, none, and is 1");
-    check(camera + "glitch_us = 0\n", "'glitch_us' must be a number from 0.1 to 25.5 us, and is 0");
-    check(camera + "glitch_us = 26\n", "from 0.1 to 25.5 us, and is 26");
-    check(camera + "glitch = 5\n", "unknown key 'glitch'; did you mean 'glitch_us'?");
-    check(camera + "[camera.features]\nrate_hz = 30\n", "move it above [camera.features]");
-    check(camera + "[camera.features]\nTriggerMode = \"Off\"\n", "set 'trigger' of the camera");
-    check(camera + "[camera.features]\nTriggerSource = \"Line1\"\n", "set 'trigger_line' of");
-    check("[ports]\npps = \"on\"\n", "unknown key 'pps'; remove it");
-    check("[clock]\npps = \"on\"\n", "and is 'on'; see ");
-    check("[[imu]]\nbus = \"usb\"\n", "must be one of spi, i2c, and is 'usb'");
-    check("[[imu]]\nbusses = \"spi\"\n", "unknown key 'busses'; did you mean 'bus'?");
-    check("[[imu]]\ni2c_adress = 0x69\n", "did you mean 'i2c_address'?");
-    check("[[imu]]\ni2c_address = \"0x68\"\n",
-          "'i2c_address' must be a whole number from 0 to 255");
-    check("[[imu]]\naccel_ready = 1\n", "'accel_ready' must be true or false, and is 1");
-    check("[ports]\ntest_rate_hz = 10001\n", "from 0 to 10000 Hz, and is 10001");
-    check("[ports]\ntest_rate = 10\n", "did you mean 'test_rate_hz'?");
-    check("[ports]\ntest_output = \"trigger4\"\n",
-          "must be one of test, sync, trigger0, trigger1, trigger2, trigger3, and is 'trigger4'; "
-          "did you mean");
-    check(camera + "history_s = -1\n", "'history_s' must be a number from 0 to 3600 s, and is -1");
-    check(camera + "slots = 20\nhistory_s = 1\n",
-          "versavis.toml:5:13: 'slots' and 'history_s' both say how many frames the ring holds; "
-          "keep one of them");
-    check("[[imu]]\nhistory_s = 3601\n", "from 0 to 3600 s, and is 3601");
-    check("[memory]\nlocked = true\n", "unknown key 'locked'; did you mean 'lock'?");
-    check(camera + "slots = 10\n", "'slots' must be a whole number from 14 to 1024, and is 10");
-    check(camera + "[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
-          "versavis.toml:6:16: 'largest_step' must be a number from 1.01 to 10, and is 1;");
-    check(camera + "[camera.features]\nGain = [1]\n", "feature 'Gain' must be a text");
-    check(camera + "[camera.features]\nGain = nan\n", "feature 'Gain' must be a text");
-    check(camera + "[camera.features]\nGain = 1\nGain = 2\n", "versavis.toml:6:");
-    check("[[imu]]\nmodel = \"mpu\"\n", "must be one of adis16448b");
-    check("[illumination]\ncameras = \"cam0\"\n", "list of strings");
-    check("[clock]\nmax_slew_ppm = 0\n", "from 0.1 to 500 ppm");
-    check("camera = 3\n", "array of tables: [[camera]], and is 3");
-    check("[[board]]\n", "'board' must be a table: [board], and is a list");
+    const std::string see_manual = "; see docs/user/configuration.md";
+    test::check_messages(
+        errors_after(camera),
+        {{"rate_hzz = 20\n", "4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"},
+         {"rate_hz = 2000\n",
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is 2000" + see_manual},
+         {"rate_hz = '20'\n",
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is '20'" + see_manual},
+         {"rate_hz = nan\n",
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is nan" + see_manual},
+         {"output = 4\n",
+          "4:10: 'output' must be a whole number from 0 to 3, but is 4" + see_manual},
+         {"packet_size = 20\n",
+          "4:15: 'packet_size' must be a whole number from 576 to 16000 bytes, but is 20" +
+              see_manual},
+         {"trigger = 'bord'\n",
+          "4:11: 'trigger' must be one of board, free, but is 'bord'; did you mean \"board\"?"},
+         {"strobe = 1\n",
+          "4:10: 'strobe' must be one of active_high, active_low, none, but is 1" + see_manual},
+         {"glitch_us = 0\n",
+          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, but is 0" + see_manual},
+         {"glitch_us = 26\n",
+          "4:13: 'glitch_us' must be a number from 0.1 to 25.5 us, but is 26" + see_manual},
+         {"glitch = 5\n", "4:1: unknown key 'glitch'; did you mean 'glitch_us'?"},
+         {"chunk = true\n", "4:1: unknown key 'chunk'; did you mean 'chunks'?"},
+         {"history_s = -1\n",
+          "4:13: 'history_s' must be a number from 0 to 3600 s, but is -1" + see_manual},
+         {"slots = 20\nhistory_s = 1\n",
+          "5:13: 'slots' and 'history_s' both set the size of the ring; remove one of the two"},
+         {"slots = 10\n",
+          "4:9: 'slots' must be a whole number from 14 to 1024, but is 10" + see_manual},
+         {"strobe_rising_us = [36, 9]\n",
+          "4:20: the delay of the other edge of the exposure line is missing; set "
+          "'strobe_rising_us' and 'strobe_falling_us', each [value, sigma]"},
+         {"strobe_rising_us = 36\n",
+          "4:20: 'strobe_rising_us' must be a list of 2 numbers from 0 to 1000" + see_manual},
+         {"[camera.features]\nrate_hz = 30\n",
+          "5:11: 'rate_hz' is a key of the camera, not a feature; move it above [camera.features]"},
+         {"[camera.features]\nTriggerMode = 'Off'\n",
+          "5:15: 'TriggerMode' is set by the service, from 'trigger'; set 'trigger' of the camera "
+          "instead"},
+         {"[camera.features]\nTriggerSource = 'Line1'\n",
+          "5:17: 'TriggerSource' is set by the service, from 'trigger_line'; set 'trigger_line' of "
+          "the camera instead"},
+         {"[camera.features]\nGain = [1]\n",
+          "5:8: feature 'Gain' must be a string, a number, true or false" + see_manual},
+         {"[camera.features]\nGain = nan\n",
+          "5:8: feature 'Gain' must be a string, a number, true or false" + see_manual},
+         {"[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
+          "5:14: 'percentile' must be a number from 0 to 100, but is 101; see "
+          "docs/user/configuration.md\n"
+          "6:16: 'largest_step' must be a number from 1.01 to 10, but is 1" +
+              see_manual},
+         {"[ports]\npps = 'on'\n",
+          "5:1: unknown key 'pps'; remove it; the keys are in docs/user/configuration.md"},
+         {"[ports]\ntest_rate_hz = 10001\n",
+          "5:16: 'test_rate_hz' must be a number from 0 to 10000 Hz, but is 10001" + see_manual},
+         {"[ports]\ntest_rate = 10\n",
+          "5:1: unknown key 'test_rate'; did you mean 'test_rate_hz'?"},
+         {"[ports]\ntest_output = 'trigger4'\n",
+          "5:15: 'test_output' must be one of test, sync, trigger0, trigger1, trigger2, trigger3, "
+          "but is 'trigger4'; did you mean \"trigger0\"?"},
+         {"[clock]\npps = 'on'\n",
+          "5:7: 'pps' must be one of off, host, nmea, but is 'on'" + see_manual},
+         {"[clock]\nmax_slew_ppm = 0\n",
+          "5:16: 'max_slew_ppm' must be a number from 0.1 to 500 ppm, but is 0" + see_manual},
+         {"[illumination]\ncameras = 'cam0'\n",
+          "5:11: 'cameras' must be a list of strings in quotes: [\"...\", \"...\"], but is 'cam0'" +
+              see_manual},
+         {"[memory]\nlocked = true\n", "5:1: unknown key 'locked'; did you mean 'lock'?"},
+         {"[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n",
+          "5:29: 'inputs' must be a list of 4 numbers from 0 to 100000" + see_manual},
+         {"[[board]]\n", "4:1: 'board' must be a table: [board], but is a list" + see_manual}});
+    test::check_messages(
+        errors_after("[[imu]]\n"),
+        {{"bus = 'usb'\n", "2:7: 'bus' must be one of spi, i2c, but is 'usb'" + see_manual},
+         {"busses = 'spi'\n", "2:1: unknown key 'busses'; did you mean 'bus'?"},
+         {"i2c_adress = 0x69\n", "2:1: unknown key 'i2c_adress'; did you mean 'i2c_address'?"},
+         {"i2c_address = '0x68'\n",
+          "2:15: 'i2c_address' must be a whole number from 0 to 255, but is '0x68'" + see_manual},
+         {"accel_ready = 1\n", "2:15: 'accel_ready' must be true or false, but is 1" + see_manual},
+         {"history_s = 3601\n",
+          "2:13: 'history_s' must be a number from 0 to 3600 s, but is 3601" + see_manual},
+         {"model = 'mpu'\n",
+          "2:9: 'model' must be one of adis16448b, adis16448a, adis16445, adis16460, adis16470, "
+          "icm42688p, bmi088, vn100, but is 'mpu'" +
+              see_manual}});
+    const std::string nothing =
+        "1:1: there is no camera and no IMU to serve; add a [[camera]] with 'name' and 'device', "
+        "or an [[imu]] with 'model'";
+    test::check_messages(
+        errors_after(""),
+        {{"", nothing},
+         {"\n\n", nothing},
+         {"# nothing yet\n", nothing},
+         {"[ports]\ninputs = ['pps']\n", nothing},
+         {"camera = 3\n",
+          "1:10: 'camera' must be an array of tables: [[camera]], but is 3" + see_manual}});
+    // The words are the parser's, the place and the cure are ours.
+    for (const auto& [text, place] :
+         {std::pair("instance = \n", "1:"), {"[[camera]]\nGain = 1\nGain = 2\n", "3:"}})
+        CHECK_THAT(errors_after("")(text),
+                   Catch::StartsWith(place) &&
+                       Catch::EndsWith("; the file must be TOML in UTF-8: https://toml.io"));
 }
 
-TEST_CASE("configuration: all errors are told at once, in the order of the file") {
+TEST_CASE("configuration: all errors are reported at once, in the order of the file") {
     const auto configuration = load("instance = \"a b\"\n" + camera +
                                     "rate_hzz = 1\npulse_us = 0\n[ports]\ntest = \"x\"\n");
     REQUIRE_FALSE(configuration);
@@ -340,13 +389,15 @@ TEST_CASE("configuration: windows line ends and a byte order mark change nothing
     std::string text = "\xEF\xBB\xBF" + camera + "rate_hz = 2000\n";
     for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2)
         text.insert(at, "\r");
-    CHECK_THAT(errors_of(text), Catch::Contains("versavis.toml:4:11: 'rate_hz' must be"));
+    CHECK(errors_of(text) ==
+          "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is 2000; see "
+          "docs/user/configuration.md");
 }
 
 TEST_CASE("configuration: every key of the manual is known, and its example loads") {
     const std::string text = manual();
     const std::string all_keys = example();
-    CHECK(errors_of(all_keys) == "no error");
+    CHECK(errors_of(all_keys).empty());
     // The example shows every key of the tables below it, and only those.
     const std::regex row("\\| `([a-z_]+)` \\|");
     std::size_t rows = 0;
@@ -406,9 +457,4 @@ TEST_CASE("configuration: delays of lines, of the board and of an IMU's filter")
     CHECK(board_configuration(*configuration).cameras[2].latency_ns == 10'030);
     CHECK(configuration->imus[0].filter_delay().delay == nanoseconds(4'272'461));
     CHECK(configuration->imus[1].filter_delay().delay == microseconds(2500));
-    CHECK_THAT(errors_of(camera + "strobe_rising_us = [36, 9]\n"),
-               Catch::Contains("both edges") && Catch::Contains("strobe_falling_us"));
-    CHECK_THAT(errors_of(camera + "strobe_rising_us = 36\n"), Catch::Contains("2 numbers"));
-    CHECK_THAT(errors_of("[board]\nboard_delay_ns = { inputs = [1, 2, 3] }\n"),
-               Catch::Contains("4 numbers"));
 }

@@ -64,7 +64,8 @@ std::vector<Bytes> pass_all(Liar& liar, int count) {
     Board board;
     std::vector<Bytes> out;
     for (int i = 0; i < count; ++i)
-        for (const Packet& told : liar.pass(board.next(), HostTime{i})) out.push_back(encode(told));
+        for (const Packet& damaged : liar.pass(board.next(), HostTime{i}))
+            out.push_back(encode(damaged));
     return out;
 }
 
@@ -98,21 +99,21 @@ TEST_CASE("damage: each kind reaches each of its fields and nothing else, unseen
         std::uint32_t expected = 0;
         for (int i = 0; i < 3000; ++i) {
             const Packet packet = board.next();
-            const auto told = liar.pass(packet, HostTime{i});
-            for (const Packet& out : told) {
+            const auto passed = liar.pass(packet, HostTime{i});
+            for (const Packet& out : passed) {
                 CHECK(out.sequence == expected++);
                 Bytes encoded = encode(out);
                 encoded.pop_back();
                 REQUIRE(decode(encoded));
             }
             if (!keeps_its_messages(kind.way)) continue;
-            REQUIRE(told.size() == 1);
-            const Bytes after = plain(told[0]);
+            REQUIRE(passed.size() == 1);
+            const Bytes after = plain(passed[0]);
             for (unsigned at = 0; at < after.size(); ++at)
                 if (after[at] != packet.payload[at]) changed[packet.type].insert(at);
         }
         CHECK(liar.damaged() > 0);
-        CHECK(liar.told_since(0).front().kind == &kind);
+        CHECK(liar.damages_since(0).front().kind == &kind);
         if (!keeps_its_messages(kind.way) || kind.way == Way::flip_bits || kind.way == Way::step)
             continue;
         for (const Victim& victim : kind.victims) {
@@ -160,7 +161,7 @@ TEST_CASE("damage: as many as ordered") {
     CHECK(liar.damaged() == before);
 }
 
-TEST_CASE("damage: messages that change places are all told") {
+TEST_CASE("damage: messages that change places are all reported") {
     for (const char* name : {"swap-messages", "swap-fields"}) {
         Liar liar(1, period);
         liar.obey({{find_kind(name)}, 1});
@@ -168,8 +169,8 @@ TEST_CASE("damage: messages that change places are all told") {
         std::multiset<std::int64_t> numbers;
         for (int i = 0; i < 3500; ++i) {
             if (i == 3493) liar.obey({});
-            for (const Packet& told : liar.pass(board.next(), HostTime{i}))
-                if (told.type == Type::exposure) numbers.insert(get(told, exposure::trigger));
+            for (const Packet& damaged : liar.pass(board.next(), HostTime{i}))
+                if (damaged.type == Type::exposure) numbers.insert(get(damaged, exposure::trigger));
         }
         CHECK(numbers.size() == 500);
         CHECK(std::set<std::int64_t>(numbers.begin(), numbers.end()).size() == 500);
@@ -187,9 +188,9 @@ TEST_CASE("damage: a clock that steps does so in every message, and by whole per
     CHECK(step % period.ns == 0);
     for (int i = 0; i < 700; ++i) {
         const Packet packet = board.next();
-        const Packet told = liar.pass(packet, {}).at(0);
+        const Packet damaged = liar.pass(packet, {}).at(0);
         for (const Field& field : instants(packet.type))
-            CHECK(get(told, field) - get(packet, field) == step);
+            CHECK(get(damaged, field) - get(packet, field) == step);
     }
     liar.forget();
     const Packet packet = board.next();
@@ -202,9 +203,9 @@ TEST_CASE("damage: what was not observed stays so") {
     Packet packet = Board().next();
     REQUIRE(packet.type == Type::exposure);
     set(packet, exposure::end, unobserved);
-    const Packet told = liar.pass(packet, {}).at(0);
-    CHECK(get(told, exposure::start) != get(packet, exposure::start));
-    CHECK(get(told, exposure::end) == unobserved);
+    const Packet damaged = liar.pass(packet, {}).at(0);
+    CHECK(get(damaged, exposure::start) != get(packet, exposure::start));
+    CHECK(get(damaged, exposure::end) == unobserved);
 }
 
 TEST_CASE("damage: a sample's true number outlives every lie, and so does a frame's tick") {
@@ -218,11 +219,11 @@ TEST_CASE("damage: a sample's true number outlives every lie, and so does a fram
         const Packet packet = board.next();
         if (packet.type == Type::imu_sample)
             given.insert(static_cast<std::uint32_t>(get(packet, imu_sample::number)));
-        for (const Packet& told : liar.pass(packet, HostTime{i})) {
-            if (told.type != Type::imu_sample) continue;
+        for (const Packet& damaged : liar.pass(packet, HostTime{i})) {
+            if (damaged.type != Type::imu_sample) continue;
             constexpr double lsb = 1e-4 / 7000;
             const auto word = [&](const Field& field) {
-                return static_cast<float>(static_cast<std::int16_t>(get(told, field)) * lsb);
+                return static_cast<float>(static_cast<std::int16_t>(get(damaged, field)) * lsb);
             };
             CHECK(given.count(true_number(word(imu_sample::magnetic_x),
                                           word(imu_sample::magnetic_y), lsb)) == 1);

@@ -32,7 +32,7 @@ TEST_CASE("description_sandbox: a good one is looked at once, also in the next l
     CHECK_FALSE(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", other, never));
 }
 
-TEST_CASE("description_sandbox: why one is refused is told, and kept for this life only") {
+TEST_CASE("description_sandbox: why one is refused is reported, and kept for this life only") {
     const test::TemporaryDirectory directory;
     auto broken = honest();
     broken.bytes.resize(1000);

@@ -212,7 +212,7 @@ TEST_CASE("diagnosis: the clock says what its state means") {
     check(bench.camera(), Fault::clock_unknown, "withheld");
 }
 
-TEST_CASE("diagnosis: a start in progress is told, and is no fault of a young service") {
+TEST_CASE("diagnosis: a start in progress is reported, and is no fault of a young service") {
     Bench bench;
     bench.cam().delivery = {false, false, false, now - seconds(2), 0};
     CHECK(bench.camera().fault == Fault::starting);
@@ -226,7 +226,7 @@ TEST_CASE("diagnosis: a start in progress is told, and is no fault of a young se
     CHECK(bench.camera().health == Health::degraded);
 }
 
-TEST_CASE("diagnosis: lost packets are told from packets that do not pass, in numbers") {
+TEST_CASE("diagnosis: lost packets are distinguished from packets that do not pass, in numbers") {
     Bench bench;
     bench.refuse(EventReason::frame_incomplete, 10);
     check(bench.camera(), Fault::packet_loss, "10 of the last 20 frames");
@@ -333,7 +333,7 @@ TEST_CASE("diagnosis: a board that is being set up is not silent") {
     check(bench.board(), Fault::board_silent, "silent for 1.2 s");
 }
 
-TEST_CASE("diagnosis: late records are told with how late they are") {
+TEST_CASE("diagnosis: late records are reported with how late they are") {
     Bench bench;
     bench.refuse(EventReason::exposure_missing, 20);
     bench.cam().pipeline.record_delay = milliseconds(600);

@@ -12,14 +12,14 @@ TEST_CASE("event_validator: pulses of PPS are a second apart, and no event comes
     test::Pipelines bench;
     const HostTime begin{40'000'000'000};
     bench.synchronise(begin);
-    EventValidator witness(bench.translator);
+    EventValidator validator(bench.translator);
     const auto doubted = [&](wire::BoardEventKind kind, std::int64_t pulse, Duration off) {
         const HostTime at = begin + seconds(pulse);
         wire::Event event{};
         event.kind = kind;
         event.value = pulse;
         event.time_ns = (test::Pipelines::to_board(at) + off).ns;
-        return witness.judge(event, at + milliseconds(2)).has_value();
+        return validator.judge(event, at + milliseconds(2)).has_value();
     };
     CHECK(doubted(wire::BoardEventKind::pps, 0, {}));  // it is alone
     for (int i = 1; i < 20; ++i) CHECK_FALSE(doubted(wire::BoardEventKind::pps, i, {}));
@@ -35,7 +35,7 @@ TEST_CASE(
     test::Pipelines bench;
     const HostTime begin{40'000'000'000};
     bench.synchronise(begin);
-    EventValidator witness(bench.translator);
+    EventValidator validator(bench.translator);
     const HostTime now = begin + seconds(20);
     constexpr int kinds_on_the_wire = 17;
     for (int kind = 1; kind <= kinds_on_the_wire; ++kind) {
@@ -43,13 +43,13 @@ TEST_CASE(
         INFO("kind " << kind);
         wire::Event event{};
         event.kind = static_cast<wire::BoardEventKind>(kind);
-        const auto doubt = [&](Duration age) {
+        const auto judge = [&](Duration age) {
             event.time_ns = test::Pipelines::to_board(now - age).ns;
-            return witness.judge(event, now);
+            return validator.judge(event, now);
         };
-        CHECK_FALSE(doubt(milliseconds(2)));
-        CHECK_FALSE(doubt(seconds(9)));
-        CHECK(doubt(-milliseconds(20))->reason == EventReason::not_yet);
-        CHECK(doubt(seconds(11))->reason == EventReason::too_old);
+        CHECK_FALSE(judge(milliseconds(2)));
+        CHECK_FALSE(judge(seconds(9)));
+        CHECK(judge(-milliseconds(20))->reason == EventReason::not_yet);
+        CHECK(judge(seconds(11))->reason == EventReason::too_old);
     }
 }

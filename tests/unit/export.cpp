@@ -103,7 +103,7 @@ TEST_CASE("export: stopped, or with something wrong, it leaves nothing behind") 
     CHECK(sample.nothing_left());
 }
 
-TEST_CASE("export: a calibration that is another camera's is not used, and told") {
+TEST_CASE("export: a calibration that is another camera's is not used, and reported") {
     Sample sample;
     sample.settings.camchain = sample.directory.write(
         "chain.yaml",
@@ -154,7 +154,8 @@ TEST_CASE("export: the camchain follows the order of the cameras") {
     CHECK(chain->at(1).overlaps == std::vector<std::uint32_t>{0});
 }
 
-TEST_CASE("export: cameras that the camchain leaves out are told, and one camera of it is enough") {
+TEST_CASE(
+    "export: cameras that the camchain leaves out are reported, and one camera of it is enough") {
     Sample sample;
     std::string text = two_cameras;
     SECTION("the first is not known: there is no chain") {
@@ -184,7 +185,7 @@ TEST_CASE("export: cameras that the camchain leaves out are told, and one camera
     }
 }
 
-TEST_CASE("export: an exposure that is not known has no row, and that is told") {
+TEST_CASE("export: an exposure that is not known has no row, and that is reported") {
     Sample sample;
     test::RecordingFile file;
     for (std::uint64_t i = 0; i < 3; ++i) {
@@ -211,7 +212,7 @@ TEST_CASE("export: an exposure that is not known has no row, and that is told") 
     CHECK(to_text(*report, false).find("exposure of 1 frames is not known") != std::string::npos);
 }
 
-TEST_CASE("export: a mosaic of 16 bits is written, and told that Kalibr does not take it") {
+TEST_CASE("export: a mosaic of 16 bits is written, with a warning that Kalibr does not take it") {
     Sample sample;
     constexpr std::uint32_t bayer_rg12 = 0x01100011;
     std::ofstream(sample.settings.recording, std::ios::binary)

@@ -116,7 +116,7 @@ TEST_CASE("exposure_check: the camera's events are as good as data of the frame"
 }
 
 TEST_CASE(
-    "exposure_check: without a line, events tell the length if the camera agrees with itself") {
+    "exposure_check: without a line, events show the length if the camera agrees with itself") {
     Bench bench;
     CHECK(bench.unseen({}, milliseconds(3)).ns == 0);  // nothing else is known
     CHECK(bench.unseen(milliseconds(3), {}).ns == 0);  // it may be of the frame before
@@ -195,7 +195,8 @@ TEST_CASE("exposure_check: chunks of the frame before are found out, and used as
         const Duration length = microseconds(3000 + i * 377 % 2000);
         const ExposureVerdict verdict = bench.frame(length, before);
         withheld += verdict.contradicted ? 1 : 0;
-        // Of the newest length there is no witness yet: half of what it may be wrong by is sigma.
+        // Of the newest length there is no confirmation yet: half of what it may be wrong by is
+        // sigma.
         INFO(i << ": " << length.ns << " after " << before.ns);
         if (i > 10) CHECK((verdict.correction.sigma * 6).ns > (absolute(length - before) / 2).ns);
         before = length;

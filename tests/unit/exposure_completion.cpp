@@ -119,7 +119,7 @@ TEST_CASE("exposure_completion: without a line of its own, an exposure begins a 
     lines.trigger.delay = microseconds(18);
     lines.start.delay = lines.end.delay = microseconds(36);
     completion.set_line_delays(lines);
-    // The board may have been told another latency than the camera turned out to have.
+    // The board may have been given another latency than the camera turned out to have.
     const auto predicted = completion.complete(record(start_ns, end_ns, wire::exposure_predicted));
     CHECK(predicted.start.ns == trigger_ns + 18'000);
     CHECK(predicted.end - predicted.start == milliseconds(4));

@@ -169,7 +169,7 @@ TEST_CASE("exposure_tracker: a second start of one trigger ends it, and belongs 
     CHECK(bench.tracker.edge(154 * ms, false).trigger == 2);
 }
 
-TEST_CASE("exposure_tracker: edges without a trigger are told, and complete nothing") {
+TEST_CASE("exposure_tracker: edges without a trigger are reported, and complete nothing") {
     Bench bench(1);
     CHECK(bench.tracker.edge(99 * ms, true).trigger == 0);
     CHECK(bench.tracker.edge(101 * ms, false).trigger == 0);

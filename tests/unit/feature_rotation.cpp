@@ -131,7 +131,7 @@ TEST_CASE("feature_rotation: what turns along does not pull", "[feature_rotation
     CHECK((turned(pinhole(), rotation, 80).rotation - rotation).norm() < 8e-4);
 }
 
-TEST_CASE("feature_rotation: nothing to follow, nothing told", "[feature_rotation]") {
+TEST_CASE("feature_rotation: nothing to follow, nothing reported", "[feature_rotation]") {
     auto tracker = FeatureRotation::create(pinhole());
     REQUIRE(tracker);
     const GreyImage blank{width, height, std::vector<std::uint8_t>(width * height, 100)};
@@ -147,7 +147,7 @@ TEST_CASE("feature_rotation: nothing to follow, nothing told", "[feature_rotatio
     CHECK_FALSE(*elsewhere);
 }
 
-TEST_CASE("feature_rotation: odd sizes and cameras are told", "[feature_rotation]") {
+TEST_CASE("feature_rotation: odd sizes and cameras are reported", "[feature_rotation]") {
     CHECK_FALSE(FeatureRotation::create({}));
     auto tracker = FeatureRotation::create(pinhole());
     REQUIRE(tracker);

@@ -345,7 +345,7 @@ TEST_CASE("frame_assembler: a trailer amid the data is no end") {
     CHECK(bench.right(1));
 }
 
-TEST_CASE("frame_assembler: a leader of another payload is told, its packets are dropped") {
+TEST_CASE("frame_assembler: a leader of another payload is reported, its packets are dropped") {
     Bench bench;
     bench.take(leader(1, false, 0x4001));
     bench.send(1, {1, 2, 3, 4, 5, 6});

@@ -35,7 +35,7 @@ struct Camera {
         for (int i = 0; i < more; ++i) take();
     }
 
-    FrameProof told() const {
+    FrameProof proof() const {
         FrameProof proof;
         for (const Evidence& item : evidence) proof.add(item);
         return proof;
@@ -60,7 +60,7 @@ TEST_CASE("frame_proof: frames before the lock are proved by those after it") {
     Camera stream;
     for (int i = 0; i < 15; ++i) stream.take();
     stream.pattern_and(40);
-    const auto proved = stream.told().finish();
+    const auto proved = stream.proof().finish();
     CHECK(proved.size() == 67);
     CHECK(right(proved));
     const auto late = std::count_if(proved.begin(), proved.end(),
@@ -73,7 +73,7 @@ TEST_CASE("frame_proof: without a camera's clock, only what lies between proved 
     Camera stream(false);
     for (int i = 0; i < 15; ++i) stream.take();
     stream.pattern_and(40);
-    const auto proved = stream.told().finish();
+    const auto proved = stream.proof().finish();
     CHECK(right(proved));
     CHECK(proved.size() < 67);
 }
@@ -85,7 +85,7 @@ TEST_CASE("frame_proof: a frame whose exposure another contradicts stays unprove
     wrong.camera_time = wrong.camera_time + period / 2;
     const std::uint64_t wrong_id = wrong.block_id;
     stream.pattern_and(40);
-    const auto proved = stream.told().finish();
+    const auto proved = stream.proof().finish();
     CHECK(right(proved));
     for (const ProvedFrame& frame : proved) CHECK(frame.arrival.block_id != wrong_id);
 }
@@ -94,7 +94,7 @@ TEST_CASE("frame_proof: nothing without the begin of a stream") {
     Camera stream;
     stream.evidence.erase(stream.evidence.begin());
     stream.pattern_and(5);
-    FrameProof proof = stream.told();
+    FrameProof proof = stream.proof();
     CHECK_FALSE(proof.begun());
     CHECK(proof.finish().empty());
     CHECK(FrameProof().finish().empty());
@@ -108,7 +108,7 @@ TEST_CASE("frame_proof: streams are not mixed") {
     stream.id = 500;
     stream.take(40);
     stream.pattern_and(20);
-    const auto proved = stream.told().finish();
+    const auto proved = stream.proof().finish();
     CHECK(right(proved));
     CHECK(proved.size() >= 60);
 }

@@ -40,7 +40,7 @@ TEST_CASE("grey_picture: bytes, words and colours keep their depth, padding is l
     CHECK(colour->pixels == std::vector<std::uint16_t>{30});
 }
 
-TEST_CASE("grey_picture: what cannot be read is told") {
+TEST_CASE("grey_picture: what cannot be read is reported") {
     const auto packed = grey_picture("cam3", frame(0x010C0047, 2, 1, 3), bytes({1, 2, 3}));
     REQUIRE_FALSE(packed);
     CHECK_THAT(packed.error().message(), Catch::Contains("cam3") && Catch::Contains("Mono12p"));

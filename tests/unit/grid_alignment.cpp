@@ -54,8 +54,7 @@ wire::Exposure exposure(std::uint64_t tick, std::uint16_t flags = wire::exposure
 
 }  // namespace
 
-TEST_CASE(
-    "grid_alignment: the board is told where the next whole second of the output clock lies") {
+TEST_CASE("grid_alignment: the board learns where the next whole second of the output clock lies") {
     Bench bench;
     compare(bench.translator, BoardTime{}, BoardTime{60'000'000'000}, microseconds(100));
     const HostTime now = host_of(BoardTime{60'000'000'000});

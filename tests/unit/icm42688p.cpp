@@ -90,7 +90,7 @@ TEST_CASE("icm42688p: what the registers hold") {
     CHECK(sample.flags == 0);
 }
 
-TEST_CASE("icm42688p: old data is told, and a part that is off or gone") {
+TEST_CASE("icm42688p: old data is reported, and a part that is off or gone") {
     std::vector<int> old = data;
     old[16] = 0xF7;  // every bit but data-ready
     CHECK(read(old, 0x0F).flags == wire::imu_repeated);

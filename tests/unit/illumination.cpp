@@ -440,7 +440,7 @@ TEST_CASE("illumination: one that is refused brings back none that was forgotten
     CHECK(bench.gate() == Times{9'900 * us, 10'900 * us});
 }
 
-TEST_CASE("illumination: eight exposures are planned, one more gets no light and is told") {
+TEST_CASE("illumination: eight exposures are planned, one more gets no light and is reported") {
     Bench bench;
     for (Nanoseconds n = 1; n <= 8; ++n) bench.light.plan(0, 20 * n * ms, ms, true, 0);
     CHECK(bench.reports.all.empty());

@@ -145,7 +145,8 @@ TEST_CASE("imu_output: the product, and a CRC over what follows the status") {
     }
 }
 
-TEST_CASE("imu_output: a sample that failed its check is not shown, a part's own failure is told") {
+TEST_CASE(
+    "imu_output: a sample that failed its check is not shown, a part's own failure is reported") {
     wire::ImuSample sample = sample_of(ImuKind::bmi088);
     CHECK(image_of(sample).burst[0] == 0);
     sample.flags =

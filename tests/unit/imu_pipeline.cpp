@@ -232,7 +232,7 @@ TEST_CASE(
           (override_us ? imu::FilterDelaySource::configuration : imu::FilterDelaySource::model));
 }
 
-TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it has changed") {
+TEST_CASE("imu_pipeline: a failure is reported once, then rarely, and anew when it has changed") {
     test::Pipelines bench;
     ImuConfiguration configuration;
     configuration.model = imu::find_model("adis16448b");
@@ -240,33 +240,33 @@ TEST_CASE("imu_pipeline: a failure is told once, then rarely, and anew when it h
                          bench.translator, bench.events);
     wire::Event event{};
     HostTime now{100'000'000'000};
-    int told = 0;
-    const auto tell = [&](wire::BoardEventKind kind, std::int64_t value) {
+    int logged = 0;
+    const auto note = [&](wire::BoardEventKind kind, std::int64_t value) {
         event.kind = kind;
         event.value = value;
         now = now + seconds(1);
-        if (pipeline.note_state(event, now)) ++told;
+        if (pipeline.note_state(event, now)) ++logged;
     };
-    for (int i = 0; i < 3600; ++i) tell(wire::BoardEventKind::imu_failed, 120);
-    CHECK(told == 6);
+    for (int i = 0; i < 3600; ++i) note(wire::BoardEventKind::imu_failed, 120);
+    CHECK(logged == 6);
     CHECK_FALSE(pipeline.report().working);
     CHECK(pipeline.report().failure.times == 3600);
-    tell(wire::BoardEventKind::imu_failed, 0);
-    CHECK(told == 7);
-    tell(wire::BoardEventKind::imu_ready, 0);
-    CHECK(told == 8);
+    note(wire::BoardEventKind::imu_failed, 0);
+    CHECK(logged == 7);
+    note(wire::BoardEventKind::imu_ready, 0);
+    CHECK(logged == 8);
     CHECK(pipeline.report().working);
     now = now + seconds(120);
-    tell(wire::BoardEventKind::imu_failed, 0);
-    CHECK(told == 9);
+    note(wire::BoardEventKind::imu_failed, 0);
+    CHECK(logged == 9);
     for (int i = 0; i < 100; ++i) {  // it comes and goes
-        tell(wire::BoardEventKind::imu_ready, 0);
-        tell(wire::BoardEventKind::imu_failed, 0);
+        note(wire::BoardEventKind::imu_ready, 0);
+        note(wire::BoardEventKind::imu_failed, 0);
     }
-    CHECK(told <= 11);
+    CHECK(logged <= 11);
 }
 
-TEST_CASE("imu_pipeline: samples that repeat are counted, and only a wired line tells an age") {
+TEST_CASE("imu_pipeline: samples that repeat are counted, and only a wired line shows an age") {
     test::Pipelines bench;
     ImuConfiguration configuration;
     configuration.model = imu::find_model("bmi088");

@@ -46,24 +46,25 @@ struct World {
     Port port{1, reports};
 };
 
-using Told = std::pair<unsigned, unsigned>;
+using NumberAndFlags = std::pair<unsigned, unsigned>;
 
 }  // namespace
 
-TEST_CASE("imu_port: numbers count from zero, without those that were missed, which is told once") {
+TEST_CASE(
+    "imu_port: numbers count from zero, without those that were missed, which is reported once") {
     World world;
-    CHECK(world.next() == Told{0, 0});
-    CHECK(world.next(wire::imu_stamped) == Told{1, wire::imu_stamped});
+    CHECK(world.next() == NumberAndFlags{0, 0});
+    CHECK(world.next(wire::imu_stamped) == NumberAndFlags{1, wire::imu_stamped});
     world.port.miss();
-    CHECK(world.next() == Told{3, wire::imu_overrun});
-    CHECK(world.next() == Told{4, 0});
+    CHECK(world.next() == NumberAndFlags{3, wire::imu_overrun});
+    CHECK(world.next() == NumberAndFlags{4, 0});
     world.port.miss(7);
     world.port.miss(0);
-    CHECK(world.next() == Told{12, wire::imu_overrun});
+    CHECK(world.next() == NumberAndFlags{12, wire::imu_overrun});
     world.port.miss(0);
-    CHECK(world.next() == Told{13, 0});
+    CHECK(world.next() == NumberAndFlags{13, 0});
     world.port.miss(1);
-    CHECK(world.next() == Told{15, wire::imu_overrun});
+    CHECK(world.next() == NumberAndFlags{15, wire::imu_overrun});
     CHECK(world.port.errors() == 0);
     CHECK(world.port.restarts() == 0);
 }
@@ -100,8 +101,8 @@ TEST_CASE("imu_port: a sample is repeated if gyro and accelerometer are as in th
 
 TEST_CASE("imu_port: what a part says is repeated stays so") {
     World world;
-    CHECK(world.next(wire::imu_repeated) == Told{0, wire::imu_repeated});
-    CHECK(world.next() == Told{1, 0});
+    CHECK(world.next(wire::imu_repeated) == NumberAndFlags{0, wire::imu_repeated});
+    CHECK(world.next() == NumberAndFlags{1, 0});
 }
 
 TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too many") {
@@ -127,7 +128,7 @@ TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too man
     SECTION("the last gives none") { CHECK_FALSE(world.port.count_error()); }
     CHECK(world.port.errors() == 58);
     CHECK(world.port.restarts() == 0);
-    // Once it is told, they are counted anew.
+    // Once it is reported, they are counted anew.
     world.port.report_failure(wire::BoardEventKind::imu_failed, 5, 0);
     CHECK(world.port.restarts() == 1);
     for (int i = 1; i < 20; ++i) CHECK(world.port.count_error());
@@ -143,17 +144,17 @@ TEST_CASE("imu_port: a part's own diagnosis is an error of each sample, and no f
     CHECK(world.port.errors() == 31);
 }
 
-TEST_CASE("imu_port: events tell the port, and after a failure at least one sample is missing") {
+TEST_CASE("imu_port: events name the port, and after a failure at least one sample is missing") {
     World world;
     world.port.report_event(wire::BoardEventKind::imu_ready, 7, 100);
     CHECK(world.reports.events ==
           std::vector<Event>{{wire::BoardEventKind::imu_ready, 1, 7, 100, 0}});
-    CHECK(world.next() == Told{0, 0});
+    CHECK(world.next() == NumberAndFlags{0, 0});
     world.port.report_failure(wire::BoardEventKind::imu_silent, 8, 9);
     world.port.report_failure(wire::BoardEventKind::imu_failed, 10, 11, 12);
     CHECK(world.port.restarts() == 2);
     REQUIRE(world.reports.events.size() == 3);
     CHECK(world.reports.events[1] == Event{wire::BoardEventKind::imu_silent, 1, 8, 9, 0});
     CHECK(world.reports.events[2] == Event{wire::BoardEventKind::imu_failed, 1, 10, 11, 12});
-    CHECK(world.next() == Told{3, wire::imu_overrun});
+    CHECK(world.next() == NumberAndFlags{3, wire::imu_overrun});
 }

@@ -56,7 +56,7 @@ TEST_CASE("kalibr_yaml: a camchain is read, written and read to the same") {
         CHECK(back[i] == Approx(cameras->at(0).from_imu->at(i)).margin(1e-12));
 }
 
-TEST_CASE("kalibr_yaml: what is wrong is told by file and line") {
+TEST_CASE("kalibr_yaml: what is wrong is reported by file and line") {
     for (const char* text : {"", "cam0: 3", "x: 1", "cam0:\n  camera_model: pinhole\n", ": [",
                              "cam0: {camera_model: p, intrinsics: [a], distortion_model: n}",
                              "cam0: {camera_model: p, intrinsics: [1,1,1,1], distortion_model: n, "

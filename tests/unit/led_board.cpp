@@ -55,7 +55,7 @@ TEST_CASE("led_board: it is found in a few pictures of a scene at rest") {
     check_place(*place, settings.leds);
 }
 
-TEST_CASE("led_board: where there is none, none is found, and the cure is told") {
+TEST_CASE("led_board: where there is none, none is found, and the cure is reported") {
     LedBenchSettings settings;
     settings.leds = {-2000, -2000, -1000, -1000};
     settings.moving = GENERATE(true, false);
@@ -81,7 +81,7 @@ TEST_CASE("led_board: levels are the share of the exposure that each LED was on"
         CHECK(seen.levels.at(i) == Approx(expected.at(i)).margin(0.03));
 }
 
-TEST_CASE("led_board: LEDs that are saturated, or covered, are told") {
+TEST_CASE("led_board: LEDs that are saturated, or covered, are reported") {
     LedBenchSettings settings;
     settings.led_level = 400;
     LedBench bright(settings);

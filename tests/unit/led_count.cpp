@@ -15,7 +15,7 @@ double off(const LedReading& reading, double phase) {
 
 }  // namespace
 
-TEST_CASE("led_count: the levels of an exposure tell its middle, whatever its length and order") {
+TEST_CASE("led_count: the levels of an exposure show its middle, whatever its length and order") {
     const double exposure = GENERATE(0.6, 0.97, 1.0, 1.3, 2.0, 2.7, 3.0);
     LedLayout layout;
     layout.backward = GENERATE(false, true);
@@ -33,7 +33,7 @@ TEST_CASE("led_count: the levels of an exposure tell its middle, whatever its le
     }
 }
 
-TEST_CASE("led_count: without a step within the exposure, the count alone is told") {
+TEST_CASE("led_count: without a step within the exposure, the count alone is reported") {
     const LedReading reading = read_leds(led_levels(17.3, 0.5, {}), 0.5, {});
     CHECK(reading.phase == Approx(17.5));
     CHECK(reading.half_width == Approx(0.25));

@@ -108,7 +108,7 @@ TEST_CASE("led_report: a slip in the middle is a wrong increment, and mismatches
     CHECK(made.pairs.at(0).mismatches == 199);
 }
 
-TEST_CASE("led_report: wrong direction and order of bits are told, with those that fit") {
+TEST_CASE("led_report: wrong direction and order of bits are reported, with those that fit") {
     Series series;
     series.layout.backward = GENERATE(true, false);
     series.layout.high_bit_first = !series.layout.backward;
@@ -119,7 +119,7 @@ TEST_CASE("led_report: wrong direction and order of bits are told, with those th
                           : "they fit with --direction forward --bits high-first"));
 }
 
-TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are told") {
+TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are reported") {
     Series series;
     series.rate_hz = 1000;
     const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 1000);
@@ -134,14 +134,14 @@ TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are to
     CHECK_FALSE(report({{"cam0", shots(series)}, {"cam1", shots(off)}}).ok());
 }
 
-TEST_CASE("led_report: the wrong rate is told, a rate that is a little off as well") {
+TEST_CASE("led_report: the wrong rate is reported, a rate that is a little off as well") {
     CHECK(notes(report({{"cam0", shots({})}, {"cam1", shots({})}}, 1003.3), "--rate"));
     Series series;
     series.rate_hz = 971;
     CHECK(notes(report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 970), "971.000"));
 }
 
-TEST_CASE("led_report: exposures that are short tell counts alone, those that are long nothing") {
+TEST_CASE("led_report: exposures that are short show counts alone, those that are long nothing") {
     Series series;
     series.exposure_s = 0.2e-3;
     const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}});
@@ -156,7 +156,7 @@ TEST_CASE("led_report: exposures that are short tell counts alone, those that ar
     CHECK_THAT(none.error().message(), Catch::Contains("too long") && Catch::Contains("3000 us"));
 }
 
-TEST_CASE("led_report: saturated LEDs tell the count alone, hidden ones nothing") {
+TEST_CASE("led_report: saturated LEDs show the count alone, hidden ones nothing") {
     auto bright = shots({});
     for (LedObservation& shot : bright) shot.picture.state = LedState::saturated;
     const LedReport made = report({{"cam0", shots({})}, {"cam1", bright}});
@@ -185,7 +185,7 @@ TEST_CASE("led_report: pairs are of one tick, epoch and life, and one camera mak
     CHECK(notes(alone, "only one camera"));
 }
 
-TEST_CASE("led_report: pictures that were not triggered are in no pair, and that is told") {
+TEST_CASE("led_report: pictures that were not triggered are in no pair, and that is reported") {
     auto arrived = shots({});
     for (LedObservation& shot : arrived) {
         shot.triggered = false;

@@ -19,7 +19,7 @@ TEST_CASE("library_log: some lines pass in each window, the others are counted")
     unsigned passed = 0;
     for (int i = 0; i < 6200; ++i) passed += limit.take(now = now + milliseconds(1)) ? 1 : 0;
     CHECK(passed == LineLimit::lines);
-    CHECK(limit.collect(now) == 0);  // told once the window is over
+    CHECK(limit.collect(now) == 0);  // reported once the window is over
     now = now + LineLimit::window;
     CHECK(limit.collect(now) == 6200 - LineLimit::lines);
     CHECK(limit.collect(now) == 0);

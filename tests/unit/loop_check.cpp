@@ -45,7 +45,7 @@ TEST_CASE("loop_check: an input that hears something else is open") {
     CHECK(check_loop(sent, few).result == LoopResult::open);
 }
 
-TEST_CASE("loop_check: what is wrong with a line is told with what to check") {
+TEST_CASE("loop_check: what is wrong with a line is reported with what to check") {
     struct Case {
         const char* name;
         std::function<void(SeenEdges&)> spoil;

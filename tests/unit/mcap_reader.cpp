@@ -138,7 +138,7 @@ TEST_CASE("mcap_reader: a chunk of another checksum is an error with its place")
     CHECK(items > 0);
 }
 
-TEST_CASE("mcap_reader: a compressed chunk is told by its compression") {
+TEST_CASE("mcap_reader: a compressed chunk is reported with its compression") {
     const Sample sample;
     std::string bytes = test::sample_recording(1, false, false, mono8);
     const std::string content = std::string(28, '\0') + std::string("\4\0\0\0zstd", 8) +
@@ -194,7 +194,7 @@ TEST_CASE("mcap_reader: a summary that names a place twice, or one in another, i
     CHECK(reader->chunks().size() == 1);
 }
 
-TEST_CASE("mcap_reader: what is no MCAP file is told, and a directory, and nothing") {
+TEST_CASE("mcap_reader: what is no MCAP file is reported, and a directory, and nothing") {
     const Sample sample;
     CHECK_FALSE(McapReader::open(sample.path));
     CHECK_FALSE(McapReader::open(sample.directory.path().string()));

@@ -47,7 +47,7 @@ TEST_CASE_METHOD(Machine, "memory_budget: a ring leaves 64 MiB to others") {
 }
 
 TEST_CASE_METHOD(Machine,
-                 "memory_budget: where the machine does not tell, the file system decides") {
+                 "memory_budget: where the machine does not say, the file system decides") {
     for (const char* memory : {"", "MemTotal: 5 kB\n", "MemAvailable: much\n", "\n\n"})
         CHECK(check(mib, memory));
     CHECK(check_tmpfs_space(directory.path() / "cam0", mib, directory.path() / "nothing"));

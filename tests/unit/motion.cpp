@@ -61,7 +61,7 @@ TEST_CASE("motion: the accelerometer shows gravity and how the position changes"
     }
 }
 
-TEST_CASE("motion: it is as strong as it is told, within its band, and the seed draws it") {
+TEST_CASE("motion: it is as strong as configured, within its band, and the seed draws it") {
     MotionScenario scenario = wild();
     scenario.lowest_hz = 0.5;
     scenario.highest_hz = 3;
@@ -80,7 +80,7 @@ TEST_CASE("motion: it is as strong as it is told, within its band, and the seed 
     CHECK(motion.rate_rad_s(at) != Motion(zero, scenario, 8).rate_rad_s(at));
 }
 
-TEST_CASE("motion: without a scenario it nods, and stands still when told to") {
+TEST_CASE("motion: without a scenario it nods, and stands still on request") {
     const Motion nodding(zero);
     CHECK(nodding.roll_rad(zero + milliseconds(500)) == Approx(0.2));
     CHECK(nodding.rate_rad_s(zero).x() == Approx(0.2 * 3.14159265358979));

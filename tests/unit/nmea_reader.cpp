@@ -298,7 +298,7 @@ TEST_CASE("nmea_reader: it begins anew with what it knows of pulses and bytes") 
     CHECK(feed(reader, line.substr(10), 400 * ms).empty());
     CHECK(feed(reader, line, 500 * ms).empty());
     reader.pulse(0);
-    CHECK(feed(reader, line, 500 * ms).size() == 1);  // told once more
+    CHECK(feed(reader, line, 500 * ms).size() == 1);  // reported once more
 }
 
 TEST_CASE("nmea_reader: which pulse a sentence names, to the nanosecond") {
@@ -324,7 +324,8 @@ TEST_CASE("nmea_reader: which pulse a sentence names, to the nanosecond") {
     CHECK(named({0, second, 2 * second}, second - 200 * ms) == std::nullopt);  // too long ago
 }
 
-TEST_CASE("nmea_reader: another name for the same pulse is told, and the same name for another") {
+TEST_CASE(
+    "nmea_reader: another name for the same pulse is reported, and the same name for another") {
     NmeaReader reader;
     reader.begin(115'200);
     reader.pulse(second);

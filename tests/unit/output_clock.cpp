@@ -91,7 +91,7 @@ TEST_CASE("output_clock: a preempted reading is made again") {
 }
 
 TEST_CASE(
-    "output_clock: preempted at each try, the best of them is taken and tells how bad it is") {
+    "output_clock: preempted at each try, the best of them is taken and shows how bad it is") {
     Machine machine(OutputClockKind::realtime);
     // In the third try the least.
     for (int attempt = 0; attempt < 8; ++attempt)
@@ -107,23 +107,23 @@ TEST_CASE("output_clock: each step is seen by the next reading, and once") {
     Machine machine(OutputClockKind::realtime);
     const auto by = GENERATE(seconds(1), -seconds(1), milliseconds(1), -milliseconds(1),
                              microseconds(50), -microseconds(50), microseconds(2));
-    const bool told = GENERATE(true, false);
+    const bool notified = GENERATE(true, false);
     const Duration before = machine.output.offset();
-    machine.clocks->step(by, told);
+    machine.clocks->step(by, notified);
     const OutputReading reading = machine.output.read();
     CHECK(reading.steps == 1);
     CHECK(absolute(reading.minus_host - before - by) < nanoseconds(200));
     for (int i = 0; i < 100; ++i) {
-        if (i == 50 && !told) machine.clocks->tell_of_set();  // the kernel comes late
+        if (i == 50 && !notified) machine.clocks->notify_of_set();  // the kernel comes late
         machine.clocks->pass(milliseconds(10));
         CHECK(machine.output.read().steps == 1);
     }
-    machine.clocks->step(by, told);
+    machine.clocks->step(by, notified);
     CHECK(machine.output.read().steps == 2);
     CHECK(machine.output.suspends() == 0);
 }
 
-TEST_CASE("output_clock: a step too small for a comparison is told by the kernel") {
+TEST_CASE("output_clock: a step too small for a comparison is reported by the kernel") {
     Machine machine(OutputClockKind::realtime);
     machine.clocks->step(nanoseconds(400));
     machine.clocks->pass(milliseconds(101));
@@ -141,7 +141,7 @@ TEST_CASE("output_clock: a step is seen through a wide reading, too") {
     };
     machine.clocks->step(microseconds(50));
     preempt_all();
-    CHECK(machine.output.read().steps == 1);  // the kernel told
+    CHECK(machine.output.read().steps == 1);  // the kernel reported it
     machine.clocks->pass(milliseconds(10));
     CHECK(machine.output.read().steps == 1);
     machine.clocks->step(milliseconds(20), false);
@@ -150,7 +150,7 @@ TEST_CASE("output_clock: a step is seen through a wide reading, too") {
     CHECK(machine.output.read().steps == 2);
     machine.clocks->step(microseconds(50), false);
     preempt_all();
-    CHECK(machine.output.read().steps == 2);  // what nobody told is not seen ...
+    CHECK(machine.output.read().steps == 2);  // what nobody reported is not seen ...
     CHECK(machine.output.read().steps == 3);  // ... until a reading is narrow again
 }
 

@@ -113,7 +113,7 @@ TEST_CASE("output_queue: cancelling leaves the output idle and the others alone"
     CHECK(queue.cancel(1));
 }
 
-TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, and is told") {
+TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, and is reported") {
     Bench bench;
     bench.queue.pulse(100'000, 0, true, 50'000);
     bench.queue.pulse(180'000, 0, true, 50'000);
@@ -215,7 +215,7 @@ TEST_CASE("output_queue: each output has room of its own, that of all fits") {
     CHECK(bench.moves.all.empty());
 }
 
-TEST_CASE("output_queue: the most that waited is told once") {
+TEST_CASE("output_queue: the most that waited is reported once") {
     Bench bench;
     for (Nanoseconds at = 1; at <= 3; ++at) bench.queue.set(at, 0, true);
     bench.queue.commit(2 - OutputQueue::horizon);

@@ -156,7 +156,7 @@ TEST_CASE("packet: a hello of another major version is passed on, whatever its s
         bytes.push_back(0);
         return bytes;
     };
-    const auto told = [&](std::uint8_t major, std::size_t payload) {
+    const auto heard = [&](std::uint8_t major, std::size_t payload) {
         Decoder decoder;
         const Bytes bytes = send(major, payload);
         HelloVersion version{};
@@ -169,10 +169,10 @@ TEST_CASE("packet: a hello of another major version is passed on, whatever its s
         return version.major * 256 + version.minor;
     };
     for (const std::size_t payload : {std::size_t{2}, std::size_t{48}, sizeof(BoardHello)})
-        CHECK(told(2, payload) == 0x207);
-    CHECK(told(4, 100) == 0x407);
-    CHECK(told(protocol_major, sizeof(BoardHello)) == protocol_major * 256 + 7);
-    CHECK(told(protocol_major, 48) == 0);
-    CHECK(told(2, 1) == 0);
-    CHECK(told(2, 0) == 0);
+        CHECK(heard(2, payload) == 0x207);
+    CHECK(heard(4, 100) == 0x407);
+    CHECK(heard(protocol_major, sizeof(BoardHello)) == protocol_major * 256 + 7);
+    CHECK(heard(protocol_major, 48) == 0);
+    CHECK(heard(2, 1) == 0);
+    CHECK(heard(2, 0) == 0);
 }

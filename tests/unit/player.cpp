@@ -121,7 +121,7 @@ TEST_CASE("pace: who does not set it waits as the others do, but not for what is
     CHECK(clock.due({seconds(202).ns}, begin) == begin + seconds(1));
 }
 
-TEST_CASE("player: what the clock was told in the minutes before is there at once") {
+TEST_CASE("player: what the clock was fed in the minutes before is there at once") {
     const test::TemporaryDirectory directory;
     constexpr std::int64_t begin = 1'700'000'000'000'000'000;
     test::RecordingFile file;

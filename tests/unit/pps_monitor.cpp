@@ -19,7 +19,7 @@ PpsMonitor with_pulses(Nanoseconds first, Nanoseconds last, Nanoseconds period =
 
 }  // namespace
 
-TEST_CASE("pps_monitor: it trusts the fourth pulse, and tells no error before") {
+TEST_CASE("pps_monitor: it trusts the fourth pulse, and reports no error before") {
     PpsMonitor monitor;
     CHECK(monitor.state(0) == PpsState::none);
     for (int n = 0; n < 3; ++n) {
@@ -91,7 +91,7 @@ TEST_CASE("pps_monitor: a pulse between two others is no part of them, however r
     }
 }
 
-TEST_CASE("pps_monitor: a pulse that is told twice counts once") {
+TEST_CASE("pps_monitor: a pulse that is reported twice counts once") {
     PpsMonitor monitor = with_pulses(0, 2 * second);
     monitor.pulse(2 * second);
     CHECK(monitor.state(2 * second) == PpsState::acquiring);

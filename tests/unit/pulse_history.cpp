@@ -15,8 +15,8 @@ PulseHistory after(std::uint32_t pulses, std::uint32_t first = 0) {
     return history;
 }
 
-EventReason reason(const std::optional<Implausibility>& doubt) {
-    return doubt ? doubt->reason : EventReason::none;
+EventReason reason(const std::optional<Implausibility>& found) {
+    return found ? found->reason : EventReason::none;
 }
 
 }  // namespace

@@ -234,18 +234,19 @@ TEST_CASE_METHOD(Instance, "recorder: stamps and events have time, life, and all
     }
 }
 
-TEST_CASE_METHOD(Instance, "recorder: what is overwritten before it is written is told as lost") {
+TEST_CASE_METHOD(Instance,
+                 "recorder: what is overwritten before it is written is reported as lost") {
     const auto settings = this->settings();
     const RecordReport report = record(settings, [&](int turn) {
         for (int i = 0; i < (turn == 2 ? 100 : 1); ++i) publish();
         return turn < 5;
     });
-    const StreamReport& told = report.streams.at("cam0");
-    CHECK(told.lost > 80);
-    CHECK(told.items + told.lost == 104);
-    CHECK(gaps_in(settings.output, "cam0").at("lost") == told.lost);
+    const StreamReport& stream = report.streams.at("cam0");
+    CHECK(stream.lost > 80);
+    CHECK(stream.items + stream.lost == 104);
+    CHECK(gaps_in(settings.output, "cam0").at("lost") == stream.lost);
     const Frames frames = frames_in(settings.output);
-    CHECK(frames.numbers.size() == told.items);
+    CHECK(frames.numbers.size() == stream.items);
     CHECK(frames.right);
     CHECK(report.streams.at("imu0").lost == 0);
 }
@@ -267,7 +268,8 @@ TEST_CASE_METHOD(Instance, "recorder: what is overwritten while it is written is
     CHECK(frames_in((files.path() / "a.mcap").string()).numbers == from_to(0, 1));
 }
 
-TEST_CASE_METHOD(Instance, "recorder: a service that ends and comes back is told, and followed") {
+TEST_CASE_METHOD(Instance,
+                 "recorder: a service that ends and comes back is reported, and followed") {
     const auto settings = this->settings();
     const RecordReport report = record(settings, [&](int turn) {
         if (turn == 4) close();
@@ -276,11 +278,11 @@ TEST_CASE_METHOD(Instance, "recorder: a service that ends and comes back is told
         if (camera) publish();
         return turn < 12;
     });
-    const StreamReport& told = report.streams.at("cam0");
-    CHECK(told.restarts == 1);
-    CHECK(told.epochs == 1);
-    CHECK(told.lost == 0);
-    CHECK(told.items == 10);
+    const StreamReport& stream = report.streams.at("cam0");
+    CHECK(stream.restarts == 1);
+    CHECK(stream.epochs == 1);
+    CHECK(stream.lost == 0);
+    CHECK(stream.items == 10);
     CHECK(gaps_in(settings.output, "cam0") ==
           std::map<std::string, std::uint64_t>{{"epoch", 1}, {"gone", 1}, {"restarted", 1}});
     auto expected = from_to(0, 4);
@@ -467,16 +469,16 @@ TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before 
         const auto report = client::record(full);
         if (!report) return false;
         const StreamReport& camera_report = report->streams.at("cam0");
-        std::ofstream(files.path() / "told") << camera_report.items;
+        std::ofstream(files.path() / "reported") << camera_report.items;
         return camera_report.lost > 0 && report->stopped_early && camera->head() < 5000 &&
                report->stopped_early->message().find("free some") != std::string::npos;
     }));
     const Frames frames = frames_in(settings.output);
     CHECK(frames.numbers.size() > 500);
     CHECK(frames.right);
-    std::uint64_t told = 0;
-    std::ifstream(files.path() / "told") >> told;
-    CHECK(told == frames.numbers.size());
+    std::uint64_t reported = 0;
+    std::ifstream(files.path() / "reported") >> reported;
+    CHECK(reported == frames.numbers.size());
 }
 
 TEST_CASE_METHOD(Instance, "recorder: a disk without room for the summary costs no item") {

@@ -121,7 +121,7 @@ TEST_CASE("recording: gaps are those of the file, and an image without its item 
     CHECK(gaps->at(0).reason == "restarted");
 }
 
-TEST_CASE("recording: files after the first are of it, others are told") {
+TEST_CASE("recording: files after the first are of it, others are reported") {
     const test::TemporaryDirectory directory;
     const auto write = [&](const std::string& name, const std::string& part, std::uint64_t number,
                            const std::string& recording = "1") {
@@ -171,7 +171,7 @@ TEST_CASE("recording: its begin and length are those of stamps, where there are 
     };
     test::RecordingFile file;
     file.add(item("clock", ring::StreamKind::clock, seconds(100)));
-    const auto told = [&](const test::RecordingFile& written) {
+    const auto period = [&](const test::RecordingFile& written) {
         auto copy = written;
         const auto path = directory.write("a.mcap", copy.finish());
         const auto recording = Recording::open(path);
@@ -182,16 +182,16 @@ TEST_CASE("recording: its begin and length are those of stamps, where there are 
                          (*info)["duration_ns"].get<std::int64_t>());
     };
     file.add(item("clock", ring::StreamKind::clock, seconds(103)));
-    CHECK(told(file) == std::pair(seconds(100).ns, seconds(3).ns));
+    CHECK(period(file) == std::pair(seconds(100).ns, seconds(3).ns));
     file.add(item("events", ring::StreamKind::events, seconds(401)));
     file.add(item("imu0", ring::StreamKind::imu, seconds(400)));
     file.add(item("imu0", ring::StreamKind::imu, seconds(402)));
     file.add(item("cam0-evidence", ring::StreamKind::evidence, seconds(50)));
     file.add(item("status", ring::StreamKind::status, seconds(500)));
-    CHECK(told(file) == std::pair(seconds(400).ns, seconds(2).ns));
+    CHECK(period(file) == std::pair(seconds(400).ns, seconds(2).ns));
 }
 
-TEST_CASE("recording: a stamp that is no time is told, with its place") {
+TEST_CASE("recording: a stamp that is no time is reported, with its place") {
     const test::TemporaryDirectory directory;
     const std::int64_t ns = GENERATE(INT64_MIN, INT64_MAX, std::int64_t{1} << 61);
     test::RecordingFile file;

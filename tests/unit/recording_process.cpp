@@ -68,8 +68,8 @@ class Minute {
         }
     }
 
-    void evidence(const pairing::Evidence& told, HostTime at) {
-        item("cam0-evidence", StreamKind::evidence, shown(at), pairing::to_metadata(told));
+    void evidence(const pairing::Evidence& decision, HostTime at) {
+        item("cam0-evidence", StreamKind::evidence, shown(at), pairing::to_metadata(decision));
     }
 
     void frames() {
@@ -288,7 +288,7 @@ TEST_CASE("recording_process: of a recording in several files, the one that is n
     CHECK(report->streams.at("imu0").items == 300);
 }
 
-TEST_CASE("recording_process: what cannot be done is told, and leaves no file") {
+TEST_CASE("recording_process: what cannot be done is reported, and leaves no file") {
     const test::TemporaryDirectory directory;
     const std::string old_file = directory.path() / "old.mcap";
     const std::string new_file = directory.path() / "new.mcap";

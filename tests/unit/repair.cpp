@@ -100,7 +100,7 @@ TEST_CASE("repair: a file that is being written is left alone, and so is what li
     CHECK(content(sample.path + ".new") == "kept");
 }
 
-TEST_CASE("repair: a damaged chunk in the middle is told and nothing is changed") {
+TEST_CASE("repair: a damaged chunk in the middle is reported and nothing is changed") {
     std::string bytes = test::sample_recording(1, false, true, mono8);
     Sample sample(bytes);
     const auto chunk = client::McapReader::open(sample.path)->chunks().at(1);

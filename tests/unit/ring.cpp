@@ -72,7 +72,7 @@ TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
 }
 
 TEST_CASE_METHOD(Fixture,
-                 "ring: a lapped reader is told how much it lost and goes on half a ring back") {
+                 "ring: a lapped reader learns how much it lost and goes on half a ring back") {
     const std::uint64_t start =
         GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
     Writer writer = inline_writer(start);

@@ -49,7 +49,7 @@ std::uint32_t u32(const std::string& bytes, std::size_t offset) {
     return at<std::uint32_t>(bytes, offset);
 }
 
-/// Field 22 of what the kernel tells of this process, whose name has no space.
+/// Field 22 of what the kernel reports of this process, whose name has no space.
 std::uint64_t start_of_this_process() {
     std::ifstream stat("/proc/self/stat");
     std::string word;

@@ -74,7 +74,7 @@ long wakes_of_this_thread() {
     return usage.ru_nvcsw;
 }
 
-/// How long a thread waits for a change of `word` that `act` tells of.
+/// How long a thread waits for a change of `word` that `act` causes.
 Duration slept_through(const std::atomic<std::uint32_t>& word, const std::function<void()>& act) {
     std::atomic<pid_t> number{0};
     Duration slept;
@@ -327,7 +327,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies bef
     CHECK(test::look(reader.latest()).number == 39);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: the newest item is told lost where no newer one comes") {
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: the newest item is reported lost where no newer one comes") {
     Writer writer = frames(4);
     Reader reader = open("frames");
     publish(writer, 10);
@@ -361,7 +362,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: what is read after the end is stale, aft
     CHECK_FALSE(newest.stale);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a loss is told though the writer has ended") {
+TEST_CASE_METHOD(Streams, "ring_reader: a loss is reported though the writer has ended") {
     auto writer = std::make_unique<Writer>(events());
     Reader reader = open("events");
     const bool by_descriptor = GENERATE(false, true);
@@ -374,7 +375,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: a loss is told though the writer has end
     CHECK(test::look(reader.next()).number == lost.lost);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a writer that falls silent is told each time, at once") {
+TEST_CASE_METHOD(Streams,
+                 "ring_reader: a writer that falls silent is reported each time, at once") {
     Writer writer = events();
     Reader reader = open("events");
     const bool with_items = GENERATE(false, true);
@@ -513,7 +515,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: a successor of another kind is another s
     CHECK(test::look(reader.next()).found == test::Found::restarted);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read is told so, and what to do") {
+TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read learns so, and what to do") {
     CHECK_THAT(refusal("absent"),
                Catch::Contains("no such stream") && Catch::Contains("is the service running?"));
     Writer writer = events();
@@ -574,9 +576,9 @@ TEST_CASE_METHOD(Streams, "ring_reader: a descriptor forgets no item of a busy w
         for (std::uint64_t i = 0; i < last; ++i) writer.publish(OutputTime{}, {i});
     });
     std::uint64_t seen = 0;
-    for (bool told = true; told && seen < last;) {
+    for (bool notified = true; notified && seen < last;) {
         pollfd entry{*descriptor, POLLIN, 0};
-        told = ::poll(&entry, 1, 20'000) == 1;
+        notified = ::poll(&entry, 1, 20'000) == 1;
         const auto found = test::look(reader.next());
         seen += found.found == test::Found::item ? 1 : found.lost;
     }

@@ -186,7 +186,7 @@ TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[statistics]")
     CHECK(found.rms_s < 259e-6 * 1.25);
 }
 
-TEST_CASE("rotation_offset: slow motion tells less, and says so", "[statistics]") {
+TEST_CASE("rotation_offset: slow motion shows less, and says so", "[statistics]") {
     World world;
     world.camera_sigma = 2e-3;
     world.rate_rms = 0.2;
@@ -280,7 +280,7 @@ TEST_CASE("rotation_offset: offsets of either sign and far off, a slow gyro and 
     }
 }
 
-TEST_CASE("rotation_offset: an offset out of range or too little data is told",
+TEST_CASE("rotation_offset: an offset out of range or too little data is reported",
           "[rotation_offset]") {
     const Seen seen = Simulation({}, 5).run();
     CHECK_FALSE(rotation_offset({}, seen.gyro));

@@ -42,7 +42,7 @@ TEST_CASE("scenario: motion and LED board") {
     CHECK(load(camera)->motion.nods);
 }
 
-TEST_CASE("scenario: what is wrong is told with its place") {
+TEST_CASE("scenario: what is wrong is reported with its place") {
     using Catch::Contains;
     CHECK_THAT(refusal("[motion]\nrate = [1, 1, 1]\n"), Contains(":2:1") && Contains("rate_rad_s"));
     CHECK_THAT(refusal("[motion]\nrate_rad_s = [1, 1]\n"),

@@ -179,7 +179,8 @@ TEST_CASE_METHOD(Instance, "sealed: one that is not can be cut short under its r
     }));
 }
 
-TEST_CASE_METHOD(Instance, "sealed: who wants nothing else is refused what is not, and told why") {
+TEST_CASE_METHOD(Instance,
+                 "sealed: who wants nothing else is refused what is not, with the reason") {
     const Writer writer = write(false);
     Options only;
     only.sealed_only = true;
@@ -227,29 +228,31 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
     const FileDescriptor plain(::open((directory.path() / "file").c_str(), O_RDONLY | O_CLOEXEC));
     const FileDescriptor soft(::memfd_create("soft", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     const auto before = open_files();
-    const auto told = [&](const std::function<void(int)>& answer) {
+    const auto refusal_of = [&](const std::function<void(int)>& answer) {
         const Peer peer(path(), answer);
         std::string message = refusal();
         std::filesystem::remove(path());
         return message;
     };
     // It is waited for, and that a second at most.
-    CHECK_THAT(told([](int) {}), Catch::Contains("handed over by the service: Resource temp"));
-    CHECK_THAT(told([](int connection) { ::shutdown(connection, SHUT_RDWR); }),
+    CHECK_THAT(refusal_of([](int) {}),
+               Catch::Contains("handed over by the service: Resource temp"));
+    CHECK_THAT(refusal_of([](int connection) { ::shutdown(connection, SHUT_RDWR); }),
                Catch::Contains("handed over by the service: Protocol error"));
-    CHECK_THAT(told([](int connection) { send(connection, {}); }),
+    CHECK_THAT(refusal_of([](int connection) { send(connection, {}); }),
                Catch::Contains("handed over by the service: Protocol error"));
     for (const std::vector<int>& files : {std::vector<int>{plain.get()}, {soft.get()}, {0, 1, 2}})
-        CHECK_THAT(told([&](int connection) { send(connection, files); }),
+        CHECK_THAT(refusal_of([&](int connection) { send(connection, files); }),
                    Catch::Contains("is not sealed, though it should be"));
     CHECK(open_files() == before);
     REQUIRE(::fcntl(soft.get(), F_ADD_SEALS,
                     F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0);
-    CHECK_THAT(told([&](int connection) { send(connection, {soft.get()}); }),
+    CHECK_THAT(refusal_of([&](int connection) { send(connection, {soft.get()}); }),
                Catch::Contains("frames"));  // empty: it cannot be mapped
 }
 
-TEST_CASE_METHOD(Instance, "sealed: where no descriptor is left to connect, that is what is told") {
+TEST_CASE_METHOD(Instance,
+                 "sealed: where no descriptor is left to connect, that is what is reported") {
     const Writer writer = write();
     CHECK(in_process([&] {
         const rlimit few{64, 64};

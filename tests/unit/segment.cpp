@@ -269,16 +269,16 @@ TEST_CASE_METHOD(Copies, "segment: what cannot be mapped says why, and what to d
     REQUIRE_FALSE(missing);
     CHECK_THAT(missing.error().message(),
                Catch::Contains("cannot be opened") && Catch::Contains("is the service running?"));
-    const auto told = [&](const char* name) {
+    const auto message = [&](const char* name) {
         return Mapping::open(directory.path() / name, Mapping::Access::read_only).error().message();
     };
     directory.write("empty", "");
-    CHECK_THAT(told("empty"),
+    CHECK_THAT(message("empty"),
                Catch::Contains("cannot be mapped") && Catch::Contains("is the service running?"));
     std::filesystem::create_symlink("frames", directory.path() / "link");
-    CHECK_THAT(told("link"), Catch::Contains("cannot be opened"));
+    CHECK_THAT(message("link"), Catch::Contains("cannot be opened"));
     REQUIRE(::mkfifo((directory.path() / "pipe").c_str(), 0600) == 0);
-    CHECK_THAT(told("pipe"), Catch::Contains("is not a VersaVIS ring"));
+    CHECK_THAT(message("pipe"), Catch::Contains("is not a VersaVIS ring"));
 }
 
 TEST_CASE_METHOD(Copies, "segment: one that ends says so, and has news for who waits") {

@@ -264,7 +264,8 @@ TEST_CASE_METHOD(Rig, "set_reader: overtaken frames are counted, and what is in 
     CHECK(sets.report().lost < 28);
 }
 
-TEST_CASE_METHOD(Rig, "set_reader: an end is told once, and a larger ring of one life is no end") {
+TEST_CASE_METHOD(Rig,
+                 "set_reader: an end is reported once, and a larger ring of one life is no end") {
     SetReader sets = open();
     frame(*a, 1);
     auto larger = camera("a", 8192);
@@ -288,7 +289,8 @@ TEST_CASE_METHOD(Rig, "set_reader: an end is told once, and a larger ring of one
     CHECK(sets.next(milliseconds(1)).error().why == Pause::nothing);
 }
 
-TEST_CASE_METHOD(Rig, "set_reader: a restart is told once, and begins anew whatever there was") {
+TEST_CASE_METHOD(Rig,
+                 "set_reader: a restart is reported once, and begins anew whatever there was") {
     SetOptions with_imu = options();
     with_imu.imu = "imu";
     SetReader sets = open(with_imu);
@@ -440,7 +442,8 @@ TEST_CASE_METHOD(Rig, "set_reader: a frame that comes after its set was given up
     CHECK(sets.next({})->tick == 2);
 }
 
-TEST_CASE_METHOD(Rig, "set_reader: the end of one camera is told once, whatever the others do") {
+TEST_CASE_METHOD(Rig,
+                 "set_reader: the end of one camera is reported once, whatever the others do") {
     SetOptions impatient = options();
     impatient.partial = true;
     impatient.patience = {};

@@ -49,11 +49,11 @@ class SimulatedClocks final : public clock::SystemClocks {
         slewed_ppb_ns_ %= 1'000'000'000;
     }
 
-    void step(Duration by, bool tell = true) {
+    void step(Duration by, bool notify = true) {
         realtime_minus_monotonic_ns_ += by.ns;
-        if (tell) tell_of_set();
+        if (notify) notify_of_set();
     }
-    void tell_of_set() { ++times_set_; }
+    void notify_of_set() { ++times_set_; }
 
     void suspend(Duration duration) {
         slept_ns_ += duration.ns;

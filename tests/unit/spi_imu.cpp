@@ -214,7 +214,7 @@ TEST_CASE("spi_imu: set-up begins when the slowest part has powered up") {
     }
 }
 
-TEST_CASE("spi_imu: what goes wrong in set-up is told, with the step, and tried again") {
+TEST_CASE("spi_imu: what goes wrong in set-up is reported, with the step, and tried again") {
     enum class Fault { held, hangs, refused, wrong };
     for (const Fault fault : {Fault::held, Fault::hangs, Fault::refused, Fault::wrong}) {
         Bench bench;
@@ -235,10 +235,10 @@ TEST_CASE("spi_imu: what goes wrong in set-up is told, with the step, and tried 
             bench.step(asked + us);
         }
         const bool wrong = fault == Fault::wrong;
-        const Event told{
+        const Event event{
             wrong ? wire::BoardEventKind::imu_failed : wire::BoardEventKind::imu_silent, bench.now,
             0, fault == Fault::hangs ? while_running : std::uint16_t{1}};
-        CHECK(bench.reports.events == std::vector<Event>{told});
+        CHECK(bench.reports.events == std::vector<Event>{event});
         CHECK_FALSE(bench.bus.armed);
         CHECK(bench.imu.restarts() == 1);
         CHECK(bench.imu.next_wake(0) == bench.now + second);
@@ -296,7 +296,7 @@ TEST_CASE("spi_imu: a reading that does not end sets the part up again, whatever
           Event{wire::BoardEventKind::imu_silent, began + 25 * ms, 0, while_running});
 }
 
-TEST_CASE("spi_imu: what edges told before the part was set up means nothing") {
+TEST_CASE("spi_imu: what edges showed before the part was set up means nothing") {
     Bench world;
     for (int i = 0; i < 6; ++i) world.set_up_once();
     for (Nanoseconds at = world.now - 20 * ms; at < world.now; at += 400 * us)
@@ -652,7 +652,8 @@ TEST_CASE(
     CHECK(world.sample.flags == (wire::imu_stamped | wire::imu_overrun));
 }
 
-TEST_CASE("spi_imu: the age of the accelerometer's values is told when its edge is beyond doubt") {
+TEST_CASE(
+    "spi_imu: the age of the accelerometer's values is reported when its edge is beyond doubt") {
     // One byte takes a microsecond; these are the accelerometer's, with a margin of two.
     constexpr Nanoseconds period = 625 * us;
     constexpr Nanoseconds first = (20 - 2) * us;
@@ -662,7 +663,7 @@ TEST_CASE("spi_imu: the age of the accelerometer's values is told when its edge 
     const auto age = [](Nanoseconds at) { return static_cast<std::int16_t>(-at / 32); };
     struct Case {
         std::vector<Nanoseconds> edges;  ///< from when the reading started, as did the gyro's edge
-        std::int16_t told;
+        std::int16_t reported;
     };
     const Case cases[] = {
         {{-100 * us - period, -100 * us}, age(-100 * us)},
@@ -697,14 +698,14 @@ TEST_CASE("spi_imu: the age of the accelerometer's values is told when its edge 
             world.bus.run(at - 38 * us);  // the gyro is read first
             for (const Nanoseconds edge : made.edges) world.imu.accel_edge(at + edge);
             REQUIRE(world.step(at + ms / 2));
-            const bool told = made.told != unknown && (options & wire::imu_accel_ready) != 0;
+            const bool known = made.reported != unknown && (options & wire::imu_accel_ready) != 0;
             const std::int16_t gyro_later = -38'000 / 32;
-            CHECK(((world.sample.flags & wire::imu_accel_stamped) != 0) == told);
-            CHECK(std::abs(world.sample.accel_age - (told ? made.told + gyro_later : 0)) <= 1);
+            CHECK(((world.sample.flags & wire::imu_accel_stamped) != 0) == known);
+            CHECK(std::abs(world.sample.accel_age - (known ? made.reported + gyro_later : 0)) <= 1);
         }
 }
 
-TEST_CASE("spi_imu: an age of the accelerometer's values that does not fit is not told") {
+TEST_CASE("spi_imu: an age of the accelerometer's values that does not fit is not reported") {
     for (const Nanoseconds age : {-32'768 * 32LL, -32'769 * 32LL}) {
         Running world(wire::imu_data_ready | wire::imu_accel_ready, 100'000, wire::ImuKind::bmi088);
         world.now += 10 * ms;

@@ -63,7 +63,7 @@ TEST_CASE("stamp_guard: sigma of a stamp that was held contains the hold") {
 }
 
 TEST_CASE(
-    "stamp_guard: what sigma cannot explain is refused, until three in a row doubt the last") {
+    "stamp_guard: what sigma cannot explain is refused, until three in a row contradict the last") {
     StampGuard guard;
     guard.guard(stamp(1'000'000, 1), 30);
     for (int i = 0; i < 3; ++i) {

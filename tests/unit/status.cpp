@@ -145,7 +145,7 @@ TEST_CASE("status: what a board has is named, and of one that was never met noth
                Catch::Contains("it has camera0, spi, imu1_ready; IMUs up to 2048.5 Hz\n"));
 }
 
-TEST_CASE("status: firmware of an older release is told, and of a board never met nothing") {
+TEST_CASE("status: firmware of an older release is reported, and of a board never met nothing") {
     Status status = healthy();
     status.release = "0.2.0";
     status.configuration = "/etc/versavis/versavis.toml";

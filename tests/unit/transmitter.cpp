@@ -15,7 +15,7 @@ struct Link final : ByteLink {
     std::size_t space = 0;
     std::vector<std::uint8_t> bytes;
     std::size_t watched = 0;  ///< bytes that were written when it was asked
-    Nanoseconds left = 0;     ///< 0: it does not tell
+    Nanoseconds left = 0;     ///< 0: it does not report it
     std::size_t free_space() override { return space; }
     void write(const std::uint8_t* data, std::size_t size) override {
         bytes.insert(bytes.end(), data, data + size);
@@ -158,7 +158,7 @@ TEST_CASE("transmitter: what is stamped as it leaves lies where its words are al
     }
 }
 
-TEST_CASE("transmitter: the most that waited is told since it was asked for last") {
+TEST_CASE("transmitter: the most that waited is reported since it was asked for last") {
     Bench bench;
     CHECK(bench.transmitter.take_high_water() == 0);
     for (unsigned i = 1; i <= 3; ++i) bench.transmitter.send(exposure(i));
@@ -227,7 +227,8 @@ TEST_CASE("transmitter: the time of sending is that at which the answer leaves")
 }
 
 TEST_CASE(
-    "transmitter: when an answer left follows as soon as the link tells, before all that waits") {
+    "transmitter: when an answer left follows as soon as the link reports it, before all that "
+    "waits") {
     Bench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 20;  // less than the answer
@@ -250,7 +251,7 @@ TEST_CASE(
     CHECK(bench.received<wire::ClockFollowUp>()[0].sent_ns == 12'345);
 }
 
-TEST_CASE("transmitter: of two answers, each is told of by its own number, and once") {
+TEST_CASE("transmitter: of two answers, each is reported by its own number, and once") {
     Bench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 1'000;
@@ -265,13 +266,13 @@ TEST_CASE("transmitter: of two answers, each is told of by its own number, and o
     bench.transmitter.pump();
     bench.link.left = 34'567;  // nobody asked
     bench.transmitter.pump();
-    const auto told = bench.received<wire::ClockFollowUp>();
-    REQUIRE(told.size() == 2);
-    CHECK(told[0].id == 42);
-    CHECK(told[0].reserved == 0);
-    CHECK(told[0].sent_ns == 12'345);
-    CHECK(told[1].id == 43);
-    CHECK(told[1].sent_ns == 23'456);
+    const auto follow_ups = bench.received<wire::ClockFollowUp>();
+    REQUIRE(follow_ups.size() == 2);
+    CHECK(follow_ups[0].id == 42);
+    CHECK(follow_ups[0].reserved == 0);
+    CHECK(follow_ups[0].sent_ns == 12'345);
+    CHECK(follow_ups[1].id == 43);
+    CHECK(follow_ups[1].sent_ns == 23'456);
 }
 
 TEST_CASE("transmitter: the departure of an answer that a new connection cuts is not asked for") {
@@ -318,10 +319,10 @@ TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody 
         bench.transmitter.send(sample);
     }
     while (bench.transmitter.pump()) continue;
-    std::vector<std::uint32_t> told;
+    std::vector<std::uint32_t> departures;
     for (const wire::ImuSample& received : bench.received<wire::ImuSample>())
-        told.push_back(received.departure_ns);
-    CHECK(told == std::vector<std::uint32_t>{10'000, 150'000, 1, 0, 0, 0xFFFFFFFF, 0, 0, 0});
+        departures.push_back(received.departure_ns);
+    CHECK(departures == std::vector<std::uint32_t>{10'000, 150'000, 1, 0, 0, 0xFFFFFFFF, 0, 0, 0});
 }
 
 TEST_CASE("transmitter: one pump writes a bounded part, and says whether the link takes more") {

@@ -58,7 +58,7 @@ TEST_CASE("uf2: the check of the boot stage is the chip's") {
           0x0376E6E7);
 }
 
-TEST_CASE("uf2: each way in which a file can be wrong is told with its block") {
+TEST_CASE("uf2: each way in which a file can be wrong is reported with its block") {
     const Damage damage = GENERATE(values<Damage>({
         {"empty", [](Bytes& file) { file.clear(); }, "x.uf2:", "is no UF2 file"},
         {"an ELF", [](Bytes& file) { put_word(file, 0, 0x464C457F); }, "x.uf2:", "is no UF2 file"},
@@ -123,7 +123,7 @@ TEST_CASE("uf2: each way in which a file can be wrong is told with its block") {
     CHECK_FALSE(parsed.error().cure.empty());
 }
 
-TEST_CASE("uf2: a file that cannot be read is told") {
+TEST_CASE("uf2: a file that cannot be read is reported") {
     const TemporaryDirectory directory;
     CHECK_THAT(read_uf2(directory.path() / "none").error().message(),
                Contains("No such file") && Contains("check its name"));

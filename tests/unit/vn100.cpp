@@ -394,7 +394,7 @@ TEST_CASE("vn100: a new configuration begins at the baud rate of the one before"
     CHECK(slow.uart.sent == std::vector<std::string>{framed("VNASY,0")});
 }
 
-TEST_CASE("vn100: an error that the part tells is a failure, with its code") {
+TEST_CASE("vn100: an error that the part reports is a failure, with its code") {
     const unsigned step = GENERATE(0U, 3U, 8U);
     World world(200'000);
     world.reach(step);
@@ -550,7 +550,7 @@ TEST_CASE("vn100: a packet with a float that is no number is sent, and says that
     }
 }
 
-TEST_CASE("vn100: packets are told by their header and CRC, wherever they begin") {
+TEST_CASE("vn100: packets are recognised by their header and CRC, wherever they begin") {
     Running world;
     const Bytes good = packet();
     SECTION("byte by byte") {
@@ -782,7 +782,7 @@ TEST_CASE("vn100: a part that falls silent is set up again, at the other baud ra
     CHECK(world.imu.next_wake() == world.now + second);
     world.send(packet(2 * second), world.now + ms);  // it is not running
     CHECK(world.samples.size() == 1);
-    // Running again: the first number tells that at least one sample is missing.
+    // Running again: the first number shows that at least one sample is missing.
     world.reports.events.clear();
     world.uart.sent.clear();
     world.set_up();

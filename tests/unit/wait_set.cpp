@@ -199,7 +199,7 @@ TEST_CASE_METHOD(TwoStreams, "wait_set: its descriptor is readable until nothing
 }
 
 TEST_CASE_METHOD(Streams,
-                 "wait_set: a reader's own descriptor tells items, ends and restarts "
+                 "wait_set: a reader's own descriptor reports items, ends and restarts "
                  "[threads]",
                  "[threads]") {
     auto first = std::make_unique<Writer>(writer("a"));
@@ -326,7 +326,8 @@ bool forbid_threads() {
 
 }  // namespace
 
-TEST_CASE_METHOD(Streams, "wait_set: where no descriptor or thread is to be had, that is told") {
+TEST_CASE_METHOD(Streams,
+                 "wait_set: where no descriptor or thread is to be had, that is reported") {
     const Writer a = writer("a");
     Reader of_a = reader("a");
     WaitSet set;

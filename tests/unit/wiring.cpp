@@ -184,7 +184,7 @@ TEST_CASE("wiring: what shows the trigger pulse is not taken for an exposure") {
     CHECK(codes(judge_wiring({{"a", 0, true, {}}}, runs)[0]) == Codes{"no_trigger"});
 }
 
-TEST_CASE("wiring: two cameras that are mixed up are told to be swapped") {
+TEST_CASE("wiring: two cameras that are mixed up are reported as swapped") {
     const auto both = [](const TrueCamera& a, const TrueCamera& b) {
         const auto wirings = World({a, b}).check();
         CHECK_THAT(wirings[0].findings[0].text, Catch::Contains("swap"));
@@ -196,7 +196,7 @@ TEST_CASE("wiring: two cameras that are mixed up are told to be swapped") {
     CHECK(both(wired({1}, {1}), wired({0}, {0})) == Codes{"wrong_port"});
 }
 
-TEST_CASE("wiring: a camera on another's output is told where it belongs") {
+TEST_CASE("wiring: a camera on another's output is reported with the output where it belongs") {
     const auto wirings = World({right(0), wired({0}, {1})}).check();
     CHECK(codes(wirings[0]) == Codes{"right"});
     CHECK(codes(wirings[1]) == Codes{"shared_trigger"});

@@ -165,9 +165,9 @@ TEST_CASE_METHOD(Memory, "writer: all rings of a process are of one life, those 
         const Writer other = *Writer::create(directory.path(), {"other", StreamKind::events, 8});
         return life_of(path("other")) != life;
     }));
-    const Writer told =
-        *Writer::create(directory.path(), {"told", StreamKind::events, 8, 0, 0, 0, 1});
-    CHECK(life_of(path("told")) == 1);
+    const Writer given =
+        *Writer::create(directory.path(), {"given", StreamKind::events, 8, 0, 0, 0, 1});
+    CHECK(life_of(path("given")) == 1);
 }
 
 TEST_CASE_METHOD(Memory, "writer: where it would lie decides whether there is room for it") {

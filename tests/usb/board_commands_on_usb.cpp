@@ -68,7 +68,7 @@ std::vector<std::int64_t> edges_of(const std::vector<OutputChange>& changes, std
 
 }  // namespace
 
-TEST_CASE("board: info tells version, parts and counters, in words and in JSON") {
+TEST_CASE("board: info shows version, parts and counters, in words and in JSON") {
     Bench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
     CHECK(bench.board({"info"}) == 0);

@@ -65,13 +65,13 @@ TEST_CASE("usb: a board that hangs is reset, and comes back under another addres
 TEST_CASE("usb: a boot loader where the board should be is named, with what to do") {
     const GObjectPtr<UMockdevTestbed> testbed(umockdev_testbed_new());
     PicoSettings settings{"PICO0001", "1-2", ""};
-    const char* words = "a board waits in its boot loader at usb:1-2";
+    const char* words = "a board is in its boot loader at usb:1-2";
     const char* cure = "'versavis flash'";
     SECTION("of the board") {}
     SECTION("of a Pico 2") {
         settings.faults.product = 0x000F;
-        words = "there is a Pico 2, whose chip is another, at usb:1-2";
-        cure = "take a board with an RP2040";
+        words = "there is a Pico 2 (RP2350), which is not supported, at usb:1-2";
+        cure = "use a board with an RP2040";
     }
     const SimulatedPico pico(testbed.get(), settings);
     Stack stack({"bootusb", 35, 1, 20, "", "", "", 320, 240, "usb"});

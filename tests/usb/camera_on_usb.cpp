@@ -108,12 +108,12 @@ TEST_CASE("usb: two entries for one camera beside a device that never answers en
     stack.start_service();
     stack.wait_for_status([](const auto& s) {
         unsigned streaming = 0;
-        unsigned told = 0;
+        unsigned misconfigured = 0;
         for (const auto& camera : s["cameras"]) {
             streaming += camera["state"] == "streaming" ? 1U : 0U;
-            told += camera["state"] == "misconfigured" ? 1U : 0U;
+            misconfigured += camera["state"] == "misconfigured" ? 1U : 0U;
         }
-        return streaming == 1 && told == 1;
+        return streaming == 1 && misconfigured == 1;
     });
     const HostTime asked = host_now();
     CHECK(stack.service().terminate() == 0);

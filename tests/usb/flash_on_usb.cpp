@@ -53,7 +53,7 @@ bool holds(const SimulatedPico& pico, const std::string& version) {
 
 }  // namespace
 
-TEST_CASE("flash: a board that runs gets new firmware, and both versions are told") {
+TEST_CASE("flash: a board that runs gets new firmware, and both versions are reported") {
     Bench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     // What lies behind the image are the board's own settings.
@@ -181,7 +181,7 @@ TEST_CASE("flash: what reads back otherwise does not start") {
     CHECK_FALSE(pico.flash().starts());
 }
 
-TEST_CASE("flash: a boot loader that refuses or does not answer is told, with the command") {
+TEST_CASE("flash: a boot loader that refuses or does not answer is reported, with the command") {
     Bench bench;
     SimulatedPico pico(bench.testbed.get(), {"PICO0001", "1-1", ""});
     struct Case {
@@ -204,7 +204,7 @@ TEST_CASE("flash: a boot loader that refuses or does not answer is told, with th
     CHECK_THAT(bench.said, Contains("run this again"));
 }
 
-TEST_CASE("flash: a boot loader that does not answer is told") {
+TEST_CASE("flash: a boot loader that does not answer is reported") {
     Bench bench;
     PicoSettings settings;
     settings.faults.held_command = 0x05;
@@ -214,7 +214,7 @@ TEST_CASE("flash: a boot loader that does not answer is told") {
                                Contains("reconnect the board"));
 }
 
-TEST_CASE("flash: a board that does not reboot into its boot loader is told") {
+TEST_CASE("flash: a board that does not reboot into its boot loader is reported") {
     Bench bench;
     PicoSettings settings;
     settings.obeys = false;
@@ -225,7 +225,7 @@ TEST_CASE("flash: a board that does not reboot into its boot loader is told") {
     CHECK(holds(pico, old_version));
 }
 
-TEST_CASE("flash: new firmware that says nothing is told") {
+TEST_CASE("flash: new firmware that says nothing is reported") {
     Bench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     auto image = pico_firmware(new_version, pages);
@@ -319,7 +319,7 @@ TEST_CASE("flash: a Pico 2 is refused, and does not stand in the way of a board"
          {std::vector<std::string>{}, {"--port", "usb:1-2"}, {"--all"}}) {
         CHECK(bench.flash(more) == 69);
         CHECK_THAT(bench.said, Contains("board at usb:1-2: is a Pico 2") && Contains("RP2350") &&
-                                   Contains("take a board with an RP2040"));
+                                   Contains("use a board with an RP2040"));
     }
     const SimulatedPico pico(bench.testbed.get(), {});
     CHECK(bench.flash() == 0);

@@ -64,7 +64,7 @@ class Port {
         write(frame.bytes, frame.size);
     }
 
-    /// Ends what the terminal has echoed to the board before it was told not to.
+    /// Ends what the terminal has echoed to the board before it was switched off.
     void begin() { write(std::array<std::uint8_t, 1>{}.data(), 1); }
 
     /// Calls on_packet with each that comes, until it returns true. False: it was in vain.

@@ -38,7 +38,7 @@ class LoopedBoard {
     LoopedBoard(const LoopedBoard&) = delete;
     LoopedBoard& operator=(const LoopedBoard&) = delete;
 
-    /// It was told to reboot, which it did.
+    /// It was asked to reboot, which it did.
     unsigned reboots() const;
     std::vector<OutputChange> output_changes() const;
 

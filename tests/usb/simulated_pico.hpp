@@ -31,7 +31,7 @@ struct PicoSettings {
     std::string version = "versavis 0.0.1";  ///< of its first firmware; empty: its flash is empty
     bool hangs = false;                      ///< that firmware hears nothing but a touch
     std::uint8_t protocol = wire::protocol_major;  ///< that this firmware speaks
-    bool obeys = true;                             ///< it reboots when told so, or touched
+    bool obeys = true;                             ///< it reboots on request, or when touched
     BootLoaderFaults faults{};                     ///< of its boot loader
 };
 

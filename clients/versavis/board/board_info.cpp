@@ -118,8 +118,8 @@ std::string board_text(const json& info) {
     const std::string state = text(info, "state");
     if (state == "boot_loader")
         return fmt::format(
-            "board    at {}, in its boot loader: put firmware into it with 'versavis "
-            "flash', or start what it has with 'versavis board reset'\n",
+            "board    at {}, in its boot loader: flash it with 'versavis flash', or "
+            "start its current firmware with 'versavis board reset'\n",
             text(info, "port"));
     std::string out = fmt::format(
         "board    {} at {}, {}\n", text(info, "serial"), text(info, "port"),

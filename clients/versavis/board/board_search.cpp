@@ -24,7 +24,7 @@ Unexpected<> none_fits(const std::vector<FoundBoard>& all, const BoardChoice& ch
             return failure("board at " + board.device.port(),
                            "is a Pico 2: its chip, an RP2350, is not the one that the firmware is "
                            "made for",
-                           "take a board with an RP2040: a Pico, Pico H, Pico W or Pico WH");
+                           "use a board with an RP2040: a Pico, Pico H, Pico W or Pico WH");
     std::string others;
     for (const FoundBoard& board : all) others += (others.empty() ? "" : ", ") + board.text();
     const std::string wanted = choice.serial.empty() ? choice.port : "serial " + choice.serial;
@@ -60,8 +60,8 @@ Expected<std::vector<FoundBoard>> list_boards(const device::UsbBus& bus) {
                    fmt::format("no board ({:04x}:{:04x}), and no boot loader ({:04x}:{:04x})",
                                wire::usb_vendor, wire::usb_product, wire::boot_loader_vendor,
                                wire::boot_loader_rp2040),
-                   "plug it in, or hold its BOOTSEL button while you do; 'lsusb' lists what is "
-                   "there");
+                   "plug it in, or hold its BOOTSEL button while you do; 'lsusb' lists connected "
+                   "devices");
 }
 
 Expected<FoundBoard> find_board(const device::UsbBus& bus, const BoardChoice& choice) {

@@ -144,7 +144,7 @@ void TableReader::fail(std::string_view key, const std::string& what, const std:
 /// The value of the key is not as expected.
 void TableReader::refuse(std::string_view key, const std::string& expected,
                          const TomlRange& range) {
-    fail(key, fmt::format("'{}' must be {}, and is {}", key, expected, text_of(*table_.get(key))));
+    fail(key, fmt::format("'{}' must be {}, but is {}", key, expected, text_of(*table_.get(key))));
     file_.problems.back().range = range;
 }
 

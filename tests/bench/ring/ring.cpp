@@ -37,7 +37,7 @@ Outcomes race_all(const std::vector<Transport>& transports, const Load& load) {
 double p50(const Outcome& outcome) { return quantile(outcome.delays_ns, 0.5); }
 
 /// The figures of all transports, for information.
-void tell(Metrics& metrics, const std::string& load, const Outcomes& outcomes) {
+void report(Metrics& metrics, const std::string& load, const Outcomes& outcomes) {
     for (const auto& [name, outcome] : outcomes) {
         const double p99 = quantile(outcome.delays_ns, 0.99);
         metrics.push_back({fmt::format("{}, {}: p50", load, name), p50(outcome) / 1000, "us", {}});
@@ -68,7 +68,7 @@ void measure_polling(Metrics& metrics, const std::optional<Transport>& peer) {
     load.interval = microseconds(20);
     const Outcomes outcomes = race_all(with({versavis_ring(), shared_word()}, peer), load);
     const std::string name = "imu, polling";
-    tell(metrics, name, outcomes);
+    report(metrics, name, outcomes);
     metrics.push_back({"imu_publish_to_polling_reader_p50", p50(outcomes.at("ring")), "ns", 1000});
     compare(metrics, name, outcomes, "shared word", p50, 1.4);
     compare(metrics, name, outcomes, "iceoryx", p50, 0.19);
@@ -89,7 +89,7 @@ void measure_blocking(Metrics& metrics, const std::optional<Transport>& peer) {
                                quantile(outcome.publish_ns, 0.5) / 1000,
                                "us",
                                {}});
-        tell(metrics, name, outcomes);
+        report(metrics, name, outcomes);
         compare(metrics, name, outcomes, "bare futex", p50, 1.05);
         compare(metrics, name, outcomes, "iceoryx", p50, {});
     }
@@ -116,7 +116,7 @@ void measure_frames(Metrics& metrics, const std::optional<Transport>& peer) {
         if (readers == 1) transports = with(with(transports, boost_queue()), zeromq());
         const Outcomes outcomes = race_all(transports, load);
         const auto name = fmt::format("frame, {} waiting", readers);
-        tell(metrics, name, outcomes);
+        report(metrics, name, outcomes);
         compare(metrics, name, outcomes, "iceoryx", p50, 0.7);
     }
 }

@@ -37,7 +37,7 @@ class Receiver {
     virtual ~Receiver() = default;
 
     /// The next item, there until the next call. nullptr: none yet; unless the channel is for
-    /// polling, that is told some 20 ms late.
+    /// polling, that is noticed some 20 ms late.
     virtual const std::byte* receive() = 0;
 
     /// True when what was read of the item is good.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A recording, smoothed: later messages tell of earlier instants.
+// A recording, smoothed: later messages improve the estimates of earlier instants.
 #include <catch2/catch.hpp>
 
 #include "engine/clock/envelope_filter.hpp"

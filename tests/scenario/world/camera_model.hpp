@@ -51,7 +51,7 @@ struct TruePulse {
     bool taken = false;
     bool into_busy = false;  ///< it came while the camera exposed or read out
     Fault fault = Fault::none;
-    bool start_seen = false;  ///< the exposure line tells it
+    bool start_seen = false;  ///< the exposure line shows it
     bool end_seen = false;
     Nanoseconds start = 0;
     Nanoseconds end = 0;

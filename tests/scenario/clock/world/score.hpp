@@ -53,7 +53,7 @@ inline std::vector<clock::Message> messages_of(const World& world) {
     return messages;
 }
 
-/// Tells an estimator what arrives, as time passes.
+/// Feeds an estimator with what arrives, as time passes.
 template <class Estimator>
 class Observer {
  public:
