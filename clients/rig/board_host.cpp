@@ -63,14 +63,13 @@ std::string rmc(std::int64_t utc_s) {
 
 }  // namespace
 
-Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
+Expected<std::unique_ptr<BoardHost>> BoardHost::create(const World& world,
                                                        const std::string& socket_path,
-                                                       HostTime zero, Surroundings& surroundings,
-                                                       GroundTruth& truth,
-                                                       std::vector<TriggeredCamera*> cameras) {
+                                                       std::vector<GenicamCamera*> cameras) {
+    const BoardScenario& settings = world.scenario.board;
     std::unique_ptr<EmulatedChip> chip;
-    if (!scenario.board.image.empty()) {
-        auto emulated = EmulatedChip::create(scenario.board.image);
+    if (!settings.image.empty()) {
+        auto emulated = EmulatedChip::create(settings.image);
         if (!emulated) return Unexpected(emulated.error());
         chip = std::move(*emulated);
     }
@@ -89,36 +88,35 @@ Expected<std::unique_ptr<BoardHost>> BoardHost::create(const Scenario& scenario,
                        "choose another with --socket");
     }
     try {
-        return std::unique_ptr<BoardHost>(new BoardHost(scenario, socket_path, zero, surroundings,
-                                                        truth, std::move(cameras), std::move(chip),
-                                                        std::move(listener)));
+        return std::unique_ptr<BoardHost>(new BoardHost(world, socket_path, std::move(cameras),
+                                                        std::move(chip), std::move(listener)));
     } catch (const std::exception& error) {
-        return failure(scenario.board.image, error.what(),
+        return failure(settings.image, error.what(),
                        "see the line before; ./dev firmware builds an image that starts");
     }
 }
 
-BoardHost::BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
-                     Surroundings& surroundings, GroundTruth& truth,
-                     std::vector<TriggeredCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
+BoardHost::BoardHost(const World& world, std::string socket_path,
+                     std::vector<GenicamCamera*> cameras, std::unique_ptr<EmulatedChip> chip,
                      FileDescriptor listener)
-    : serial_(scenario.board.serial),
-      seed_(scenario.seed),
-      clock_errors_(scenario.board.clock),
-      link_delay_{std::llround(scenario.board.link_ms * 1e6)},
-      imu_name_(scenario.imu),
+    : serial_(world.scenario.board.serial),
+      seed_(world.scenario.seed),
+      clock_errors_(world.scenario.board.clock),
+      link_delay_{std::llround(world.scenario.board.link_ms * 1e6)},
+      imu_name_(world.scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
-           [&motion = surroundings.motion](firmware::Nanoseconds at) {
+           [&motion = world.surroundings.motion](firmware::Nanoseconds at) {
                return felt(motion, HostTime{at});
            }),
-      leds_(surroundings.leds.get()),
-      truth_(truth),
+      leds_(world.surroundings.leds.get()),
+      truth_(world.truth),
       cameras_(std::move(cameras)),
       listener_(std::move(listener)),
       chip_(std::move(chip)) {
-    if (scenario.board.gnss) utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
-    boot({}, clock_errors_, zero);
+    if (world.scenario.board.gnss)
+        utc_ = *clock::OutputClock::create(clock::OutputClockKind::realtime);
+    boot({}, clock_errors_, world.zero);
     thread_ = start_thread("board", [this] { run(); });
 }
 
@@ -187,7 +185,7 @@ void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {
     pins_ = pins;
     const HostTime instant = clock_->host(at);
     if (leds_ != nullptr && (changed & pins) >> leds_->output() & 1U) leds_->pulse(instant);
-    for (TriggeredCamera* camera : cameras_) {
+    for (GenicamCamera* camera : cameras_) {
         const unsigned output = camera->settings().output;
         if ((changed >> output & 1U) == 0) continue;
         const bool level = (pins >> output & 1U) != 0;

@@ -18,21 +18,19 @@
 #include "camera_view.hpp"
 #include "emulated_board.hpp"
 #include "engine/clock/output_clock.hpp"
+#include "genicam_camera.hpp"
 #include "ground_truth.hpp"
 #include "posix/file_descriptor.hpp"
 #include "skewed_clock.hpp"
-#include "triggered_camera.hpp"
 
 namespace versavis::rig {
 
 class BoardHost {
  public:
     /// Error: the socket cannot be created.
-    static Expected<std::unique_ptr<BoardHost>> create(const Scenario& scenario,
+    static Expected<std::unique_ptr<BoardHost>> create(const World& world,
                                                        const std::string& socket_path,
-                                                       HostTime zero, Surroundings& surroundings,
-                                                       GroundTruth& truth,
-                                                       std::vector<TriggeredCamera*> cameras);
+                                                       std::vector<GenicamCamera*> cameras);
     ~BoardHost();
     BoardHost(const BoardHost&) = delete;
     BoardHost& operator=(const BoardHost&) = delete;
@@ -41,8 +39,7 @@ class BoardHost {
     void suffer(const Fault& fault);
 
  private:
-    BoardHost(const Scenario& scenario, std::string socket_path, HostTime zero,
-              Surroundings& surroundings, GroundTruth& truth, std::vector<TriggeredCamera*> cameras,
+    BoardHost(const World& world, std::string socket_path, std::vector<GenicamCamera*> cameras,
               std::unique_ptr<EmulatedChip> chip, FileDescriptor listener);
 
     void run();
@@ -76,7 +73,7 @@ class BoardHost {
     devices::AdisDevice imu_;
     TimingBoard* leds_;  ///< nullptr: there is none
     GroundTruth& truth_;
-    std::vector<TriggeredCamera*> cameras_;
+    std::vector<GenicamCamera*> cameras_;
     FileDescriptor listener_;
     FileDescriptor host_;
 

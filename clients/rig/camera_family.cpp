@@ -8,8 +8,8 @@
 #include <map>
 #include <sstream>
 
+#include "camera_registers.hpp"
 #include "engine/toml/table_reader.hpp"
-#include "gige_registers.hpp"
 
 namespace versavis::rig {
 

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <vector>
 
+#include "bytes.hpp"
+
 namespace versavis::rig {
 
 namespace {
@@ -15,8 +17,8 @@ constexpr std::uint8_t acknowledge_wanted = 0x01;
 constexpr std::uint8_t extended_ids = 0x10;
 constexpr std::uint16_t event_command = 0x00C0;
 
-void put(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned bytes) {
-    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
+void put(std::vector<std::uint8_t>& out, std::uint64_t value, std::size_t size) {
+    append_number(out, value, size, std::endian::big);
 }
 
 /// GigE Vision's EVENT command with one event.

@@ -10,26 +10,11 @@
 #include <mutex>
 #include <thread>
 
+#include "camera_transport.hpp"
 #include "posix/thread.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::rig {
-
-/// Numbers of events, as the camera's description has them.
-enum class CameraEventId : std::uint16_t {
-    exposure_start = 0x9001,
-    exposure_end = 0x9002,
-    trigger_missed = 0x9003,
-    ptp_lost = 0x9004,
-    ptp_locked = 0x9005,
-};
-
-struct TimedEvent {
-    CameraEventId id;
-    std::uint64_t block_id;
-    std::uint64_t ticks;
-    bool extended_id;
-};
 
 /// Thread-safe.
 class EventSender {

@@ -20,8 +20,12 @@ CameraFamily load(const std::string& name) {
     return *family;
 }
 
-GigeRegisters camera(const CameraFamily& family) {
-    return GigeRegisters({"127.0.0.9", "1", "", 640, 480, 4000, false}, family);
+CameraScenario settings() {
+    CameraScenario settings;
+    settings.width = 640;
+    settings.height = 480;
+    settings.exposure_us = 4000;
+    return settings;
 }
 
 std::string error_of(const std::string& toml) {
@@ -47,7 +51,7 @@ TEST_CASE("camera_family: another program's settings go with the factory setting
     for (const std::string name : {"ace", "blackfly-s", "hikrobot", "alvium"}) {
         INFO(name);
         const CameraFamily family = load(name);
-        GigeRegisters registers = camera(family);
+        CameraRegisters registers(settings(), family, {});
         CHECK(registers.any(family.stalled));
         CHECK(registers.all(family.triggered));
         CHECK(registers.number(family.trigger_delay) >= 600);
@@ -64,7 +68,7 @@ TEST_CASE("camera_family: another program's settings go with the factory setting
 
 TEST_CASE("camera_family: what is locked while it acquires, and by another setting") {
     const CameraFamily family = load("blackfly-s");
-    GigeRegisters registers = camera(family);
+    CameraRegisters registers(settings(), family, {});
     const std::uint32_t binning = family.binning->at;
     CHECK(registers.locked(binning, true));
     CHECK_FALSE(registers.locked(binning, false));

@@ -10,7 +10,8 @@
 #include "../support/stack.hpp"
 #include "board_host.hpp"
 #include "judge.hpp"
-#include "rig_u3v_camera.hpp"
+#include "simulated_device.hpp"
+#include "u3v_camera.hpp"
 #include "usb_bridge.hpp"
 
 using namespace versavis;
@@ -24,38 +25,40 @@ class UsbRig {
  public:
     explicit UsbRig(const Stack& stack)
         : testbed_(umockdev_testbed_new()),
-          zero_(host_now()),
-          surroundings_(zero_),
+          surroundings_(zero_, stack.scenario()),
           truth_(std::move(*rig::GroundTruth::create(stack.truth_path()))),
-          camera(testbed_.get(), "1-2", stack.scenario().cameras[0], zero_, surroundings_.motion,
-                 *truth_, stack.scenario().seed),
-          board_(std::move(*rig::BoardHost::create(stack.scenario(), stack.socket_path(), zero_,
-                                                   surroundings_, *truth_, {&camera}))),
+          world_{stack.scenario(), zero_, surroundings_, *truth_},
+          camera(std::make_shared<U3vCamera>(world_, stack.scenario().cameras[0])),
+          device(testbed_.get(), "1-2", camera),
+          board_(
+              std::move(*rig::BoardHost::create(world_, stack.socket_path(), {&camera->camera()}))),
           bridge_(testbed_.get(), stack.socket_path(), stack.scenario().board.serial) {}
 
     /// Another camera on the bus, which takes commands and never answers.
     void add_mute(const Stack& stack) {
         rig::CameraScenario settings = stack.scenario().cameras[0];
         settings.serial = "MUTE";
-        mute_ =
-            std::make_unique<RigU3vCamera>(testbed_.get(), "1-3", settings, zero_,
-                                           surroundings_.motion, *truth_, stack.scenario().seed);
-        mute_->camera().mute(true);
+        mute_ = std::make_shared<U3vCamera>(world_, settings);
+        mute_->mute(true);
+        mute_device_ = std::make_unique<SimulatedDevice>(testbed_.get(), "1-3", mute_);
     }
 
  private:
     GObjectPtr<UMockdevTestbed> testbed_;
-    HostTime zero_;
+    HostTime zero_ = host_now();
     rig::Surroundings surroundings_;
     std::unique_ptr<rig::GroundTruth> truth_;
+    rig::World world_;
 
  public:
-    RigU3vCamera camera;
+    std::shared_ptr<U3vCamera> camera;
+    SimulatedDevice device;
 
  private:
     std::unique_ptr<rig::BoardHost> board_;
     UsbBridge bridge_;
-    std::unique_ptr<RigU3vCamera> mute_;
+    std::shared_ptr<U3vCamera> mute_;
+    std::unique_ptr<SimulatedDevice> mute_device_;
 };
 
 void judge(const Stack& stack) {
@@ -68,7 +71,7 @@ void judge(const Stack& stack) {
 }  // namespace
 
 TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes back") {
-    StackSettings settings{"u3v", 32, 1, 20, "", "", "", 320, 240, "usb"};
+    StackSettings settings{"u3v", 32, 1, 20, "exposure_swing = 0.5", "", "", 320, 240, "usb"};
     settings.devices = {"RIGCAM-cam0"};  // its serial number
     Stack stack(settings);
     {
@@ -77,21 +80,22 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
         auto status = stack.wait_for_status(healthy);
         CHECK(status["cameras"][0]["serial"] == "RIGCAM-cam0");
         CHECK(status["cameras"][0]["packet_size"] == 0);
+        CHECK(status["cameras"][0]["exposure_source"] == "chunk");
         judge(stack);
 
-        rig.camera.camera().stall_data();
+        rig.camera->stall_data();
         // It may be opened again before a status reports it.
         REQUIRE(stack.service().wait_for_output("cam0: silent", seconds(30)));
         stack.wait_for_status(
             [](const auto& s) { return healthy(s) && s["cameras"][0]["connections"] == 2; });
         judge(stack);
 
-        rig.camera.device().unplug();
+        rig.device.unplug();
         status = stack.wait_for_status(
             [](const auto& s) { return s["cameras"][0]["state"] == "absent"; });
         CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
                    Catch::Contains("no camera answers to this name"));
-        rig.camera.device().plug();
+        rig.device.plug();
         status = stack.wait_for_status(healthy);
         CHECK(status["cameras"][0]["connections"] == 3);
         judge(stack);
