@@ -41,6 +41,7 @@ sigset_t block_signals() {
 int serve(Service& service, const sigset_t& signals) {
     const timespec interval{0, Service::tick_interval.ns};
     Health health = Health::starting;
+    std::string summary;
     for (;;) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
@@ -50,10 +51,14 @@ int serve(Service& service, const sigset_t& signals) {
         service.tick();
         report_suppressed_library_lines(host_now());
         sd_notify(0, "WATCHDOG=1");
+        if (summary == service.health_summary()) continue;
+        summary = service.health_summary();
+        sd_notifyf(0, "STATUS=%s", summary.c_str());
+        // A cause that is only worded anew, such as by a time, is not logged again.
         if (health == service.health()) continue;
         health = service.health();
-        sd_notifyf(0, "STATUS=%s", to_string(health));
-        log(LogLevel::info, "service", "health: {}", to_string(health));
+        log(health == Health::degraded ? LogLevel::warning : LogLevel::info, "service",
+            "health: {}", summary);
     }
 }
 

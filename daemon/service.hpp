@@ -42,6 +42,8 @@ class Service final : private BoardListener {
 
     /// As of the last status document.
     Health health() const { return status_.health(); }
+    /// The same, and why, in one line.
+    const std::string& health_summary() const { return status_.summary(); }
 
     static constexpr Duration tick_interval = milliseconds(50);
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_version.hpp"
@@ -18,6 +19,16 @@ namespace {
 using nlohmann::json;
 
 constexpr int schema = 1;
+
+/// Of all devices, in the order of cause.
+std::vector<std::pair<std::string, const Diagnosis*>> diagnoses(const Status& status) {
+    std::vector<std::pair<std::string, const Diagnosis*>> all{{"board", &status.board_diagnosis},
+                                                              {"clock", &status.clock_diagnosis}};
+    for (const CameraStatus& camera : status.cameras)
+        all.emplace_back(camera.name, &camera.diagnosis);
+    for (const ImuStatus& imu : status.imus) all.emplace_back(imu.report.name, &imu.diagnosis);
+    return all;
+}
 
 /// The keys that every device has; they replace those of the same name.
 json with_diagnosis(json device, const Diagnosis& diagnosis) {
@@ -199,11 +210,26 @@ bool firmware_outdated(const Status& status) {
 }
 
 Health health(const Status& status) {
-    Health worst = std::max(status.board_diagnosis.health, status.clock_diagnosis.health);
-    for (const CameraStatus& camera : status.cameras)
-        worst = std::max(worst, camera.diagnosis.health);
-    for (const ImuStatus& imu : status.imus) worst = std::max(worst, imu.diagnosis.health);
+    Health worst = Health::ok;
+    for (const auto& [name, diagnosis] : diagnoses(status))
+        worst = std::max(worst, diagnosis->health);
     return worst;
+}
+
+std::string summary(const Status& status) {
+    const Health worst = health(status);
+    std::string text = to_string(worst);
+    if (worst == Health::ok) return text;
+    std::string others;
+    bool first = true;
+    for (const auto& [name, diagnosis] : diagnoses(status)) {
+        if (diagnosis->health != worst) continue;
+        if (std::exchange(first, false))
+            text += fmt::format(": {}: {}", name, diagnosis->hint);
+        else
+            others += (others.empty() ? "" : ", ") + name;
+    }
+    return others.empty() ? text : fmt::format("{} (also {}: {})", text, to_string(worst), others);
 }
 
 std::string to_json(const Status& status) {

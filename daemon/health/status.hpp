@@ -65,6 +65,10 @@ bool firmware_outdated(const Status& status);
 /// That of the device that is worst off.
 Health health(const Status& status);
 
+/// The health in one line: why, by the first device in the order of cause, and which others are as
+/// badly off.
+std::string summary(const Status& status);
+
 std::string to_json(const Status& status);
 
 }  // namespace versavis::daemon

@@ -51,6 +51,7 @@ void StatusPublisher::publish(Status status, clock::Translator& translator) {
     for (StreamStatus& stream : status.streams) stream.rate_hz = rate_hz(stream, status.now);
     watch_.examine(status);
     health_ = daemon::health(status);
+    summary_ = daemon::summary(status);
     const std::string document = to_json(status);
     if (!make_room(document.size())) return;
     const auto slot = ring_.acquire();

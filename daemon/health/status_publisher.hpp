@@ -29,6 +29,7 @@ class StatusPublisher {
 
     /// As of the last document.
     Health health() const { return health_; }
+    const std::string& summary() const { return summary_; }
 
  private:
     StatusPublisher(ring::Place place, ring::Writer ring)
@@ -43,6 +44,7 @@ class StatusPublisher {
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
     HealthWatch watch_;
     Health health_ = Health::starting;
+    std::string summary_ = to_string(Health::starting);
 };
 
 }  // namespace versavis::daemon

@@ -43,6 +43,18 @@ void collect(const nlohmann::json& value, std::string prefix, std::vector<std::s
 
 }  // namespace
 
+TEST_CASE("status: its summary says why, by the cause, and who else is affected") {
+    Status status = healthy();
+    CHECK(summary(status) == "ok");
+    status.imus[0].diagnosis = {Health::starting, Fault::starting, "not yet", {}};
+    CHECK(summary(status) == "starting: imu0: not yet");
+    status.cameras[0].diagnosis = {Health::degraded, Fault::no_frames, "check its cable", {}};
+    CHECK(summary(status) == "degraded: cam0: check its cable");
+    status.board_diagnosis = {Health::degraded, Fault::board_gone, "not found", {}};
+    status.imus[0].diagnosis.health = Health::degraded;
+    CHECK(summary(status) == "degraded: board: not found (also degraded: cam0, imu0)");
+}
+
 TEST_CASE("status: as healthy as the device that is worst off") {
     CHECK(health(healthy()) == Health::ok);
     Status status = healthy();
