@@ -40,7 +40,7 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
-      witness_(history(configuration), samples_to_confirm) {
+      pulse_filter_(history(configuration), samples_to_confirm) {
     report_.name = configuration.name;
     report_.model = model_.name;
     report_.filter = filter_;
@@ -54,7 +54,7 @@ void ImuPipeline::board_restarted() {
 
 void ImuPipeline::restart() {
     last_number_.reset();
-    witness_.forget();
+    pulse_filter_.forget();
 }
 
 bool ImuPipeline::note_state(const wire::Event& event, HostTime now) {
@@ -76,9 +76,9 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
         return false;
     }
     const auto stamp = translator_.translate(BoardTime{sample.time_ns} - filter_.delay);
-    if (!stamp || !witness_.confirmed()) {
+    if (!stamp || !pulse_filter_.confirmed()) {
         ++report_.no_clock;
-        return witness_.confirmed();
+        return pulse_filter_.confirmed();
     }
     const std::uint64_t number = extended(sample.number);
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
@@ -102,12 +102,12 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     const clock::ClockContact contact = translator_.contact();
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
     const auto arrival = contradicts_arrival(departed, received, translator_);
-    const auto doubt = witness_.judge(pulse, contact.exchanges, arrival);
+    const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, arrival);
     if (!doubt) translator_.clock_continues();
-    if (!doubt || arrival || contact.contradicted || !witness_.stepped(contact.exchanges))
+    if (!doubt || arrival || contact.contradicted || !pulse_filter_.stepped(contact.exchanges))
         return doubt;
     // The part was set up anew, or the board lost count.
-    witness_.adopt(pulse);
+    pulse_filter_.adopt(pulse);
     last_number_.reset();
     translator_.begin_epoch();
     journal(EventKind::stream_stepped, sample, *doubt);

@@ -75,7 +75,7 @@ class ImuPipeline {
     ring::Writer ring_;
     clock::Translator& translator_;
     EventJournal& events_;
-    MajorityFilter<PulseHistory> witness_;
+    MajorityFilter<PulseHistory> pulse_filter_;
     StampGuard guard_;
     std::optional<std::uint64_t> last_number_;
     ImuReport report_;
