@@ -436,6 +436,8 @@ TEST_CASE("end to end: without a board the service says so and waits, it also st
                Catch::Contains("is the board's process"));
     CHECK_THAT(status["cameras"][0]["hint"].template get<std::string>(),
                Catch::Contains("no camera answers to this name"));
+    CHECK(stack.service().wait_for_output("warning: service: health: degraded: board: ",
+                                          seconds(20)));
     CHECK(stack.service().terminate() == 0);
 }
 
