@@ -36,6 +36,28 @@ configure_file(cmake/versavis.pc.in versavis.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
+# Manual pages, where there is scdoc.
+find_program(scdoc scdoc)
+find_program(python python3)
+if(scdoc AND python)
+    set(man_pages ${CMAKE_BINARY_DIR}/man)
+    file(GLOB man_sources CONFIGURE_DEPENDS docs/man/*.scd)
+    set(programs versavisd versavis_tool)
+    if(TARGET versavis-rig)
+        list(APPEND programs versavis-rig)
+    endif()
+    add_custom_command(OUTPUT ${man_pages}/.made
+        COMMAND ${python} ${CMAKE_CURRENT_SOURCE_DIR}/docs/man/man_pages
+            ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${man_pages} ${CMAKE_INSTALL_FULL_DOCDIR}
+        COMMAND ${CMAKE_COMMAND} -E touch ${man_pages}/.made
+        DEPENDS docs/man/man_pages ${man_sources} ${programs} VERBATIM)
+    add_custom_target(man ALL DEPENDS ${man_pages}/.made)
+    install(DIRECTORY ${man_pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}
+        FILES_MATCHING PATTERN *.[158])
+else()
+    message(STATUS "No manual pages are made: they need scdoc and python3")
+endif()
+
 # The Python client, where Debian's Python looks if the prefix is /usr.
 set(VERSAVIS_PYTHON_DIR lib/python3/dist-packages CACHE STRING
     "Where the Python package goes; if relative, below the prefix")
@@ -44,8 +66,7 @@ install(DIRECTORY clients/python/versavis DESTINATION ${VERSAVIS_PYTHON_DIR}
 
 # The documents keep their folders, so that the links between them hold.
 install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(FILES systemd/versavis.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN man EXCLUDE)
 install(DIRECTORY clients/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
 
 # Last, as it may need rights that the rest does not: what starts the service.

@@ -27,6 +27,8 @@ function(place source target)
         FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
 endfunction()
 
+set(configuration_name versavis)
+set(state_directory versavis)
 foreach(pair
         versavisd.service.in:systemd/system/versavisd.service
         60-versavis.rules:udev/rules.d/60-versavis.rules
@@ -38,6 +40,13 @@ foreach(pair
     place(${source} "${system_directory}/${target}")
     list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${system_directory}/${target}")
 endforeach()
+
+# Of several services, each has a configuration of its own: versavisd@NAME reads NAME.toml.
+set(of_instance " (%i)")
+set(configuration_name %i)
+set(state_directory versavis/%i)
+place(versavisd.service.in "${system_directory}/systemd/system/versavisd@.service")
+list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${system_directory}/systemd/system/versavisd@.service")
 
 # The user's own is neither overwritten nor, as the manifest does not name it, uninstalled.
 set(configuration "${sysconfdir}/versavis/versavis.toml")

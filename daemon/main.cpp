@@ -8,6 +8,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
+#include <cstdlib>
+#include <memory>
 
 #include "base/library_log.hpp"
 #include "base/log.hpp"
@@ -15,6 +17,7 @@
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
+#include "health/health_log.hpp"
 #include "posix/file.hpp"
 #include "service.hpp"
 #include "settings/configuration.hpp"
@@ -40,8 +43,8 @@ sigset_t block_signals() {
 /// Ticks until a signal asks to stop; returns it.
 int serve(Service& service, const sigset_t& signals) {
     const timespec interval{0, Service::tick_interval.ns};
-    Health health = Health::starting;
-    std::string summary;
+    HealthLog health_log;
+    std::string status;
     for (;;) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
@@ -51,14 +54,12 @@ int serve(Service& service, const sigset_t& signals) {
         service.tick();
         report_suppressed_library_lines(host_now());
         sd_notify(0, "WATCHDOG=1");
-        if (summary == service.health_summary()) continue;
-        summary = service.health_summary();
-        sd_notifyf(0, "STATUS=%s", summary.c_str());
-        // A cause that is only worded anew, such as by a time, is not logged again.
-        if (health == service.health()) continue;
-        health = service.health();
-        log(health == Health::degraded ? LogLevel::warning : LogLevel::info, "service",
-            "health: {}", summary);
+        const Summary& health = service.health();
+        if (const auto level = health_log.see(health, host_now()))
+            log(*level, "service", "health: {}", health.text);
+        if (status == health.text) continue;
+        status = health.text;
+        sd_notifyf(0, "STATUS=%s", status.c_str());
     }
 }
 
@@ -67,16 +68,70 @@ void log_problems(const TomlProblems& problems) {
         log(LogLevel::error, "configuration", "{}", problem.message());
 }
 
+bool serves(const Configuration& configuration) {
+    return !configuration.cameras.empty() || !configuration.imus.empty();
+}
+
+constexpr auto serves_nothing =
+    "it has no camera and no IMU, so nothing is served; add a [[camera]] with 'name' and 'device', "
+    "or an [[imu]] with 'model'";
+
 int check(const std::string& path, bool as_json) {
     const auto configuration = load_configuration(path);
     const TomlProblems problems = configuration ? TomlProblems{} : configuration.error();
     if (as_json)
         fmt::print("{}\n", to_json(path, problems));
+    else if (problems.empty() && !serves(*configuration))
+        fmt::print("{}: ok, but {}\n", path, serves_nothing);
     else if (problems.empty())
         fmt::print("{}: ok\n", path);
     else
         log_problems(problems);
     return problems.empty() ? EX_OK : EX_CONFIG;
+}
+
+/// For so long, or until a signal asks to stop: then true.
+bool stopped_within(Duration length, const sigset_t& signals) {
+    const timespec interval{1, 0};
+    for (const HostTime end = host_now() + length; host_now() < end;) {
+        sd_notify(0, "WATCHDOG=1");
+        const int signal = sigtimedwait(&signals, nullptr, &interval);
+        if (signal == SIGINT || signal == SIGTERM) return true;
+    }
+    return false;
+}
+
+/// As after an installation: systemd need not start it again until there is something to serve.
+int wait_for_configuration(const std::string& path, const sigset_t& signals) {
+    const std::string text = fmt::format("{}: {}, then restart the service", path, serves_nothing);
+    log(LogLevel::warning, "service", "{}", text);
+    sd_notifyf(0, "READY=1\nSTATUS=%s", text.c_str());
+    while (!stopped_within(seconds(60), signals)) {
+    }
+    return EX_OK;
+}
+
+Expected<std::unique_ptr<Service>> make_service(const Configuration& configuration) {
+    if (configuration.memory.lock)
+        if (const auto locked = lock_memory(); !locked) return Unexpected(locked.error());
+    return Service::create(configuration);
+}
+
+/// What is missing may come: a service manager need not start the program for each attempt. A
+/// terminal gets the error at once. None: stopped while it waited.
+Expected<std::unique_ptr<Service>> make_or_wait(const Configuration& configuration,
+                                                const sigset_t& signals) {
+    constexpr Duration retry = seconds(5);
+    std::string reported;
+    for (;;) {
+        auto service = make_service(configuration);
+        if (service || std::getenv("NOTIFY_SOCKET") == nullptr) return service;
+        const std::string text = service.error().message();
+        if (text != reported) log(LogLevel::error, "service", "{}; trying again every 5 s", text);
+        reported = text;
+        sd_notifyf(0, "READY=1\nSTATUS=waiting: %s", text.c_str());
+        if (stopped_within(retry, signals)) return std::unique_ptr<Service>{};
+    }
 }
 
 int run(const std::string& path) {
@@ -87,18 +142,14 @@ int run(const std::string& path) {
         return EX_CONFIG;
     }
     set_log_level(configuration->log_level);
+    if (!serves(*configuration)) return wait_for_configuration(path, signals);
     route_library_log();
-    if (configuration->memory.lock) {
-        if (const auto locked = lock_memory(); !locked) {
-            log(LogLevel::error, "service", "{}", locked.error().message());
-            return EX_UNAVAILABLE;
-        }
-    }
-    auto service = Service::create(*configuration);
+    auto service = make_or_wait(*configuration, signals);
     if (!service) {
         log(LogLevel::error, "service", "{}", service.error().message());
         return EX_UNAVAILABLE;
     }
+    if (!*service) return EX_OK;
     (*service)->start();
     sd_notify(0, "READY=1");
     log(LogLevel::info, "service", "serving instance '{}' with {} camera(s) and {} IMU(s)",

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/state_directory.hpp"
@@ -234,6 +235,16 @@ void Service::report_output_step(const OutputStep& step) {
     events_->add({EventKind::output_clock_stepped, EventReason::none, 0, "clock", by.ns});
 }
 
+/// Of the host's clock, where that names the seconds of PPS pulses.
+void Service::report_discipline(const clock::KernelState& kernel) {
+    if (std::exchange(host_disciplined_, kernel.synchronised) == kernel.synchronised) return;
+    events_->add({EventKind::host_undisciplined, EventReason::none, 0, "clock",
+                  kernel.synchronised ? 0 : 1});
+    log(kernel.synchronised ? LogLevel::info : LogLevel::warning, "clock",
+        "the host's clock, which names the seconds of PPS pulses, is {}disciplined",
+        kernel.synchronised ? "" : "not ");
+}
+
 Status Service::collect_status(HostTime now) {
     Status status;
     status.instance = configuration_.instance;
@@ -247,6 +258,8 @@ Status Service::collect_status(HostTime now) {
     if (status.board.state == BoardState::running && status.board.hint.empty())
         status.board.hint = missing_capability(configuration_, status.board.capabilities);
     status.clock = translator_.report();
+    status.pps_labels = configuration_.clock.pps;
+    if (status.pps_labels == clock::PpsLabels::host) report_discipline(status.clock.kernel);
     asymmetry_.keep(status.clock);
     if (const auto step = output_steps_.see(status.clock)) report_output_step(*step);
     status.grid = alignment_.report(now);

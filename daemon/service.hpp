@@ -41,9 +41,7 @@ class Service final : private BoardListener {
     void tick();
 
     /// As of the last status document.
-    Health health() const { return status_.health(); }
-    /// The same, and why, in one line.
-    const std::string& health_summary() const { return status_.summary(); }
+    const Summary& health() const { return status_.summary(); }
 
     static constexpr Duration tick_interval = milliseconds(50);
 
@@ -58,6 +56,7 @@ class Service final : private BoardListener {
     void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
     void report_output_step(const OutputStep& step);
+    void report_discipline(const clock::KernelState& kernel);
 
     // On the link's thread.
     void board_restarted() override;
@@ -74,6 +73,7 @@ class Service final : private BoardListener {
     clock::Translator translator_;
     StatusPublisher status_;
     ClockStepDetector output_steps_;
+    bool host_disciplined_ = true;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
     std::unique_ptr<EventJournal> events_;

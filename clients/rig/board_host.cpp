@@ -40,7 +40,6 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
     return felt;
 }
 
-constexpr Duration lateness = milliseconds(600);
 constexpr Duration marked_ahead = milliseconds(500);
 /// Edges of the IMU's data-ready line are scheduled so long before they are due.
 constexpr Duration signalled_ahead = milliseconds(2);
@@ -304,6 +303,7 @@ void BoardHost::drop_host() {
 void BoardHost::suffer(const Fault& fault) {
     if (fault.kind == FaultKind::board_reset) return reset();
     const HostTime until = host_now() + Duration{std::llround(fault.seconds * 1e9)};
+    if (fault.kind == FaultKind::late_records) lateness_ns_ = std::llround(fault.delay_ms * 1e6);
     suffers_until_ns_[static_cast<std::size_t>(fault.kind)] = until.ns;
 }
 
@@ -324,7 +324,8 @@ void BoardHost::plug(bool in) {
 void BoardHost::write_late(HostTime now) {
     const auto out = board_->transmitted();
     if (!out.empty()) {
-        const Duration delay = suffers(FaultKind::late_records) ? lateness : link_delay_;
+        const Duration delay =
+            suffers(FaultKind::late_records) ? Duration{lateness_ns_} : link_delay_;
         late_.emplace_back(now + delay, std::vector(out.begin(), out.end()));
         board_->consume(out.size(), board_now());
     }

@@ -91,6 +91,7 @@ class BoardHost {
     Parcels coming_;  ///< on its way from there
     bool plugged_ = true;
     std::array<std::atomic<std::int64_t>, fault_kinds> suffers_until_ns_{};
+    std::atomic<std::int64_t> lateness_ns_{0};  ///< of late records
     std::atomic<bool> reset_pending_{false};
     std::atomic<bool> stop_{false};
     std::thread thread_;

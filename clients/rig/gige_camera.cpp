@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <system_error>
 
 #include "bytes.hpp"
@@ -24,6 +25,7 @@ constexpr std::uint8_t acknowledge_wanted = 0x01;
 constexpr std::size_t discovery_size = 0xF8;
 constexpr std::size_t most_memory = 512;
 constexpr int poll_ms = 20;
+constexpr int answer_poll_ms = 1;  ///< while answers wait
 constexpr std::uint32_t fire_bit = 1U << 31U;
 
 enum Command : std::uint16_t {
@@ -100,6 +102,7 @@ GigeCamera::GigeCamera(const World& world, const CameraScenario& settings,
                        const CameraFamily& family, FileDescriptor socket,
                        FileDescriptor broadcast_socket)
     : hostility_(settings.hostility),
+      answer_time_{std::llround(settings.answer_ms * 1e6)},
       socket_(std::move(socket)),
       broadcast_socket_(std::move(broadcast_socket)),
       transmitter_(settings.address, settings.link_mbps, settings.packet_loss, world.scenario.seed),
@@ -117,11 +120,12 @@ GigeCamera::~GigeCamera() {
 void GigeCamera::serve() {
     while (!stop_) {
         pollfd readable[] = {{socket_.get(), POLLIN, 0}, {broadcast_socket_.get(), POLLIN, 0}};
-        ::poll(readable, 2, poll_ms);
+        ::poll(readable, 2, answers_.empty() ? poll_ms : answer_poll_ms);
         if (camera_.poll(host_now())) {
             lose_controller();
             configure_stream();
         }
+        send_answers();
         for (const pollfd& entry : readable)
             if ((entry.revents & POLLIN) != 0) receive(entry.fd);
         const Duration silence = host_now() - last_contact_;
@@ -155,8 +159,16 @@ void GigeCamera::handle(std::span<const std::uint8_t> packet, const sockaddr_in&
     put_half(reply, body.size());
     put_half(reply, half(packet, 6));
     reply.insert(reply.end(), body.begin(), body.end());
-    ::sendto(socket_.get(), reply.data(), reply.size(), 0, reinterpret_cast<const sockaddr*>(&from),
-             sizeof from);
+    answers_.push_back({host_now() + answer_time_, std::move(reply), from});
+    send_answers();
+}
+
+void GigeCamera::send_answers() {
+    for (; !answers_.empty() && answers_.front().due <= host_now(); answers_.pop_front()) {
+        const Answer& due = answers_.front();
+        ::sendto(socket_.get(), due.packet.data(), due.packet.size(), 0,
+                 reinterpret_cast<const sockaddr*>(&due.to), sizeof due.to);
+    }
 }
 
 /// In milliseconds, the longest that a device may ask for: a host that believes it waits a minute.

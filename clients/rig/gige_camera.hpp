@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <thread>
@@ -41,6 +42,7 @@ class GigeCamera final : private CameraTransport {
 
     void serve();
     void receive(int socket);
+    void send_answers();
     void handle(std::span<const std::uint8_t> packet, const sockaddr_in& from);
     std::vector<std::uint8_t> answer(std::uint16_t command, std::span<const std::uint8_t> body,
                                      const sockaddr_in& from, std::uint16_t& status);
@@ -53,7 +55,15 @@ class GigeCamera final : private CameraTransport {
     void configure_messages();
     bool pending(std::uint16_t command, std::span<const std::uint8_t> body) const;
 
+    struct Answer {
+        HostTime due;
+        std::vector<std::uint8_t> packet;
+        sockaddr_in to{};
+    };
+
     Hostility hostility_;
+    Duration answer_time_;  ///< from question to answer
+    std::deque<Answer> answers_;
     FileDescriptor socket_;
     FileDescriptor broadcast_socket_;  ///< receives discovery; none on loopback
     GvspTransmitter transmitter_;

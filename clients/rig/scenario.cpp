@@ -77,6 +77,7 @@ CameraScenario read_camera(TableReader& reader) {
     reader.read("readout_us", camera.readout_us, 0, 1e6);
     reader.read("link_mbps", camera.link_mbps, 0, 1e5);
     reader.read("packet_loss", camera.packet_loss, 0, 1);
+    reader.read("answer_ms", camera.answer_ms, 0, 1e4);
     reader.read("extended_ids", camera.extended_ids);
     reader.read("ids_count_ignored", camera.ids_count_ignored);
     reader.read("events", camera.events);
@@ -154,6 +155,7 @@ Fault read_fault(TableReader& reader) {
     reader.read("count", fault.count, 1, INT64_MAX);
     reader.read("seconds", fault.seconds, -1e6, 1e6);
     reader.read("share", fault.share, 0, 1);
+    reader.read("delay_ms", fault.delay_ms, 0, 1e4);
     return fault;
 }
 

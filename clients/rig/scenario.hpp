@@ -69,6 +69,7 @@ struct CameraScenario {
     double readout_us = 2000;        ///< end of exposure to first packet
     double link_mbps = 1000;         ///< packets leave at this pace; 0: as fast as they can
     double packet_loss = 0;          ///< fraction
+    double answer_ms = 0;            ///< each answer of the control channel takes so long
     bool extended_ids = false;       ///< block ids of 64 bits
     bool ids_count_ignored = false;  ///< an ignored trigger also takes a block id
     bool events = true;              ///< it has a message channel, for those of its exposures
@@ -117,7 +118,7 @@ enum class FaultKind {
     board_reset,   ///< the board restarts with another nonce
     board_gone,    ///< it is unplugged
     board_mute,    ///< it neither reads nor writes
-    late_records,  ///< what it writes arrives 600 ms late
+    late_records,  ///< what it writes arrives `delay_ms` late
     imu_missing,   ///< nobody drives the line of the IMU's answers, which reads as ones
     imu_noisy,     ///< bits of the IMU's bursts are wrong
     imu_stuck,     ///< no transfer of the IMU ends
@@ -133,6 +134,7 @@ struct Fault {
     std::uint64_t count = 1;  ///< this many exposures in a row
     double seconds = 1;       ///< negative for a clock that steps back
     double share = 0.5;
+    double delay_ms = 600;
 };
 
 struct Scenario {

@@ -46,19 +46,25 @@ int exit_code(const std::string& health) {
     return health == "starting" ? exit_starting : EXIT_FAILURE;
 }
 
-int show_status(const std::string& instance, bool json) {
+struct StatusOptions {
+    bool json = false;
+    bool verbose = false;
+};
+
+int show_status(const std::string& instance, const StatusOptions& options) {
     const auto status = client::read_status(instance);
     if (!status) return fail(status.error());
-    fmt::print("{}", json ? status->dump() + "\n" : client::status_text(*status));
+    const auto detail = options.verbose ? client::Detail::full : client::Detail::summary;
+    fmt::print("{}", options.json ? status->dump() + "\n" : client::status_text(*status, detail));
     std::fflush(stdout);
     return exit_code(status->value("health", ""));
 }
 
-int watch_status(const std::string& instance, bool json) {
+int watch_status(const std::string& instance, const StatusOptions& options) {
     int code = EX_OK;
     while (stop_requested == 0) {
-        if (isatty(STDOUT_FILENO) != 0 && !json) fmt::print("\x1b[H\x1b[J");
-        code = show_status(instance, json);
+        if (isatty(STDOUT_FILENO) != 0 && !options.json) fmt::print("\x1b[H\x1b[J");
+        code = show_status(instance, options);
         const timespec interval{1, 0};
         nanosleep(&interval, nullptr);  // a signal ends it early
     }
@@ -99,6 +105,8 @@ int main(int argc, char** argv) {
         "1 if something is not delivering, 2 while it starts, 69 if the service is not running "
         "(docs/user/troubleshooting.md)");
     status->add_flag("--watch", watch, "Refresh every second");
+    bool verbose = false;
+    status->add_flag("--verbose", verbose, "Also show delays, streams, and counters that are zero");
     status->add_flag("--json", json,
                      "Print the status document as JSON (docs/contracts/status.md)");
 
@@ -160,7 +168,9 @@ int main(int argc, char** argv) {
         process.chosen() || files.chosen() || recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     signal(SIGXFSZ, SIG_IGN);  // a limit on files is reported like a full disk
-    if (*status) return watch ? watch_status(instance, json) : show_status(instance, json);
+    if (*status)
+        return watch ? watch_status(instance, {json, verbose})
+                     : show_status(instance, {json, verbose});
     if (*list) {
         const auto text = client::list_streams(instance, json);
         if (!text) return fail(text.error());

@@ -38,6 +38,9 @@ constexpr Duration doubt_interval = milliseconds(50);
 /// Time of an answer to that.
 constexpr Duration doubt_patience = milliseconds(30);
 
+/// Time of an answer of one that sends no frames.
+constexpr Duration silence_patience = milliseconds(500);
+
 /// Packets come, but no frame for so long: the camera began to count anew, less than 100 back, and
 /// Aravis takes its frames for late ones.
 constexpr Duration time_of_deafness = milliseconds(300);
@@ -116,14 +119,15 @@ CameraReport Camera::report() const {
     const std::lock_guard lock(mutex_);
     CameraReport report = report_;
     report.stuck_ids = deaf_streams_ >= deaf_streams_of_stuck_ids;
+    report.deaf = deaf_ || deaf_streams_ > 0;  // in this stream, or in the one just before
     report.renumbers = host_now().ns - renumbered_before_ns_ < renumbering_memory.ns;
-    const Duration setting_up = host_now() - setting_up_since_;
-    if (setting_up_since_.ns != 0 && setting_up > set_up_patience) {
+    report.setting_up = setting_up_since_.ns != 0 ? host_now() - setting_up_since_ : Duration{};
+    if (report.setting_up > set_up_patience) {
         report.state = CameraState::failed;
         report.hint = fmt::format(
             "{}: set-up has taken {} s so far: its control channel is slow, or its answers are "
             "incomplete; if that lasts, power it off and on",
-            configuration_.device, setting_up.ns / seconds(1).ns);
+            configuration_.device, report.setting_up.ns / seconds(1).ns);
     }
     return report;
 }
@@ -131,10 +135,11 @@ CameraReport Camera::report() const {
 void Camera::set_state(CameraState state, const std::string& hint) {
     const std::lock_guard lock(mutex_);
     if (report_.state != state || report_.hint != hint) {
-        const bool good = hint.empty();
-        log(good ? LogLevel::info : LogLevel::warning, configuration_.name, "{}{}{}",
-            to_string(state), good ? "" : ": ", hint);
         report_.since = host_now();
+        const bool good = hint.empty();
+        const std::string line = fmt::format("{}{}{}", to_string(state), good ? "" : ": ", hint);
+        if (const auto passed = log_limit_.pass(line, report_.since))
+            log_line(good ? LogLevel::info : LogLevel::warning, configuration_.name, *passed);
     }
     report_.state = state;
     report_.hint = hint;
@@ -160,6 +165,7 @@ void Camera::run() {
         environment_.bandwidth.leave(configuration_.name);
         if (ended || !pause({})) break;
         explain(ended.error());
+        note_held();
         set_state(ended.error().state, ended.error().error.message());
         if (!wait_to_retry(ended.error().state)) break;
     }
@@ -168,8 +174,12 @@ void Camera::run() {
     wake_.notify_all();
 }
 
-/// Control that is held need not be held by a program that runs.
+/// Control that is held need not be held by a program that runs, and a camera that was there a
+/// moment ago may come back.
 void Camera::explain(CameraProblem& ended) {
+    if (ended.state == CameraState::absent && report_.connections > 0)
+        ended.error = {configuration_.device, "it answered before, and does not any more",
+                       "it may be restarting: if it does not return, check cable, power and name"};
     if (ended.state != CameraState::busy) {
         held_since_ = {};
         return;
@@ -179,6 +189,11 @@ void Camera::explain(CameraProblem& ended) {
     ended = {CameraState::opening,
              {configuration_.device, "it is still locked, perhaps by a program that was killed",
               "the lock expires within seconds; the service keeps trying"}};
+}
+
+void Camera::note_held() {
+    const std::lock_guard lock(mutex_);
+    report_.held = held_since_.ns != 0;
 }
 
 /// Waits; not as long when the camera was gone and is back. False: it is to stop.
@@ -300,6 +315,8 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     lose();
     if (!ended) {
         set_state(ended.error().state, ended.error().error.message());
+        const std::lock_guard lock(mutex_);
+        report_.reopened = ended.error().error.what;
         return ended;
     }
     g_object_ref(camera);  // which may be mute
@@ -431,6 +448,7 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
     const bool expected =
         !pipeline_.triggered() || pipeline_.unanswered_triggers() > triggers_of_silence;
     const bool missed = expected && host_now() - health.taken_at > time_of_deafness;
+    deaf_ = frames.packets() > health.packets && missed;
     if (frames.packets() > health.packets && (silent || (health.taken > 0 && missed))) {
         ++deaf_streams_;
         if (health.taken > few_frames)
@@ -438,14 +456,17 @@ CameraResult<> Camera::examine(FrameSource& frames, Health& health) {
         return problem(CameraState::opening, {configuration_.name, "its frame numbers started over",
                                               "the camera is being reopened"});
     }
-    if (silent)
-        return problem(
-            CameraState::silent,
-            {configuration_.name,
-             pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
-             "check the trigger cable, TriggerSource and the network; the camera is being "
-             "reopened"});
-    return {};
+    if (!silent) return {};
+    if (device_ && !answers(silence_patience))
+        return problem(CameraState::silent,
+                       {configuration_.name, "the camera does not answer",
+                        "it may be restarting: if it does not return, check its cable and power"});
+    return problem(
+        CameraState::silent,
+        {configuration_.name,
+         pipeline_.triggered() ? "triggers are sent but no frames come" : "no frames come",
+         "check the trigger cable, TriggerSource and the network; the camera is being "
+         "reopened"});
 }
 
 /// Whether a camera that leaves triggers unanswered has forgotten that it is controlled.

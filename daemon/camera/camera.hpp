@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/detached_tasks.hpp"
+#include "base/repeat_limit.hpp"
 #include "camera/auto_exposure.hpp"
 #include "camera/bandwidth_plan.hpp"
 #include "camera/camera_state.hpp"
@@ -51,6 +52,10 @@ struct CameraReport {
     BandwidthShare bandwidth;
     bool renumbers = false;  ///< its frames were numbered anew twice lately, and it was reopened
     bool stuck_ids = false;  ///< packets come, but no frame completes, time and again
+    bool held = false;       ///< another program has control of it, or had a moment ago
+    bool deaf = false;       ///< packets have come since the newest frame, and it is overdue
+    Duration setting_up;     ///< for so long; 0: it is not
+    std::string reopened;    ///< why it was last given up while it streamed, and opened anew
     std::string gain_feature;
     SensorState sensor;  ///< as its registers say
 };
@@ -111,6 +116,7 @@ class Camera {
     CameraResult<> watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSource& frames,
                          const std::atomic<bool>& control_lost);
     CameraResult<> examine(FrameSource& frames, Health& health);
+    void note_held();
     void explain(CameraProblem& ended);
     bool wait_to_retry(CameraState why);
     bool answers(Duration patience) const;
@@ -156,6 +162,8 @@ class Camera {
     std::optional<NetworkDevice> device_;  ///< where it was last seen
     HostTime held_since_;                  ///< somebody else has control since; 0: nobody
     static constexpr std::int64_t never_ns = INT64_MIN / 2;
+    RepeatLimit log_limit_;  ///< of states
+    std::atomic<bool> deaf_{false};
     std::atomic<unsigned> deaf_streams_{0};                     ///< in a row
     std::atomic<std::int64_t> renumbered_ns_{never_ns};         ///< its frames were numbered anew
     std::atomic<std::int64_t> renumbered_before_ns_{never_ns};  ///< the same, the time before

@@ -46,6 +46,12 @@ constexpr int quiet_periods = 5;
 /// A camera that restarts is back within so long, mostly.
 constexpr Duration restart_time = seconds(6);
 
+/// Setting up takes less, mostly.
+constexpr Duration long_set_up = seconds(3);
+
+/// A start so long after a camera was reopened has another cause.
+constexpr Duration reopened_lately = seconds(10);
+
 /// On top of the longest pause between two triggers, and of the link's delay, no record for so long
 /// is no trigger.
 constexpr Duration record_patience = milliseconds(1500);
@@ -106,7 +112,7 @@ std::string own_hint(const CameraView& camera) { return camera.it.camera.hint; }
 
 /// It would be open, did not something hold it that ends by itself.
 bool leased(const CameraView& camera) {
-    return camera.in(CameraState::opening) && !own_hint(camera).empty();
+    return camera.in(CameraState::opening) && camera.it.camera.held;
 }
 
 bool numbers_anew(const CameraView& camera) {
@@ -147,6 +153,18 @@ bool late_records(const CameraView& camera) {
     return camera.triggered() && !camera.full() && camera.it.pipeline.record_delay > late_record;
 }
 
+/// Not too late, but the link's delay looks the same as a step of the board's clock.
+bool later_records(const CameraView& camera) {
+    return camera.triggered() && !camera.full() && camera.it.pipeline.records_late_by.ns > 0;
+}
+
+/// By its line, and the board's records of that are doubted.
+bool exposure_changed(const CameraView& camera) {
+    return camera.triggered() && !camera.full() && camera.it.pipeline.doubted_exposure.ns > 0 &&
+           some(camera.it.recent.records_doubted,
+                camera.it.recent.records_doubted + camera.it.recent.triggers);
+}
+
 bool exposes_too_long(const CameraView& camera) {
     const double rest = 1 - share(static_cast<std::uint64_t>(camera.exposure().ns),
                                   static_cast<std::uint64_t>(camera.period().ns));
@@ -184,12 +202,33 @@ std::string not_exposing_hint(const CameraView& camera) {
         camera.it.configuration.output);
 }
 
-/// By the exposure line, and as many frames are missing.
-bool ignores_triggers(const CameraView& camera) {
+/// No frame is of a trigger without a measured exposure.
+bool frames_fit(const CameraView& camera) {
     const PipelineReport& recent = camera.it.recent;
-    return camera.triggered() && camera.strobe() && !camera.full() && camera.frames() > 0 &&
-           some(recent.answers.ignored, recent.triggers) &&
-           camera.frames() + recent.answers.ignored <= recent.triggers + 2;
+    return camera.frames() + recent.unmeasured <= recent.triggers + recent.records_doubted + 2;
+}
+
+/// Triggers that the camera did not take: by its exposure line, which is silent and as many frames
+/// are missing; or by its own events; or because frames are missing of which it has not counted
+/// any.
+std::uint64_t ignored_triggers(const CameraView& camera) {
+    const PipelineReport& recent = camera.it.recent;
+    if (camera.strobe()) return frames_fit(camera) ? recent.answers.ignored : 0;
+    const std::uint64_t arrived = camera.frames() + camera.on_link() + recent.answers.ids_skipped;
+    const std::uint64_t missing = recent.triggers - std::min(recent.triggers, arrived);
+    return std::max(recent.triggers_missed, missing);
+}
+
+/// By its own events; lately, or in a start, where triggers are too few.
+bool missed(const CameraView& camera) {
+    const PipelineReport& all = camera.it.pipeline;
+    return some(camera.it.recent.triggers_missed, camera.it.recent.triggers) ||
+           (all.pairing == pairing::State::searching && some(all.triggers_missed, all.triggers));
+}
+
+bool ignores_triggers(const CameraView& camera) {
+    return camera.triggered() && !camera.full() && camera.frames() > 0 &&
+           some(ignored_triggers(camera), camera.it.recent.triggers);
 }
 
 bool takes_every_nth(const CameraView& camera) {
@@ -218,16 +257,22 @@ std::string every_nth_hint(const CameraView& camera) {
 }
 
 std::string ignored_hint(const CameraView& camera) {
-    const PipelineReport& recent = camera.it.recent;
+    const PipelineReport& all = camera.it.pipeline;
+    std::uint64_t ignored = ignored_triggers(camera);
+    std::uint64_t triggers = camera.it.recent.triggers;
+    if (!some(ignored, triggers)) {
+        ignored = all.triggers_missed;
+        triggers = all.triggers;
+    }
     return fmt::format(
         "ignores {:.0f} % of triggers: {} of the last {}; it may still be exposing or reading out, "
         "or miss the pulses: lower 'rate_hz' or ExposureTime, check the trigger cable",
-        100 * share(recent.answers.ignored, recent.triggers), recent.answers.ignored,
-        recent.triggers);
+        100 * share(ignored, triggers), ignored, triggers);
 }
 
 bool sends_too_many(const CameraView& camera) {
-    const std::uint64_t triggers = camera.it.recent.triggers + camera.on_link();
+    const std::uint64_t triggers =
+        camera.it.recent.triggers + camera.it.recent.records_doubted + camera.on_link();
     return camera.triggered() && !camera.full() && triggers > 0 && camera.frames() > triggers + 1 &&
            some(camera.frames() - triggers, triggers);
 }
@@ -275,10 +320,16 @@ bool all_frames_missing(const CameraView& camera) {
 
 std::string missing_hint(const CameraView& camera) {
     const std::uint64_t triggers = camera.it.recent.triggers;
+    const std::uint64_t missing = triggers - std::min(camera.frames(), triggers);
+    if (!camera.strobe())
+        return fmt::format(
+            "{} of the last {} triggers have no frame here, and without an exposure line nothing "
+            "shows why: check trigger cable, TriggerSource, network and firewall",
+            missing, triggers);
     return fmt::format(
         "{} of the last {} exposures have no frame here: check network, firewall and the camera's "
         "bandwidth limit",
-        triggers - std::min(camera.frames(), triggers), triggers);
+        missing, triggers);
 }
 
 /// Some triggers are answered, the others come while it is busy.
@@ -291,7 +342,7 @@ bool answers_some(const CameraView& camera) {
 }
 
 bool strobe_missing(const CameraView& camera) {
-    return camera.triggered() && camera.strobe() && camera.frames() > 0 &&
+    return camera.triggered() && camera.strobe() && camera.frames() > 0 && !frames_fit(camera) &&
            some(camera.it.recent.unmeasured, camera.it.recent.triggers);
 }
 
@@ -340,6 +391,17 @@ std::string count_of(std::uint64_t part, std::uint64_t whole) {
 std::string rates(const CameraView& camera) {
     return fmt::format("{:.1f} of {:g} Hz", camera.it.delivery.rate_hz,
                        camera.it.configuration.rate_hz);
+}
+
+/// Setting up is a few hundred answers.
+std::string opening_hint(const CameraView& camera) {
+    const Duration lasts = camera.it.camera.setting_up;
+    if (lasts < long_set_up && !own_hint(camera).empty()) return own_hint(camera);
+    if (lasts < long_set_up) return "it is being opened and set up";
+    return fmt::format(
+        "it is being set up, which has taken {} s so far: a new description takes up to 10 s, a "
+        "slow control channel longer",
+        lasts.ns / seconds(1).ns);
 }
 
 struct Rule {
@@ -403,8 +465,7 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& /*c*/) {
          return std::string("frames are withheld: the board's clock is not known yet");
      }},
-    {Fault::starting, [](const CameraView& c) { return !c.streaming(); },
-     [](const CameraView& /*c*/) { return std::string("it is being opened and set up"); }},
+    {Fault::starting, [](const CameraView& c) { return !c.streaming(); }, opening_hint},
     {Fault::link_full,
      [](const CameraView& c) { return lost_packets(c) && !c.it.camera.bandwidth.fits(); },
      own_hint},
@@ -439,6 +500,19 @@ constexpr Rule camera_rules[] = {
                             c.it.recent.no_buffer);
      }},
     {Fault::no_exposure, exposes_not, not_exposing_hint},
+    {Fault::block_ids, [](const CameraView& c) { return c.streaming() && c.it.camera.deaf; },
+     [](const CameraView& /*c*/) {
+         return std::string(
+             "packets arrive, but no frame completes: its block ids stand still or start over, or "
+             "the end of each frame is lost; it is reopened, and if that does not help, update its "
+             "firmware");
+     }},
+    {Fault::triggers_ignored,
+     [](const CameraView& c) {
+         return c.triggered() && !c.full() && missed(c) && !takes_every_nth(c) &&
+                !exposes_too_long(c);
+     },
+     ignored_hint},
     {Fault::no_frames, all_frames_missing, missing_hint},
     {Fault::camera_clock,
      [](const CameraView& c) { return c.triggered() && !c.full() && !clock_hint(c).empty(); },
@@ -446,8 +520,11 @@ constexpr Rule camera_rules[] = {
     {Fault::rate_too_high, takes_every_nth, every_nth_hint},
     // A start in progress looks like what follows.
     {Fault::starting, [](const CameraView& c) { return c.starting(); },
-     [](const CameraView& /*c*/) {
-         return std::string("a start is in progress: its frames are being proved");
+     [](const CameraView& c) {
+         return c.it.camera.reopened.empty() || c.all.now - c.it.camera.since > reopened_lately
+                    ? std::string("a start is in progress: its frames are being proved")
+                    : fmt::format("it was reopened ({}): its frames are being proved",
+                                  c.it.camera.reopened);
      }},
     {Fault::no_triggers, no_records,
      [](const CameraView& c) {
@@ -462,6 +539,14 @@ constexpr Rule camera_rules[] = {
              "the board's records arrive {} ms after the exposure, too late to prove frames: lower "
              "the load of host and USB",
              c.it.pipeline.record_delay.ns / 1'000'000);
+     }},
+    {Fault::late_records, later_records,
+     [](const CameraView& c) {
+         return fmt::format(
+             "the board's records arrive {} after the exposure, {} later than before: frames are "
+             "withheld until exchanges show that this is the link, and no step of the board's "
+             "clock; lower the load of host and USB",
+             in_ms(c.it.pipeline.record_delay), in_ms(c.it.pipeline.records_late_by));
      }},
     {Fault::exposure_too_long, exposes_too_long,
      [](const CameraView& c) {
@@ -493,9 +578,17 @@ constexpr Rule camera_rules[] = {
      [](const CameraView& c) { return c.triggered() && c.it.pipeline.exposure_contradicted; },
      [](const CameraView& c) {
          return fmt::format(
-             "the exposure line shows {} us, but the camera exposes {} us: check "
-             "'strobe_line' and its LineSource, or set check_exposure = false",
+             "the exposure line shows {} us, but the camera was to expose {} us: unless "
+             "ExposureTime was changed, check 'strobe_line' and its LineSource, or set "
+             "check_exposure = false",
              c.it.pipeline.exposure.ns / 1000, c.it.pipeline.camera_exposure.ns / 1000);
+     }},
+    {Fault::wrong_exposure, exposure_changed,
+     [](const CameraView& c) {
+         return fmt::format(
+             "its exposure line suddenly shows {} us: frames are withheld until that lasts; did "
+             "another program, or the camera itself, change ExposureTime?",
+             c.it.pipeline.doubted_exposure.ns / 1000);
      }},
     {Fault::double_frames, sends_too_many,
      [](const CameraView& c) {
@@ -593,6 +686,7 @@ const char* to_string(Fault fault) {
         case Fault::clock_holdover: return "clock_holdover";
         case Fault::clock_step: return "clock_step";
         case Fault::seconds_differ: return "seconds_differ";
+        case Fault::host_undisciplined: return "host_undisciplined";
         case Fault::camera_absent: return "camera_absent";
         case Fault::camera_unreachable: return "camera_unreachable";
         case Fault::camera_busy: return "camera_busy";
@@ -683,7 +777,15 @@ Diagnosis diagnose_board(const Status& status) {
     return conclude(Fault::none, board_remark(status), known, in_time);
 }
 
-Diagnosis diagnose_seconds(const clock::PpsReport& pps) {
+/// Of a clock whose estimate is good: who names the seconds?
+Diagnosis diagnose_seconds(const Status& status) {
+    const clock::PpsReport& pps = status.clock.pps;
+    if (status.pps_labels == clock::PpsLabels::host && !status.clock.kernel.synchronised)
+        return conclude(Fault::host_undisciplined,
+                        "PPS is not used: the kernel reports that the host's clock, which names "
+                        "its seconds, is not disciplined; start chrony, or ptp4l and phc2sys, or "
+                        "set pps = \"nmea\"",
+                        false, young(status.started, status.now));
     if (pps.second_difference == 0) return {};
     return conclude(Fault::seconds_differ,
                     fmt::format("the receiver at the board is {} s {} the host: has it received "
@@ -704,7 +806,7 @@ Diagnosis diagnose_clock(const Status& status) {
         return conclude(cause, "no exchanges: see the board's hint", status.clock.slots > 0,
                         in_time);
     switch (state) {
-        case ClockState::locked: return diagnose_seconds(status.clock.pps);
+        case ClockState::locked: return diagnose_seconds(status);
         case ClockState::init:
         case ClockState::reset:
             return conclude(Fault::clock_unknown,

@@ -35,6 +35,7 @@ enum class Fault {
     clock_holdover,
     clock_step,
     seconds_differ,
+    host_undisciplined,
     // Of a camera: it cannot be had.
     camera_absent,
     camera_unreachable,

@@ -39,10 +39,13 @@ PipelineReport difference(PipelineReport now, const PipelineReport& before) {
     now.published -= before.published;
     now.triggers -= before.triggers;
     now.unmeasured -= before.unmeasured;
+    now.records_doubted -= before.records_doubted;
+    now.triggers_missed -= before.triggers_missed;
     now.suspect -= before.suspect;
     now.answers.ignored -= before.answers.ignored;
     now.answers.ids_repeated -= before.answers.ids_repeated;
     now.answers.ids_restarted -= before.answers.ids_restarted;
+    now.answers.ids_skipped -= before.answers.ids_skipped;
     for (std::size_t i = 0; i < now.refused.size(); ++i) now.refused[i] -= before.refused[i];
     return now;
 }
@@ -63,11 +66,16 @@ bool outlasts_reopening(const Diagnosis& before, const CameraStatus& camera, Hos
            (before.fault == Fault::no_exposure || before.fault == Fault::no_frames);
 }
 
+/// A camera that delivers again is trusted after so long.
+constexpr Duration recovery = seconds(4);
+
+/// What it lacked is seen, and not why.
+bool unexplained(Fault fault) { return fault == Fault::too_slow || fault == Fault::unproved; }
+
 /// What it lacked a moment ago has ended, and it is not yet trusted.
-bool recovers(const Diagnosis& before, const CameraStatus& camera) {
-    return camera.diagnosis.fault == Fault::too_slow && before.fault != Fault::none &&
-           camera.recent.published - camera.recent.suspect + 1 >= camera.recent.triggers &&
-           camera.recent.received > 0;
+bool recovers(const CameraStatus& camera, HostTime explained, HostTime now) {
+    return unexplained(camera.diagnosis.fault) && now - explained < recovery &&
+           camera.pipeline.pairing == pairing::State::locked && camera.recent.received > 0;
 }
 
 }  // namespace
@@ -82,8 +90,12 @@ void HealthWatch::examine(Status& status) {
         const std::string key = "camera " + camera.name;
         camera.diagnosis = diagnose(camera, status);
         const Diagnosis& before = lasting_[key].second;
-        if (outlasts_reopening(before, camera, status.now) || recovers(before, camera))
+        HostTime& explained = explained_[camera.name];
+        if (outlasts_reopening(before, camera, status.now) ||
+            (before.fault != Fault::none && recovers(camera, explained, status.now)))
             camera.diagnosis = before;
+        else if (!unexplained(camera.diagnosis.fault))
+            explained = status.now;
         date(key, to_string(camera.camera.state), camera.diagnosis, status.now);
     }
     for (ImuStatus& imu : status.imus) {

@@ -36,6 +36,7 @@ class HealthWatch {
     std::map<std::string, Device<PipelineReport>> cameras_;
     std::map<std::string, Device<ImuReport>> imus_;
     std::map<std::string, std::pair<std::string, Diagnosis>> lasting_;  ///< states, by device
+    std::map<std::string, HostTime> explained_;  ///< cameras whose faults had a cause
 };
 
 }  // namespace versavis::daemon

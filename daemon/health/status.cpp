@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_version.hpp"
@@ -216,20 +215,27 @@ Health health(const Status& status) {
     return worst;
 }
 
-std::string summary(const Status& status) {
+Summary summary(const Status& status) {
     const Health worst = health(status);
-    std::string text = to_string(worst);
-    if (worst == Health::ok) return text;
+    Summary summary{worst, false, "", to_string(worst)};
+    if (worst == Health::ok) return summary;
     std::string others;
-    bool first = true;
     for (const auto& [name, diagnosis] : diagnoses(status)) {
         if (diagnosis->health != worst) continue;
-        if (std::exchange(first, false))
-            text += fmt::format(": {}: {}", name, diagnosis->hint);
-        else
+        if (summary.cause.empty()) {
+            summary.cause = fmt::format("{}: {}", name, to_string(diagnosis->fault));
+            summary.text += fmt::format(": {}: {}", name, diagnosis->hint);
+        } else {
             others += (others.empty() ? "" : ", ") + name;
+        }
     }
-    return others.empty() ? text : fmt::format("{} (also {}: {})", text, to_string(worst), others);
+    if (!others.empty()) summary.text += fmt::format(" (also {}: {})", to_string(worst), others);
+    const auto dead = [](const auto& stream) {
+        return stream.diagnosis.health == Health::degraded && stream.delivery.rate_hz == 0;
+    };
+    summary.dead = std::any_of(status.cameras.begin(), status.cameras.end(), dead) ||
+                   std::any_of(status.imus.begin(), status.imus.end(), dead);
+    return summary;
 }
 
 std::string to_json(const Status& status) {

@@ -52,6 +52,7 @@ struct Status {
     BoardReport board;
     Diagnosis board_diagnosis;
     clock::ClockReport clock;
+    clock::PpsLabels pps_labels = clock::PpsLabels::off;  ///< as configured
     Diagnosis clock_diagnosis;
     GridReport grid;
     std::vector<CameraStatus> cameras;
@@ -65,9 +66,14 @@ bool firmware_outdated(const Status& status);
 /// That of the device that is worst off.
 Health health(const Status& status);
 
-/// The health in one line: why, by the first device in the order of cause, and which others are as
-/// badly off.
-std::string summary(const Status& status);
+/// The health in one line.
+struct Summary {
+    Health health = Health::starting;
+    bool dead = false;  ///< a device that is degraded delivers nothing at all
+    std::string cause;  ///< the first device in the order of cause, and its fault
+    std::string text = to_string(health);  ///< the same with its hint, and who else is as badly off
+};
+Summary summary(const Status& status);
 
 std::string to_json(const Status& status);
 

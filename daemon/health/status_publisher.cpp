@@ -50,7 +50,6 @@ void StatusPublisher::publish(Status status, clock::Translator& translator) {
     status.streams.push_back({"status", "status", ring_.head()});
     for (StreamStatus& stream : status.streams) stream.rate_hz = rate_hz(stream, status.now);
     watch_.examine(status);
-    health_ = daemon::health(status);
     summary_ = daemon::summary(status);
     const std::string document = to_json(status);
     if (!make_room(document.size())) return;

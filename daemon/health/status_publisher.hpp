@@ -28,8 +28,7 @@ class StatusPublisher {
     void heartbeat(HostTime now) { ring_.heartbeat(now); }
 
     /// As of the last document.
-    Health health() const { return health_; }
-    const std::string& summary() const { return summary_; }
+    const Summary& summary() const { return summary_; }
 
  private:
     StatusPublisher(ring::Place place, ring::Writer ring)
@@ -43,8 +42,7 @@ class StatusPublisher {
     HostTime next_;
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
     HealthWatch watch_;
-    Health health_ = Health::starting;
-    std::string summary_ = to_string(Health::starting);
+    Summary summary_;
 };
 
 }  // namespace versavis::daemon

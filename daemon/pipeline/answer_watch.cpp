@@ -77,6 +77,8 @@ void AnswerWatch::arrived(const pairing::Arrival& arrival) {
     if (!times_.empty()) {
         if (arrival.block_id == report_.block_id) ++report_.ids_repeated;
         if (arrival.block_id + ids_back < report_.block_id) ++report_.ids_restarted;
+        if (arrival.block_id > report_.block_id)
+            report_.ids_skipped += arrival.block_id - report_.block_id - 1;
     }
     report_.block_id = arrival.block_id;
     times_.push_back({arrival.camera_time, arrival.arrived});

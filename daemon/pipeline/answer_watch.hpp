@@ -15,9 +15,10 @@ struct AnswerReport {
     std::uint64_t ignored = 0;       ///< triggers whose exposure line stayed silent
     std::uint64_t ids_repeated = 0;  ///< frames with the block id of the one before
     std::uint64_t ids_restarted = 0;
-    std::uint64_t block_id = 0;  ///< of the newest frame
-    std::uint64_t every = 1;     ///< n: it takes every n-th trigger, and did so lately without
-                                 ///< exception; else 1
+    std::uint64_t ids_skipped = 0;  ///< by frames that did not arrive whole
+    std::uint64_t block_id = 0;     ///< of the newest frame
+    std::uint64_t every = 1;        ///< n: it takes every n-th trigger, and did so lately without
+                                    ///< exception; else 1
     Duration lead;          ///< by which its exposure line rises before the trigger; 0: it does not
     Duration shortest;      ///< between two triggers that it took, lately; 0: unknown
     double clock_rate = 1;  ///< of its clock, when it cannot be a clock in nanoseconds; else 1

@@ -22,7 +22,7 @@ pairing::RecordLimits record_limits_of(const CameraConfiguration& configuration)
     return {period_of(configuration),           from_us(configuration.latency_us),
             from_us(configuration.exposure_us), from_us(configuration.max_exposure_us),
             configuration.grid_slew_ppm,        configuration.strobe != Strobe::none,
-            !configuration.master.empty()};
+            !configuration.master.empty(),      configuration.grid_slew_ppm == 0};
 }
 
 pairing::Limits limits_of(const CameraConfiguration& configuration) {
@@ -44,8 +44,8 @@ pairing::Exposure corrected(pairing::Exposure exposure, const ExposureVerdict& v
     exposure.end = exposure.end - correction.end;
     exposure.delay = exposure.delay + correction.middle();
     exposure.delay_sigma = rounded(std::hypot(exposure.delay_sigma.ns, correction.sigma.ns));
-    exposure.length_by_camera = verdict.length.ns != 0;
-    if (exposure.length_by_camera) exposure.end = exposure.start + verdict.length;
+    exposure.length_by_camera = verdict.confirmed;
+    if (verdict.length.ns != 0) exposure.end = exposure.start + verdict.length;
     return exposure;
 }
 
@@ -63,6 +63,7 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       index_(index),
       translator_(translator),
       events_(events),
+      stream_(translator.add_stream()),
       frames_(configuration),
       evidence_(translator),
       record_limits_(record_limits_of(configuration)),
@@ -126,7 +127,7 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     {
         const std::lock_guard lock(mutex_);
         feed(record_limits_);
-        forget_records();
+        restart_pairing();  // the board goes on, whatever the camera did
     }
     auto ring = frames_.make_ring(place, payload_size);
     if (!ring) return Unexpected(ring.error());
@@ -226,35 +227,46 @@ std::optional<Implausibility> CameraPipeline::doubt(const wire::Exposure& record
                                                     HostTime received) {
     const clock::ClockContact contact = translator_.contact();
     follow_clock(contact.life);
-    const auto arrival =
-        contradicts_arrival(pairing::newest_instant(record), received, translator_);
-    feed(pairing::ReceivedRecord{
-        record, check_.reported_at(received), contact.exchanges, arrival ? arrival->expected : 0,
-        arrival ? arrival->reason : EventReason::none, contact.contradicted});
+    pairing::ReceivedRecord judged{record, check_.reported_at(received), contact.exchanges};
+    judged.clock_contradicted = contact.contradicted;
+    judged.promptness = Promptness::unknown;
+    const auto arrival = arrival_delay(pairing::newest_instant(record), received, translator_);
+    if (arrival) judged.promptness = delays_.of(arrival->delay, arrival->sigma);
+    if (arrival && arrival->doubt) {
+        judged.arrival = arrival->doubt->reason;
+        judged.expected_ns = arrival->doubt->expected;
+    }
+    feed(judged);
     const pairing::RecordVerdict verdict = filter_.verdict();
+    if (record.end_ns != wire::no_time && judged.arrival == EventReason::none)
+        translator_.heard(stream_, {pairing::newest_instant(record), received}, !verdict.doubt);
     if (verdict.overturned) restart_pairing();
-    if (verdict.step)
-        adopt_step(record, *verdict.step);
-    else if (!verdict.doubt)
-        translator_.clock_continues();
-    return verdict.doubt;
+    if (verdict.step) adopt_step(record, *verdict.step);
+    if (verdict.doubt) return verdict.doubt;
+    if (!verdict.step && judged.promptness == Promptness::usual) translator_.clock_continues();
+    if (arrival && record.end_ns != wire::no_time) delays_.learn(arrival->delay, received);
+    return std::nullopt;
 }
 
-/// What pairing knows of the board's time is void when the estimate of that time is.
+/// What is known of the board's time is void when the estimate of that time is.
 void CameraPipeline::follow_clock(std::uint32_t life) {
     const auto before = std::exchange(clock_life_, life);
-    if (before && before != life) restart_pairing();
+    if (!before || before == life) return;
+    forget_records();
+    delays_.forget();
 }
 
 void CameraPipeline::adopt_step(const wire::Exposure& record, const Implausibility& doubt) {
     restart_pairing();
-    translator_.begin_epoch();
+    delays_.forget();
     events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
                  BoardTime{record.trigger_ns}, doubt.expected});
 }
 
 void CameraPipeline::count_rejected(const wire::Exposure& record, const Implausibility& doubt) {
     ++report_.records_doubted;
+    const bool by_length = doubt.reason == EventReason::implausible_length;
+    report_.doubted_exposure = {by_length ? record.end_ns - record.start_ns : 0};
     events_.add({EventKind::message_doubted,
                  doubt.reason,
                  index_,
@@ -481,6 +493,7 @@ PipelineReport CameraPipeline::report() {
     const std::lock_guard lock(mutex_);
     report_.pairing = pairing_.state();
     report_.stamp_instant = pairing_.stamped();
+    report_.records_late_by = pairing_.records_late_by();
     report_.exposure = check_.measured();
     report_.camera_exposure = check_.reported();
     report_.exposure_contradicted = check_.contradicted();

@@ -37,6 +37,7 @@ struct PipelineReport {
     std::uint64_t frames_without_trigger = 0;
     std::uint64_t triggers = 0;
     std::uint64_t records_doubted = 0;  ///< their witnesses contradict them: they were not used
+    Duration doubted_exposure;          ///< of the newest one, if its length was doubted; else 0
     std::uint64_t triggers_without_frame = 0;
     std::uint64_t triggers_missed = 0;  ///< by the camera's own events
     bool ptp_lost = false;              ///< the same
@@ -49,6 +50,7 @@ struct PipelineReport {
     pairing::Instant stamp_instant = pairing::Instant::unknown;  ///< by the camera
     std::array<std::uint64_t, counted_reasons> refused{};  ///< frames not proved, by EventReason
     Duration record_delay;        ///< end of the newest exposure to the arrival of its record
+    Duration records_late_by;     ///< against those before, as long as frames are withheld for it
     Duration start_delay;         ///< trigger to the start that its record has; 0: it has none
     Duration commanded_exposure;  ///< set in the camera, or read from it; 0: it varies
     HostTime last_record;         ///< the board's record of an exposure arrived, doubted or not
@@ -171,12 +173,14 @@ class CameraPipeline final : private pairing::Outcome {
     std::uint32_t index_;
     clock::Translator& translator_;
     EventJournal& events_;
+    std::size_t stream_;  ///< of the translator's witnesses
 
     std::mutex mutex_;
     FramePublisher frames_;
     EvidenceRecorder evidence_;
     pairing::RecordLimits record_limits_;
     pairing::RecordFilter filter_;
+    DelayFloor delays_;                        ///< of records
     std::optional<std::uint32_t> clock_life_;  ///< none: no record came yet
     ExposureCompletion completion_;
     ExposureCheck check_;

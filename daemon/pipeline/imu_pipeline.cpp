@@ -40,6 +40,8 @@ ImuPipeline::ImuPipeline(const ImuConfiguration& configuration, ring::Writer rin
       ring_(std::move(ring)),
       translator_(translator),
       events_(events),
+      departures_(translator.add_stream()),
+      samples_(translator.add_stream(false)),
       pulse_filter_(history(configuration), samples_to_confirm) {
     report_.name = configuration.name;
     report_.model = model_.name;
@@ -54,14 +56,19 @@ void ImuPipeline::board_restarted() {
 
 void ImuPipeline::restart() {
     last_number_.reset();
+    number_shift_ = 0;
     pulse_filter_.forget();
+    delays_.forget();
 }
 
 bool ImuPipeline::note_state(const wire::Event& event, HostTime now) {
     const std::lock_guard lock(mutex_);
     ImuFailure& last = report_.failure;
     report_.working = event.kind == wire::BoardEventKind::imu_ready;
-    if (report_.working) return last.times <= 1;
+    if (report_.working) {
+        pulse_filter_.forget();  // it was set up anew, and samples at instants of its own
+        return last.times <= 1;
+    }
     const bool again = last.kind == event.kind && last.step == event.detail &&
                        last.answer == event.value && now - last.last < forgotten_after;
     last = {event.kind, event.detail, event.value, again ? last.times + 1 : 1, now};
@@ -84,14 +91,23 @@ bool ImuPipeline::add(const wire::ImuSample& sample, HostTime received) {
     if (last_number_ && number > *last_number_) report_.lost += number - *last_number_ - 1;
     last_number_ = number;
     publish(sample, number, *stamp);
-    return true;
+    return translator_.steers(departures_);
 }
 
 /// 32 bits on the wire are extended by the number before.
 std::uint64_t ImuPipeline::extended(std::uint32_t number) const {
     if (!last_number_) return number;
-    const auto step = static_cast<std::int32_t>(number - static_cast<std::uint32_t>(*last_number_));
+    const auto step = static_cast<std::int32_t>(number + number_shift_ -
+                                                static_cast<std::uint32_t>(*last_number_));
     return *last_number_ + static_cast<std::uint64_t>(std::int64_t{step});
+}
+
+/// The board counts from another number on: those that are published go on.
+void ImuPipeline::adopt_number(std::uint32_t number) {
+    if (!last_number_) return;
+    const std::uint64_t next = extended(number);
+    if (next <= *last_number_)
+        number_shift_ += static_cast<std::uint32_t>(*last_number_ + 1 - next);
 }
 
 std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, HostTime received) {
@@ -101,17 +117,55 @@ std::optional<Implausibility> ImuPipeline::doubt(const wire::ImuSample& sample, 
     const Pulse pulse{sample.number, BoardTime{sample.time_ns}};
     const clock::ClockContact contact = translator_.contact();
     const BoardTime departed = pulse.at + Duration{sample.departure_ns};
-    const auto arrival = contradicts_arrival(departed, received, translator_);
-    const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, arrival);
-    if (!doubt) translator_.clock_continues();
-    if (!doubt || arrival || contact.contradicted || !pulse_filter_.stepped(contact.exchanges))
-        return doubt;
-    // The part was set up anew, or the board lost count.
-    pulse_filter_.adopt(pulse);
-    last_number_.reset();
-    translator_.begin_epoch();
-    journal(EventKind::stream_stepped, sample, *doubt);
+    if (std::exchange(clock_life_, contact.life) != contact.life) delays_.forget();
+    const auto arrival = arrival_delay(departed, received, translator_);
+    const auto impossible = arrival ? arrival->doubt : std::nullopt;
+    // Also those that are impossible: the others alone would seem to be as prompt as usual.
+    const bool fits = !pulse_filter_.believed().doubt(pulse);
+    translator_.heard(departures_, {departed, received}, fits);
+    translator_.heard(samples_, {pulse.at, received}, fits);
+    const auto doubt = pulse_filter_.judge(pulse, contact.exchanges, impossible);
+    if (doubt) {
+        if (!arrival || impossible || contact.contradicted ||
+            !may_adopt(*arrival, *doubt, contact.exchanges))
+            return doubt;
+        pulse_filter_.adopt(pulse);
+        delays_.forget();
+        adopt_number(sample.number);
+        journal(EventKind::stream_stepped, sample, *doubt);
+    } else if (const auto by = departure()) {
+        return Implausibility{EventReason::implausible_time, sample.time_ns,
+                              sample.time_ns - by->ns};
+    } else if (arrival && delays_.of(arrival->delay, arrival->sigma) == Promptness::usual) {
+        translator_.clock_continues();
+    }
+    if (arrival) delays_.learn(arrival->delay, received);
+    believed_life_ = clock_life_;
     return std::nullopt;
+}
+
+/// By how much the messages depart from the exchanges.
+std::optional<Duration> ImuPipeline::departure() const {
+    const auto by = translator_.departure(samples_);
+    return by ? by : translator_.departure(departures_);
+}
+
+/// The board lost count, or the part samples at other instants than it did.
+bool ImuPipeline::may_adopt(const ArrivalDelay& arrival, const Implausibility& doubt,
+                            std::uint64_t exchanges) const {
+    // The clock began anew, and all with it.
+    if (clock_life_ != believed_life_) return pulse_filter_.stepped(exchanges);
+    const auto samples = translator_.confirms_others(samples_);
+    const auto departures = translator_.confirms_others(departures_);
+    if (samples && departures)
+        return *samples && *departures
+                   ? pulse_filter_.stepped(exchanges)
+                   : pulse_filter_.prevailed(exchanges, clock::exchanges_to_believe);
+    const Promptness promptness = delays_.of(arrival.delay, arrival.sigma);
+    const bool decided = doubt.reason == EventReason::implausible_number
+                             ? promptness == Promptness::usual
+                             : arrival_confirms(promptness, {doubt.said - doubt.expected});
+    return decided ? pulse_filter_.stepped(exchanges) : pulse_filter_.prevailed(exchanges);
 }
 
 void ImuPipeline::journal(EventKind kind, const wire::ImuSample& sample,

@@ -6,8 +6,10 @@
 #include <string>
 
 #include "engine/clock/translator.hpp"
+#include "engine/plausibility/delay_floor.hpp"
 #include "engine/plausibility/majority_filter.hpp"
 #include "engine/ring/writer.hpp"
+#include "plausibility/arrival_check.hpp"
 #include "plausibility/pulse_history.hpp"
 #include "publish/event_journal.hpp"
 #include "publish/stamp_guard.hpp"
@@ -49,7 +51,8 @@ class ImuPipeline {
     ImuPipeline(const ImuConfiguration& configuration, ring::Writer ring,
                 clock::Translator& translator, EventJournal& events);
 
-    /// False: the sample is doubted, or not confirmed yet: nothing may be made of its time.
+    /// False: nothing may be made of the time of its message: it is doubted, not confirmed yet, or
+    /// not quite as prompt as usual.
     bool add(const wire::ImuSample& sample, HostTime received);
     void board_restarted();
 
@@ -63,6 +66,10 @@ class ImuPipeline {
  private:
     void restart();
     std::optional<Implausibility> doubt(const wire::ImuSample& sample, HostTime received);
+    std::optional<Duration> departure() const;
+    bool may_adopt(const ArrivalDelay& arrival, const Implausibility& doubt,
+                   std::uint64_t exchanges) const;
+    void adopt_number(std::uint32_t number);
     void journal(EventKind kind, const wire::ImuSample& sample, const Implausibility& doubt);
     std::uint64_t extended(std::uint32_t number) const;
     void publish(const wire::ImuSample& sample, std::uint64_t number, const clock::Stamp& stamp);
@@ -75,9 +82,15 @@ class ImuPipeline {
     ring::Writer ring_;
     clock::Translator& translator_;
     EventJournal& events_;
+    std::size_t departures_;  ///< of messages, among the translator's streams
+    std::size_t samples_;     ///< which may be off alone
     MajorityFilter<PulseHistory> pulse_filter_;
+    DelayFloor delays_;  ///< of samples, from their departure
+    std::uint32_t clock_life_ = 0;
+    std::uint32_t believed_life_ = 0;  ///< of the clock, when a sample was believed last
     StampGuard guard_;
-    std::optional<std::uint64_t> last_number_;
+    std::optional<std::uint64_t> last_number_;  ///< published
+    std::uint32_t number_shift_ = 0;            ///< from those of the board
     ImuReport report_;
 };
 

@@ -9,8 +9,18 @@
 
 namespace versavis::daemon {
 
-/// `at`: the newest instant in the message. None also while the board's clock is
-/// unknown.
+/// How long a message took from the newest instant that it names.
+struct ArrivalDelay {
+    Duration delay;
+    Duration sigma;  ///< of differences of such delays, by the estimate of the board's clock
+    std::optional<Implausibility> doubt;
+};
+
+/// `at`: the newest instant in the message. None while the board's clock is unknown.
+std::optional<ArrivalDelay> arrival_delay(BoardTime at, HostTime received,
+                                          const clock::Translator& translator);
+
+/// The doubt alone.
 std::optional<Implausibility> contradicts_arrival(BoardTime at, HostTime received,
                                                   const clock::Translator& translator);
 

@@ -142,20 +142,21 @@ ExposureVerdict ExposureCheck::unwitnessed(const Measured& before) const {
     return {false, {{}, {}, root_of_squares(unwitnessed_end, change / 2)}, {}};
 }
 
-/// Without an exposure line, two accounts of the camera must agree.
+/// Without an exposure line, two accounts of the camera must agree; one alone is the best guess.
 ExposureVerdict ExposureCheck::by_camera(const FrameAccount& frame,
                                          const pairing::Exposure& exposure) {
+    if (!enabled_) return {};
     const Duration length = frame.event;
-    if (!enabled_ || length.ns == 0) return {};
     const auto range = frame.chunk.ns != 0
                            ? LengthRange{frame.chunk, frame.chunk}
                            : (varies_ ? readings_ : settings_).at(exposure.earliest_on_host);
     const Duration difference = std::max(length / part_of_length, least_difference);
-    if (!range || length + difference < range->shortest || length - difference > range->longest)
-        return {};
+    if (length.ns == 0 || !range || length + difference < range->shortest ||
+        length - difference > range->longest)
+        return {false, {}, range ? (range->shortest + range->longest) / 2 : length};
     source_ = ExposureSource::event;
     reported_ = length;
-    return {false, {}, length};
+    return {false, {}, length, true};
 }
 
 ExposureVerdict ExposureCheck::judge(const pairing::Arrival& arrival, const FrameAccount& frame,

@@ -26,7 +26,8 @@ const char* to_string(ExposureSource source);
 struct ExposureVerdict {
     bool contradicted = false;  ///< the camera exposed for another time
     EdgeCorrection correction;  ///< its sigma contains what no witness has confirmed
-    Duration length;            ///< of an exposure that no line shows; 0: unknown
+    Duration length{};          ///< by the camera, of an exposure that no line shows; 0: unknown
+    bool confirmed = false;     ///< that length, by a second account of the camera
 };
 
 /// How long the camera says that it exposed one frame; 0: it does not.

@@ -90,13 +90,6 @@ void check_instance(const Configuration& configuration, Findings& findings) {
                      "use at most 31 letters, digits, '_' and '-'");
 }
 
-void check_that_it_serves(const Configuration& configuration, Findings& findings) {
-    const auto& keys = configuration.entry;
-    if (!keys.has("camera") && !keys.has("imu"))
-        findings.add(configuration.entry, "", "there is no camera and no IMU to serve",
-                     "add a [[camera]] with 'name' and 'device', or an [[imu]] with 'model'");
-}
-
 void check_link(const Configuration& configuration, Findings& findings) {
     const BoardConfiguration& board = configuration.board;
     const std::string prefix = "unix:";
@@ -552,27 +545,12 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
                        "lower it");
 }
 
-constexpr void (*rules[])(const Configuration&, Findings&){check_that_it_serves,
-                                                           check_instance,
-                                                           check_link,
-                                                           check_pps,
-                                                           check_names,
-                                                           check_devices,
-                                                           check_outputs,
-                                                           check_masters,
-                                                           check_camera_times,
-                                                           check_line_delays,
-                                                           check_glitch,
-                                                           check_auto_exposure,
-                                                           check_presets,
-                                                           check_imus,
-                                                           check_illumination,
-                                                           check_inputs,
-                                                           check_uart_and_imu_output,
-                                                           check_test_rate,
-                                                           check_pulse_outputs,
-                                                           check_history,
-                                                           check_receive};
+constexpr void (*rules[])(const Configuration&, Findings&){
+    check_instance,    check_link,          check_pps,           check_names,
+    check_devices,     check_outputs,       check_masters,       check_camera_times,
+    check_line_delays, check_glitch,        check_auto_exposure, check_presets,
+    check_imus,        check_illumination,  check_inputs,        check_uart_and_imu_output,
+    check_test_rate,   check_pulse_outputs, check_history,       check_receive};
 
 }  // namespace
 

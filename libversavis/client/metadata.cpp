@@ -44,6 +44,7 @@ const char* to_string(EventKind kind) {
         case EventKind::sync_taken: return "sync_taken";
         case EventKind::configuration_stored: return "configuration_stored";
         case EventKind::seconds_differ: return "seconds_differ";
+        case EventKind::host_undisciplined: return "host_undisciplined";
     }
     return "unknown";
 }

@@ -96,21 +96,21 @@ class WorkingStream final : public ByteStream {
 };
 
 /// Threads that take all the time that they can get.
-class Load {
+class BusyLoad {
  public:
-    Load() {
+    BusyLoad() {
         for (int i = 0; i < busy_threads; ++i)
             threads_.emplace_back([this] {
                 while (!stop_) {
                 }
             });
     }
-    ~Load() {
+    ~BusyLoad() {
         stop_ = true;
         for (std::thread& thread : threads_) thread.join();
     }
-    Load(const Load&) = delete;
-    Load& operator=(const Load&) = delete;
+    BusyLoad(const BusyLoad&) = delete;
+    BusyLoad& operator=(const BusyLoad&) = delete;
 
  private:
     std::atomic<bool> stop_{false};
@@ -163,7 +163,7 @@ std::vector<double> delays_us(const test::Stack& stack, bool own_thread) {
     link.start();
     while (!work.connected()) pause(milliseconds(10));
     link.start_cameras(0xF, pairing::Start::steady);
-    const Load load;
+    const BusyLoad load;
     auto reader = ring::Reader::open(directory.path() / "clock");
     pause(turn_time);
     std::vector<double> delays;

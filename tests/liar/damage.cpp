@@ -14,11 +14,6 @@ namespace {
 /// themselves. At half it ends about when the service believes it, at twice it says no more.
 constexpr unsigned lasting_messages = 20;
 
-/// Slow edges and wrong ends of an exposure move its middle by less than the clock may be wrong on
-/// a loaded machine, so these kinds are judged against the other cameras too. The least that they
-/// move it by is 150 us, and honest frames of two cameras differ by less than 20 us.
-constexpr Duration tight = microseconds(60);
-
 const std::vector<Field> exposure_instants = instants(Type::exposure);
 const std::vector<Field> answer_instants = instants(Type::clock_answer);
 
@@ -78,29 +73,25 @@ const std::vector<Kind>& kinds() {
          {{Type::exposure, {exposure::end}}},
          2,
          microseconds(300),
-         milliseconds(1),
-         tight},
+         milliseconds(1)},
         {"end-third",
          Way::regular,
          {{Type::exposure, {exposure::end}}},
          3,
          microseconds(300),
-         milliseconds(1),
-         tight},
+         milliseconds(1)},
         {"end-all",
          Way::regular,
          {{Type::exposure, {exposure::end}}},
          1,
          microseconds(300),
-         milliseconds(1),
-         tight},
+         milliseconds(1)},
         {"slow-end",
          Way::regular,
          {{Type::exposure, {exposure::end}}},
          1,
          microseconds(400),
-         microseconds(400),
-         tight},
+         microseconds(400)},
         {"record", Way::shift, {{Type::exposure, exposure_instants}}},
         {"record-periods", Way::shift_periods, {{Type::exposure, exposure_instants}}},
         {"camera", Way::jump, {{Type::exposure, {exposure::camera}}}},
@@ -156,6 +147,13 @@ void Liar::obey(Orders orders) {
     orders_ = std::move(orders);
     lies_ = 0;
     lasting_.clear();
+    steady_.reset();
+}
+
+void Liar::begin(const SteadyLie& lie) {
+    obey(Orders{});
+    const std::lock_guard lock(mutex_);
+    steady_.emplace(lie, period_);
 }
 
 void Liar::forget() {
@@ -197,7 +195,8 @@ std::vector<Packet> Liar::pass(Packet packet, HostTime now) {
     }
     if (!sequence_) sequence_ = packet.sequence;
     observe(packet);
-    if (step_ns_ != 0) shift(instants(packet.type), step_ns_, packet);
+    if (steady_ && steady_->alter(packet, now)) damage_counted(now);
+    if (step_ns_ != 0) shift_fields(instants(packet.type), step_ns_, packet);
 
     std::vector<Packet> out;
     const bool waited_for =
@@ -281,7 +280,7 @@ bool Liar::continue_lies(Packet& packet, HostTime now) {
         const auto lied =
             follow_ups_.find(static_cast<std::uint32_t>(get(packet, clock_follow_up::id)));
         if (lied != follow_ups_.end()) {
-            shift({clock_follow_up::sent}, lied->second, packet);
+            shift_fields({clock_follow_up::sent}, lied->second, packet);
             follow_ups_.erase(lied);
             damage_counted(now);
             lied_on = true;
@@ -296,7 +295,7 @@ bool Liar::continue_lies(Packet& packet, HostTime now) {
         if (lasting.kind->way == Way::freeze)
             set(packet, lasting.fields[0], lasting.amount_ns);
         else
-            shift(lasting.fields, lasting.amount_ns, packet);
+            shift_fields(lasting.fields, lasting.amount_ns, packet);
         if (packet.type == Type::clock_answer && lasting.kind->way == Way::late)
             follow_ups_[static_cast<std::uint32_t>(get(packet, clock_answer::id))] =
                 lasting.amount_ns;
@@ -340,7 +339,7 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
         case Way::shift:
         case Way::shift_periods: {
             const std::int64_t by = kind.way == Way::shift ? any_shift_ns() : any_periods_ns();
-            if (!shift(victim.fields, by, packet)) return false;
+            if (!shift_fields(victim.fields, by, packet)) return false;
             note(kind, packet, now, names(victim.fields) + " " + in_ms(by));
             return true;
         }
@@ -388,7 +387,7 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
         }
         case Way::late: {
             const std::int64_t by = small_shift_ns();
-            if (!shift(victim.fields, by, packet)) return false;
+            if (!shift_fields(victim.fields, by, packet)) return false;
             lasting_.push_back({&kind, packet.type, camera_of(packet), victim.fields, by,
                                 lasting_messages - 1, lasting_messages});
             if (packet.type == Type::clock_answer)
@@ -401,7 +400,7 @@ bool Liar::alter(const Kind& kind, const Victim& victim, Packet& packet, HostTim
         case Way::step: {
             const std::int64_t by = any_periods_ns();
             step_ns_ += by;
-            shift(instants(packet.type), by, packet);
+            shift_fields(instants(packet.type), by, packet);
             note(kind, packet, now, "the clock steps by " + in_ms(by));
             return true;
         }
@@ -415,23 +414,9 @@ bool Liar::shift_regularly(const Kind& kind, const Victim& victim, Packet& packe
     if (camera_of(packet) != 0 || ++regular_ % kind.every != 0) return false;
     const auto spread = static_cast<std::uint64_t>((kind.most - kind.least).ns);
     const std::int64_t by = kind.least.ns + static_cast<std::int64_t>(below(spread + 1));
-    if (!shift(victim.fields, by, packet)) return false;
+    if (!shift_fields(victim.fields, by, packet)) return false;
     note(kind, packet, now, names(victim.fields) + " " + in_ms(by));
     return true;
-}
-
-/// False: none of them was observed.
-bool Liar::shift(const std::vector<Field>& fields, std::int64_t by_ns, Packet& packet) {
-    bool shifted = false;
-    for (const Field& field : fields) {
-        const std::int64_t value = get(packet, field);
-        if (value == unobserved) continue;
-        set(packet, field,
-            static_cast<std::int64_t>(static_cast<std::uint64_t>(value) +
-                                      static_cast<std::uint64_t>(by_ns)));
-        shifted = true;
-    }
-    return shifted;
 }
 
 void Liar::note(const Kind& kind, const Packet& packet, HostTime now, std::string what) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "foreign_packet.hpp"
+#include "steady_lie.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::liar {
@@ -41,10 +42,9 @@ struct Kind {
     std::string_view name;
     Way way;
     std::vector<Victim> victims;
-    unsigned every = 1;                    ///< for Way::regular: n
-    Duration least{};                      ///< for Way::regular: how late, drawn anew for each
-    Duration most{};                       ///< the same
-    std::optional<Duration> edge_floor{};  ///< see LiveJudge::set_edge_floor
+    unsigned every = 1;  ///< for Way::regular: n
+    Duration least{};    ///< for Way::regular: how late, drawn anew for each
+    Duration most{};     ///< the same
 };
 
 const std::vector<Kind>& kinds();
@@ -77,6 +77,9 @@ class Liar {
 
     void obey(Orders orders);
 
+    /// From now on this lie, which must outlive it, and no other; until the next orders.
+    void begin(const SteadyLie& lie);
+
     /// What goes on in place of `packet`; numbered so that nothing seems to be lost.
     std::vector<Packet> pass(Packet packet, HostTime now);
 
@@ -104,7 +107,6 @@ class Liar {
     bool continue_lies(Packet& packet, HostTime now);
     std::vector<Packet> lie(const Kind& kind, const Victim& victim, Packet packet, HostTime now);
     bool alter(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
-    bool shift(const std::vector<Field>& fields, std::int64_t by_ns, Packet& packet);
     bool shift_regularly(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
     void note(const Kind& kind, const Packet& packet, HostTime now, std::string what);
     void damage_counted(HostTime now);
@@ -121,6 +123,7 @@ class Liar {
     mutable std::mutex mutex_;
     std::mt19937_64 random_;
     Orders orders_;
+    std::optional<SteadyLiar> steady_;
     std::uint64_t lies_ = 0;  ///< under the present orders
     std::vector<Lasting> lasting_;
     std::map<std::uint32_t, std::int64_t> follow_ups_;  ///< by request: lie of its answer

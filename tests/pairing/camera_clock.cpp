@@ -10,9 +10,9 @@ using namespace versavis::pairing;
 namespace {
 
 /// Exposures at 20 Hz of a camera that stamps one of their instants, by a clock 80 ppm fast.
-class Bench {
+class ClockBench {
  public:
-    Bench(Instant stamps, Instant assumed) : clock(assumed), stamps_(stamps) {}
+    ClockBench(Instant stamps, Instant assumed) : clock(assumed), stamps_(stamps) {}
 
     Record expose(Duration length, StampKind kind = StampKind::measured_middle) {
         at_ = at_ + milliseconds(50);
@@ -46,7 +46,7 @@ class Bench {
 
 TEST_CASE("camera_clock: what is stamped is unknown until exposures vary, then it is found out") {
     const Instant stamps = GENERATE(Instant::start, Instant::middle, Instant::end);
-    Bench bench(stamps, Instant::unknown);
+    ClockBench bench(stamps, Instant::unknown);
     for (int i = 0; i < 200; ++i) bench.frame(milliseconds(2));
     CHECK(bench.clock.stamped() == Instant::unknown);
     CHECK(bench.clock.possible().size() == 3);
@@ -59,7 +59,7 @@ TEST_CASE("camera_clock: what is stamped is unknown until exposures vary, then i
 }
 
 TEST_CASE("camera_clock: what was said or found out stays, whatever is seen") {
-    Bench said(Instant::end, Instant::start);
+    ClockBench said(Instant::end, Instant::start);
     for (int i = 0; i < 50; ++i) said.frame(milliseconds(i % 2 == 0 ? 30 : 2));
     CHECK(said.clock.stamped() == Instant::start);
     said.clock.forget();
@@ -67,11 +67,11 @@ TEST_CASE("camera_clock: what was said or found out stays, whatever is seen") {
 }
 
 TEST_CASE("camera_clock: changes that nobody measured, or that no instant explains, say nothing") {
-    Bench bench(Instant::end, Instant::unknown);
+    ClockBench bench(Instant::end, Instant::unknown);
     for (int i = 0; i < 50; ++i)
         bench.frame(milliseconds(i % 2 == 0 ? 30 : 2), StampKind::trigger_edge);
     CHECK(bench.clock.stamped() == Instant::unknown);
-    Bench odd(Instant::start, Instant::unknown);
+    ClockBench odd(Instant::start, Instant::unknown);
     for (int i = 0; i < 50; ++i) {  // its stamps move by a quarter of each change
         const Duration length = milliseconds(i % 2 == 0 ? 30 : 2);
         const Record record = odd.expose(length);
@@ -82,13 +82,13 @@ TEST_CASE("camera_clock: changes that nobody measured, or that no instant explai
 
 TEST_CASE("camera_clock: five votes in a row make it known") {
     for (const int changes : {4, 5}) {
-        Bench bench(Instant::end, Instant::unknown);
+        ClockBench bench(Instant::end, Instant::unknown);
         for (int i = 0; i < 100; ++i) bench.frame(milliseconds(2));
         for (int i = 0; i < changes; ++i) bench.frame(milliseconds(i % 2 == 0 ? 30 : 2));
         CHECK((bench.clock.stamped() == Instant::end) == (changes == 5));
     }
     // A vote for another instant in between: they begin anew.
-    Bench bench(Instant::end, Instant::unknown);
+    ClockBench bench(Instant::end, Instant::unknown);
     for (int i = 0; i < 100; ++i) bench.frame(milliseconds(2));
     for (int i = 0; i < 4; ++i) bench.frame(milliseconds(i % 2 == 0 ? 30 : 2));
     const Record odd = bench.expose(milliseconds(30));
@@ -120,7 +120,7 @@ TEST_CASE("camera_clock: what a stamp may say, and what the board saw of it") {
 }
 
 TEST_CASE("camera_clock: a clock that stepped is followed from there, one forgotten begins anew") {
-    Bench bench(Instant::start, Instant::start);
+    ClockBench bench(Instant::start, Instant::start);
     for (int i = 0; i < 10; ++i) bench.frame(milliseconds(2));
     const Record record = bench.expose(milliseconds(2));
     const CameraTime stepped{bench.stamp(record).ns + seconds(3).ns};
@@ -238,7 +238,7 @@ TEST_CASE("camera_clock: no vote compares with a frame from before a step of the
 }
 
 TEST_CASE("camera_clock: after all is forgotten, rates are learned again") {
-    Bench bench(Instant::start, Instant::start);
+    ClockBench bench(Instant::start, Instant::start);
     for (int i = 0; i < 10; ++i) bench.frame(milliseconds(5));
     bench.clock.forget();
     for (int i = 0; i < 600; ++i) bench.frame(milliseconds(5));

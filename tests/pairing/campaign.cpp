@@ -12,7 +12,7 @@ namespace versavis::test {
 namespace {
 
 constexpr double rates_hz[] = {5, 20, 155};
-constexpr CameraClock clocks[] = {CameraClock::good, CameraClock::drifting, CameraClock::absent};
+constexpr WorldClock clocks[] = {WorldClock::good, WorldClock::drifting, WorldClock::absent};
 constexpr std::uint64_t first_fault = 40;
 constexpr std::uint64_t fault_distance = 50;
 constexpr std::uint64_t quiet_end = 120;  // pulses after the last fault ...
@@ -30,6 +30,7 @@ WorldSettings variation(std::uint64_t seed) {
     if (seed % 4 == 3) settings.late_frames = 0;
     settings.stamped = static_cast<pairing::Instant>(1 + seed % 7 % 3);
     if (seed % 7 == 2) settings.readout_start = milliseconds(1);
+    settings.compensated = seed % 11 != 0 && seed % 8 == 1;
     if (seed % 11 != 0) return settings;
     settings.exposure = microseconds(500);
     settings.other_exposure = milliseconds(3);
@@ -43,7 +44,7 @@ void answer_unevenly(WorldSettings& settings, std::mt19937_64& random) {
     };
     settings.ignored = chance(0.6);
     // Without a clock, a second frame that comes a period late is like the next trigger's.
-    if (settings.clock != CameraClock::absent) settings.doubled = chance(0.3);
+    if (settings.clock != WorldClock::absent) settings.doubled = chance(0.3);
     const Duration period{std::llround(1e9 / settings.rate_hz)};
     if (random() % 3 == 0)
         settings.shortest_period =
@@ -55,7 +56,7 @@ std::uint64_t end_after(std::uint64_t last_fault, double rate_hz) {
     return last_fault + quiet_end + static_cast<std::uint64_t>(quiet_end_s * rate_hz);
 }
 
-WorldSettings cell(FaultKind kind, CameraClock clock, bool wide_ids, double rate_hz,
+WorldSettings cell(FaultKind kind, WorldClock clock, bool wide_ids, double rate_hz,
                    std::uint64_t seed) {
     WorldSettings settings = variation(seed);
     settings.clock = clock;
@@ -77,7 +78,7 @@ void Totals::add(const WorldSettings& settings, const Verdict& verdict) {
     frames += verdict.frames;
     published += verdict.published;
     wrong += verdict.wrong;
-    if (settings.clock != CameraClock::absent) wrong += verdict.lies_published;
+    if (settings.clock != WorldClock::absent) wrong += verdict.lies_published;
     withheld += verdict.withheld;
     withheld_needlessly += verdict.withheld_needlessly;
     slips += verdict.slips;
@@ -92,7 +93,7 @@ void Totals::add(const WorldSettings& settings, const Verdict& verdict) {
 
 std::vector<Row> run_matrix(unsigned seeds) {
     std::vector<Row> rows;
-    for (const CameraClock clock : clocks)
+    for (const WorldClock clock : clocks)
         for (std::size_t kind = 0; kind < fault_kinds; ++kind) {
             Row row{static_cast<FaultKind>(kind), clock, {}};
             for (const bool wide_ids : {false, true})
@@ -109,7 +110,7 @@ std::vector<Row> run_matrix(unsigned seeds) {
     return rows;
 }
 
-Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
+Totals run_random(std::uint64_t faults, std::uint64_t seed, WorldClock clock,
                   const std::function<void(const Totals&)>& progress, Answers answers) {
     Totals totals;
     for (; totals.faults < faults; ++seed) {

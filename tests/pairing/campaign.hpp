@@ -33,7 +33,7 @@ struct Totals {
 /// rates.
 struct Row {
     FaultKind kind{};
-    CameraClock clock{};
+    WorldClock clock{};
     Totals totals;
 };
 
@@ -48,7 +48,7 @@ enum class Answers {
 };
 
 /// Faults of all kinds at random, close together at times. `progress` is called after each world.
-Totals run_random(std::uint64_t faults, std::uint64_t seed, CameraClock clock,
+Totals run_random(std::uint64_t faults, std::uint64_t seed, WorldClock clock,
                   const std::function<void(const Totals&)>& progress = {},
                   Answers answers = Answers::each);
 

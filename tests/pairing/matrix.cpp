@@ -28,7 +28,7 @@ TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") 
             continue;
         }
         CHECK(totals.published > totals.frames / 4);
-        if (row.clock == CameraClock::absent) {
+        if (row.clock == WorldClock::absent) {
             CHECK(quantile(totals.first_published, 1) < seconds(4));
             continue;
         }
@@ -48,19 +48,18 @@ TEST_CASE("matrix: every fault with every camera clock, width of ids and rate") 
 }
 
 TEST_CASE("matrix: faults at random, close together at times") {
-    for (const CameraClock clock :
-         {CameraClock::good, CameraClock::drifting, CameraClock::absent}) {
-        const Totals totals = run_random(clock == CameraClock::good ? 8000 : 1000, 1, clock);
+    for (const WorldClock clock : {WorldClock::good, WorldClock::drifting, WorldClock::absent}) {
+        const Totals totals = run_random(clock == WorldClock::good ? 8000 : 1000, 1, clock);
         INFO("clock " << to_string(clock));
         CHECK(totals.wrong == 0);
-        if (clock == CameraClock::good) CHECK(needless(totals) < needless_goal);
+        if (clock == WorldClock::good) CHECK(needless(totals) < needless_goal);
     }
 }
 
 TEST_CASE("matrix: worlds that once ended with wrong pairs, or without any") {
     struct Ended {
         std::uint64_t seed;
-        CameraClock clock = CameraClock::good;
+        WorldClock clock = WorldClock::good;
     };
     for (const auto& [seed, clock] : std::initializer_list<Ended>{{554},
                                                                   {929},
@@ -75,7 +74,7 @@ TEST_CASE("matrix: worlds that once ended with wrong pairs, or without any") {
                                                                   {9344},
                                                                   {20099},
                                                                   {36299},
-                                                                  {3520, CameraClock::absent}}) {
+                                                                  {3520, WorldClock::absent}}) {
         const Totals totals = run_random(1, seed, clock);
         INFO("seed " << seed);
         CHECK(totals.wrong == 0);

@@ -40,7 +40,7 @@ TEST_CASE(
     "pairing: a clean start publishes every frame, the first ones within half a second at 20 Hz") {
     WorldSettings settings = world();
     settings.rate_hz = GENERATE(5.0, 20.0, 155.0);
-    settings.clock = GENERATE(CameraClock::good, CameraClock::drifting);
+    settings.clock = GENERATE(WorldClock::good, WorldClock::drifting);
     settings.first_id = GENERATE(1U, 4711U);
     const Verdict verdict = run(settings);
     CHECK(verdict.published == verdict.frames);
@@ -51,7 +51,7 @@ TEST_CASE(
 
 TEST_CASE("pairing: a camera without a clock is started slowly, then paired by ids and arrival") {
     WorldSettings settings = world();
-    settings.clock = CameraClock::absent;
+    settings.clock = WorldClock::absent;
     settings.clock_known_absent = GENERATE(true, false);
     const Verdict verdict = run(settings);
     // It is found out from the first frames, which are lost then.
@@ -178,7 +178,7 @@ TEST_CASE(
     settings.strobe = GENERATE(true, false);
     settings.drops_after_exposure = GENERATE(true, false);
     settings.ids_count_ignored = GENERATE(true, false);
-    settings.clock = GENERATE(CameraClock::drifting, CameraClock::absent);
+    settings.clock = GENERATE(WorldClock::drifting, WorldClock::absent);
     const Verdict verdict = run_world(settings);
     CHECK(verdict.wrong == 0);
     CHECK(verdict.published > 0);
@@ -199,7 +199,7 @@ TEST_CASE("pairing: ids and clock that both step while no record comes are no de
 TEST_CASE("pairing: swapped cameras are never proved") {
     WorldSettings settings = with(FaultKind::cameras_swapped);
     settings.pulses = 1000;
-    settings.clock = GENERATE(CameraClock::good, CameraClock::absent);
+    settings.clock = GENERATE(WorldClock::good, WorldClock::absent);
     const Verdict verdict = run_world(settings);
     CHECK(verdict.published == 0);
     CHECK(verdict.final_state == State::searching);
@@ -235,7 +235,7 @@ TEST_CASE("pairing: a board whose time steps is never followed to other triggers
     WorldSettings settings =
         with(GENERATE(FaultKind::board_time_step, FaultKind::board_time_step_grid));
     settings.seed = GENERATE(range(1, 30));
-    settings.clock = GENERATE(CameraClock::good, CameraClock::absent);
+    settings.clock = GENERATE(WorldClock::good, WorldClock::absent);
     settings.pulses = 400;
     CHECK(run(settings).lies_published == 0);
 }
@@ -253,7 +253,7 @@ TEST_CASE("pairing: a board whose time steps while the link stalls is not believ
 
 TEST_CASE("pairing: ids that stay one behind are not confirmed by a single frame's arrival") {
     WorldSettings settings = world(GENERATE(range(1U, 30U)));
-    settings.clock = CameraClock::absent;
+    settings.clock = WorldClock::absent;
     settings.rate_hz = 155;
     settings.exposure = microseconds(500);
     settings.other_exposure = milliseconds(3);
@@ -265,7 +265,7 @@ TEST_CASE("pairing: ids that stay one behind are not confirmed by a single frame
 
 TEST_CASE("pairing: ids that begin anew cost a camera without a clock few frames, and no start") {
     WorldSettings settings = world(GENERATE(range(1U, 10U)));
-    settings.clock = CameraClock::absent;
+    settings.clock = WorldClock::absent;
     settings.rate_hz = GENERATE(20.0, 155.0);
     settings.first_id = 1000;
     settings.faults[80] = FaultKind::id_restart;

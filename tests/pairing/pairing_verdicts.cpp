@@ -50,6 +50,63 @@ TEST_CASE("pairing_verdicts: a search waits until no record can be missing") {
     }
 }
 
+TEST_CASE("pairing_verdicts: a frame that was given up before its record came proves nothing") {
+    Limits limits = Bench::made();
+    limits.frames_held = 4;
+    limits.latest_arrival = seconds(3);
+    Bench bench(limits);
+    // All records of one pattern, and none of the next, are there.
+    for (const std::uint64_t at : pattern) bench.pairing.add(bench.next(at - bench.tick));
+    const std::uint64_t base = bench.tick;
+    for (const std::uint64_t at : pattern)
+        bench.pairing.add(bench.frame(bench.next_id++, bench.next(base + at - bench.tick)));
+    CHECK(bench.decided.locks.empty());
+}
+
+TEST_CASE("pairing_verdicts: no start is by frames that come sooner than any did, unless seen") {
+    // The camera ignores just the triggers that its frames seem to be of a later pattern.
+    constexpr std::uint64_t later = 15;  // periods
+    constexpr std::uint64_t grid_points[] = {1, 2, 4, 5, 8, 10, 12, 15, 18, 19, 20};
+    for (const auto& [kind, new_stream] : {std::pair{StampKind::trigger_edge, false},
+                                           {StampKind::trigger_edge, true},
+                                           {StampKind::measured_middle, false}}) {
+        Limits limits = Bench::made();
+        limits.latest_arrival = seconds(2);
+        limits.frames_held = 20;
+        Bench bench(limits);
+        bench.frame_after = period * later + milliseconds(20);
+        const auto add = [&, made = kind](std::uint64_t steps) {
+            Exposure exposure = bench.next(steps);
+            exposure.kind = made;
+            bench.pairing.add(exposure);
+            return exposure;
+        };
+        const auto send_pattern = [&](std::uint64_t gap) {
+            const std::uint64_t base = bench.tick;
+            std::vector<Exposure> exposures;
+            for (const std::uint64_t at : grid_points)
+                exposures.push_back(add(base + at * gap - bench.tick));
+            for (std::uint64_t i = 0; i <= later; ++i) add(1);
+            return exposures;
+        };
+        for (const Exposure& exposure : send_pattern(2))
+            bench.pairing.add(bench.frame(bench.next_id++, exposure));
+        REQUIRE(bench.decided.locks.size() == 1);
+        bench.pairing.reset();
+        if (new_stream) bench.pairing.set_limits(limits);
+        for (std::uint64_t i = 0; i < 20; ++i) add(1);
+        const std::vector<Exposure> exposures = send_pattern(1);
+        for (std::size_t i = 0; i < 8; ++i) {
+            Arrival frame = bench.frame(bench.next_id++, exposures[i]);
+            frame.arrived = exposures[i].end_on_host + milliseconds(20);
+            bench.pairing.add(frame);
+        }
+        const bool held_against = kind == StampKind::trigger_edge && !new_stream;
+        INFO("kind " << static_cast<int>(kind) << ", new stream " << new_stream);
+        CHECK(bench.decided.locks.size() == (held_against ? 1 : 2));
+    }
+}
+
 TEST_CASE("pairing_verdicts: three frames a second apart prove a slow start") {
     for (const bool has_clock : {true, false}) {
         Limits limits = Bench::made();

@@ -232,3 +232,55 @@ TEST_CASE("record_delay: after what was learned is forgotten, four records have 
     delays.take(one);
     CHECK(delays.too_early(soon(11)));
 }
+
+namespace {
+
+/// Two exchanges with the board's clock for each record, of which each comes `late`.
+void take_late(RecordDelay& delays, std::uint64_t trigger, Duration late, bool agree = true) {
+    delays.compared(2 * trigger, agree);
+    Exposure next = record(trigger, trigger);
+    next.recorded = next.recorded + late;
+    REQUIRE_FALSE(delays.too_early(next));
+    delays.take(next);
+}
+
+}  // namespace
+
+TEST_CASE("record_delay: a link that became slower is believed once exchanges agree with it") {
+    for (const Duration late : {milliseconds(15), milliseconds(30), milliseconds(45)}) {
+        RecordDelay delays = delays_after(5);
+        for (std::uint64_t i = 6; i <= 11; ++i) {
+            take_late(delays, i, late);
+            CHECK_FALSE(delays.live());
+            CHECK_FALSE(delays.prompt());
+            CHECK(absolute(delays.late_by() - late) < milliseconds(1));
+        }
+        for (std::uint64_t i = 12; i <= 13; ++i) take_late(delays, i, late);
+        CHECK(delays.live());
+        CHECK(delays.prompt());
+        CHECK(delays.late_by() == Duration{});
+        // It may be as quick again as ever, and as slow again only after the same proof.
+        take_late(delays, 14, {});
+        CHECK(delays.live());
+        take_late(delays, 15, late);
+        CHECK_FALSE(delays.live());
+    }
+}
+
+TEST_CASE("record_delay: late records are not believed without exchanges, nor against them") {
+    RecordDelay delays = delays_after(5);
+    for (std::uint64_t i = 6; i <= 40; ++i) {
+        Exposure late = record(i, i);
+        late.recorded = late.recorded + milliseconds(45);
+        delays.take(late);
+        CHECK_FALSE(delays.live());
+    }
+    for (std::uint64_t i = 41; i <= 80; ++i) {
+        take_late(delays, i, milliseconds(45), i % 5 != 0);
+        CHECK_FALSE(delays.live());
+    }
+    // Later than a frame waits is too late, whatever the exchanges say.
+    RecordDelay useless = delays_after(5);
+    for (std::uint64_t i = 6; i <= 40; ++i) take_late(useless, i, milliseconds(600));
+    CHECK_FALSE(useless.live());
+}

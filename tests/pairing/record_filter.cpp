@@ -36,8 +36,8 @@ wire::Exposure displaced(wire::Exposure made, std::uint64_t trigger, Duration by
     return made;
 }
 
-struct Bench {
-    Bench() {
+struct FilterBench {
+    FilterBench() {
         // What is confirmed is no longer overturned by those that contradict it.
         for (std::uint64_t tick = 1; tick <= before; ++tick)
             REQUIRE(believes(record(tick, milliseconds(4), milliseconds(4))));
@@ -57,12 +57,12 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("record_filter: exposures that vary move the triggers, and are believed") {
-    Bench bench;
+    FilterBench bench;
     Duration expected = milliseconds(4);
     const std::vector<Duration> exposures{milliseconds(4),  milliseconds(4), milliseconds(30),
                                           milliseconds(30), milliseconds(2), milliseconds(2),
                                           milliseconds(17), milliseconds(1)};
-    for (std::uint64_t tick = Bench::before + 1; tick < 100; ++tick) {
+    for (std::uint64_t tick = FilterBench::before + 1; tick < 100; ++tick) {
         const Duration exposure = exposures[tick % exposures.size()];
         CHECK(bench.believes(record(tick, exposure, expected)));
         expected = exposure;
@@ -70,9 +70,9 @@ TEST_CASE("record_filter: exposures that vary move the triggers, and are believe
 }
 
 TEST_CASE("record_filter: an exposure of which the camera says that it is fixed stays so") {
-    Bench bench;
+    FilterBench bench;
     const Duration fixed = milliseconds(4);
-    for (std::uint64_t tick = Bench::before + 1; tick < 40; ++tick)
+    for (std::uint64_t tick = FilterBench::before + 1; tick < 40; ++tick)
         CHECK(bench.believes(record(tick, fixed, fixed), fixed));
     CHECK_FALSE(bench.believes(record(40, fixed + microseconds(150), fixed), fixed));
     // Set anew, the new one is learned.
@@ -81,9 +81,9 @@ TEST_CASE("record_filter: an exposure of which the camera says that it is fixed 
 }
 
 TEST_CASE("record_filter: lost records, skipped triggers and late ones are no contradiction") {
-    Bench bench;
+    FilterBench bench;
     const Duration fixed = milliseconds(4);
-    for (std::uint64_t tick = Bench::before + 1; tick < 20; ++tick)
+    for (std::uint64_t tick = FilterBench::before + 1; tick < 20; ++tick)
         bench.believes(record(tick, fixed, fixed));
     wire::Exposure skipped = record(25, fixed, fixed);
     skipped.trigger = 22;
@@ -121,8 +121,8 @@ TEST_CASE("record_filter: flags say which line there is") {
 }
 
 TEST_CASE("record_filter: no field of a record overflows anything") {
-    Bench bench;
-    for (std::uint64_t tick = Bench::before + 1; tick < 20; ++tick)
+    FilterBench bench;
+    for (std::uint64_t tick = FilterBench::before + 1; tick < 20; ++tick)
         bench.believes(record(tick, milliseconds(4), milliseconds(4)));
     CHECK(rc::check("random fields", [&] {
         wire::Exposure made = record(20, milliseconds(4), milliseconds(4));
@@ -138,14 +138,14 @@ TEST_CASE("record_filter: no field of a record overflows anything") {
         const bool damaged = made.trigger != honest.trigger || made.tick != honest.tick ||
                              made.trigger_ns != honest.trigger_ns ||
                              made.start_ns != honest.start_ns || made.end_ns != honest.end_ns;
-        Bench fresh = bench;
+        FilterBench fresh = bench;
         const bool believed = fresh.believes(made);
         RC_ASSERT(believed != damaged || (believed && made.trigger == 20 && made.tick == 20));
     }));
 }
 
 TEST_CASE("record_filter: a record that comes at an impossible time is doubted, whatever it says") {
-    Bench bench;
+    FilterBench bench;
     ReceivedRecord received;
     received.record = record(4, milliseconds(4), milliseconds(4));
     received.expected_ns = 17;
@@ -161,7 +161,7 @@ TEST_CASE("record_filter: a record that comes at an impossible time is doubted, 
 }
 
 TEST_CASE("record_filter: three that agree on another time are a step, if the clock agrees, too") {
-    Bench bench;
+    FilterBench bench;
     const auto judge = [&](std::uint64_t tick, std::uint64_t exchanges, EventReason arrival,
                            bool contradicted) {
         ReceivedRecord received;
@@ -200,7 +200,7 @@ TEST_CASE("record_filter: before three agree, one that contradicts them makes th
 }
 
 TEST_CASE("record_filter: what was believed is known until all is forgotten") {
-    Bench bench;
+    FilterBench bench;
     wire::Exposure other = record(3, milliseconds(4), milliseconds(4));
     CHECK_FALSE(bench.filter.disputes_newest(other));
     ++other.start_ns;
@@ -213,4 +213,81 @@ TEST_CASE("record_filter: what was believed is known until all is forgotten") {
         displaced(record(5, milliseconds(4), milliseconds(4)), 4, milliseconds(20))));
     bench.filter.forget();
     CHECK(bench.believes(record(1, milliseconds(4), milliseconds(4))));
+}
+
+TEST_CASE("record_filter: what varies its exposure on a fixed grid is believed, a drift is not") {
+    RecordLimits limits = camera();
+    limits.fixed_grid = true;
+    RecordFilter filter{limits};
+    Duration expected = milliseconds(4);
+    std::uint64_t tick = 1;
+    const auto judge = [&](Duration off, Duration exposure) {
+        ReceivedRecord received;
+        received.record = displaced(record(tick, exposure, expected), tick, off);
+        received.promptness = Promptness::usual;
+        ++tick;
+        expected = exposure;
+        return filter.judge(received);
+    };
+    for (const std::int64_t us : {4000, 4000, 30'000, 30'000, 2000, 2000, 17'000, 1000, 4000})
+        CHECK_FALSE(judge({}, microseconds(us)).doubt);
+    for (int i = 0; i < 100; ++i) CHECK_FALSE(judge({}, milliseconds(4)).doubt);
+    const Duration each = GENERATE(nanoseconds(100), microseconds(1), microseconds(10));
+    Duration off;
+    Duration believed;
+    for (int i = 0; i < 1000; ++i) {
+        off = off + each;
+        if (!judge(off, milliseconds(4)).doubt) believed = off;
+    }
+    CHECK(believed < microseconds(25));
+    CHECK_FALSE(judge({}, milliseconds(4)).doubt);
+}
+
+TEST_CASE("record_filter: a fixed grid is where it was after a new start of the camera") {
+    RecordLimits limits = camera();
+    limits.fixed_grid = true;
+    RecordFilter filter{limits};
+    std::uint64_t trigger = 0;
+    const auto believes = [&](std::uint64_t tick, Duration off) {
+        ReceivedRecord received;
+        received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), ++trigger, off);
+        received.promptness = Promptness::usual;
+        return !filter.judge(received).doubt;
+    };
+    for (std::uint64_t tick = 1; tick < 30; ++tick) CHECK(believes(tick, {}));
+    filter.forget_grid();
+    CHECK_FALSE(believes(40, milliseconds(1)));
+    CHECK(believes(41, {}));
+    filter.forget();
+    CHECK(believes(42, milliseconds(1)));
+}
+
+TEST_CASE("record_filter: a step is believed when its delay confirms it, or nothing but time can") {
+    RecordLimits limits = camera();
+    limits.fixed_grid = true;
+    RecordFilter filter{limits};
+    std::uint64_t tick = 0;
+    const auto judge = [&](Duration off, Promptness promptness) {
+        ReceivedRecord received;
+        ++tick;
+        received.record = displaced(record(tick, milliseconds(4), milliseconds(4)), tick, off);
+        received.promptness = promptness;
+        received.exchanges = tick;
+        return filter.judge(received);
+    };
+    for (int i = 0; i < 50; ++i) CHECK_FALSE(judge({}, Promptness::usual).doubt);
+    struct Step {
+        Duration off;
+        Promptness promptness;
+        std::uint64_t believed_after;
+    };
+    const auto [off, promptness, believed_after] = GENERATE(
+        Step{milliseconds(1), Promptness::usual, 5}, Step{-milliseconds(1), Promptness::usual, 5},
+        Step{milliseconds(1), Promptness::early, 97}, Step{-milliseconds(1), Promptness::late, 97},
+        Step{microseconds(300), Promptness::usual, 97},
+        Step{milliseconds(1), Promptness::unknown, 97});
+    std::uint64_t records = 1;
+    while (judge(off, promptness).doubt && records < 1000) ++records;
+    INFO(off.ns << " ns, " << static_cast<int>(promptness));
+    CHECK(records == believed_after);
 }

@@ -8,7 +8,7 @@ using versavis::pairing::Relation;
 
 namespace {
 
-constexpr std::int64_t period = 50'000'000;
+constexpr std::int64_t period_ns = 50'000'000;
 
 }
 
@@ -16,7 +16,7 @@ TEST_CASE("relation: drift is learned, and predicts through an outage") {
     Relation clock(true);
     std::int64_t instant = 0;
     const auto frame = [&] { return 7'000'000'000 + instant + instant / 10'000; };  // 100 ppm
-    for (int i = 0; i < 600; ++i, instant += period) clock.track(frame(), instant);
+    for (int i = 0; i < 600; ++i, instant += period_ns) clock.track(frame(), instant);
     instant += 3'000'000'000;
     CHECK(std::abs(clock.expected_instant_ns(frame()) - instant) < 20'000);
     CHECK(clock.tolerance_ns(instant) < 200'000);
@@ -27,7 +27,7 @@ TEST_CASE("relation: a step is followed at once, without losing the drift") {
     std::int64_t instant = 0;
     std::int64_t offset = 0;
     const auto frame = [&] { return offset + instant + instant / 20'000; };
-    for (int i = 0; i < 600; ++i, instant += period) clock.track(frame(), instant);
+    for (int i = 0; i < 600; ++i, instant += period_ns) clock.track(frame(), instant);
     offset = -5'000'000'000;
     clock.move(frame(), instant);
     instant += 1'000'000'000;
@@ -36,14 +36,14 @@ TEST_CASE("relation: a step is followed at once, without losing the drift") {
 
 TEST_CASE("relation: a late frame moves a delay by little, an early one by more") {
     Relation latency(false);
-    for (int i = 0; i < 200; ++i) latency.track(i * period + 3'000'000, i * period);
-    latency.track(200 * period + 43'000'000, 200 * period);
-    CHECK(latency.expected_instant_ns(300 * period + 3'000'000) ==
-          Approx(300 * period).margin(300'000));
+    for (int i = 0; i < 200; ++i) latency.track(i * period_ns + 3'000'000, i * period_ns);
+    latency.track(200 * period_ns + 43'000'000, 200 * period_ns);
+    CHECK(latency.expected_instant_ns(300 * period_ns + 3'000'000) ==
+          Approx(300 * period_ns).margin(300'000));
     CHECK(latency.deviation_ns() < 500'000);
-    for (int i = 201; i < 260; ++i) latency.track(i * period + 2'000'000, i * period);
-    CHECK(latency.expected_instant_ns(300 * period + 2'000'000) ==
-          Approx(300 * period).margin(100'000));
+    for (int i = 201; i < 260; ++i) latency.track(i * period_ns + 2'000'000, i * period_ns);
+    CHECK(latency.expected_instant_ns(300 * period_ns + 2'000'000) ==
+          Approx(300 * period_ns).margin(100'000));
 }
 
 TEST_CASE("relation: what it expects and tolerates, from its first pair on") {
@@ -119,9 +119,9 @@ TEST_CASE("relation: ten seconds count from its first pair, whenever that was") 
     constexpr std::int64_t hour = 3'600'000'000'000;
     Relation clock(true);
     std::int64_t instant = hour;
-    for (; instant <= hour + 9'000'000'000; instant += period) clock.track(instant, instant);
+    for (; instant <= hour + 9'000'000'000; instant += period_ns) clock.track(instant, instant);
     const std::int64_t before = clock.tolerance_ns(instant + 1'000'000'000);
-    for (; instant <= hour + 11'000'000'000; instant += period) clock.track(instant, instant);
+    for (; instant <= hour + 11'000'000'000; instant += period_ns) clock.track(instant, instant);
     const std::int64_t after = clock.tolerance_ns(instant + 1'000'000'000);
     CHECK(before > 250'000);
     CHECK(after < 60'000);

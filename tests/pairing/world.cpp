@@ -87,7 +87,7 @@ class World final : private pairing::Outcome {
         pairing::Limits limits;
         limits.period = period_;
         limits.camera_clock =
-            settings_.clock != CameraClock::absent || !settings_.clock_known_absent;
+            settings_.clock != WorldClock::absent || !settings_.clock_known_absent;
         limits.stamped = settings_.told_stamped;
         limits.pattern_duration = period_ * (wire::start_pattern_length + 2);
         limits.frames_held = 6 + static_cast<std::uint32_t>(std::ceil(settings_.rate_hz * 0.12));
@@ -100,6 +100,7 @@ class World final : private pairing::Outcome {
         limits.exposure = exposure_;
         limits.max_exposure = period_;
         limits.wired = settings_.strobe;
+        limits.fixed_grid = settings_.compensated;
         return limits;
     }
 
@@ -161,12 +162,23 @@ class World final : private pairing::Outcome {
             end_ = now_ + seconds(4);
             return;
         }
-        at(now_ + period_ + std::exchange(grid_waits_, {}), [this] { tick(); });
+        at(now_ + board_period() + std::exchange(grid_waits_, {}), [this] { tick(); });
         if (++idle_ticks_ > 100'000) end_ = now_;
         if (!board_alive_ || !running_) return;
         if (wanted(0)) pulse();
         if (swapped_ && wanted(1)) expose(now_, {life_, 0, 0, false, {}}, false);
         ++ticks_;
+    }
+
+    Duration longest_exposure() const {
+        const Duration longest = settings_.exposure.ns != 0 ? settings_.exposure : period_ / 3;
+        return std::max(longest, settings_.other_exposure);
+    }
+
+    /// A fixed grid goes by the board's clock.
+    Duration board_period() const {
+        if (!settings_.compensated) return period_;
+        return {std::llround(static_cast<double>(period_.ns) / (1 + board_drift))};
     }
 
     void pulse() {
@@ -182,7 +194,10 @@ class World final : private pairing::Outcome {
         const bool takes = !camera_dead_ && fault_ != FaultKind::trigger_ignored && !crowded &&
                            !busy() && !(settings_.ignored > 0 && chance(settings_.ignored));
         const bool lost = fault_ == FaultKind::record_lost;
-        const HostTime start = now_ + microseconds(20);
+        // The middle of an exposure as long as the one before is on the grid.
+        const HostTime triggered_at =
+            settings_.compensated ? now_ + (longest_exposure() - expected_) / 2 : now_;
+        const HostTime start = triggered_at + microseconds(20);
         const Truth truth{life_, trigger_, pulses_, !lost,
                           to_board(stamped(start, start + exposure_))};
         Exposure exposure;
@@ -193,8 +208,9 @@ class World final : private pairing::Outcome {
         if (!settings_.strobe) exposure.kind = StampKind::trigger_edge;
         exposure.exposed =
             takes || !settings_.strobe || swapped_ || (crowded && settings_.drops_after_exposure);
+        if (exposure.exposed) expected_ = exposure_;
         const HostTime sent = start + (exposure.exposed ? exposure_ : start_patience());
-        BoardTime triggered = to_board(now_);
+        BoardTime triggered = to_board(triggered_at);
         if (fault_ == FaultKind::lying_record) lie(exposure, triggered);
         if (!lost) send_record(exposure, triggered, sent);
         if (!swapped_) expose(start, truth, takes);
@@ -236,14 +252,18 @@ class World final : private pairing::Outcome {
     bool believed(const wire::Exposure& record) {
         constexpr Duration exchange_period = milliseconds(100);
         constexpr Duration ahead_slack = milliseconds(1);
+        constexpr Duration estimate_sigma = microseconds(10);
         pairing::ReceivedRecord received;
         received.record = record;
         received.exchanges = static_cast<std::uint64_t>(now_.ns / exchange_period.ns);
-        if (now_ - to_host(pairing::newest_instant(record)) < -ahead_slack)
-            received.arrival = EventReason::not_yet;
+        const Duration delay = now_ - to_host(pairing::newest_instant(record));
+        if (delay < -ahead_slack) received.arrival = EventReason::not_yet;
+        received.promptness = delays_.of(delay, estimate_sigma);
         const pairing::RecordVerdict verdict = filter_.judge(received);
         if (verdict.overturned || verdict.step) pairing_.reset();
-        return !verdict.doubt;
+        if (verdict.doubt) return false;
+        if (record.end_ns != wire::no_time) delays_.learn(delay, now_);
+        return true;
     }
 
     void send_record(Exposure exposure, BoardTime triggered, HostTime sent) {
@@ -258,7 +278,11 @@ class World final : private pairing::Outcome {
         at(link_free_, [this, exposure, record, noise, life = life_]() mutable {
             if (life != life_) return;
             // As the service does, before it looks at the record.
-            if (std::exchange(clock_anew_, false)) pairing_.reset();
+            if (std::exchange(clock_anew_, false)) {
+                pairing_.reset();
+                filter_.forget();
+                delays_.forget();
+            }
             if (!believed(record)) return;
             exposure.recorded = now_;
             exposure.end_on_host = exposure.earliest_on_host = to_host(exposure.end) + noise;
@@ -389,8 +413,8 @@ class World final : private pairing::Outcome {
     }
 
     CameraTime camera_time(HostTime start) {
-        if (settings_.clock == CameraClock::absent) return {};
-        const double rate = settings_.clock == CameraClock::drifting ? camera_drift : -5e-6;
+        if (settings_.clock == WorldClock::absent) return {};
+        const double rate = settings_.clock == WorldClock::drifting ? camera_drift : -5e-6;
         return {camera_offset_ + std::llround(static_cast<double>(start.ns) * (1 + rate)) +
                 std::uniform_int_distribution<std::int64_t>(-2000, 2000)(random_)};
     }
@@ -542,8 +566,10 @@ class World final : private pairing::Outcome {
     WorldSettings settings_;
     Duration period_;
     Duration exposure_;
+    Duration expected_ = exposure_;  ///< by the board, of the next
     std::mt19937_64 random_;
     pairing::RecordFilter filter_;
+    DelayFloor delays_;
     pairing::Pairing pairing_;
     pairing::BlockIdUnwrapper unwrapper_;
     Verdict verdict_;
@@ -617,11 +643,11 @@ const char* to_string(FaultKind kind) {
     return "unknown";
 }
 
-const char* to_string(CameraClock clock) {
+const char* to_string(WorldClock clock) {
     switch (clock) {
-        case CameraClock::good: return "good";
-        case CameraClock::drifting: return "100 ppm";
-        case CameraClock::absent: return "absent";
+        case WorldClock::good: return "good";
+        case WorldClock::drifting: return "100 ppm";
+        case WorldClock::absent: return "absent";
     }
     return "unknown";
 }

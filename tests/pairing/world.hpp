@@ -40,13 +40,13 @@ enum class FaultKind {
 inline constexpr std::size_t fault_kinds = 19;
 const char* to_string(FaultKind kind);
 
-enum class CameraClock { good, drifting, absent };
-const char* to_string(CameraClock clock);
+enum class WorldClock { good, drifting, absent };
+const char* to_string(WorldClock clock);
 
 struct WorldSettings {
     std::uint64_t seed = 1;
     double rate_hz = 20;
-    CameraClock clock = CameraClock::good;
+    WorldClock clock = WorldClock::good;
     bool clock_known_absent = true;  ///< the service was reported, or found out from the camera
     bool wide_ids = false;           ///< 64 bits, else 16
     std::uint64_t first_id = 1;
@@ -59,6 +59,7 @@ struct WorldSettings {
     Duration exposure;        ///< 0: 2 ms or a third of the period, and it follows the light
     Duration other_exposure;  ///< from `switched_every` to the same number of pulses later ...
     std::uint64_t switched_every = 0;  ///< ... and so on; 0: never
+    bool compensated = false;  ///< the board keeps the middles of exposures on its grid, not starts
     Duration readout = microseconds(2500);
     Duration jitter = microseconds(1500);  ///< of the arrival, either way
     double late_frames =

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::uint32_t words = 16 * page_size / sizeof(std::uint64_t);
 constexpr unsigned readers = 3;
-constexpr std::uint32_t slots = 4;
+constexpr std::uint32_t frame_slots = 4;
 
 /// What a reader found.
 struct Finding {
@@ -115,7 +115,7 @@ void read_all(Reader& reader, const Shared& course, Finding& finding) {
     const auto dawdle = [&] {
         const std::uint64_t from = reader.head();
         if (turn++ % 64 != 0) return;
-        while (reader.head() - from < 2 * slots && !course->done) ::sched_yield();
+        while (reader.head() - from < 2 * frame_slots && !course->done) ::sched_yield();
     };
     for (;;) {
         const bool last = course->done;
@@ -142,7 +142,7 @@ struct Stress {
     std::vector<pid_t> processes;
 
     Writer writer(std::uint64_t first = 0) {
-        return *Writer::create(directory.path(), {"frames", StreamKind::frames, 8, slots,
+        return *Writer::create(directory.path(), {"frames", StreamKind::frames, 8, frame_slots,
                                                   words * sizeof(std::uint64_t), first});
     }
     void start_readers() {
@@ -201,7 +201,7 @@ TEST_CASE("stress: writers are killed at random, readers follow to the last") {
     constexpr unsigned seed = 7;
     std::mt19937 random(seed);
     Stress stress;
-    Writer(stress.writer());  // for readers to open; it ends at once
+    static_cast<void>(stress.writer());  // for readers to open; it ends at once
     Writer first = stress.writer();
     stress.start_readers();
     std::uint64_t life = 1;

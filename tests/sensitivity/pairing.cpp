@@ -31,7 +31,7 @@ void append(Totals& totals, const Totals& more) {
 Totals run_queues(unsigned seeds) {
     Totals totals;
     for (unsigned seed = 1; seed <= seeds; ++seed)
-        for (const CameraClock clock : {CameraClock::drifting, CameraClock::absent})
+        for (const WorldClock clock : {WorldClock::drifting, WorldClock::absent})
             for (const bool strobe : {false, true})
                 for (const bool dropped : {false, true})
                     for (const bool counted : {false, true}) {
@@ -55,7 +55,7 @@ Totals run_harsh(unsigned seeds) {
                                    FaultKind::clock_jump,      FaultKind::record_lost};
     Totals totals;
     for (std::uint64_t seed = 1; seed <= seeds; ++seed)
-        for (const CameraClock clock : {CameraClock::good, CameraClock::absent}) {
+        for (const WorldClock clock : {WorldClock::good, WorldClock::absent}) {
             std::mt19937_64 random(seed);
             WorldSettings settings;
             settings.seed = seed;
@@ -77,7 +77,7 @@ Totals run_harsh(unsigned seeds) {
 Totals run_swapped(unsigned seeds) {
     Totals totals;
     for (unsigned seed = 1; seed <= seeds; ++seed)
-        for (const CameraClock clock : {CameraClock::good, CameraClock::absent}) {
+        for (const WorldClock clock : {WorldClock::good, WorldClock::absent}) {
             WorldSettings settings;
             settings.seed = seed;
             settings.clock = clock;
@@ -98,9 +98,9 @@ double in_seconds(versavis::Duration duration) { return static_cast<double>(dura
 
 int main(int argc, char** argv) {
     const unsigned effort = effort_of(argc, argv);
-    Totals with = run_random(faults_with_clock * effort, 1, CameraClock::good);
-    append(with, run_random(faults_with_clock * effort, seeds_of_drifting, CameraClock::drifting));
-    const Totals without = run_random(faults_without_clock * effort, 1, CameraClock::absent);
+    Totals with = run_random(faults_with_clock * effort, 1, WorldClock::good);
+    append(with, run_random(faults_with_clock * effort, seeds_of_drifting, WorldClock::drifting));
+    const Totals without = run_random(faults_without_clock * effort, 1, WorldClock::absent);
     const Totals queued = run_queues(queues * effort);
     const Totals harsh = run_harsh(harsh_seeds * effort);
     const Totals swapped = run_swapped(2 * effort);

@@ -14,7 +14,7 @@ Stack::Stack(const StackSettings& settings) : settings_(settings) {
     const std::string link = settings.link.empty() ? "unix:" + socket_path() : settings.link;
     std::string configuration =
         fmt::format("instance = \"{}\"\nstate_directory = \"{}\"\n[board]\nlink = \"{}\"\n",
-                    settings.name, directory_.path().string(), link);
+                    settings_.name, directory_.path().string(), link);
     const auto at = [](const std::vector<std::string>& texts, unsigned i) {
         return i < texts.size() ? texts[i] : std::string();
     };

@@ -17,7 +17,7 @@
 namespace versavis::test {
 
 struct StackSettings {
-    std::string name;     ///< of the instance
+    std::string name;     ///< of the instance, which no other test may have
     unsigned subnet = 0;  ///< cameras are at 127.0.<subnet>.<2...>
     unsigned cameras = 1;
     double rate_hz = 20;

@@ -399,7 +399,7 @@ TEST_CASE("cameras: which instant of a changing exposure a camera stamps is foun
     const std::string changing =
         "exposure_us = 8000\nexposure_swing = 0.7\n"
         "exposure_swing_s = 0.43\nstamps = ";
-    StackSettings settings{"stamps", 56, 4, 20, "", "", ""};
+    StackSettings settings{"stamp-kinds", 56, 4, 20, "", "", ""};
     settings.scenarios = {changing + "\"start\"", changing + "\"middle\"", changing + "\"end\"",
                           changing + "\"readout\""};
     Stack stack(settings);

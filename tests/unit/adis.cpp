@@ -17,10 +17,10 @@ namespace {
 using Words = std::vector<std::uint16_t>;
 using Steps = std::vector<std::string>;
 
-const ImuPart& part(ImuKind kind) { return *find_part(kind); }
+const ImuPart& adis_part(ImuKind kind) { return *find_part(kind); }
 
 /// The maker's description, bit by bit.
-std::uint16_t slow_crc(const std::uint16_t* words) {
+std::uint16_t slow_adis_crc(const std::uint16_t* words) {
     unsigned crc = 0xFFFF;
     for (std::size_t word = 0; word < 11; ++word)
         for (unsigned bit = 0; bit < 16; ++bit) {
@@ -43,7 +43,7 @@ ImuReply reply(const Words& words) {
 }
 
 Words with_crc(Words words) {
-    words.push_back(slow_crc(words.data() + 1));
+    words.push_back(slow_adis_crc(words.data() + 1));
     return words;
 }
 
@@ -59,17 +59,17 @@ struct Read {
     wire::ImuSample sample;
 };
 
-Read read(ImuKind kind, const std::vector<Words>& bursts) {
+Read read_bursts(ImuKind kind, const std::vector<Words>& bursts) {
     std::array<ImuReply, max_readings> replies;
     for (std::size_t i = 0; i < bursts.size(); ++i) replies.at(i) = reply(bursts[i]);
     Read read{};
     read.verdict =
-        part(kind).parse(replies.data(), static_cast<unsigned>(bursts.size()), read.sample);
+        adis_part(kind).parse(replies.data(), static_cast<unsigned>(bursts.size()), read.sample);
     return read;
 }
 
 unsigned flags(ImuKind kind, const std::vector<Words>& bursts) {
-    const Read result = read(kind, bursts);
+    const Read result = read_bursts(kind, bursts);
     REQUIRE(result.verdict == Verdict::taken);
     return result.sample.flags;
 }
@@ -96,7 +96,7 @@ TEST_CASE("adis: the CRC is that of its description, bit by bit") {
     for (int i = 0; i < 1000; ++i) {
         std::uint16_t words[11];
         for (std::uint16_t& word : words) word = static_cast<std::uint16_t>(random());
-        REQUIRE(adis16448_crc(words) == slow_crc(words));
+        REQUIRE(adis16448_crc(words) == slow_adis_crc(words));
     }
 }
 
@@ -104,26 +104,27 @@ TEST_CASE("adis: rates are those of the part, the slowest that is not slower tha
     const auto octaves = GENERATE(ImuKind::adis16445, ImuKind::adis16448a, ImuKind::adis16448b);
     for (unsigned code = 0; code <= 9; ++code) {
         const std::uint32_t rate = 819'200U >> code;
-        CHECK(part(octaves).rate(rate) == rate);
-        CHECK(part(octaves).rate(rate - 1) == rate);
-        CHECK(part(octaves).rate(rate + 1) == (code == 0 ? rate : 2 * rate));
+        CHECK(adis_part(octaves).rate(rate) == rate);
+        CHECK(adis_part(octaves).rate(rate - 1) == rate);
+        CHECK(adis_part(octaves).rate(rate + 1) == (code == 0 ? rate : 2 * rate));
     }
-    CHECK(part(octaves).rate(8'000'000) == 819'200);
-    CHECK(part(ImuKind::adis16460).rate(600'000) == 682'666);
-    CHECK(part(ImuKind::adis16470).rate(1'000) == 1'000);
-    CHECK(part(ImuKind::adis16470).rate(1'001) == 2'000'000 / 1998);
+    CHECK(adis_part(octaves).rate(8'000'000) == 819'200);
+    CHECK(adis_part(ImuKind::adis16460).rate(600'000) == 682'666);
+    CHECK(adis_part(ImuKind::adis16470).rate(1'000) == 1'000);
+    CHECK(adis_part(ImuKind::adis16470).rate(1'001) == 2'000'000 / 1998);
     for (const auto& [kind, fastest] :
          {std::pair{ImuKind::adis16460, 2'048'000U}, {ImuKind::adis16470, 2'000'000U}}) {
-        CHECK(part(kind).rate(fastest + 1) == fastest);
-        CHECK(part(kind).rate(2 * fastest) == fastest);
+        CHECK(adis_part(kind).rate(fastest + 1) == fastest);
+        CHECK(adis_part(kind).rate(2 * fastest) == fastest);
         for (unsigned divider = 1; divider <= 2000; ++divider)
-            REQUIRE(part(kind).rate(fastest / divider) == fastest / divider);
+            REQUIRE(adis_part(kind).rate(fastest / divider) == fastest / divider);
     }
-    CHECK(part(ImuKind::adis16460).rate(1'023) == 1'024);  // it has no slower one
+    CHECK(adis_part(ImuKind::adis16460).rate(1'023) == 1'024);  // it has no slower one
     // A rate that a part has is kept: the answer of a configuration can be sent again.
     for (std::uint32_t wanted = 1'000; wanted < 2'000'000; wanted += 777)
         for (const auto kind : {ImuKind::adis16445, ImuKind::adis16460, ImuKind::adis16470})
-            REQUIRE(part(kind).rate(part(kind).rate(wanted)) == part(kind).rate(wanted));
+            REQUIRE(adis_part(kind).rate(adis_part(kind).rate(wanted)) ==
+                    adis_part(kind).rate(wanted));
 }
 
 TEST_CASE("adis: each part is set up by the registers of its data sheet") {
@@ -146,7 +147,7 @@ TEST_CASE("adis: each part is set up by the registers of its data sheet") {
 
 TEST_CASE("adis: a register is written byte by byte, and read by a word that asks for it") {
     using Action = SetupStep::Action;
-    const ImuPart& adis = part(ImuKind::adis16448b);
+    const ImuPart& adis = adis_part(ImuKind::adis16448b);
     const ImuTransfer write = access_of(ImuKind::adis16448b, {Action::write, 0, 0x36, 0x1234, 300});
     CHECK(write.bus == ImuTransfer::Bus::spi);
     CHECK(write.clock_hz == 1'000'000);
@@ -176,9 +177,9 @@ TEST_CASE("adis: a sample is one burst as long as the part's, without gaps") {
                                            {ImuKind::adis16448b, 0x3E, 28},
                                            {ImuKind::adis16460, 0x3E, 22},
                                            {ImuKind::adis16470, 0x68, 22}}));
-    for (unsigned index = 0; index < part(kind).readings(); ++index) {
+    for (unsigned index = 0; index < adis_part(kind).readings(); ++index) {
         ImuTransfer transfer;
-        part(kind).reading(index, transfer);
+        adis_part(kind).reading(index, transfer);
         CHECK(transfer.clock_hz == 1'000'000);
         CHECK(transfer.word_gap_ns == 0);
         CHECK(transfer.size == size);
@@ -189,7 +190,7 @@ TEST_CASE("adis: a sample is one burst as long as the part's, without gaps") {
 
 TEST_CASE("adis: a burst with a CRC") {
     const Words good = with_crc(motion);
-    const wire::ImuSample sample = read(ImuKind::adis16448b, {good}).sample;
+    const wire::ImuSample sample = read_bursts(ImuKind::adis16448b, {good}).sample;
     CHECK(axes(sample.gyro) == std::vector{1, -2, 3});
     CHECK(axes(sample.accel) == std::vector{4, -5, 6});
     CHECK(axes(sample.magnetic) == std::vector{7, -8, 9});
@@ -211,13 +212,13 @@ TEST_CASE("adis: temperatures of twelve bits, whatever the other bits are") {
         {{0x0000, 0}, {0x07FF, 2047}, {0xF7FF, 2047}, {0x0800, -2048}, {0x0FFF, -1}, {0x1001, 1}}));
     Words words = motion;
     words[11] = static_cast<std::uint16_t>(word);
-    CHECK(read(ImuKind::adis16448b, {with_crc(words)}).sample.temperature == temperature);
+    CHECK(read_bursts(ImuKind::adis16448b, {with_crc(words)}).sample.temperature == temperature);
 }
 
 TEST_CASE("adis: a burst with a sum of its bytes") {
     const auto kind = GENERATE(ImuKind::adis16460, ImuKind::adis16470);
     const Words good = with_sum({0, 0x8001, 2, 0xFFFF, 4, 0xFEFB, 6, 0x9002, 8});
-    const wire::ImuSample sample = read(kind, {good}).sample;
+    const wire::ImuSample sample = read_bursts(kind, {good}).sample;
     CHECK(axes(sample.gyro) == std::vector{-32767, 2, -1});
     CHECK(axes(sample.accel) == std::vector{4, -261, 6});
     CHECK(axes(sample.magnetic) == std::vector{0, 0, 0});
@@ -239,7 +240,7 @@ TEST_CASE("adis: without a checksum, two readings in a row must be equal") {
     const auto kind = GENERATE(ImuKind::adis16445, ImuKind::adis16448a);
     const std::size_t size = kind == ImuKind::adis16445 ? 8 : 12;
     const Words good(motion.begin(), motion.begin() + static_cast<std::ptrdiff_t>(size));
-    const Read twice = read(kind, {good, good});
+    const Read twice = read_bursts(kind, {good, good});
     CHECK(twice.verdict == Verdict::taken);
     CHECK(twice.sample.flags == 0);
     CHECK(axes(twice.sample.gyro) == std::vector{1, -2, 3});
@@ -251,13 +252,13 @@ TEST_CASE("adis: without a checksum, two readings in a row must be equal") {
     for (std::size_t i = 1; i < size; ++i) {
         Words other = good;
         other[i] ^= 0x0100U;
-        CHECK(read(kind, {good, other}).verdict == Verdict::unsure);
-        CHECK(read(kind, {good, other, good}).verdict == Verdict::unsure);
+        CHECK(read_bursts(kind, {good, other}).verdict == Verdict::unsure);
+        CHECK(read_bursts(kind, {good, other, good}).verdict == Verdict::unsure);
         // An update came between, or within one: the newest two agree.
-        const Read settled = read(kind, {good, other, other});
+        const Read settled = read_bursts(kind, {good, other, other});
         CHECK(settled.verdict == Verdict::taken);
         CHECK(settled.sample.flags == 0);
-        CHECK(read(kind, {good, other, good, other}).verdict == Verdict::unsure);
+        CHECK(read_bursts(kind, {good, other, good, other}).verdict == Verdict::unsure);
         CHECK(flags(kind, {good, other, good, other, other}) == 0);
         // Five of which no two agree are enough.
         CHECK(flags(kind, {good, other, good, other, good}) == wire::imu_check_failed);
@@ -299,7 +300,7 @@ TEST_CASE("adis: the part's own diagnosis is reported, by whichever reading had 
         const unsigned expected = (failures >> bit & 1U) != 0 ? wire::imu_self_test_failed : 0;
         words[0] = static_cast<std::uint16_t>(1U << bit);
         CAPTURE(bit);
-        if (part(kind).readings() == 1) {
+        if (adis_part(kind).readings() == 1) {
             CHECK(flags(kind, {kind == ImuKind::adis16448b ? with_crc(words) : with_sum(words)}) ==
                   expected);
             continue;

@@ -11,7 +11,7 @@ using Catch::Contains;
 
 namespace {
 
-constexpr double rate_hz = 200;
+constexpr double imu_rate_hz = 200;
 
 std::vector<float> noise(std::size_t count, double density, double walk, unsigned seed) {
     std::mt19937_64 random(seed);
@@ -19,8 +19,9 @@ std::vector<float> noise(std::size_t count, double density, double walk, unsigne
     std::vector<float> rates;
     double bias = 0.02;
     for (std::size_t i = 0; i < count; ++i) {
-        bias += walk / std::sqrt(rate_hz) * normal(random);
-        rates.push_back(static_cast<float>(bias + density * std::sqrt(rate_hz) * normal(random)));
+        bias += walk / std::sqrt(imu_rate_hz) * normal(random);
+        rates.push_back(
+            static_cast<float>(bias + density * std::sqrt(imu_rate_hz) * normal(random)));
     }
     return rates;
 }
@@ -42,7 +43,7 @@ double naive_deviation(const std::vector<float>& rates, std::size_t m) {
 RestingImu resting(double seconds, double gyro_walk, double accel_walk) {
     RestingImu imu;
     imu.name = "imu0";
-    const auto count = static_cast<std::size_t>(seconds * rate_hz);
+    const auto count = static_cast<std::size_t>(seconds * imu_rate_hz);
     for (std::size_t i = 0; i < count; ++i)
         imu.times.push_back({static_cast<std::int64_t>(i) * 5'000'000});
     for (unsigned axis = 0; axis < 3; ++axis) {
@@ -56,11 +57,11 @@ RestingImu resting(double seconds, double gyro_walk, double accel_walk) {
 
 TEST_CASE("allan: the deviation is that of the definition", "[allan]") {
     const auto rates = noise(700, 2e-3, 1e-2, 5);
-    const auto points = allan_deviation(rates, 1 / rate_hz);
+    const auto points = allan_deviation(rates, 1 / imu_rate_hz);
     REQUIRE(points.size() == 8);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const std::size_t m = std::size_t{1} << i;
-        CHECK(points[i].tau_s == Approx(static_cast<double>(m) / rate_hz));
+        CHECK(points[i].tau_s == Approx(static_cast<double>(m) / imu_rate_hz));
         CHECK(points[i].deviation == Approx(naive_deviation(rates, m)).epsilon(1e-6));
     }
 }
@@ -76,7 +77,7 @@ TEST_CASE("allan: density and walk of simulated noise, and honest sigmas", "[sta
     double density_square = 0;
     double walk_square = 0;
     for (unsigned seed = 0; seed < runs; ++seed) {
-        const auto axis = axis_noise(noise(200'000, 2e-4, 4e-5, seed), 1 / rate_hz);
+        const auto axis = axis_noise(noise(200'000, 2e-4, 4e-5, seed), 1 / imu_rate_hz);
         REQUIRE(axis);
         CHECK(axis->density.value == Approx(2e-4).epsilon(0.02));
         REQUIRE(axis->walk);
@@ -97,20 +98,21 @@ TEST_CASE("allan: the limit of a walk that is not seen holds, and what it needs 
           "[allan]") {
     int above = 0;
     for (unsigned seed = 0; seed < 40; ++seed) {
-        const auto axis = axis_noise(noise(20'000, 2e-4, 1e-5, 100 + seed), 1 / rate_hz);
+        const auto axis = axis_noise(noise(20'000, 2e-4, 1e-5, 100 + seed), 1 / imu_rate_hz);
         REQUIRE(axis);
         if (axis->walk_limit < 1e-5) ++above;
         if (axis->walk) continue;
         CHECK(axis->walk_needs_s > 100);
     }
     CHECK(above <= 4);
-    const auto axis = axis_noise(noise(20'000, 2e-4, 0, 7), 1 / rate_hz);
+    const auto axis = axis_noise(noise(20'000, 2e-4, 0, 7), 1 / imu_rate_hz);
     REQUIRE(axis);
     REQUIRE_FALSE(axis->walk);
-    const auto longer = static_cast<std::size_t>(2 * axis->walk_needs_s * rate_hz);
+    const auto longer = static_cast<std::size_t>(2 * axis->walk_needs_s * imu_rate_hz);
     int shown = 0;
     for (unsigned seed = 0; seed < 4; ++seed) {
-        const auto long_axis = axis_noise(noise(longer, 2e-4, axis->walk_limit, seed), 1 / rate_hz);
+        const auto long_axis =
+            axis_noise(noise(longer, 2e-4, axis->walk_limit, seed), 1 / imu_rate_hz);
         REQUIRE(long_axis);
         if (long_axis->walk) ++shown;
     }
@@ -125,7 +127,7 @@ TEST_CASE("allan: a filter's shoulder is left out", "[allan]") {
         for (std::size_t k = i - 16; k < i; ++k) sum += raw[k];
         filtered.push_back(sum / 16);
     }
-    const auto axis = axis_noise(filtered, 1 / rate_hz);
+    const auto axis = axis_noise(filtered, 1 / imu_rate_hz);
     REQUIRE(axis);
     CHECK(axis->density.value == Approx(2e-4).epsilon(0.09));
 }
@@ -133,7 +135,7 @@ TEST_CASE("allan: a filter's shoulder is left out", "[allan]") {
 TEST_CASE("allan: an IMU at rest gives Kalibr's values", "[allan]") {
     const auto result = evaluate_allan(resting(1000, 4e-5, 4e-4));
     REQUIRE(result);
-    CHECK(result->rate_hz == Approx(rate_hz));
+    CHECK(result->rate_hz == Approx(imu_rate_hz));
     CHECK(density_of(result->gyro).value == Approx(2e-4).epsilon(0.02));
     CHECK(density_of(result->accel).value == Approx(2e-3).epsilon(0.02));
     REQUIRE(walk_of(result->gyro));
@@ -166,7 +168,7 @@ TEST_CASE("allan: lost samples are interpolated while they are few", "[allan]") 
     auto result = evaluate_allan(imu);
     REQUIRE(result);
     CHECK(result->missing == 3);
-    CHECK(result->rate_hz == Approx(rate_hz));
+    CHECK(result->rate_hz == Approx(imu_rate_hz));
     for (int i = 0; i < 30; ++i) drop(2000);
     result = evaluate_allan(imu);
     REQUIRE_FALSE(result);

@@ -9,7 +9,7 @@ using namespace versavis::daemon;
 namespace {
 
 /// A camera at 20 Hz and its board.
-struct Bench {
+struct AnswerBench {
     /// A trigger that the camera takes or ignores.
     void trigger(bool taken, std::uint16_t flags = 0, Duration latency = microseconds(20)) {
         ++number;
@@ -47,7 +47,7 @@ struct Bench {
 
 TEST_CASE("answer_watch: which triggers the camera takes, by its exposure line") {
     for (const unsigned every : {1U, 2U, 3U}) {
-        Bench bench;
+        AnswerBench bench;
         for (unsigned i = 0; i < 8 * every; ++i) bench.trigger(i % every == 0);
         CHECK(bench.watch.report().every == 1);
         for (unsigned i = 0; i < every; ++i) bench.trigger(i % every == 0);
@@ -62,7 +62,7 @@ TEST_CASE("answer_watch: which triggers the camera takes, by its exposure line")
 }
 
 TEST_CASE("answer_watch: triggers ignored at random are counted, and no pattern") {
-    Bench bench;
+    AnswerBench bench;
     for (unsigned i = 0; i < 40; ++i) bench.trigger(i % 5 != 0);
     CHECK(bench.watch.report().ignored == 8);
     CHECK(bench.watch.report().every == 1);
@@ -70,7 +70,7 @@ TEST_CASE("answer_watch: triggers ignored at random are counted, and no pattern"
 }
 
 TEST_CASE("answer_watch: without an own exposure line, nobody knows what the camera took") {
-    Bench bench;
+    AnswerBench bench;
     for (const auto flag : {wire::exposure_predicted, wire::exposure_from_master})
         for (unsigned i = 0; i < 20; ++i) bench.trigger(i % 2 == 0, flag);
     CHECK(bench.watch.report().ignored == 0);
@@ -79,11 +79,20 @@ TEST_CASE("answer_watch: without an own exposure line, nobody knows what the cam
 
 TEST_CASE(
     "answer_watch: ids that stand still or begin again are counted, frames out of order not") {
-    Bench bench;
+    AnswerBench bench;
     for (const std::uint64_t id : {100, 101, 101, 101, 102, 85, 86, 1, 2}) bench.frame(id);
     CHECK(bench.watch.report().ids_repeated == 2);
     CHECK(bench.watch.report().ids_restarted == 2);
     CHECK(bench.watch.report().block_id == 2);
+}
+
+TEST_CASE("answer_watch: ids of frames that did not arrive are counted, and no restart is") {
+    AnswerBench bench;
+    for (const std::uint64_t id : {100, 101, 104, 104, 105, 1, 2, 4}) bench.frame(id);
+    CHECK(bench.watch.report().ids_skipped == 3);
+    bench.watch.restart();
+    bench.frame(50);
+    CHECK(bench.watch.report().ids_skipped == 3);
 }
 
 TEST_CASE("answer_watch: a clock in another unit is known, one that steps or drifts is not") {
@@ -95,15 +104,15 @@ TEST_CASE("answer_watch: a clock in another unit is known, one that steps or dri
                                       {0.21, 1.0},
                                       {1.0005, 1.0},
                                       {0.0, 1.0}}) {
-        Bench bench;
+        AnswerBench bench;
         bench.rate = rate;
         for (unsigned i = 0; i < 32; ++i) bench.frame(i);
         CHECK(bench.watch.report().clock_rate == 1);
         bench.frame(32);
         CHECK(bench.watch.report().clock_rate == Approx(found).epsilon(0.001));
     }
-    Bench stepped;
-    Bench late;
+    AnswerBench stepped;
+    AnswerBench late;
     for (unsigned i = 0; i < 200; ++i) {
         if (i % 70 == 40) stepped.step = stepped.step + seconds(1);
         stepped.frame(i);
@@ -114,7 +123,7 @@ TEST_CASE("answer_watch: a clock in another unit is known, one that steps or dri
 }
 
 TEST_CASE("answer_watch: an exposure line that rises before its trigger leads") {
-    Bench bench;
+    AnswerBench bench;
     for (int i = 0; i < 4; ++i) bench.leading_trigger(microseconds(380));
     bench.trigger(false);  // before a gap of the pattern
     CHECK(bench.watch.report().lead.ns == 0);

@@ -5,20 +5,19 @@
 #include <cstring>
 #include <vector>
 
+#include "pixel_formats.hpp"
+
 using namespace versavis;
 using namespace versavis::daemon;
+using namespace versavis::test;
 
 namespace {
 
-constexpr std::uint32_t mono8 = 0x01080001;
-constexpr std::uint32_t mono12 = 0x01100005;
-constexpr std::uint32_t mono12_packed = 0x010C0006;
-
-std::vector<std::byte> plain(std::size_t pixels, unsigned value) {
+std::vector<std::byte> plain_pixels(std::size_t pixels, unsigned value) {
     return std::vector<std::byte>(pixels, static_cast<std::byte>(value));
 }
 
-AutoExposureConfiguration settings() {
+AutoExposureConfiguration exposure_settings() {
     AutoExposureConfiguration settings;
     settings.enabled = true;
     settings.max_us = 20'000;
@@ -28,7 +27,7 @@ AutoExposureConfiguration settings() {
 }  // namespace
 
 TEST_CASE("auto_exposure: brightness is the mean, or a percentile, of pixels of 8 to 16 bits") {
-    auto pixels = plain(640 * 480, 51);
+    auto pixels = plain_pixels(640 * 480, 51);
     CHECK(brightness({pixels, 640, 480, mono8}, 0) == Approx(0.2));
     std::fill(pixels.begin(), pixels.begin() + 640 * 240, std::byte{255});
     CHECK(brightness({pixels, 640, 480, mono8}, 0) == Approx(0.6).margin(0.02));
@@ -42,7 +41,7 @@ TEST_CASE("auto_exposure: brightness is the mean, or a percentile, of pixels of 
 }
 
 TEST_CASE("auto_exposure: what cannot be metered is not guessed") {
-    const auto pixels = plain(100, 51);
+    const auto pixels = plain_pixels(100, 51);
     CHECK_FALSE(brightness({pixels, 10, 10, mono12_packed}, 0));
     CHECK_FALSE(brightness({pixels, 10, 11, mono8}, 0));  // more rows than bytes
     CHECK_FALSE(brightness({pixels, 0, 10, mono8}, 0));
@@ -52,7 +51,7 @@ TEST_CASE("auto_exposure: what cannot be metered is not guessed") {
 }
 
 TEST_CASE("auto_exposure: a frame is used once, and only if it was exposed as asked") {
-    const auto pixels = plain(100, 255);
+    const auto pixels = plain_pixels(100, 255);
     FrameMeter meter(0);
     meter.take({pixels, 10, 10, mono8}, HostTime{5});
     CHECK_FALSE(meter.newest(HostTime{5}));
@@ -64,7 +63,7 @@ TEST_CASE("auto_exposure: it settles at the target, from below and above, within
     const double light = GENERATE(0.00002, 0.0002, 0.002);  // brightness per microsecond
     const Duration first = GENERATE(microseconds(50), milliseconds(20),
                                     milliseconds(100));  // the last is beyond the limits
-    AutoExposure control(settings(), first);
+    AutoExposure control(exposure_settings(), first);
     int changes = 0;
     for (int frame = 0; frame < 60; ++frame) {
         const double seen =
@@ -83,7 +82,7 @@ TEST_CASE("auto_exposure: it settles at the target, from below and above, within
 }
 
 TEST_CASE("auto_exposure: black and saturated frames lead to the limits, not beyond") {
-    AutoExposure control(settings(), milliseconds(1));
+    AutoExposure control(exposure_settings(), milliseconds(1));
     for (int i = 0; i < 50; ++i) control.update(0);
     CHECK(control.exposure() == milliseconds(20));
     for (int i = 0; i < 50; ++i) control.update(1);

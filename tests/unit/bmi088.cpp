@@ -11,13 +11,13 @@ using namespace versavis::firmware;
 
 namespace {
 
-const ImuPart& part = *find_part(wire::ImuKind::bmi088);
+const ImuPart& bmi088_part = *find_part(wire::ImuKind::bmi088);
 
-struct Rate {
+struct BmiRate {
     std::uint32_t millihertz;
     unsigned code;
 };
-const std::vector<Rate> rates{
+const std::vector<BmiRate> bmi088_rates{
     {2'000'000, 0}, {1'000'000, 2}, {400'000, 3}, {200'000, 6}, {100'000, 7}};
 
 /// Replies of a part that is well; a test changes single bytes of them.
@@ -37,7 +37,7 @@ struct Replies {
     }
     wire::ImuSample read() const {
         wire::ImuSample sample{};
-        CHECK(part.parse(replies, 3, sample) == Verdict::taken);
+        CHECK(bmi088_part.parse(replies, 3, sample) == Verdict::taken);
         return sample;
     }
     ImuReply replies[3];
@@ -46,17 +46,17 @@ struct Replies {
 }  // namespace
 
 TEST_CASE("bmi088: rates are those of the gyro, never slower than asked") {
-    for (std::size_t i = 0; i < rates.size(); ++i) {
-        const std::uint32_t rate = rates[i].millihertz;
-        CHECK(part.rate(rate) == rate);
-        CHECK(part.rate(rate - 1) == rate);
-        CHECK(part.rate(rate + 1) == (i == 0 ? rate : rates[i - 1].millihertz));
+    for (std::size_t i = 0; i < bmi088_rates.size(); ++i) {
+        const std::uint32_t rate = bmi088_rates[i].millihertz;
+        CHECK(bmi088_part.rate(rate) == rate);
+        CHECK(bmi088_part.rate(rate - 1) == rate);
+        CHECK(bmi088_part.rate(rate + 1) == (i == 0 ? rate : bmi088_rates[i - 1].millihertz));
     }
-    CHECK(part.rate(1'000) == 100'000);
+    CHECK(bmi088_part.rate(1'000) == 100'000);
 }
 
 TEST_CASE("bmi088: set up by the registers of the data sheet, at each rate and filter") {
-    for (const Rate& rate : rates)
+    for (const BmiRate& rate : bmi088_rates)
         for (const unsigned filter : {0U, 1U, 2U})
             for (const bool accel_ready : {false, true}) {
                 std::vector<std::string> expected{
@@ -71,8 +71,9 @@ TEST_CASE("bmi088: set up by the registers of the data sheet, at each rate and f
                                                  fmt::format("0:10={:X}, 1000", rate.code),
                                                  fmt::format("0:10?{:X}, 0", rate.code | 0x80U),
                                                  "0:16=D, 1000", "0:18=1, 1000", "0:15=80, 1000"});
-                CHECK(setup_of(part.kind(), {rate.millihertz, static_cast<std::uint8_t>(filter),
-                                             accel_ready}) == expected);
+                CHECK(setup_of(bmi088_part.kind(),
+                               {rate.millihertz, static_cast<std::uint8_t>(filter), accel_ready}) ==
+                      expected);
             }
 }
 
@@ -83,7 +84,7 @@ TEST_CASE("bmi088: a sample is three transfers: both chips' data, and the accele
     const Expected expected[] = {{0, 9, 0x80}, {1, 2 + 0x24, 0x80}, {1, 4, 0xFC}};
     for (unsigned index = 0; index < 3; ++index) {
         ImuTransfer transfer;
-        part.reading(index, transfer);
+        bmi088_part.reading(index, transfer);
         CHECK(transfer.chip == expected[index].chip);
         CHECK(transfer.clock_hz == 10'000'000);
         CHECK(transfer.size == expected[index].size);
@@ -102,9 +103,9 @@ TEST_CASE("bmi088: what the registers hold") {
     cold.set(1, 2 + 0x22, {0xFF, 0xE0});
     CHECK(cold.read().temperature == -1);
     // The accelerometer's values are where accel_bytes() says.
-    CHECK(part.accel_bytes().reading == 1);
-    CHECK(part.accel_bytes().first == 2 + 0x12);
-    CHECK(part.accel_bytes().end == 2 + 0x12 + 6);
+    CHECK(bmi088_part.accel_bytes().reading == 1);
+    CHECK(bmi088_part.accel_bytes().first == 2 + 0x12);
+    CHECK(bmi088_part.accel_bytes().end == 2 + 0x12 + 6);
 }
 
 TEST_CASE("bmi088: a chip that is not there, or has lost its settings, fails the check") {

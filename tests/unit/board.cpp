@@ -9,7 +9,7 @@
 #include "world.hpp"
 
 using namespace versavis;
-using namespace versavis::scenario;
+using namespace versavis::test;
 using namespace versavis::firmware;
 
 namespace {
@@ -19,7 +19,7 @@ constexpr std::uint32_t one_camera = wire::present_camera0;
 }  // namespace
 
 TEST_CASE("board: it says who it is, and what it can do") {
-    World world;
+    scenario::World world;
     world.connect();
     REQUIRE(world.inbox().hellos.size() == 1);
     const wire::BoardHello& hello = world.inbox().hellos[0];
@@ -31,7 +31,7 @@ TEST_CASE("board: it says who it is, and what it can do") {
 }
 
 TEST_CASE("board: a host of another major version learns who is there, and nothing more") {
-    World world;
+    scenario::World world;
     world.send(wire::HostHello{wire::protocol_major + 1, 0, {}});
     world.run(100 * ms);
     REQUIRE(world.inbox().hellos.size() == 1);
@@ -43,7 +43,7 @@ TEST_CASE("board: a host of another major version learns who is there, and nothi
 TEST_CASE(
     "board: a clock request is answered with the instants at which it came and at which the answer "
     "left") {
-    World world;
+    scenario::World world;
     world.connect();
     world.run(second);
     world.send(wire::ClockRequest{77, 0});
@@ -56,7 +56,7 @@ TEST_CASE(
 }
 
 TEST_CASE("board: its health comes once a second") {
-    World world;
+    scenario::World world;
     world.connect();
     world.run(10 * second);
     CHECK(world.inbox().healths.size() == 10);
@@ -66,7 +66,7 @@ TEST_CASE("board: its health comes once a second") {
 TEST_CASE(
     "board: when a clock answer left is reported after it, also when the host was slow to take "
     "it") {
-    World world;
+    scenario::World world;
     world.connect();
     for (const Nanoseconds stall : {Nanoseconds{0}, 300 * ms}) {
         world.inbox() = {};
@@ -85,7 +85,7 @@ TEST_CASE(
 }
 
 TEST_CASE("board: an announced exposure out of range is ignored and counted") {
-    World world;
+    scenario::World world;
     world.add_camera(0);
     REQUIRE(world.begin());
     world.send(wire::ExpectedExposure{4, {}, 1, ms});
@@ -100,7 +100,7 @@ TEST_CASE("board: its hello names the port, the firmware and this life") {
     port.time = 7 * second;
     port.facts.present = wire::present_all & ~(one_camera << 1U);
     port.facts.fastest_imu_millihertz = 1'234;
-    Bench bench(port, {0xABCD, wire::ResetCause::watchdog, "B7"});
+    BoardBench bench(port, {0xABCD, wire::ResetCause::watchdog, "B7"});
     bench.greet();
     bench.configure();  // which takes what else waits along
     const auto hellos = bench.all<wire::BoardHello>();
@@ -122,7 +122,7 @@ TEST_CASE("board: its hello names the port, the firmware and this life") {
 
 TEST_CASE("board: before it is greeted, and to an unknown version, it only says who it is") {
     for (const bool other_version : {false, true}) {
-        Bench bench{BenchPort()};
+        BoardBench bench{BenchPort()};
         bench.add_camera(0);
         if (other_version) bench.greet(wire::protocol_major + 1);
         const std::size_t greeted = bench.all<wire::BoardHello>().size();
@@ -154,7 +154,7 @@ TEST_CASE("board: before it is greeted, and to an unknown version, it only says 
 }
 
 TEST_CASE("board: it reboots on the right word") {
-    Bench bench;
+    BoardBench bench;
     bench.send(wire::Reboot{wire::reboot_magic + 1, 0});
     bench.send(wire::Reboot{0, 1});
     CHECK(bench.port.reboots.empty());
@@ -164,7 +164,7 @@ TEST_CASE("board: it reboots on the right word") {
 }
 
 TEST_CASE("board: health comes once a second, and not twice after a pause") {
-    Bench bench;
+    BoardBench bench;
     bench.run(2'500 * ms);
     CHECK(bench.all<wire::Health>().size() == 2);
     bench.poll(5'700 * ms);
@@ -215,7 +215,7 @@ TEST_CASE("board: a hello ends what the host before began, and leaves the config
 }
 
 TEST_CASE("board: what waited for the host before is not sent to the next one") {
-    Bench bench;
+    BoardBench bench;
     bench.port.room = 0;
     for (std::uint32_t id = 0; id < 5; ++id) bench.send(wire::ClockRequest{id, 0});
     bench.greet();
@@ -240,7 +240,7 @@ TEST_CASE("board: announced exposures move the triggers of their camera") {
 }
 
 TEST_CASE("board: health counts what both IMUs did, and what the cameras skipped") {
-    Bench bench;
+    BoardBench bench;
     add_imus(bench, 0);
     bench.configuration.imus[0] = {};
     bench.configure();
@@ -271,7 +271,7 @@ TEST_CASE("board: health counts what both IMUs did, and what the cameras skipped
 }
 
 TEST_CASE("board: health reports what its inputs, its outputs and the link count") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configuration.imus[0] = {wire::ImuKind::bmi088, 0, wire::imu_data_ready, 0, 400'000};
     bench.configure();

@@ -128,10 +128,10 @@ struct BenchPort final : Clock64,
 };
 
 /// A board, and a host that greets it.
-struct Bench {
-    Bench() : Bench(BenchPort()) { greet(); }
+struct BoardBench {
+    BoardBench() : BoardBench(BenchPort()) { greet(); }
     /// Not greeted.
-    explicit Bench(const BenchPort& of, const Identity& identity = {})
+    explicit BoardBench(const BenchPort& of, const Identity& identity = {})
         : port(of),
           board(Hal{port, port, port, port, port, port.uart, port, port, port, port, port,
                     port.facts},
@@ -238,7 +238,7 @@ struct Bench {
 };
 
 /// Everything but the answers to a start is at its default: cameras at 20 Hz, on the same grid.
-struct Cameras : Bench {
+struct Cameras : BoardBench {
     explicit Cameras(unsigned count, std::uint32_t flags = 0) {
         for (unsigned i = 0; i < count; ++i) add_camera(i, flags);
     }
@@ -253,7 +253,7 @@ struct Cameras : Bench {
 };
 
 /// A VN-100 at the UART, and an ADIS16448 at the SPI.
-inline void add_imus(Bench& bench, std::uint8_t options) {
+inline void add_imus(BoardBench& bench, std::uint8_t options) {
     bench.configuration.imus[0] = {wire::ImuKind::adis16448b, 0, options, 0, 400'000};
     bench.configuration.imus[1] = {wire::ImuKind::vn100, 0, options, 0, 300'000};
 }

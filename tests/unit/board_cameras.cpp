@@ -9,12 +9,12 @@
 #include "world.hpp"
 
 using namespace versavis;
-using namespace versavis::scenario;
+using namespace versavis::test;
 using namespace versavis::firmware;
 
 TEST_CASE(
     "board: the host places the grid at once while no camera runs, and slews it when one does") {
-    World world;
+    scenario::World world;
     world.add_camera(0);
     world.gaps_allowed = true;
     world.connect();
@@ -52,7 +52,7 @@ TEST_CASE(
 }
 
 TEST_CASE("board: an alignment out of range is ignored, counted and reported") {
-    World world;
+    scenario::World world;
     world.add_camera(0);
     REQUIRE(world.begin());
     world.run(second);
@@ -87,7 +87,7 @@ TEST_CASE("board: cameras start and stop by their bits") {
 }
 
 TEST_CASE("board: slaves are switched on and off by their bits") {
-    const auto routed = [](const Bench& bench) {
+    const auto routed = [](const BoardBench& bench) {
         unsigned mask = 0;
         for (unsigned i = 0; i < 4; ++i)
             if (bench.port.routes.master[i] != not_routed) mask |= 1U << i;
@@ -216,7 +216,7 @@ TEST_CASE("board: an alignment counts up to its limits") {
                         {0, -500'001, 1000},
                         {0, 0, 0},
                         {0, 0, 1'000'001}};
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     bench.run(200 * second);
     for (const bool right : {true, false}) {
@@ -232,7 +232,7 @@ TEST_CASE("board: an alignment counts up to its limits") {
 TEST_CASE(
     "board: the grid steps to the host's if nothing runs, and if it is off by more than 1 us") {
     for (const Nanoseconds off : {-1'001, -1'000, 1'000, 1'001}) {
-        Bench bench;
+        BoardBench bench;
         bench.configuration.ports.sync_rate_uhz = 10'000'000;
         bench.configure();
         bench.run(99'800 * us);
@@ -247,7 +247,7 @@ TEST_CASE(
 }
 
 TEST_CASE("board: pulses go on at once where the host places the grid") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
     bench.run(5'150 * ms);

@@ -8,7 +8,7 @@ using namespace versavis::daemon;
 
 namespace {
 
-wire::Health report(std::uint32_t lost_edges, std::uint32_t imu_errors) {
+wire::Health counter_report(std::uint32_t lost_edges, std::uint32_t imu_errors) {
     wire::Health health{};
     health.glitches = lost_edges * 2;
     health.lost_edges = lost_edges;
@@ -22,8 +22,8 @@ wire::Health report(std::uint32_t lost_edges, std::uint32_t imu_errors) {
 TEST_CASE("board_counters: what was counted before the service looked is taken off") {
     BoardCounters counters;
     counters.board_restarted();  // the life of the first hello may be old
-    CHECK(counters.since_start(report(1000, 5)).lost_edges == 0);
-    const wire::Health later = counters.since_start(report(1003, 7));
+    CHECK(counters.since_start(counter_report(1000, 5)).lost_edges == 0);
+    const wire::Health later = counters.since_start(counter_report(1003, 7));
     CHECK(later.lost_edges == 3);
     CHECK(later.glitches == 6);
     CHECK(later.imu_errors[1] == 2);
@@ -32,19 +32,19 @@ TEST_CASE("board_counters: what was counted before the service looked is taken o
 
 TEST_CASE("board_counters: a new life adds to the one before") {
     BoardCounters counters;
-    counters.since_start(report(1000, 0));
-    counters.since_start(report(1004, 0));
+    counters.since_start(counter_report(1000, 0));
+    counters.since_start(counter_report(1004, 0));
     counters.board_restarted();
-    CHECK(counters.since_start(report(2, 0)).lost_edges == 6);
-    const wire::Health sum = counters.since_start(report(3, 0));
+    CHECK(counters.since_start(counter_report(2, 0)).lost_edges == 6);
+    const wire::Health sum = counters.since_start(counter_report(3, 0));
     CHECK(sum.lost_edges == 7);
     CHECK(sum.glitches == 14);
 }
 
 TEST_CASE("board_counters: a counter that goes back says nothing") {
     BoardCounters counters;
-    counters.since_start(report(10, 0));
-    CHECK(counters.since_start(report(4, 0)).lost_edges == 0);
-    CHECK(counters.since_start(report(4, 0)).glitches == 0);
-    CHECK(counters.since_start(report(5, 0)).lost_edges == 1);
+    counters.since_start(counter_report(10, 0));
+    CHECK(counters.since_start(counter_report(4, 0)).lost_edges == 0);
+    CHECK(counters.since_start(counter_report(4, 0)).glitches == 0);
+    CHECK(counters.since_start(counter_report(5, 0)).lost_edges == 1);
 }

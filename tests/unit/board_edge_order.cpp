@@ -14,17 +14,15 @@
 #include <vector>
 
 #include "adis_device.hpp"
+#include "nanoseconds.hpp"
 #include "native_board.hpp"
 #include "wire/packet.hpp"
 
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
-
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-constexpr Nanoseconds second = 1'000'000'000;
 
 /// How often records, samples and events were right, and in which way they were not.
 struct Findings {
@@ -40,7 +38,7 @@ struct Pulse {
     Nanoseconds end = 0;
 };
 
-struct Camera {
+struct EdgeCamera {
     std::optional<unsigned> master;
     bool strobe = true;
     Nanoseconds latency = 0;  ///< true
@@ -59,9 +57,9 @@ struct Camera {
     std::vector<wire::Exposure> records;
 };
 
-class Simulation {
+class EdgeSimulation {
  public:
-    Simulation(std::uint64_t seed, bool lossy)
+    EdgeSimulation(std::uint64_t seed, bool lossy)
         : random_(seed), lossy_(lossy), model_(draw_model(seed)) {
         Environment around;
         around.outputs_changed = [this](auto at, auto pins) { outputs_changed(at, pins); };
@@ -87,7 +85,7 @@ class Simulation {
         send(wire::Stop{0xF, {}});
         next_aux_ = never;
         board_->run_until(1'200 * ms + duration_);  // its next health, too
-        for (const Camera& camera : cameras_)
+        for (const EdgeCamera& camera : cameras_)
             lossy_ ? judge_lossy(camera, findings) : judge(camera, findings);
         judge_samples(findings);
         judge_events(findings);
@@ -138,7 +136,7 @@ class Simulation {
     }
 
     void draw_camera(unsigned index, Nanoseconds period) {
-        Camera& camera = cameras_[index];
+        EdgeCamera& camera = cameras_[index];
         camera.strobe = !camera.master || chance(0.85);
         camera.latency = draw_size(200, std::min(period / 5, 400 * us));
         camera.jitter = draw(0, 100);
@@ -184,9 +182,9 @@ class Simulation {
     }
 
     void trigger(unsigned index, Nanoseconds at) {
-        Camera& camera = cameras_[index];
+        EdgeCamera& camera = cameras_[index];
         if (!camera.master) return expose(index, at, at);
-        const Camera& master = cameras_[*camera.master];
+        const EdgeCamera& master = cameras_[*camera.master];
         // The master's line bounces, and a camera takes none of that for a trigger.
         if (camera.followed == master.exposures) return;
         camera.followed = master.exposures;
@@ -199,7 +197,7 @@ class Simulation {
     }
 
     void expose(unsigned index, Nanoseconds at, Nanoseconds stamp) {
-        Camera& camera = cameras_[index];
+        EdgeCamera& camera = cameras_[index];
         Pulse pulse{stamp};
         pulse.taken = at >= camera.free_at && !chance(camera.deaf);
         if (pulse.taken) {
@@ -216,7 +214,7 @@ class Simulation {
     }
 
     void show(unsigned index, Nanoseconds at, bool exposing) {
-        const Camera& camera = cameras_[index];
+        const EdgeCamera& camera = cameras_[index];
         const auto input = static_cast<std::uint8_t>(index);
         board_->schedule_edge({at, input, exposing});
         if (camera.bounces == 0) return;
@@ -269,7 +267,7 @@ class Simulation {
     }
 
     /// The n-th pulse of a camera has the n-th record.
-    void judge(const Camera& camera, Findings& findings) const {
+    void judge(const EdgeCamera& camera, Findings& findings) const {
         if (camera.pulses.size() != camera.records.size()) ++findings.wrong["number of records"];
         for (std::size_t i = 0; i < std::min(camera.pulses.size(), camera.records.size()); ++i) {
             const Pulse& pulse = camera.pulses[i];
@@ -288,7 +286,7 @@ class Simulation {
     }
 
     /// Of each trigger that was sent there is a record; of a slave's pulses some are unknown.
-    void judge_lossy(const Camera& camera, Findings& findings) const {
+    void judge_lossy(const EdgeCamera& camera, Findings& findings) const {
         std::map<Nanoseconds, const Pulse*> pulses;
         for (const Pulse& pulse : camera.pulses)
             pulses[camera.master ? stamped(pulse.at) : pulse.at] = &pulse;
@@ -315,7 +313,7 @@ class Simulation {
     }
 
     /// Grid point of the newest trigger before.
-    static std::uint64_t tick_at(const Camera& master, Nanoseconds at) {
+    static std::uint64_t tick_at(const EdgeCamera& master, Nanoseconds at) {
         const auto after = std::partition_point(
             master.records.begin(), master.records.end(),
             [at](const wire::Exposure& record) { return record.trigger_ns <= at; });
@@ -362,7 +360,7 @@ class Simulation {
     std::mt19937_64 random_;
     bool lossy_;
     PortModel model_;
-    std::array<Camera, camera_count> cameras_;
+    std::array<EdgeCamera, camera_count> cameras_;
     devices::AdisDevice imu_{devices::AdisModel::adis16448b,
                              [](Nanoseconds) { return devices::Inertial{}; }};
     wire::Configuration configuration_{};
@@ -382,7 +380,7 @@ class Simulation {
     std::optional<NativeBoard> board_;
 };
 
-std::uint64_t total(const std::map<std::string, std::uint64_t>& counts) {
+std::uint64_t sum_of_counts(const std::map<std::string, std::uint64_t>& counts) {
     std::uint64_t sum = 0;
     for (const auto& [what, count] : counts) sum += count;
     return sum;
@@ -399,9 +397,9 @@ void measure(bool lossy, std::uint64_t default_pulses) {
     Findings found;
     std::uint64_t wrong = 0;
     for (std::uint64_t seed = 1; wrong < 1000 && found.right["measured"] < pulses; ++seed) {
-        Simulation(seed, lossy).run(found);
-        if (total(found.wrong) > wrong) FAIL_CHECK("seed " << seed);
-        wrong = total(found.wrong);
+        EdgeSimulation(seed, lossy).run(found);
+        if (sum_of_counts(found.wrong) > wrong) FAIL_CHECK("seed " << seed);
+        wrong = sum_of_counts(found.wrong);
     }
     for (const auto& [what, count] : found.wrong) FAIL_CHECK("wrong: " << what << ": " << count);
     if (lossy) CHECK(found.right["losses"] > found.right["measured"] / 20);

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "board_bench.hpp"
 
+#include "nanoseconds.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
 
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-constexpr Nanoseconds second = 1'000'000'000;
 constexpr std::uint8_t pps = input_pulse + unsigned{wire::pulse_pps};
 constexpr std::uint8_t aux0 = input_pulse + unsigned{wire::pulse_aux0};
 constexpr std::uint8_t aux1 = input_pulse + unsigned{wire::pulse_aux1};
 constexpr std::uint8_t sync_in = input_pulse + unsigned{wire::pulse_sync};
 
 /// Camera 0 runs, and a pulse of it has begun.
-struct Running : Bench {
-    Running() {
+struct RunningInputs : BoardBench {
+    RunningInputs() {
         add_camera(0);
         add_slave(1, 0);
         configure();
@@ -35,7 +35,7 @@ struct Running : Bench {
 };
 
 /// Camera 0 follows camera 1, of which a pulse has begun.
-struct Following : Bench {
+struct Following : BoardBench {
     Following() {
         add_camera(0, wire::camera_slave);
         add_camera(1);
@@ -65,7 +65,7 @@ struct Following : Bench {
 }  // namespace
 
 TEST_CASE("board_inputs: each pulse is an event, with the number of its input") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.falling = 1U << wire::pulse_aux1;
     bench.configure();
     CHECK(bench.port.inputs == 0xFU << input_pulse);
@@ -100,7 +100,7 @@ TEST_CASE("board_inputs: each pulse is an event, with the number of its input") 
 }
 
 TEST_CASE("board_inputs: echoes of pulses are no events, but counted") {
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     for (const auto& [input, width] : {std::pair{pps, ms}, std::pair{aux0, 10 * us},
                                        std::pair{aux1, 10 * us}, std::pair{sync_in, ms}}) {
@@ -114,7 +114,7 @@ TEST_CASE("board_inputs: echoes of pulses are no events, but counted") {
 }
 
 TEST_CASE("board_inputs: one poll takes a bounded number of edges, and the rest is due at once") {
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     for (int i = 0; i < 30; ++i) bench.edge(aux0, 10 * ms + i * 20 * us);
     bench.poll(11 * ms);
@@ -125,7 +125,7 @@ TEST_CASE("board_inputs: one poll takes a bounded number of edges, and the rest 
 }
 
 TEST_CASE("board_inputs: what waits behind the edges of one poll is not given up") {
-    Running world;
+    RunningInputs world;
     // Its start is among the edges that are still to be read when it should have come.
     for (int i = 0; i < 24; ++i) world.edge(aux0, world.began + 10 * us + i * 10 * us);
     world.edge(0, world.began + 400 * us);
@@ -139,7 +139,7 @@ TEST_CASE("board_inputs: what waits behind the edges of one poll is not given up
 }
 
 TEST_CASE("board_inputs: an exposure counts once its edges have settled") {
-    Running world;
+    RunningInputs world;
     world.edge(0, world.began);
     world.poll(world.began + 3 * us);
     CHECK(world.board.next_wake() <= world.began + 10 * us);
@@ -158,7 +158,7 @@ TEST_CASE("board_inputs: an exposure counts once its edges have settled") {
 }
 
 TEST_CASE("board_inputs: a start that has not settled when it is due is not given up") {
-    Running world;
+    RunningInputs world;
     const Nanoseconds due = world.began + 50 * ms;  // at the latest
     world.run(due - 3 * us);
     world.edge(0, due - 2 * us);
@@ -175,7 +175,7 @@ TEST_CASE("board_inputs: a start that has not settled when it is due is not give
 
 TEST_CASE("board_inputs: where edges were lost, no start is paired with an end") {
     for (const bool ended : {false, true}) {
-        Running world;
+        RunningInputs world;
         world.edge(0, world.began);
         world.poll(world.began + 50 * us);
         world.edge(0, world.began + 4 * ms, false);
@@ -195,7 +195,7 @@ TEST_CASE("board_inputs: where edges were lost, no start is paired with an end")
 
 TEST_CASE("board_inputs: no start that waited while edges were lost is paired with a later end") {
     for (const int others : {0, 22, 23, 24, 60}) {
-        Running world;
+        RunningInputs world;
         for (int i = 0; i < others; ++i) world.edge(aux0, world.began - 10 * us);
         world.edge(0, world.began);
         world.edge(aux0, world.began + 10 * us);  // it has settled
@@ -217,7 +217,7 @@ TEST_CASE("board_inputs: no start that waited while edges were lost is paired wi
 }
 
 TEST_CASE("board_inputs: lost edges leave the light on for as long as an exposure may come") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configuration.illumination.cameras = 1;
     bench.configuration.illumination.lead_ns = 100'000;
@@ -239,7 +239,7 @@ TEST_CASE("board_inputs: lost edges leave the light on for as long as an exposur
 
 TEST_CASE("board_inputs: a slave is switched when its master does not expose, as far as is known") {
     for (const bool lost : {false, true}) {
-        Running world;
+        RunningInputs world;
         const auto switched = [&world] { return world.port.routes.master[1] == 0; };
         world.edge(0, world.began);
         world.poll(world.began + ms);
@@ -259,7 +259,7 @@ TEST_CASE("board_inputs: a slave is switched when its master does not expose, as
 }
 
 TEST_CASE("board_inputs: a slave is switched at an edge of its master, not of another camera") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.add_slave(1, 0);
     bench.add_camera(2);
@@ -277,7 +277,7 @@ TEST_CASE("board_inputs: a slave is switched at an edge of its master, not of an
 }
 
 TEST_CASE("board_inputs: a slave has the master's edges, and its grid point") {
-    Running world;
+    RunningInputs world;
     world.send(wire::Start{2, 0, {}});
     world.edge(0, world.began);
     world.edge(0, world.began + 4 * ms, false);
@@ -348,7 +348,7 @@ TEST_CASE("board_inputs: edges that wait for too long behind a line that bounces
 
 TEST_CASE("board_inputs: a noisy input is reported, and spoils the exposures only of the cameras") {
     for (const std::uint8_t input : {std::uint8_t{0}, std::uint8_t{input_imu_ready}, aux0}) {
-        Running world;
+        RunningInputs world;
         world.edge(0, world.began);
         world.edge(aux1, world.began + 10 * us);
         for (int i = 0; i < 165; ++i)
@@ -372,7 +372,7 @@ TEST_CASE("board_inputs: a noisy input is reported, and spoils the exposures onl
 TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the second of a pair") {
     for (const std::uint32_t rate_uhz : {0U, 10'000'000U})
         for (const Nanoseconds off : {-1, 0, 1}) {
-            Bench bench;
+            BoardBench bench;
             bench.add_camera(0);
             bench.configuration.ports.sync_rate_uhz = rate_uhz;
             bench.configure();
@@ -400,7 +400,7 @@ TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the sec
             bench.run(450 * ms);
             CHECK(bench.trigger() == 0);
         }
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configure();
     bench.send(wire::Start{1, wire::start_on_sync, {}});
@@ -414,7 +414,7 @@ TEST_CASE("board_inputs: a start that waits for a sync pulse begins with the sec
 }
 
 TEST_CASE("board_inputs: a camera that waits for a sync pulse joins those that run at once") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.add_camera(1);
     bench.configure();
@@ -430,7 +430,7 @@ TEST_CASE("board_inputs: a camera that waits for a sync pulse joins those that r
 }
 
 TEST_CASE("board_inputs: what is on the grid goes on from a sync pulse") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
@@ -450,7 +450,7 @@ TEST_CASE("board_inputs: what is on the grid goes on from a sync pulse") {
 }
 
 TEST_CASE("board_inputs: sync pulses that no longer fit the grid are reported, and then followed") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configure();
     bench.send(wire::Start{1, wire::start_on_sync, {}});
@@ -479,7 +479,7 @@ TEST_CASE("board_inputs: sync pulses that no longer fit the grid are reported, a
 
 TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse before they began") {
     for (const std::uint32_t baud : {0U, 19'200U}) {
-        Bench bench;
+        BoardBench bench;
         bench.configuration.ports.options = wire::port_nmea;
         bench.configuration.ports.nmea_baud = baud;
         bench.configure();
@@ -501,7 +501,7 @@ TEST_CASE("board_inputs: sentences are read at their rate, and name the pulse be
         CHECK(labels[0].time_ns == pulse);
         CHECK(labels[0].value == 1'704'067'199);
     }
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     CHECK(bench.port.uart.baud == 0);
     bench.port.uart.bytes.assign(10, '$');  // they are of another part
@@ -514,7 +514,7 @@ TEST_CASE(
     const std::string line = "$GPRMC,235959.00,A,4723.1,N,00832.4,E,0.02,31.6,311223,,,A*57\r\n";
     for (const std::size_t before : {0U, 5U, 31U, 40U})
         for (const Nanoseconds late : {0, 1}) {
-            Bench bench;
+            BoardBench bench;
             bench.configuration.ports.options = wire::port_nmea;
             bench.configure();
             const std::string bytes = std::string(before, 'x') + line;

@@ -177,7 +177,7 @@ class PlayedBoard final : public ByteStream {
 };
 
 /// Counts its calls; the test waits for counts.
-class Listener final : public BoardListener {
+class LinkListener final : public BoardListener {
  public:
     struct Counts {
         unsigned restarted = 0;
@@ -224,7 +224,7 @@ class Listener final : public BoardListener {
     Counts counts_;
 };
 
-struct Clock {
+struct LinkClock {
     clock::Translator translator{
         *clock::OutputClock::create(clock::OutputClockKind::monotonic_raw)};
     test::TemporaryDirectory directory{"/dev/shm"};
@@ -234,24 +234,24 @@ struct Clock {
 };
 
 /// The clock as it stands when the cameras may be started.
-clock::ClockReport connect(const Manner& manner) {
-    Clock clock;
-    Listener listener;
+clock::ClockReport connect_board(const Manner& manner) {
+    LinkClock clock;
+    LinkListener listener;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
             return std::make_unique<PlayedBoard>(manner);
         },
         {}, 1, clock.translator, clock.recorder, listener);
     link.start();
-    REQUIRE(listener.wait(&Listener::Counts::connected, 1));
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
     return clock.translator.report();
 }
 
 /// What is reported of a board of which nothing can be made.
 BoardReport end_of_connection(const Configuration& configuration, const Manner& manner,
                               std::vector<wire::Type>* heard = nullptr) {
-    Clock clock;
-    Listener listener;
+    LinkClock clock;
+    LinkListener listener;
     std::promise<BoardReport> closed;
     std::once_flag first;
     BoardLink link(
@@ -271,22 +271,22 @@ BoardReport end_of_connection(const Configuration& configuration, const Manner& 
 }
 
 /// A link to a board that the test plays, while it runs.
-struct Running {
-    Running() {
+struct RunningLink {
+    RunningLink() {
         link.start();
-        REQUIRE(listener.wait(&Listener::Counts::connected, 1));
+        REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
     }
-    ~Running() { board.load()->hold_writes(false); }
+    ~RunningLink() { board.load()->hold_writes(false); }
 
     /// What was sent until now was taken.
     void settle() {
         const unsigned before = listener.counts().samples;
         board.load()->send(wire::ImuSample{});
-        REQUIRE(listener.wait(&Listener::Counts::samples, before + 1));
+        REQUIRE(listener.wait(&LinkListener::Counts::samples, before + 1));
     }
 
-    Clock clock;
-    Listener listener;
+    LinkClock clock;
+    LinkListener listener;
     std::atomic<PlayedBoard*> board{nullptr};
     BoardLink link{[&]() -> Expected<std::unique_ptr<ByteStream>> {
                        auto made = std::make_unique<PlayedBoard>();
@@ -356,20 +356,20 @@ wire::ImuSample sample_at(std::int64_t ns) {
 }  // namespace
 
 TEST_CASE("board_link: an exchange ends when the answer truly left, if the board reports it") {
-    const clock::ClockReport clock = connect({});
+    const clock::ClockReport clock = connect_board({});
     CHECK(clock.exchanges == 4);
     CHECK(clock.round_trip < on_the_way / 2);
 }
 
 TEST_CASE("board_link: without a follow-up the answer's own stamp is used") {
-    const clock::ClockReport clock = connect({false});
+    const clock::ClockReport clock = connect_board({false});
     CHECK(clock.exchanges == 4);
     CHECK(clock.round_trip >= on_the_way);
 }
 
 TEST_CASE("board_link: the grid is aligned before any camera can be started") {
-    Clock clock;
-    Listener listener;
+    LinkClock clock;
+    LinkListener listener;
     std::vector<wire::Type> heard;
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
@@ -381,7 +381,7 @@ TEST_CASE("board_link: the grid is aligned before any camera can be started") {
         link.align_grid({1, 2, 3});
     };
     link.start();
-    REQUIRE(listener.wait(&Listener::Counts::connected, 1));
+    REQUIRE(listener.wait(&LinkListener::Counts::connected, 1));
     CHECK((link.report().capabilities & wire::capability_host_grid) != 0);
     link.stop();
     CHECK(std::count(heard.begin(), heard.end(), wire::Type::align_grid) == 1);
@@ -389,8 +389,8 @@ TEST_CASE("board_link: the grid is aligned before any camera can be started") {
 }
 
 TEST_CASE("board_link: a board that reboots while the link stays open is back within a second") {
-    Clock clock;
-    Listener listener;
+    LinkClock clock;
+    LinkListener listener;
     std::atomic<NativeStream*> board{nullptr};
     BoardLink link(
         [&]() -> Expected<std::unique_ptr<ByteStream>> {
@@ -401,10 +401,10 @@ TEST_CASE("board_link: a board that reboots while the link stays open is back wi
         {}, 10, clock.translator, clock.recorder, listener);
     link.start();
     for (unsigned life = 1; life <= 3; ++life) {
-        REQUIRE(listener.wait(&Listener::Counts::connected, life));
+        REQUIRE(listener.wait(&LinkListener::Counts::connected, life));
         const HostTime rebooted = host_now();
         board.load()->boot();
-        REQUIRE(listener.wait(&Listener::Counts::connected, life + 1));
+        REQUIRE(listener.wait(&LinkListener::Counts::connected, life + 1));
         CHECK(host_now() - rebooted < seconds(1));
         CHECK(listener.counts().restarted == life + 1);
         CHECK(listener.counts().lost == life);
@@ -412,16 +412,16 @@ TEST_CASE("board_link: a board that reboots while the link stays open is back wi
 }
 
 TEST_CASE("board_link: a board that falls silent is greeted again on the same link") {
-    Running running;
+    RunningLink running;
     PlayedBoard* board = running.board;
     board->mute();
-    REQUIRE(running.listener.wait(&Listener::Counts::connected, 2));
+    REQUIRE(running.listener.wait(&LinkListener::Counts::connected, 2));
     CHECK(running.board == board);
     CHECK(running.listener.counts().restarted == 1);  // it is the same life
 }
 
 TEST_CASE("board_link: packets of an unknown nonce are a new life when some agree") {
-    Running running;
+    RunningLink running;
     PlayedBoard& board = *running.board;
     board.set_nonce(8);
     board.send(sample_at(1));
@@ -433,14 +433,14 @@ TEST_CASE("board_link: packets of an unknown nonce are a new life when some agre
     board.set_nonce(9);
     const HostTime begin = host_now();
     for (int i = 0; i < 3; ++i) board.send(sample_at(1));
-    REQUIRE(running.listener.wait(&Listener::Counts::connected, 2));
+    REQUIRE(running.listener.wait(&LinkListener::Counts::connected, 2));
     CHECK(host_now() - begin < seconds(1));
     CHECK(running.listener.counts().restarted == 2);
     CHECK(running.listener.counts().samples == 1);
 }
 
 TEST_CASE("board_link: a wrong packet number is an error and no loss") {
-    Running running;
+    RunningLink running;
     running.board.load()->skip_numbers(0xFFFFFFF0U);
     running.settle();
     running.settle();  // goes on from there
@@ -452,7 +452,7 @@ TEST_CASE("board_link: a wrong packet number is an error and no loss") {
 }
 
 TEST_CASE("board_link: times that cannot be reach nobody") {
-    Running running;
+    RunningLink running;
     PlayedBoard& board = *running.board;
     board.send(sample_at(std::numeric_limits<std::int64_t>::max()));
     board.send(sample_at(-1));
@@ -482,7 +482,7 @@ TEST_CASE("board_link: times that cannot be reach nobody") {
 }
 
 TEST_CASE("board_link: nobody who gives a command waits for a slow board") {
-    Running running;
+    RunningLink running;
     running.board.load()->hold_writes(true);
     auto given = std::async(std::launch::async, [&] {
         running.link.stop_cameras(1);

@@ -12,11 +12,11 @@
 #include "world.hpp"
 
 using namespace versavis;
-using namespace versavis::scenario;
+using namespace versavis::test;
 using namespace versavis::firmware;
 
 TEST_CASE("board: a light that ends as soon as the port can is not late") {
-    World world(1, firmware::chip_model(2 * us, 1));
+    scenario::World world(1, firmware::chip_model(2 * us, 1));
     world.add_camera(0);
     world.configuration.illumination = {1, 0, {}, 0, 10'000'000, 1'000'000};
     REQUIRE(world.begin());
@@ -27,10 +27,10 @@ TEST_CASE("board: a light that ends as soon as the port can is not late") {
 
 TEST_CASE("board: samples are served at the second port where the configuration says so") {
     for (const bool serves : {false, true}) {
-        World world;
-        world.add_imu(
-            std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-            wire::ImuKind::adis16448b, 819.2, true);
+        scenario::World world;
+        world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b,
+                                                            &scenario::World::motion),
+                      wire::ImuKind::adis16448b, 819.2, true);
         if (serves) world.configuration.ports.options = wire::port_imu_output;
         REQUIRE(world.begin());
         world.run(second);
@@ -81,7 +81,7 @@ TEST_CASE("board: it listens to what the configuration uses") {
                            wire::imu_data_ready | wire::imu_accel_ready,
                            wire::imu_data_ready,
                            0b111'1111'1111}};
-    Bench bench;
+    BoardBench bench;
     CHECK(bench.port.inputs == 0);
     bench.configuration.illumination.reserved = 0xFFFF;  // says nothing
     for (const Case& one : cases) {
@@ -128,7 +128,7 @@ TEST_CASE("board: routes and levels at rest are those of the configuration, at o
 }
 
 TEST_CASE("board: the test output shows the data-ready line of an IMU that has one") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.illumination.reserved = 0xFFFF;  // says nothing
     for (const bool ready : {false, true})
         for (const unsigned port : {0U, 1U}) {
@@ -215,7 +215,7 @@ TEST_CASE("board: light follows a camera without an exposure line by the plan, s
     for (const std::uint8_t master : {0, 1}) {
         const auto slave = static_cast<std::uint8_t>(1 - master);
         const auto leads = [&](unsigned lit, bool with_slave) {
-            Bench bench;
+            BoardBench bench;
             bench.add_camera(master);
             bench.add_slave(slave, master);
             bench.configuration.illumination = {

@@ -10,11 +10,11 @@
 #include "world.hpp"
 
 using namespace versavis;
-using namespace versavis::scenario;
+using namespace versavis::test;
 using namespace versavis::firmware;
 
 TEST_CASE("board: one poll takes four packets, and what remains is due at once") {
-    Bench bench;
+    BoardBench bench;
     for (unsigned id = 0; id < 5; ++id) bench.queue(wire::ClockRequest{id, 0});
     bench.poll(ms);
     CHECK(bench.port.packets.size() == 1);
@@ -26,7 +26,7 @@ TEST_CASE("board: one poll takes four packets, and what remains is due at once")
 }
 
 TEST_CASE("board: it asks for what happens next, and otherwise five times a second") {
-    Bench bench{BenchPort()};
+    BoardBench bench{BenchPort()};
     bench.run(0);
     CHECK(bench.board.next_wake() == 200 * ms);
     bench.poll(100 * ms);  // nobody asked for it
@@ -47,7 +47,7 @@ TEST_CASE("board: it asks for what happens next, and otherwise five times a seco
 TEST_CASE("board: the longest delay is that of what was due, since the last health") {
     BenchPort port;
     port.time = 5 * second;  // before that nothing was due
-    Bench bench(port);
+    BoardBench bench(port);
     bench.greet();
     const Nanoseconds greeted = bench.port.time;
     CHECK(bench.health().loop_max_ns == 0);
@@ -61,7 +61,7 @@ TEST_CASE("board: the longest delay is that of what was due, since the last heal
 }
 
 TEST_CASE("board: the watchdog is fed until the outputs have been stuck for half a second") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
     const auto fed = [&bench](Nanoseconds at) {
@@ -81,7 +81,7 @@ TEST_CASE("board: the watchdog is fed until the outputs have been stuck for half
 }
 
 TEST_CASE("board: a queue of the hardware that is full is not asked again before a word leaves") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
     bench.port.outputs_full = true;
@@ -122,7 +122,7 @@ TEST_CASE("board: an output that leaves later by rounding is not late, and its r
     BenchPort port;
     port.facts.output_step = 16;
     port.late = 1;
-    Bench bench(port);
+    BoardBench bench(port);
     bench.greet();
     bench.add_camera(0, wire::camera_no_strobe);
     bench.configure();
@@ -174,10 +174,10 @@ TEST_CASE("board: an exposure that does not come is reported as soon as all edge
 TEST_CASE("board: a sample leaves as soon as the edges of its time are known") {
     PortModel model;
     model.edge_lag_ns = 300 * us;
-    World world(1, model);
-    world.add_imu(
-        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-        wire::ImuKind::adis16448b, 102.4, true);
+    scenario::World world(1, model);
+    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b,
+                                                        &scenario::World::motion),
+                  wire::ImuKind::adis16448b, 102.4, true);
     REQUIRE(world.begin());
     world.run(second);
     REQUIRE(world.inbox().samples[0].size() > 50);
@@ -204,7 +204,7 @@ TEST_CASE("board: after a pause, nobody waits for what a trigger did that has no
 }
 
 TEST_CASE("board: stray edges are all counted, and reported ten times a second") {
-    Bench bench;
+    BoardBench bench;
     bench.add_camera(0);
     bench.configure();
     for (Nanoseconds at = 10 * ms; at < 220 * ms; at += 20 * ms) {
@@ -220,7 +220,7 @@ TEST_CASE("board: stray edges are all counted, and reported ten times a second")
 }
 
 TEST_CASE("board: an input that was ignored is listened to again a second later") {
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     bench.run(150 * ms);
     const std::uint8_t aux0 = input_pulse + unsigned{wire::pulse_aux0};

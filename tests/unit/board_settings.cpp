@@ -10,12 +10,12 @@
 #include "world.hpp"
 
 using namespace versavis;
-using namespace versavis::scenario;
+using namespace versavis::test;
 using namespace versavis::firmware;
 
 namespace {
 
-std::vector<std::uint8_t> bytes_of(const wire::Configuration& configuration) {
+std::vector<std::uint8_t> wire_bytes(const wire::Configuration& configuration) {
     std::vector<std::uint8_t> bytes(sizeof configuration);
     std::memcpy(bytes.data(), &configuration, sizeof configuration);
     return bytes;
@@ -24,10 +24,10 @@ std::vector<std::uint8_t> bytes_of(const wire::Configuration& configuration) {
 }  // namespace
 
 TEST_CASE("board: each sample says how old it was when it left") {
-    World world;
-    world.add_imu(
-        std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b, &World::motion),
-        wire::ImuKind::adis16448b, 204.8, true);
+    scenario::World world;
+    world.add_imu(std::make_unique<devices::AdisDevice>(devices::AdisModel::adis16448b,
+                                                        &scenario::World::motion),
+                  wire::ImuKind::adis16448b, 204.8, true);
     REQUIRE(world.begin());
     world.run(2 * second);
     REQUIRE(world.inbox().samples[0].size() > 200);
@@ -38,7 +38,7 @@ TEST_CASE("board: each sample says how old it was when it left") {
 }
 
 TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
-    World world;
+    scenario::World world;
     world.add_pulses(wire::pulse_pps, 300 * ms, 1e9);
     world.configuration.ports.options = wire::port_nmea;
     world.connect();
@@ -70,7 +70,7 @@ TEST_CASE("board: sentences at the UART name the pulses of the PPS input") {
 }
 
 TEST_CASE("board: NMEA is refused where an IMU has the UART, or at a baud rate that nobody has") {
-    World world;
+    scenario::World world;
     world.connect();
     world.configuration.ports.options = wire::port_nmea;
     world.configuration.ports.nmea_baud = 1'000;
@@ -86,7 +86,7 @@ TEST_CASE("board: NMEA is refused where an IMU has the UART, or at a baud rate t
 }
 
 TEST_CASE("board: a configuration that is refused changes nothing, and reports each reason") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configure();
     const wire::Configuration good = bench.configuration;
@@ -139,7 +139,7 @@ TEST_CASE("board: no configuration while cameras run, be they slaves alone") {
 }
 
 TEST_CASE("board: a configuration is answered with the grid's origin and the rates as they are") {
-    Bench bench;
+    BoardBench bench;
     add_imus(bench, 0);
     bench.configuration.id = 1234;
     bench.run(100 * ms);
@@ -150,7 +150,7 @@ TEST_CASE("board: a configuration is answered with the grid's origin and the rat
     wire::Configuration taken = bench.configuration;
     for (std::size_t i = 0; i < wire::imu_count; ++i)
         taken.imus[i].rate_millihertz = answer.taken.imus[i].rate_millihertz;
-    CHECK(bytes_of(answer.taken) == bytes_of(taken));
+    CHECK(wire_bytes(answer.taken) == wire_bytes(taken));
     CHECK(answer.taken.imus[0].rate_millihertz == 400'000);  // on the board's grid
     CHECK(answer.taken.imus[1].rate_millihertz == Vn100::true_rate(300'000));
     CHECK(answer.taken.imus[1].rate_millihertz != 300'000);
@@ -162,7 +162,7 @@ TEST_CASE("board: a configuration is answered with the grid's origin and the rat
 }
 
 TEST_CASE("board: an IMU is set up when its part of the configuration changed, and only then") {
-    Bench bench;
+    BoardBench bench;
     add_imus(bench, wire::imu_data_ready);
     bench.run(10 * second);
     const auto set_up = [&bench] {
@@ -257,7 +257,7 @@ TEST_CASE("board: a slave that a new configuration cuts off does not run in it")
 }
 
 TEST_CASE("board: pulses of the old configuration end before the new one is in force") {
-    Bench bench;
+    BoardBench bench;
     bench.configuration.ports.sync_rate_uhz = 10'000'000;
     bench.configuration.ports.test = wire::test_rate;
     bench.configuration.ports.test_rate_millihertz = 10'000;
@@ -279,7 +279,7 @@ TEST_CASE("board: pulses of the old configuration end before the new one is in f
 }
 
 TEST_CASE("board: a configuration that is to be kept is stored, and reported when it is safe") {
-    Bench bench;
+    BoardBench bench;
     bench.configure();
     CHECK(bench.port.stored.empty());
     bench.configuration.flags = wire::configuration_store;
@@ -287,7 +287,7 @@ TEST_CASE("board: a configuration that is to be kept is stored, and reported whe
         bench.configuration.id += 5;
         bench.port.outcome = Persist::Outcome::busy;
         bench.configure();
-        CHECK(bench.port.stored == bytes_of(bench.configuration));
+        CHECK(bench.port.stored == wire_bytes(bench.configuration));
         bench.run(bench.port.time + 300 * ms);
         const std::size_t before = bench.events(wire::BoardEventKind::stored).size();
         CHECK(before == (safe ? 0 : 1));
@@ -306,22 +306,22 @@ TEST_CASE("board: a configuration that is to be kept is stored, and reported whe
 TEST_CASE("board: what was stored is in force from power-up, if it is whole and fits the board") {
     BenchPort port;
     port.time = 3 * second;
-    wire::Configuration kept = Bench().configuration;
+    wire::Configuration kept = BoardBench().configuration;
     kept.ports.sync_rate_uhz = 10'000'000;
-    port.stored = bytes_of(kept);
-    Bench bench(port);
+    port.stored = wire_bytes(kept);
+    BoardBench bench(port);
     CHECK(bench.port.inputs == 0xF0U << 2U);
     bench.run(3 * second + 150 * ms);
     CHECK(bench.pulses(output_sync) == std::vector<Nanoseconds>{3 * second + 100 * ms});
     BenchPort cut = port;
     cut.stored.pop_back();
-    CHECK(Bench(cut).port.inputs == 0);
+    CHECK(BoardBench(cut).port.inputs == 0);
     BenchPort longer = port;
     longer.stored.push_back(0);
-    CHECK(Bench(longer).port.inputs == 0);
+    CHECK(BoardBench(longer).port.inputs == 0);
     BenchPort small = port;
     small.facts.present = 0;
-    Bench lacking(small);
+    BoardBench lacking(small);
     CHECK(lacking.port.inputs == 0);
     lacking.greet();
     lacking.run(4 * second);

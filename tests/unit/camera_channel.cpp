@@ -6,20 +6,19 @@
 #include <utility>
 #include <vector>
 
+#include "nanoseconds.hpp"
 #include "recorded_reports.hpp"
 
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
 
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-constexpr Nanoseconds second = 1'000'000'000;
 constexpr Nanoseconds horizon = OutputQueue::horizon;
 constexpr std::uint8_t starts[] = {0, wire::start_pattern, wire::start_slow};
 
-struct Hardware final : OutputSchedule {
+struct ChannelHardware final : OutputSchedule {
     std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
     Nanoseconds soonest = 0;  ///< that a word can leave
     Nanoseconds push(Nanoseconds at, std::uint32_t levels) override {
@@ -28,13 +27,12 @@ struct Hardware final : OutputSchedule {
     }
 };
 
-using Event = test::ReportedEvent;
 using Reports = test::RecordedReports;
 
 /// A camera at 20 Hz that is expected to expose for 4 ms, and its outputs; grid and board time are
 /// one. The test says what its exposure line does.
-struct Bench {
-    explicit Bench(std::uint32_t flags = 0) { camera.flags = wire::camera_enabled | flags; }
+struct ChannelBench {
+    explicit ChannelBench(std::uint32_t flags = 0) { camera.flags = wire::camera_enabled | flags; }
 
     static wire::CameraConfiguration default_camera() {
         wire::CameraConfiguration camera{};
@@ -44,12 +42,12 @@ struct Bench {
         camera.max_exposure_ns = 60 * ms;
         return camera;
     }
-    Bench& configure(Nanoseconds lead = 0) {
+    ChannelBench& configure(Nanoseconds lead = 0) {
         channel.configure(camera, lead);
         return *this;
     }
     /// Its first trigger is that of the grid point after `at`.
-    Bench& start(Nanoseconds at, std::uint8_t start_flags = 0) {
+    ChannelBench& start(Nanoseconds at, std::uint8_t start_flags = 0) {
         channel.start(at, start_flags);
         now = at;
         return *this;
@@ -73,16 +71,16 @@ struct Bench {
     }
 
     struct Moves final : OutputMoves {
-        explicit Moves(Bench& owner) : bench(owner) {}
+        explicit Moves(ChannelBench& owner) : bench(owner) {}
         void moved(unsigned /*output*/, bool level, Nanoseconds asked, Nanoseconds left) override {
             if (level) bench.channel.moved(asked, left, true);
         }
-        Bench& bench;
+        ChannelBench& bench;
     };
 
     wire::CameraConfiguration camera = default_camera();
     Moves moves{*this};
-    Hardware hardware;
+    ChannelHardware hardware;
     Reports reports;
     GridClock clock;
     OutputQueue outputs{hardware, moves, {}};
@@ -92,8 +90,8 @@ struct Bench {
 
 /// The next trigger, of a camera that is expected to expose for `expected`, would leave at
 /// 100 ms - `expected` / 2; the one before left at 48 ms, and its exposure lasts `lasts`.
-struct Running : Bench {
-    explicit Running(std::uint32_t flags = 0) : Bench(flags) {
+struct RunningChannel : ChannelBench {
+    explicit RunningChannel(std::uint32_t flags = 0) : ChannelBench(flags) {
         configure().start(20 * ms);
         run(48 * ms);
         REQUIRE(reports.planned.size() == 1);
@@ -103,7 +101,7 @@ struct Running : Bench {
 }  // namespace
 
 TEST_CASE("camera_channel: the middle of an exposure belongs on its grid point") {
-    Bench bench;
+    ChannelBench bench;
     bench.camera.latency_ns = 300 * us;
     bench.camera.phase_ns = 7 * ms;
     bench.configure(500 * us).start(20 * ms);
@@ -138,7 +136,7 @@ TEST_CASE("camera_channel: the middle of an exposure belongs on its grid point")
 
 TEST_CASE("camera_channel: a lead that the latency covers takes no time") {
     for (const Nanoseconds lead : {299 * us, 300 * us, 301 * us}) {
-        Bench bench;
+        ChannelBench bench;
         bench.camera.latency_ns = 300 * us;
         bench.configure(lead).start(20 * ms);
         CHECK(bench.channel.next_wake(0) ==
@@ -158,7 +156,7 @@ TEST_CASE("camera_channel: triggering begins at the first grid point that can be
           Case{10 * ms, 300'000, 0, 6'300 * us}, Case{10 * ms, 300'000, 400 * us, 6'400 * us},
           Case{90 * ms, 0, 0, 31 * ms}}) {
         for (const bool missed : {false, true}) {
-            Bench bench;
+            ChannelBench bench;
             bench.camera.exposure_ns = made.exposure;
             bench.camera.latency_ns = made.latency;
             bench.configure(made.lead).start(1'050 * ms - made.ahead + (missed ? 1 : 0));
@@ -173,7 +171,7 @@ TEST_CASE("camera_channel: triggering begins at the first grid point that can be
 
 TEST_CASE("camera_channel: ticks count on the grid, and none is used twice until it begins anew") {
     for (const bool anew : {false, true}) {
-        Bench bench;
+        ChannelBench bench;
         bench.camera.exposure_ns = 30 * ms;
         bench.configure().start(1'020 * ms);
         bench.poll(1'034 * ms);  // decides tick 21
@@ -207,7 +205,7 @@ TEST_CASE("camera_channel: ticks count on the grid, and none is used twice until
 }
 
 TEST_CASE("camera_channel: a start takes no longer when the grid began long ago") {
-    Bench bench;
+    ChannelBench bench;
     bench.camera.rate_uhz = 1'000'000'000;
     const Nanoseconds month = 30 * 86'400 * second;
     bench.configure().start(month);
@@ -216,7 +214,7 @@ TEST_CASE("camera_channel: a start takes no longer when the grid began long ago"
 
 TEST_CASE("camera_channel: a start pattern and a slow start leave grid points out") {
     for (const std::uint8_t flags : starts) {
-        Bench bench(wire::camera_no_strobe);
+        ChannelBench bench(wire::camera_no_strobe);
         bench.configure().start(20 * ms);
         CHECK_FALSE(bench.channel.slow());
         bench.run(100 * ms);
@@ -249,7 +247,7 @@ TEST_CASE("camera_channel: a start pattern and a slow start leave grid points ou
 
 TEST_CASE("camera_channel: a trigger waits for the end of the exposure, and the gap") {
     for (const bool fits : {true, false}) {
-        Bench bench;
+        ChannelBench bench;
         bench.camera.exposure_ns = 48 * ms;
         bench.camera.gap_ns = 2'000'000 + (fits ? 0 : 1);
         bench.configure().start(10 * ms);
@@ -257,8 +255,9 @@ TEST_CASE("camera_channel: a trigger waits for the end of the exposure, and the 
         CHECK(bench.reports.planned.size() == (fits ? 2 : 1));
         CHECK(bench.channel.skipped() == (fits ? 0 : 1));
         if (fits) continue;
-        CHECK(bench.reports.events ==
-              std::vector<Event>{{wire::BoardEventKind::trigger_skipped, 2, 76 * ms, 2, 0}});
+        CHECK(
+            bench.reports.events ==
+            std::vector<ReportedEvent>{{wire::BoardEventKind::trigger_skipped, 2, 76 * ms, 2, 0}});
         bench.run(130 * ms);
         CHECK(bench.reports.planned.size() == 2);
         CHECK(bench.reports.planned[1].first == 126 * ms);
@@ -267,7 +266,7 @@ TEST_CASE("camera_channel: a trigger waits for the end of the exposure, and the 
 
 TEST_CASE("camera_channel: between two pulses there is a pause of at least 10 us") {
     for (const std::uint32_t pulse : {9'990'000U, 9'990'001U, 10'000'000U}) {
-        Bench bench(wire::camera_no_strobe);
+        ChannelBench bench(wire::camera_no_strobe);
         bench.camera.rate_uhz = 100'000'000;
         bench.camera.pulse_ns = pulse;
         bench.configure().start(10 * ms);
@@ -278,7 +277,7 @@ TEST_CASE("camera_channel: between two pulses there is a pause of at least 10 us
 }
 
 TEST_CASE("camera_channel: no trigger is sent that nobody can keep") {
-    Bench bench;
+    ChannelBench bench;
     bench.camera.rate_uhz = 1'000'000'000;
     bench.camera.exposure_ns = 100 * us;
     bench.configure().start(10 * ms);
@@ -290,12 +289,12 @@ TEST_CASE("camera_channel: no trigger is sent that nobody can keep") {
     CHECK(bench.reports.planned.size() == 4);
     REQUIRE_FALSE(bench.reports.events.empty());
     CHECK(bench.reports.events[0] ==
-          Event{wire::BoardEventKind::trigger_skipped, 2, 19 * ms - 50 * us, 19, 2});
+          ReportedEvent{wire::BoardEventKind::trigger_skipped, 2, 19 * ms - 50 * us, 19, 2});
 }
 
 TEST_CASE("camera_channel: a trigger that the outputs have no room for is skipped") {
     for (const unsigned edges : {22U, 23U}) {
-        Bench bench;
+        ChannelBench bench;
         bench.configure().start(20 * ms);
         for (unsigned i = 0; i < edges; ++i) bench.outputs.set(60 * second, 2, true);
         bench.run(48 * ms);
@@ -303,7 +302,8 @@ TEST_CASE("camera_channel: a trigger that the outputs have no room for is skippe
         CHECK(bench.channel.skipped() == (edges == 22 ? 0 : 1));
         if (edges == 23)
             CHECK(bench.reports.events ==
-                  std::vector<Event>{{wire::BoardEventKind::trigger_skipped, 2, 48 * ms, 1, 2}});
+                  std::vector<ReportedEvent>{
+                      {wire::BoardEventKind::trigger_skipped, 2, 48 * ms, 1, 2}});
     }
 }
 
@@ -315,7 +315,7 @@ TEST_CASE("camera_channel: a late trigger is sent within a sixteenth of the peri
     for (const Case& made : {Case{20'000'000, ms}, Case{62'500'000, ms}, Case{62'600'000, 998'402},
                              Case{100'000'000, 625 * us}, Case{1'000'000'000, 62'500}})
         for (const Nanoseconds beyond : {0, 1}) {
-            Bench bench;
+            ChannelBench bench;
             bench.camera.rate_uhz = made.rate_uhz;
             bench.camera.exposure_ns = 200 * us;
             bench.configure().start(20 * ms);
@@ -342,7 +342,7 @@ TEST_CASE("camera_channel: a late trigger is sent within a sixteenth of the peri
 }
 
 TEST_CASE("camera_channel: triggers in a row that were too late are reported together") {
-    using Events = std::vector<Event>;
+    using Events = std::vector<ReportedEvent>;
     const auto kind = wire::BoardEventKind::triggers_skipped;
     struct Case {
         Nanoseconds late;  ///< beyond what is still sent
@@ -363,7 +363,7 @@ TEST_CASE("camera_channel: triggers in a row that were too late are reported tog
           Case{69'999 * period + 1,
                {{kind, 2, trigger, 1, 65'535}, {kind, 2, trigger + 65'535 * period, 65'536, 4'465}},
                70'000}}) {
-        Bench bench;
+        ChannelBench bench;
         bench.configure().start(20 * ms);
         bench.poll(trigger + ms + made.late);
         CHECK(bench.reports.events == made.events);
@@ -383,7 +383,7 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
                     return flags != wire::start_pattern || tick >= 20 ||
                            (0xC5A5DU >> tick & 1U) != 0;
                 };
-                Bench bench(wire::camera_no_strobe);
+                ChannelBench bench(wire::camera_no_strobe);
                 bench.configure().start(20 * ms, flags);
                 for (unsigned i = 0; i < since; ++i) bench.poll(bench.channel.next_wake(0));
                 while (bench.channel.next_wake(0) < (47 + 50 * since) * ms)
@@ -395,7 +395,7 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
                 const bool single = ticks == 1 && skipped == 1;
                 REQUIRE(bench.reports.events.size() == (skipped > 0 ? 1 : 0));
                 if (skipped == 0) continue;
-                const Event& event = bench.reports.events[0];
+                const ReportedEvent& event = bench.reports.events[0];
                 REQUIRE(event.kind == (single ? wire::BoardEventKind::trigger_skipped
                                               : wire::BoardEventKind::triggers_skipped));
                 REQUIRE(event.value == since + 1);
@@ -404,7 +404,7 @@ TEST_CASE("camera_channel: of what is skipped, only wanted grid points count") {
 }
 
 TEST_CASE("camera_channel: one poll decides two triggers") {
-    Bench bench;
+    ChannelBench bench;
     bench.camera.rate_uhz = 1'000'000'000;
     bench.camera.exposure_ns = 100 * us;
     bench.configure().start(10 * ms, wire::start_slow);  // at tick 15, 1515, ...
@@ -418,7 +418,7 @@ TEST_CASE("camera_channel: one poll decides two triggers") {
 }
 
 TEST_CASE("camera_channel: an inverted trigger is low, and one that leaves late says when it did") {
-    Bench bench(wire::camera_trigger_inverted);
+    ChannelBench bench(wire::camera_trigger_inverted);
     bench.configure();
     CHECK(bench.channel.trigger_inverted());
     bench.outputs.set(ms, 2, true);
@@ -430,7 +430,7 @@ TEST_CASE("camera_channel: an inverted trigger is low, and one that leaves late 
     bench.outputs.commit(48 * ms);
     CHECK(bench.hardware.words == Words{{ms, 4}, {48 * ms, 0}, {48 * ms + 100 * us, 4}});
 
-    Running world;
+    RunningChannel world;
     world.channel.moved(48 * ms, 49 * ms, true);
     world.expose(49 * ms, 4 * ms);
     REQUIRE(world.reports.exposures.size() == 1);
@@ -439,7 +439,7 @@ TEST_CASE("camera_channel: an inverted trigger is low, and one that leaves late 
 }
 
 TEST_CASE("camera_channel: what is announced is expected from its trigger on, and reported") {
-    Running world;
+    RunningChannel world;
     world.expose(48 * ms, 4 * ms);
     world.channel.announce(3, 10 * ms);
     CHECK(world.next_trigger() == 98 * ms);
@@ -467,7 +467,7 @@ TEST_CASE("camera_channel: what is announced is expected from its trigger on, an
 }
 
 TEST_CASE("camera_channel: an exposure from before an announcement does not override it") {
-    Bench bench;
+    ChannelBench bench;
     bench.camera.exposure_ns = 48 * ms;
     bench.configure().start(10 * ms);
     bench.run(26 * ms);
@@ -483,18 +483,18 @@ TEST_CASE("camera_channel: an exposure from before an announcement does not over
     bench.channel.exposure_edge(90 * ms, false);
     CHECK(bench.next_trigger() == 147 * ms);
     CHECK(bench.reports.events ==
-          std::vector<Event>{{wire::BoardEventKind::stray_edge, 2, 90 * ms, 0, 0}});
+          std::vector<ReportedEvent>{{wire::BoardEventKind::stray_edge, 2, 90 * ms, 0, 0}});
 }
 
 TEST_CASE("camera_channel: before any trigger, an edge says nothing about exposures") {
-    Bench bench;
+    ChannelBench bench;
     bench.configure().start(20 * ms);
     bench.channel.exposure_edge(30 * ms, false);
     CHECK(bench.next_trigger() == 48 * ms);
 }
 
 TEST_CASE("camera_channel: a new configuration forgets announcements and measurements") {
-    Running world;
+    RunningChannel world;
     world.expose(48 * ms, 20 * ms);
     world.channel.announce(2, 10 * ms);
     world.channel.announce(3, 30 * ms);
@@ -515,7 +515,7 @@ TEST_CASE("camera_channel: a start is waited for one period, at least 2 ms, at m
     for (const Case& made :
          {Case{1'000'000'000, 2 * ms}, Case{500'000'000, 2 * ms}, Case{400'000'000, 2'500 * us},
           Case{20'000'000, 50 * ms}, Case{10'000'000, 50 * ms}}) {
-        Bench bench;
+        ChannelBench bench;
         bench.camera.rate_uhz = made.rate_uhz;
         bench.camera.exposure_ns = 100 * us;
         bench.camera.latency_ns = 300 * us;
@@ -537,7 +537,7 @@ TEST_CASE("camera_channel: a start is waited for one period, at least 2 ms, at m
 }
 
 TEST_CASE("camera_channel: nobody gives up on a pulse that has not left yet") {
-    Bench bench;
+    ChannelBench bench;
     bench.configure().start(20 * ms);
     bench.channel.poll(47 * ms, 47 * ms);
     bench.channel.stop();
@@ -554,7 +554,7 @@ TEST_CASE("camera_channel: nobody gives up on a pulse that has not left yet") {
 }
 
 TEST_CASE("camera_channel: when the clock of the grid moves, the next trigger does") {
-    Running world;
+    RunningChannel world;
     world.clock.begin(ms, 0);
     CHECK(world.next_trigger() == 98 * ms);
     world.channel.grid_moved();
@@ -568,7 +568,7 @@ TEST_CASE("camera_channel: when the clock of the grid moves, the next trigger do
 
 TEST_CASE("camera_channel: an exposure line must keep its level, as long as is configured") {
     for (const unsigned glitch : {0U, 20U}) {
-        Bench bench(wire::camera_strobe_inverted);
+        ChannelBench bench(wire::camera_strobe_inverted);
         bench.camera.glitch = static_cast<std::uint8_t>(glitch);
         bench.configure();
         const Nanoseconds width = glitch == 0 ? 5'000 : 2'000;
@@ -596,7 +596,7 @@ TEST_CASE("camera_channel: an exposure line must keep its level, as long as is c
 }
 
 TEST_CASE("camera_channel: edges that were lost end the wait for the end of an exposure") {
-    Running world;
+    RunningChannel world;
     world.channel.exposure_edge(48 * ms, true);
     world.channel.edges_lost();
     REQUIRE(world.reports.exposures.size() == 1);
@@ -604,7 +604,7 @@ TEST_CASE("camera_channel: edges that were lost end the wait for the end of an e
 }
 
 TEST_CASE("camera_channel: a camera that is off, or has no exposure line, has no edges") {
-    Bench off;
+    ChannelBench off;
     CHECK(off.channel.next_wake(0) == never);
     off.camera.flags = 0;
     off.configure().start(20 * ms);
@@ -613,7 +613,7 @@ TEST_CASE("camera_channel: a camera that is off, or has no exposure line, has no
     off.channel.exposure_edge(30 * ms, true);
     CHECK(off.reports.events.empty());
 
-    Running world(wire::camera_no_strobe);
+    RunningChannel world(wire::camera_no_strobe);
     world.channel.exposure_edge(49 * ms, true);
     world.channel.exposure_edge(51 * ms, false);
     CHECK(world.reports.events.empty());
@@ -627,8 +627,8 @@ TEST_CASE("camera_channel: a camera that is off, or has no exposure line, has no
 namespace {
 
 /// A slave with a latency of 300 us; its master's exposures last 4 ms.
-struct Slave : Bench {
-    explicit Slave(std::uint32_t flags = 0) : Bench(wire::camera_slave | flags) {
+struct Slave : ChannelBench {
+    explicit Slave(std::uint32_t flags = 0) : ChannelBench(wire::camera_slave | flags) {
         camera.master = 1;
         camera.latency_ns = 300 * us;
         configure();

@@ -8,19 +8,23 @@
 #include "gige_registers.hpp"
 
 using namespace versavis;
-using namespace versavis::rig;
+using rig::CameraFamily;
+using rig::CameraRegisters;
+using rig::CameraScenario;
+using rig::gige_xml;
+using rig::load_camera_family;
 
 namespace {
 
 const std::string models = VERSAVIS_SOURCE_DIR "/clients/rig/models";
 
-CameraFamily load(const std::string& name) {
+CameraFamily load_family(const std::string& name) {
     auto family = load_camera_family(models, name);
     if (!family) throw std::runtime_error(family.error().message());
     return *family;
 }
 
-CameraScenario settings() {
+CameraScenario family_settings() {
     CameraScenario settings;
     settings.width = 640;
     settings.height = 480;
@@ -40,7 +44,7 @@ std::string error_of(const std::string& toml) {
 
 TEST_CASE("camera_family: descriptions of all models are good") {
     for (const std::string name : {"ace", "blackfly-s", "hikrobot", "alvium"}) {
-        const std::string text = gige_xml(640, 480, load(name));
+        const std::string text = gige_xml(640, 480, load_family(name));
         const auto good = daemon::check_description({{text.begin(), text.end()}, false});
         INFO(name << ": " << (good ? "good" : good.error().what));
         CHECK(good);
@@ -50,29 +54,29 @@ TEST_CASE("camera_family: descriptions of all models are good") {
 TEST_CASE("camera_family: another program's settings go with the factory settings, each number") {
     for (const std::string name : {"ace", "blackfly-s", "hikrobot", "alvium"}) {
         INFO(name);
-        const CameraFamily family = load(name);
-        CameraRegisters registers(settings(), family, {});
+        const CameraFamily family = load_family(name);
+        CameraRegisters registers(family_settings(), family, {});
         CHECK(registers.any(family.stalled));
         CHECK(registers.all(family.triggered));
         CHECK(registers.number(family.trigger_delay) >= 600);
-        CHECK(registers.value(reg_width) == 320);
+        CHECK(registers.value(rig::reg_width) == 320);
         REQUIRE(registers.write(family.user_set_load->at, 1));
         CHECK_FALSE(registers.any(family.stalled));
         CHECK_FALSE(registers.all(family.triggered));
         CHECK(registers.number(family.trigger_delay) == 0);
         CHECK(registers.number(family.exposure) == 4000);
-        CHECK(registers.value(reg_width) == 640);
-        CHECK(registers.value(reg_payload_size) == 640 * 480);
+        CHECK(registers.value(rig::reg_width) == 640);
+        CHECK(registers.value(rig::reg_payload_size) == 640 * 480);
     }
 }
 
 TEST_CASE("camera_family: what is locked while it acquires, and by another setting") {
-    const CameraFamily family = load("blackfly-s");
-    CameraRegisters registers(settings(), family, {});
+    const CameraFamily family = load_family("blackfly-s");
+    CameraRegisters registers(family_settings(), family, {});
     const std::uint32_t binning = family.binning->at;
     CHECK(registers.locked(binning, true));
     CHECK_FALSE(registers.locked(binning, false));
-    const Field trigger_mode = family.triggered.front().first;
+    const rig::Field trigger_mode = family.triggered.front().first;
     CHECK(registers.locked(trigger_mode.at, false));  // the sequencer was left on
     registers.write(family.user_set_load->at, 1);
     CHECK_FALSE(registers.locked(trigger_mode.at, false));

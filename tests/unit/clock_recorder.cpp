@@ -20,7 +20,7 @@ struct Recorded {
 };
 
 /// A recorder on a simulated machine, and what is in its ring.
-struct Recording {
+struct RecordedClock {
     HostTime now() const { return {clocks->value_ns(SystemClock::monotonic_raw)}; }
     OutputTime output_now() const { return {clocks->value_ns(SystemClock::realtime)}; }
     void tick() { recorder.tick(now()); }
@@ -65,7 +65,7 @@ struct Recording {
 
 TEST_CASE(
     "clock_recorder: what it is given is in the ring, with the board's nonce and the output time") {
-    Recording recording;
+    RecordedClock recording;
     recording.recorder.board_restarted(77);
     CHECK(recording.expect<RecordedOutput>().epoch == 0);
     CHECK(recording.expect<RecordedRestart>().nonce == 77);
@@ -90,7 +90,7 @@ TEST_CASE(
 }
 
 TEST_CASE("clock_recorder: the output clock is reported once a second, and at each step") {
-    Recording recording;
+    RecordedClock recording;
     for (int i = 0; i < 30; ++i) {
         recording.tick();
         recording.clocks->pass(milliseconds(50));
@@ -112,7 +112,7 @@ TEST_CASE("clock_recorder: the output clock is reported once a second, and at ea
 }
 
 TEST_CASE("clock_recorder: a step is reported before the first item that is stamped after it") {
-    Recording recording;
+    RecordedClock recording;
     recording.tick();
     recording.expect<RecordedOutput>();
     recording.clocks->step(-seconds(1));

@@ -20,18 +20,18 @@ Item there_and_back(const Item& item) {
 }
 
 template <class T>
-T at(const ring::Metadata& bytes, std::size_t offset) {
+T metadata_at(const ring::Metadata& bytes, std::size_t offset) {
     T value;
     std::memcpy(&value, reinterpret_cast<const char*>(bytes.data()) + offset, sizeof value);
     return value;
 }
 
-const RecordedExchange exchange{0x11223344, 7, 5, {-1}, {0x7000000000000002}, {3}, {4}};
+const RecordedExchange recorded_exchange{0x11223344, 7, 5, {-1}, {0x7000000000000002}, {3}, {4}};
 
 }  // namespace
 
 TEST_CASE("clock_recording: items come back from the ring as they were") {
-    const RecordedExchange same = there_and_back(exchange);
+    const RecordedExchange same = there_and_back(recorded_exchange);
     CHECK(same.nonce == 0x11223344);
     CHECK(same.request == 7);
     CHECK(same.flags == 5);
@@ -53,30 +53,30 @@ TEST_CASE("clock_recording: items come back from the ring as they were") {
 }
 
 TEST_CASE("clock_recording: layout by the document, and kinds that nobody knows") {
-    const ring::Metadata bytes = pack(to_metadata(exchange));
-    CHECK(at<std::uint32_t>(bytes, 0) == 1);
-    CHECK(at<std::uint32_t>(bytes, 4) == 0x11223344);
-    CHECK(at<std::uint32_t>(bytes, 8) == 7);
-    CHECK(at<std::uint32_t>(bytes, 12) == 5);
-    CHECK(at<std::int64_t>(bytes, 16) == -1);
-    CHECK(at<std::int64_t>(bytes, 24) == 0x7000000000000002);
-    CHECK(at<std::int64_t>(bytes, 32) == 3);
-    CHECK(at<std::int64_t>(bytes, 40) == 4);
+    const ring::Metadata bytes = pack(to_metadata(recorded_exchange));
+    CHECK(metadata_at<std::uint32_t>(bytes, 0) == 1);
+    CHECK(metadata_at<std::uint32_t>(bytes, 4) == 0x11223344);
+    CHECK(metadata_at<std::uint32_t>(bytes, 8) == 7);
+    CHECK(metadata_at<std::uint32_t>(bytes, 12) == 5);
+    CHECK(metadata_at<std::int64_t>(bytes, 16) == -1);
+    CHECK(metadata_at<std::int64_t>(bytes, 24) == 0x7000000000000002);
+    CHECK(metadata_at<std::int64_t>(bytes, 32) == 3);
+    CHECK(metadata_at<std::int64_t>(bytes, 40) == 4);
     const ring::Metadata output = pack(to_metadata(RecordedOutput{13, {14}, {-15}, {16}}));
-    CHECK(at<std::uint32_t>(output, 0) == 4);
-    CHECK(at<std::uint32_t>(output, 4) == 13);
-    CHECK(at<std::int64_t>(output, 8) == 14);
-    CHECK(at<std::int64_t>(output, 16) == -15);
-    CHECK(at<std::uint32_t>(output, 24) == 16);
+    CHECK(metadata_at<std::uint32_t>(output, 0) == 4);
+    CHECK(metadata_at<std::uint32_t>(output, 4) == 13);
+    CHECK(metadata_at<std::int64_t>(output, 8) == 14);
+    CHECK(metadata_at<std::int64_t>(output, 16) == -15);
+    CHECK(metadata_at<std::uint32_t>(output, 24) == 16);
     CHECK(to_metadata(RecordedMessage{}).kind == 2);
     CHECK(to_metadata(RecordedRestart{}).kind == 3);
-    ClockMetadata unknown = to_metadata(exchange);
+    ClockMetadata unknown = to_metadata(recorded_exchange);
     unknown.kind = GENERATE(0U, 5U, 0xFFFFFFFFU);
     CHECK_FALSE(from_metadata(unknown));
 }
 
 TEST_CASE("clock_recording: as JSON") {
-    const auto line = client::to_json(ClockItem{exchange});
+    const auto line = client::to_json(ClockItem{recorded_exchange});
     CHECK(line["clock"] == "exchange");
     CHECK(line["nonce"] == 0x11223344);
     CHECK(line["sent_ns"] == -1);

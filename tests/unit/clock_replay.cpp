@@ -16,11 +16,12 @@ using namespace versavis;
 using namespace versavis::client;
 using Catch::Contains;
 using clock::ClockState;
+using test::content_of;
 
 namespace {
 
-constexpr std::int64_t low = std::numeric_limits<std::int64_t>::min();
-constexpr std::int64_t high = std::numeric_limits<std::int64_t>::max();
+constexpr std::int64_t lowest_ns = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t highest_ns = std::numeric_limits<std::int64_t>::max();
 
 /// Exchanges at 10 Hz with a board that runs 20 ppm fast; delays 0.1 to 0.6 ms.
 std::vector<clock::Exchange> exchanges(std::size_t count, bool board_begins = false) {
@@ -80,11 +81,6 @@ std::string csv(const std::vector<clock::Exchange>& all) {
         out << e.sent.ns << ',' << e.received.ns << ',' << e.answered.ns << ',' << e.arrived.ns
             << '\n';
     return out.str();
-}
-
-std::string content(const std::string& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
 }
 
 std::size_t files_in(const test::TemporaryDirectory& directory) {
@@ -170,7 +166,7 @@ TEST_CASE(
 TEST_CASE("clock_replay: absurd stamps are left out, and absurd questions not answered") {
     const test::TemporaryDirectory directory;
     auto all = exchanges(50);
-    for (const std::int64_t bad : {low, high}) {
+    for (const std::int64_t bad : {lowest_ns, highest_ns}) {
         all.push_back({{bad}, {bad}, {bad}, {bad}});
         all.push_back({{0}, {bad}, {0}, {1}});
     }
@@ -178,10 +174,12 @@ TEST_CASE("clock_replay: absurd stamps are left out, and absurd questions not an
     REQUIRE(recording);
     CHECK(recording->ignored == 4);
     CHECK(recording->messages.size() == 50);
-    const auto answer =
-        answers(recording->messages,
-                {{{high}, {low}}, {{high}, {high}}, {{high}, {9'000'000'000}}, {{low}, {0}}},
-                GENERATE(from_range(every_kind)));
+    const auto answer = answers(recording->messages,
+                                {{{highest_ns}, {lowest_ns}},
+                                 {{highest_ns}, {highest_ns}},
+                                 {{highest_ns}, {9'000'000'000}},
+                                 {{lowest_ns}, {0}}},
+                                GENERATE(from_range(every_kind)));
     CHECK(answer[0].state == ClockState::init);
     CHECK(answer[1].state == ClockState::init);
     CHECK(answer[2].state != ClockState::init);
@@ -206,14 +204,14 @@ TEST_CASE("clock_replay: the file of answers is whole or not there") {
     REQUIRE(done);
     CHECK(done->answers == 2);
     CHECK(done->unanswered == 1);
-    CHECK_THAT(content(settings.out), Catch::StartsWith("board_ns,host_ns,sigma_ns,state\n7,") &&
-                                          Catch::EndsWith("\n8,0,9223372036854775807,init\n"));
+    CHECK_THAT(content_of(settings.out), Catch::StartsWith("board_ns,host_ns,sigma_ns,state\n7,") &&
+                                             Catch::EndsWith("\n8,0,9223372036854775807,init\n"));
     CHECK(files_in(directory) == 3);
 
-    const std::string before = content(settings.out);
+    const std::string before = content_of(settings.out);
     directory.write("q.csv", "available_ns,board_ns\n1,x\n");
     REQUIRE_FALSE(replay_clock(settings));
-    CHECK(content(settings.out) == before);
+    CHECK(content_of(settings.out) == before);
     CHECK(files_in(directory) == 3);
 }
 
@@ -247,6 +245,6 @@ TEST_CASE("clock_replay: what cannot be done is said") {
     }
     SECTION("no questions are no error") {
         CHECK(replay_clock(settings)->answers == 0);
-        CHECK(content(settings.out) == "board_ns,host_ns,sigma_ns,state\n");
+        CHECK(content_of(settings.out) == "board_ns,host_ns,sigma_ns,state\n");
     }
 }

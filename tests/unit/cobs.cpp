@@ -8,26 +8,26 @@
 #include <numeric>
 #include <vector>
 
-using namespace versavis::wire;
+using namespace versavis;
 using Bytes = std::vector<std::uint8_t>;
 
 namespace {
 
 Bytes encode(const Bytes& data) {
-    Bytes out(cobs_bound(data.size()));
-    out.resize(cobs_encode(data.data(), data.size(), out.data()));
-    Bytes in_place(cobs_bound(data.size()));
+    Bytes out(wire::cobs_bound(data.size()));
+    out.resize(wire::cobs_encode(data.data(), data.size(), out.data()));
+    Bytes in_place(wire::cobs_bound(data.size()));
     std::copy(data.rbegin(), data.rend(), in_place.rbegin());
     const std::uint8_t* const from = in_place.data() + in_place.size() - data.size();
-    in_place.resize(cobs_encode(from, data.size(), in_place.data()));
+    in_place.resize(wire::cobs_encode(from, data.size(), in_place.data()));
     CHECK(in_place == out);
     return out;
 }
 
 Bytes decode(const Bytes& data) {
     Bytes out(data.size() + 1);
-    const std::size_t size = cobs_decode(data.data(), data.size(), out.data(), out.size());
-    REQUIRE(size != cobs_invalid);
+    const std::size_t size = wire::cobs_decode(data.data(), data.size(), out.data(), out.size());
+    REQUIRE(size != wire::cobs_invalid);
     out.resize(size);
     return out;
 }
@@ -46,7 +46,7 @@ TEST_CASE("cobs: blocks of 253, 254 and 255 bytes without zero") {
     for (const std::size_t size : {253U, 254U, 255U, 508U, 509U}) {
         Bytes data(size, 7);
         CHECK(decode(encode(data)) == data);
-        CHECK(encode(data).size() <= cobs_bound(size));
+        CHECK(encode(data).size() <= wire::cobs_bound(size));
         data.push_back(0);
         CHECK(decode(encode(data)) == data);
     }
@@ -68,9 +68,11 @@ TEST_CASE("cobs: malformed input is refused") {
     const Bytes cut{5, 1, 2};
     const Bytes zero_inside{3, 0, 1};
     const Bytes long_one(20, 1);
-    CHECK(cobs_decode(zero_code.data(), zero_code.size(), out.data(), out.size()) == cobs_invalid);
-    CHECK(cobs_decode(cut.data(), cut.size(), out.data(), out.size()) == cobs_invalid);
-    CHECK(cobs_decode(zero_inside.data(), zero_inside.size(), out.data(), out.size()) ==
-          cobs_invalid);
-    CHECK(cobs_decode(long_one.data(), long_one.size(), out.data(), out.size()) == cobs_invalid);
+    CHECK(wire::cobs_decode(zero_code.data(), zero_code.size(), out.data(), out.size()) ==
+          wire::cobs_invalid);
+    CHECK(wire::cobs_decode(cut.data(), cut.size(), out.data(), out.size()) == wire::cobs_invalid);
+    CHECK(wire::cobs_decode(zero_inside.data(), zero_inside.size(), out.data(), out.size()) ==
+          wire::cobs_invalid);
+    CHECK(wire::cobs_decode(long_one.data(), long_one.size(), out.data(), out.size()) ==
+          wire::cobs_invalid);
 }

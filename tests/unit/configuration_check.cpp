@@ -21,7 +21,7 @@ using test::accepted;
 namespace {
 
 /// All messages from their places on, one a line.
-std::string errors_of(const std::string& text) {
+std::string check_errors(const std::string& text) {
     const test::TemporaryDirectory directory;
     const std::string path = directory.write("c.toml", text);
     const auto configuration = load_configuration(path);
@@ -35,17 +35,18 @@ std::string errors_of(const std::string& text) {
 }
 
 /// Each row is what follows `before` in the file.
-void check(const std::string& before, const std::vector<test::MessageRow>& rows) {
-    test::check_messages([&](const std::string& text) { return errors_of(before + text); }, rows);
+void check_rows(const std::string& before, const std::vector<test::MessageRow>& rows) {
+    test::check_messages([&](const std::string& text) { return check_errors(before + text); },
+                         rows);
 }
 
-std::string camera(const std::string& name, unsigned output, const std::string& more = "") {
+std::string camera_section(const std::string& name, unsigned output, const std::string& more = "") {
     return fmt::format("[[camera]]\nname = '{0}'\ndevice = 'of {0}'\noutput = {1}\n{2}", name,
                        output, more);
 }
-const std::string cam0 = camera("cam0", 0);
+const std::string cam0 = camera_section("cam0", 0);
 
-class Refusals : public firmware::RefusalSink {
+class CheckRefusals : public firmware::RefusalSink {
  public:
     void refuse(const wire::Refusal& refusal) override { all.push_back(refusal); }
     std::vector<wire::Refusal> all;
@@ -79,7 +80,7 @@ wire::Configuration valid() {
 
 std::vector<wire::Refusal> refusals_of(const wire::Configuration& configuration,
                                        std::uint32_t present = wire::present_all) {
-    Refusals refusals;
+    CheckRefusals refusals;
     firmware::check(configuration, {present, fastest_here}, refusals);
     return refusals.all;
 }
@@ -90,112 +91,117 @@ TEST_CASE("configuration_check: the times of a camera fit its period, its limit 
     const std::string hidden =
         ", but must be at least 5 us ('glitch_us'): the board ignores shorter pulses on the "
         "exposure line; lower 'glitch_us', or expose longer";
-    check(camera("a", 0),
-          {{"rate_hz = 20\nexposure_us = 60000\n",
-            "6:15: 'exposure_us' is 60000 us, but must be at most 50000 us (the period less "
-            "'latency_us' and 'gap_us'); lower it, or 'rate_hz'"},
-           {"exposure_us = 3000\nmax_exposure_us = 2000\n",
-            "5:15: 'exposure_us' is 3000 us, but must be at most 2000 us ('max_exposure_us'); "
-            "lower it, or raise 'max_exposure_us'"},
-           {"rate_hz = 100\nexposure_us = 8000\nlatency_us = 50\ngap_us = 2000\n",
-            "6:15: 'exposure_us' is 8000 us, but must be at most 7950 us (the period less "
-            "'latency_us' and 'gap_us'); lower it, or 'rate_hz'"},
-           {"rate_hz = 100\nexposure_us = 8000\ngap_us = 2000\n", accepted},
-           {"trigger = 'free'\nexposure_us = 60000\n", accepted},
-           {"phase_us = 50000\n",
-            "5:12: 'phase_us' is 50000 us, but must be at most 49999.999 us (less than the "
-            "period); lower it, or 'rate_hz'"},
-           {"rate_hz = 500\nlatency_us = 2000\nstrobe = 'none'\n",
-            "6:14: 'latency_us' is 2000 us, but must be at most 1999.999 us (less than the "
-            "period); lower it, or 'rate_hz'"},
-           {"gap_us = 50000\nstrobe = 'none'\n",
-            "5:10: 'gap_us' is 50000 us, but must be at most 49999.999 us (less than the period); "
-            "lower it, or 'rate_hz'"},
-           {"rate_hz = 500\npulse_us = 1001\n",
-            "6:12: 'pulse_us' is 1001 us, but must be at most 1000 us (half the period); lower it, "
-            "or 'rate_hz'"},
-           // What the filter of its line takes for a disturbance.
-           {"exposure_us = 4.9\n", "5:15: 'exposure_us' is 4.9 us" + hidden},
-           {"glitch_us = 20\nmax_exposure_us = 15\n",
-            "6:19: 'max_exposure_us' is 15 us, but must be at least 20 us ('glitch_us'): the board "
-            "ignores shorter pulses on the exposure line; lower 'glitch_us', or expose longer"},
-           {"exposure = 'pulse'\npulse_us = 3\n", "6:12: 'pulse_us' is 3 us" + hidden},
-           {"[camera.auto_exposure]\nmin_us = 2\n", "6:10: 'min_us' is 2 us" + hidden},
-           {"[camera.auto_exposure]\nmax_us = 2\n", "6:10: 'max_us' is 2 us" + hidden},
-           {"[camera.features]\nExposureTime = 4.5\n", "6:16: 'ExposureTime' is 4.5 us" + hidden},
-           {"[camera.features]\nExposureTimeAbs = 4.5\n",
-            "6:19: 'ExposureTimeAbs' is 4.5 us" + hidden},
-           {"exposure_us = 5\n", accepted},
-           {"exposure_us = 0.1\nglitch_us = 0.1\n", accepted},
-           {"exposure_us = 1\nstrobe = 'none'\n", accepted},
-           {"exposure_us = 1\ntrigger = 'free'\n", accepted},
-           {"pulse_us = 3\n", accepted},
-           {"[camera.features]\nExposureTime = 5\nGain = 1\n", accepted},
-           // How long a frame can be waited for.
-           {"latest_arrival_ms = 49351\n",
-            "5:21: 'latest_arrival_ms' is 49351 ms, but must be at most 49350 ms (exposures are "
-            "kept no longer at this rate); lower it, or 'rate_hz'"},
-           {"latest_arrival_ms = 49350\n", accepted},
-           {"rate_hz = 1000\nlatest_arrival_ms = 800\n",
-            "6:21: 'latest_arrival_ms' is 800 ms, but must be at most 742 ms (exposures are kept "
-            "no longer at this rate); lower it, or 'rate_hz'"},
-           {"camera_clock = false\nlatest_arrival_ms = 901\n",
-            "6:21: 'latest_arrival_ms' is 901 ms, but must be at most 900 ms (without "
-            "'camera_clock', cameras start at one trigger per second); lower it, or set "
-            "camera_clock = true"},
-           // How late a packet socket may deliver.
-           {"receive = 'packet'\nrate_hz = 200\n",
-            "5:11: receive = \"packet\" may delay frames by 2 ms, too much for a period of 5 ms; "
-            "set receive = \"auto\" or \"socket\""},
-           {"receive = 'packet'\nrate_hz = 166\n", accepted},
-           {"receive = 'auto'\nrate_hz = 200\n", accepted}});
+    check_rows(
+        camera_section("a", 0),
+        {{"rate_hz = 20\nexposure_us = 60000\n",
+          "6:15: 'exposure_us' is 60000 us, but must be at most 50000 us (the period less "
+          "'latency_us' and 'gap_us'); lower it, or 'rate_hz'"},
+         {"exposure_us = 3000\nmax_exposure_us = 2000\n",
+          "5:15: 'exposure_us' is 3000 us, but must be at most 2000 us ('max_exposure_us'); "
+          "lower it, or raise 'max_exposure_us'"},
+         {"rate_hz = 100\nexposure_us = 8000\nlatency_us = 50\ngap_us = 2000\n",
+          "6:15: 'exposure_us' is 8000 us, but must be at most 7950 us (the period less "
+          "'latency_us' and 'gap_us'); lower it, or 'rate_hz'"},
+         {"rate_hz = 100\nexposure_us = 8000\ngap_us = 2000\n", accepted},
+         {"trigger = 'free'\nexposure_us = 60000\n", accepted},
+         {"phase_us = 50000\n",
+          "5:12: 'phase_us' is 50000 us, but must be at most 49999.999 us (less than the "
+          "period); lower it, or 'rate_hz'"},
+         {"rate_hz = 500\nlatency_us = 2000\nstrobe = 'none'\n",
+          "6:14: 'latency_us' is 2000 us, but must be at most 1999.999 us (less than the "
+          "period); lower it, or 'rate_hz'"},
+         {"gap_us = 50000\nstrobe = 'none'\n",
+          "5:10: 'gap_us' is 50000 us, but must be at most 49999.999 us (less than the period); "
+          "lower it, or 'rate_hz'"},
+         {"rate_hz = 500\npulse_us = 1001\n",
+          "6:12: 'pulse_us' is 1001 us, but must be at most 1000 us (half the period); lower it, "
+          "or 'rate_hz'"},
+         // What the filter of its line takes for a disturbance.
+         {"exposure_us = 4.9\n", "5:15: 'exposure_us' is 4.9 us" + hidden},
+         {"glitch_us = 20\nmax_exposure_us = 15\n",
+          "6:19: 'max_exposure_us' is 15 us, but must be at least 20 us ('glitch_us'): the board "
+          "ignores shorter pulses on the exposure line; lower 'glitch_us', or expose longer"},
+         {"exposure = 'pulse'\npulse_us = 3\n", "6:12: 'pulse_us' is 3 us" + hidden},
+         {"[camera.auto_exposure]\nmin_us = 2\n", "6:10: 'min_us' is 2 us" + hidden},
+         {"[camera.auto_exposure]\nmax_us = 2\n", "6:10: 'max_us' is 2 us" + hidden},
+         {"[camera.features]\nExposureTime = 4.5\n", "6:16: 'ExposureTime' is 4.5 us" + hidden},
+         {"[camera.features]\nExposureTimeAbs = 4.5\n",
+          "6:19: 'ExposureTimeAbs' is 4.5 us" + hidden},
+         {"exposure_us = 5\n", accepted},
+         {"exposure_us = 0.1\nglitch_us = 0.1\n", accepted},
+         {"exposure_us = 1\nstrobe = 'none'\n", accepted},
+         {"exposure_us = 1\ntrigger = 'free'\n", accepted},
+         {"pulse_us = 3\n", accepted},
+         {"[camera.features]\nExposureTime = 5\nGain = 1\n", accepted},
+         // How long a frame can be waited for.
+         {"latest_arrival_ms = 49351\n",
+          "5:21: 'latest_arrival_ms' is 49351 ms, but must be at most 49350 ms (exposures are "
+          "kept no longer at this rate); lower it, or 'rate_hz'"},
+         {"latest_arrival_ms = 49350\n", accepted},
+         {"rate_hz = 1000\nlatest_arrival_ms = 800\n",
+          "6:21: 'latest_arrival_ms' is 800 ms, but must be at most 742 ms (exposures are kept "
+          "no longer at this rate); lower it, or 'rate_hz'"},
+         {"camera_clock = false\nlatest_arrival_ms = 901\n",
+          "6:21: 'latest_arrival_ms' is 901 ms, but must be at most 900 ms (without "
+          "'camera_clock', cameras start at one trigger per second); lower it, or set "
+          "camera_clock = true"},
+         // How late a packet socket may deliver.
+         {"receive = 'packet'\nrate_hz = 200\n",
+          "5:11: receive = \"packet\" may delay frames by 2 ms, too much for a period of 5 ms; "
+          "set receive = \"auto\" or \"socket\""},
+         {"receive = 'packet'\nrate_hz = 166\n", accepted},
+         {"receive = 'auto'\nrate_hz = 200\n", accepted}});
 }
 
 TEST_CASE("configuration_check: a preset exists and does what the keys ask for") {
-    check(camera("a", 0),
-          {{"preset = 'flirr'\n",
-            "5:10: there is no preset 'flirr'; use one of: auto, alvium, basler-ace2, basler-dart, "
-            "basler-usb, flir, flir-oryx, allied-vision-gige, basler, baumer, daheng, dalsa, "
-            "hikrobot, ids, imaging-source, imperx, jai, lucid, point-grey, svs-vistek, generic"},
-           {"preset = 'basler-dart'\nptp = true\n",
-            "6:7: the preset 'basler-dart' does not support 'ptp'; remove the key, or set the "
-            "features by name in [camera.features]"},
-           {"preset = 'flir'\nptp = true\n", accepted}});
-    check("preset_directory = '/nowhere'\n",
-          {{cam0,
-            "1:20: /nowhere: there are no camera presets in this directory; install them, or set "
-            "'preset_directory' in the configuration"}});
+    check_rows(
+        camera_section("a", 0),
+        {{"preset = 'flirr'\n",
+          "5:10: there is no preset 'flirr'; use one of: auto, alvium, basler-ace2, basler-dart, "
+          "basler-usb, flir, flir-oryx, allied-vision-gige, basler, baumer, daheng, dalsa, "
+          "hikrobot, ids, imaging-source, imperx, jai, lucid, point-grey, svs-vistek, generic"},
+         {"preset = 'basler-dart'\nptp = true\n",
+          "6:7: the preset 'basler-dart' does not support 'ptp'; remove the key, or set the "
+          "features by name in [camera.features]"},
+         {"preset = 'flir'\nptp = true\n", accepted}});
+    check_rows(
+        "preset_directory = '/nowhere'\n",
+        {{cam0,
+          "1:20: /nowhere: there are no camera presets in this directory; install them, or set "
+          "'preset_directory' in the configuration"}});
 }
 
 TEST_CASE("configuration_check: limits of auto exposure agree with each other") {
-    check(camera("a", 0),
-          {{"[camera.auto_exposure]\nmin_us = 30000\nmax_us = 20000\n",
-            "6:10: 'min_us' is 30000 us, but must be at most 20000 us ('max_us'); lower it, or "
-            "raise 'max_us'"},
-           {"[camera.auto_exposure]\nmin_us = 60000\n",
-            "6:10: 'min_us' is 60000 us, but must be at most 50000 us ('max_us'); lower it, or "
-            "raise 'max_us'"},
-           {"max_exposure_us = 9000\n[camera.auto_exposure]\nmax_us = 9001\n",
-            "7:10: 'max_us' is 9001 us, but must be at most 9000 us ('max_exposure_us' of the "
-            "camera); lower it, or raise 'max_exposure_us'"},
-           {"max_exposure_us = 20\n[camera.auto_exposure]\n", accepted},
-           {"exposure = 'pulse'\n[camera.auto_exposure]\n",
-            "6:1: with exposure = \"pulse\" the trigger sets the exposure, so auto exposure "
-            "cannot; set exposure = \"timed\", or remove [camera.auto_exposure]"}});
+    check_rows(
+        camera_section("a", 0),
+        {{"[camera.auto_exposure]\nmin_us = 30000\nmax_us = 20000\n",
+          "6:10: 'min_us' is 30000 us, but must be at most 20000 us ('max_us'); lower it, or "
+          "raise 'max_us'"},
+         {"[camera.auto_exposure]\nmin_us = 60000\n",
+          "6:10: 'min_us' is 60000 us, but must be at most 50000 us ('max_us'); lower it, or "
+          "raise 'max_us'"},
+         {"max_exposure_us = 9000\n[camera.auto_exposure]\nmax_us = 9001\n",
+          "7:10: 'max_us' is 9001 us, but must be at most 9000 us ('max_exposure_us' of the "
+          "camera); lower it, or raise 'max_exposure_us'"},
+         {"max_exposure_us = 20\n[camera.auto_exposure]\n", accepted},
+         {"exposure = 'pulse'\n[camera.auto_exposure]\n",
+          "6:1: with exposure = \"pulse\" the trigger sets the exposure, so auto exposure "
+          "cannot; set exposure = \"timed\", or remove [camera.auto_exposure]"}});
 }
 
 TEST_CASE("configuration_check: names, devices and outputs are valid and not used twice") {
-    check(
+    check_rows(
         cam0,
         {{"[[camera]]\nname = 'cam1'\ndevice = 'OF cam0'\noutput = 1\n",
           "7:10: the device 'OF cam0' is already used by [[camera]] \"cam0\" on line 1; set "
           "another device, or remove one of the two tables"},
-         {camera("cam1", 0),
+         {camera_section("cam1", 0),
           "8:10: output 0 is already used by [[camera]] \"cam0\" on line 1; free outputs: 1, 2, 3"},
-         {camera("cam1", 0, "trigger = 'free'\n"), accepted},
+         {camera_section("cam1", 0, "trigger = 'free'\n"), accepted},
          {"[[camera]]\nname = 'cam1'\ndevice = 'x'\n",
           "5:1: output 0 is already used by [[camera]] \"cam0\" on line 1; free outputs: 1, 2, 3"},
-         {camera("b", 1) + camera("c", 2) + camera("d", 3) + camera("e", 3),
+         {camera_section("b", 1) + camera_section("c", 2) + camera_section("d", 3) +
+              camera_section("e", 3),
           "20:10: output 3 is already used by [[camera]] \"d\" on line 13; the board triggers at "
           "most four cameras: remove one"},
          {"[[imu]]\nname = 'cam0'\n",
@@ -204,56 +210,57 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
          {"[[imu]]\nname = \"a\\u001b[31m\"\n",
           "6:8: 'a?[31m' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
          // What is wrong already is not reported again in other words.
-         {camera("cam1", 4),
+         {camera_section("cam1", 4),
           "8:10: 'output' must be a whole number from 0 to 3, but is 4; see "
           "docs/user/configuration.md"}});
-    check("",
-          {{camera("clock", 0),
-            "2:8: the name 'clock' is reserved for a stream of the service; choose another name"},
-           {camera("events", 0),
-            "2:8: the name 'events' is reserved for a stream of the service; choose another name"},
-           {camera("status", 0),
-            "2:8: the name 'status' is reserved for a stream of the service; choose another name"},
-           {camera("cam0-evidence", 0),
-            "2:8: the name 'cam0-evidence' is reserved for a stream of the service; choose another "
-            "name"},
-           {camera("../x", 0),
-            "2:8: '../x' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
-           {"[[camera]]\ndevice = 'x'\n", "1:1: 'name' is missing; set one, such as \"cam0\""},
-           {"instance = 'a/b'\n" + cam0,
-            "1:12: 'a/b' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
-           {"camera = 1\n",
-            "1:10: 'camera' must be an array of tables: [[camera]], but is 1; see "
-            "docs/user/configuration.md"}});
+    check_rows(
+        "",
+        {{camera_section("clock", 0),
+          "2:8: the name 'clock' is reserved for a stream of the service; choose another name"},
+         {camera_section("events", 0),
+          "2:8: the name 'events' is reserved for a stream of the service; choose another name"},
+         {camera_section("status", 0),
+          "2:8: the name 'status' is reserved for a stream of the service; choose another name"},
+         {camera_section("cam0-evidence", 0),
+          "2:8: the name 'cam0-evidence' is reserved for a stream of the service; choose another "
+          "name"},
+         {camera_section("../x", 0),
+          "2:8: '../x' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
+         {"[[camera]]\ndevice = 'x'\n", "1:1: 'name' is missing; set one, such as \"cam0\""},
+         {"instance = 'a/b'\n" + cam0,
+          "1:12: 'a/b' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
+         {"camera = 1\n",
+          "1:10: 'camera' must be an array of tables: [[camera]], but is 1; see "
+          "docs/user/configuration.md"}});
     const std::string no_address =
         " is not an IP address; an IP address is four numbers from 0 to 255, such as 192.168.1.20";
-    check("[[camera]]\nname = 'a'\n",
-          {{"",
-            "1:1: 'device' is missing; set the camera's IP address, serial number or name; "
-            "arv-tool-0.8 lists them"},
-           {"device = ''\n",
-            "3:10: 'device' is missing; set the camera's IP address, serial number or name; "
-            "arv-tool-0.8 lists them"},
-           {"device = '192.168.1.300'\n", "3:10: '192.168.1.300'" + no_address},
-           {"device = '192.168.1'\n", "3:10: '192.168.1'" + no_address},
-           {"device = '1.2.3.4.5'\n", "3:10: '1.2.3.4.5'" + no_address},
-           {"device = '1..2.3'\n", "3:10: '1..2.3'" + no_address},
-           {"device = '192.168.1.20'\n", accepted},
-           {"device = '21098765'\n", accepted},
-           {"device = 'Basler-21.5.3'\n", accepted},
-           {"device = '00:11:1c:aa:bb:cc'\n", accepted}});
+    check_rows("[[camera]]\nname = 'a'\n",
+               {{"",
+                 "1:1: 'device' is missing; set the camera's IP address, serial number or name; "
+                 "arv-tool-0.8 lists them"},
+                {"device = ''\n",
+                 "3:10: 'device' is missing; set the camera's IP address, serial number or name; "
+                 "arv-tool-0.8 lists them"},
+                {"device = '192.168.1.300'\n", "3:10: '192.168.1.300'" + no_address},
+                {"device = '192.168.1'\n", "3:10: '192.168.1'" + no_address},
+                {"device = '1.2.3.4.5'\n", "3:10: '1.2.3.4.5'" + no_address},
+                {"device = '1..2.3'\n", "3:10: '1..2.3'" + no_address},
+                {"device = '192.168.1.20'\n", accepted},
+                {"device = '21098765'\n", accepted},
+                {"device = 'Basler-21.5.3'\n", accepted},
+                {"device = '00:11:1c:aa:bb:cc'\n", accepted}});
 }
 
 TEST_CASE("configuration_check: which cameras can be a master") {
-    const auto slave = [](const std::string& more) { return camera("slave", 1, more); };
-    check(
+    const auto slave = [](const std::string& more) { return camera_section("slave", 1, more); };
+    check_rows(
         cam0,
         {{slave("master = 'cam9'\n"),
           "9:10: 'cam9' cannot be the master: there is no camera with that name; possible masters: "
           "cam0"},
          {slave("master = 'slave'\n"),
           "9:10: 'slave' cannot be the master: it is the slave itself; possible masters: cam0"},
-         {slave("master = 'cam0'\n") + camera("third", 2, "master = 'slave'\n"),
+         {slave("master = 'cam0'\n") + camera_section("third", 2, "master = 'slave'\n"),
           "14:10: 'slave' cannot be the master: it is a slave itself; possible masters: cam0"},
          {slave("master = 'cam0'\ntrigger = 'free'\n"),
           "9:10: a camera with trigger = \"free\" cannot have a 'master'; remove one of the two"},
@@ -263,17 +270,18 @@ TEST_CASE("configuration_check: which cameras can be a master") {
           "10:12: a slave takes 'phase_us' from its master; remove the key, or 'master'"},
          {slave("master = 'cam0'\nmax_exposure_us = 10\n"),
           "10:19: a slave takes 'max_exposure_us' from its master; remove the key, or 'master'"}});
-    check(slave("master = 'cam0'\n"), {{cam0, accepted},
-                                       {camera("cam0", 0, "trigger = 'free'\n"),
-                                        "5:10: 'cam0' cannot be the master: the board does not "
-                                        "trigger it; no other camera can be one: remove 'master'"},
-                                       {camera("cam0", 0, "strobe = 'none'\n"),
-                                        "5:10: 'cam0' cannot be the master: it has no exposure "
-                                        "line; no other camera can be one: remove 'master'"}});
+    check_rows(slave("master = 'cam0'\n"),
+               {{cam0, accepted},
+                {camera_section("cam0", 0, "trigger = 'free'\n"),
+                 "5:10: 'cam0' cannot be the master: the board does not "
+                 "trigger it; no other camera can be one: remove 'master'"},
+                {camera_section("cam0", 0, "strobe = 'none'\n"),
+                 "5:10: 'cam0' cannot be the master: it has no exposure "
+                 "line; no other camera can be one: remove 'master'"}});
 }
 
 TEST_CASE("configuration_check: rate, filter, bus and lines of an IMU are those of its part") {
-    check(
+    check_rows(
         "[[imu]]\n",
         {{"rate_hz = 900\ndata_ready = true\n",
           "2:11: 'rate_hz' is 900 Hz, but must be at most 819.2 Hz (the maximum of the "
@@ -299,100 +307,105 @@ TEST_CASE("configuration_check: rate, filter, bus and lines of an IMU are those 
           "3:15: 'accel_ready' needs the data-ready line of the gyro, which paces the samples; "
           "wire that line and set data_ready = true, or remove the key"},
          {"model = 'bmi088'\ndata_ready = true\naccel_ready = true\n", accepted}});
-    check("[[imu]]\nmodel = 'icm42688p'\n",
-          {{"i2c_address = 0x69\n",
-            "3:15: 'i2c_address' is only for a part on I2C; set bus = \"i2c\", or remove the key"},
-           {"bus = 'i2c'\n",
-            "3:7: reads over I2C are slow, so the data-ready line must start them; wire that line "
-            "and set data_ready = true, or connect the part to SPI"},
-           {"bus = 'i2c'\ndata_ready = true\ni2c_address = 0x6A\n",
-            "5:15: 'i2c_address' is 0x6A, but must be 0x68 or 0x69; the address pin of the part "
-            "selects which"},
-           {"bus = 'i2c'\ndata_ready = true\nrate_hz = 1000\n", accepted},
-           {"bus = 'i2c'\ndata_ready = true\nrate_hz = 1001\n",
-            "5:11: 'rate_hz' is 1001 Hz, but must be at most 1000 Hz (the maximum of the icm42688p "
-            "on I2C); lower it, or connect the part to SPI"},
-           {"bus = 'i2c'\ndata_ready = true\nrate_hz = 8000\n",
-            "5:11: 'rate_hz' is 8000 Hz, but must be at most 1000 Hz (the maximum of the icm42688p "
-            "on I2C); lower it, or connect the part to SPI"},
-           {"bus = 'spi'\ndata_ready = true\nrate_hz = 8000\n", accepted}});
+    check_rows(
+        "[[imu]]\nmodel = 'icm42688p'\n",
+        {{"i2c_address = 0x69\n",
+          "3:15: 'i2c_address' is only for a part on I2C; set bus = \"i2c\", or remove the key"},
+         {"bus = 'i2c'\n",
+          "3:7: reads over I2C are slow, so the data-ready line must start them; wire that line "
+          "and set data_ready = true, or connect the part to SPI"},
+         {"bus = 'i2c'\ndata_ready = true\ni2c_address = 0x6A\n",
+          "5:15: 'i2c_address' is 0x6A, but must be 0x68 or 0x69; the address pin of the part "
+          "selects which"},
+         {"bus = 'i2c'\ndata_ready = true\nrate_hz = 1000\n", accepted},
+         {"bus = 'i2c'\ndata_ready = true\nrate_hz = 1001\n",
+          "5:11: 'rate_hz' is 1001 Hz, but must be at most 1000 Hz (the maximum of the icm42688p "
+          "on I2C); lower it, or connect the part to SPI"},
+         {"bus = 'i2c'\ndata_ready = true\nrate_hz = 8000\n",
+          "5:11: 'rate_hz' is 8000 Hz, but must be at most 1000 Hz (the maximum of the icm42688p "
+          "on I2C); lower it, or connect the part to SPI"},
+         {"bus = 'spi'\ndata_ready = true\nrate_hz = 8000\n", accepted}});
 }
 
 TEST_CASE("configuration_check: test pulses use an output that nothing else uses") {
-    check(cam0 + camera("cam1", 1) + "[ports]\n",
-          {{"test_rate_hz = 0.05\n",
-            "10:16: 'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz; raise it, or set it "
-            "to 0"},
-           {"test_rate_hz = 0.1\n", accepted},
-           {"test_rate_hz = 10000\n", accepted},
-           {"test_rate_hz = 10000\npulse_us = 50\n", accepted},
-           {"test_rate_hz = 10000\npulse_us = 51\n",
-            "11:12: 'pulse_us' is 51 us, but must be at most 50 us (half the period of "
-            "'test_rate_hz'); lower it"},
-           {"test = 'cam1'\ntest_rate_hz = 10\n",
-            "11:16: the test output already shows 'cam1' ('test'); remove one of the two keys"},
-           {"test_output = 'trigger3'\n",
-            "10:15: 'test_output' has no effect without 'test_rate_hz'; set 'test_rate_hz', or "
-            "remove the key"},
-           {"test_output = 'test'\ntest_rate_hz = 0\ntest = 'cam0'\n", accepted},
-           {"test_rate_hz = 10\ntest_output = 'trigger1'\n",
-            "11:15: output 1 is already used by [[camera]] \"cam1\" on line 5; free outputs: test, "
-            "sync, trigger2, trigger3"},
-           {"test_rate_hz = 10\ntest_output = 'trigger2'\nsync_rate_hz = 1\n", accepted},
-           {"test_rate_hz = 10\ntest_output = 'sync'\nsync_rate_hz = 1\n",
-            "11:15: the sync output is used by 'sync_rate_hz'; set sync_rate_hz = 0, or choose "
-            "another output"},
-           {"test_rate_hz = 10\ntest_output = 'sync'\n", accepted}});
-    check(camera("cam1", 1, "trigger = 'free'\n"),
-          {{"[ports]\ntest_rate_hz = 10\ntest_output = 'trigger1'\n", accepted}});
+    check_rows(
+        cam0 + camera_section("cam1", 1) + "[ports]\n",
+        {{"test_rate_hz = 0.05\n",
+          "10:16: 'test_rate_hz' must be 0 (no pulses), or 0.1 to 10000 Hz; raise it, or set it "
+          "to 0"},
+         {"test_rate_hz = 0.1\n", accepted},
+         {"test_rate_hz = 10000\n", accepted},
+         {"test_rate_hz = 10000\npulse_us = 50\n", accepted},
+         {"test_rate_hz = 10000\npulse_us = 51\n",
+          "11:12: 'pulse_us' is 51 us, but must be at most 50 us (half the period of "
+          "'test_rate_hz'); lower it"},
+         {"test = 'cam1'\ntest_rate_hz = 10\n",
+          "11:16: the test output already shows 'cam1' ('test'); remove one of the two keys"},
+         {"test_output = 'trigger3'\n",
+          "10:15: 'test_output' has no effect without 'test_rate_hz'; set 'test_rate_hz', or "
+          "remove the key"},
+         {"test_output = 'test'\ntest_rate_hz = 0\ntest = 'cam0'\n", accepted},
+         {"test_rate_hz = 10\ntest_output = 'trigger1'\n",
+          "11:15: output 1 is already used by [[camera]] \"cam1\" on line 5; free outputs: test, "
+          "sync, trigger2, trigger3"},
+         {"test_rate_hz = 10\ntest_output = 'trigger2'\nsync_rate_hz = 1\n", accepted},
+         {"test_rate_hz = 10\ntest_output = 'sync'\nsync_rate_hz = 1\n",
+          "11:15: the sync output is used by 'sync_rate_hz'; set sync_rate_hz = 0, or choose "
+          "another output"},
+         {"test_rate_hz = 10\ntest_output = 'sync'\n", accepted}});
+    check_rows(camera_section("cam1", 1, "trigger = 'free'\n"),
+               {{"[ports]\ntest_rate_hz = 10\ntest_output = 'trigger1'\n", accepted}});
 }
 
 TEST_CASE("configuration_check: board, clock, light and ports use what is there") {
-    check(cam0,
-          {{"[board]\nlink = 'unix:'\n",
-            "6:8: 'unix:' is not a valid link; use \"usb\" or \"unix:/path/of/socket\""},
-           {"[board]\nlink = 'tty'\n",
-            "6:8: 'tty' is not a valid link; use \"usb\" or \"unix:/path/of/socket\""},
-           {"[board]\nlink = 'unix:" + std::string(107, 'a') + "'\n", accepted},
-           {"[board]\nlink = 'unix:" + std::string(108, 'a') + "'\n",
-            "6:8: a socket path can have at most 107 characters; use a shorter path"},
-           {"[clock]\npps = 'host'\n",
-            "6:7: 'pps' needs the PPS input, which is not enabled; add \"pps\" to 'inputs' of "
-            "[ports]"},
-           {"[clock]\npps = 'nmea'\n[ports]\ninputs = ['pps']\n",
-            "6:7: pps = \"nmea\" needs a GNSS receiver at the board's UART; set nmea = true in "
-            "[ports], or pps = \"host\""},
-           {"[clock]\npps = 'host'\noutput = 'monotonic_raw'\n[ports]\ninputs = ['pps']\n",
-            "6:7: PPS cannot label CLOCK_MONOTONIC_RAW; set output = \"realtime\" or \"tai\", or "
-            "pps = \"off\""},
-           {"[illumination]\ncameras = ['cam1']\n",
-            "6:11: 'cam1' is not a camera that the board triggers; use the 'name' of a [[camera]]"},
-           {"[ports]\nnmea = true\n",
-            "6:8: 'nmea' labels the pulses of the PPS input, which is not enabled; add \"pps\" to "
-            "'inputs'"},
-           {"[ports]\ninputs = ['gps']\n",
-            "6:10: 'gps' is not an input; use any of: pps, aux0, aux1, sync"},
-           {"[ports]\nfalling = ['aux0']\n",
-            "6:11: the input 'aux0' is not enabled; add it to 'inputs', or remove it"},
-           {"[ports]\ntest = 'nobody'\n",
-            "6:8: 'nobody' is neither a triggered camera nor an IMU; use the 'name' of a "
-            "[[camera]] or [[imu]], or \"\" for none"},
-           {"[ports]\nimu_output = true\n",
-            "6:14: 'imu_output' needs an IMU on SPI or I2C; add an [[imu]] of any model but vn100, "
-            "or remove the key"},
-           {"[ports]\nsync_rate_hz = 0.01\n",
-            "6:16: 'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz; raise it, or set it to "
-            "0"}});
-    check("[[imu]]\nmodel = 'vn100'\n[ports]\n",
-          {{"inputs = ['pps']\nnmea = true\n",
-            "5:8: 'nmea' needs the UART, which the vn100 uses; remove one of the two"},
-           {"test = 'imu0'\n",
-            "4:8: without its data-ready line, the samples of a vn100 cannot be shown; wire that "
-            "line and set data_ready = true, or choose another 'test'"}});
-    check(camera("cam0", 0, "rate_hz = 1000\n"),
-          {{"[ports]\ntest = 'cam0'\npulse_us = 501\n",
-            "8:12: 'pulse_us' is 501 us, but must be at most 500 us (half the period of 'cam0', "
-            "which 'test' shows); lower it"}});
+    check_rows(
+        cam0,
+        {{"[board]\nlink = 'unix:'\n",
+          "6:8: 'unix:' is not a valid link; use \"usb\" or \"unix:/path/of/socket\""},
+         {"[board]\nlink = 'tty'\n",
+          "6:8: 'tty' is not a valid link; use \"usb\" or \"unix:/path/of/socket\""},
+         {"[board]\nlink = 'unix:" + std::string(107, 'a') + "'\n", accepted},
+         {"[board]\nlink = 'unix:" + std::string(108, 'a') + "'\n",
+          "6:8: a socket path can have at most 107 characters; use a shorter path"},
+         {"[clock]\npps = 'host'\n",
+          "6:7: 'pps' needs the PPS input, which is not enabled; add \"pps\" to 'inputs' of "
+          "[ports]"},
+         {"[clock]\npps = 'nmea'\n[ports]\ninputs = ['pps']\n",
+          "6:7: pps = \"nmea\" needs a GNSS receiver at the board's UART; set nmea = true in "
+          "[ports], or pps = \"host\""},
+         {"[clock]\npps = 'host'\noutput = 'monotonic_raw'\n[ports]\ninputs = ['pps']\n",
+          "6:7: PPS cannot label CLOCK_MONOTONIC_RAW; set output = \"realtime\" or \"tai\", or "
+          "pps = \"off\""},
+         {"[illumination]\ncameras = ['cam1']\n",
+          "6:11: 'cam1' is not a camera that the board triggers; use the 'name' of a [[camera]]"},
+         {"[ports]\nnmea = true\n",
+          "6:8: 'nmea' labels the pulses of the PPS input, which is not enabled; add \"pps\" to "
+          "'inputs'"},
+         {"[ports]\ninputs = ['gps']\n",
+          "6:10: 'gps' is not an input; use any of: pps, aux0, aux1, sync"},
+         {"[ports]\nfalling = ['aux0']\n",
+          "6:11: the input 'aux0' is not enabled; add it to 'inputs', or remove it"},
+         {"[ports]\ntest = 'nobody'\n",
+          "6:8: 'nobody' is neither a triggered camera nor an IMU; use the 'name' of a "
+          "[[camera]] or [[imu]], or \"\" for none"},
+         {"[ports]\nimu_output = true\n",
+          "6:14: 'imu_output' needs an IMU on SPI or I2C; add an [[imu]] of any model but vn100, "
+          "or remove the key"},
+         {"[ports]\nsync_rate_hz = 0.01\n",
+          "6:16: 'sync_rate_hz' must be 0 (no pulses), or 0.1 to 10 Hz; raise it, or set it to "
+          "0"}});
+    check_rows(
+        "[[imu]]\nmodel = 'vn100'\n[ports]\n",
+        {{"inputs = ['pps']\nnmea = true\n",
+          "5:8: 'nmea' needs the UART, which the vn100 uses; remove one of the two"},
+         {"test = 'imu0'\n",
+          "4:8: without its data-ready line, the samples of a vn100 cannot be shown; wire that "
+          "line and set data_ready = true, or choose another 'test'"}});
+    check_rows(
+        camera_section("cam0", 0, "rate_hz = 1000\n"),
+        {{"[ports]\ntest = 'cam0'\npulse_us = 501\n",
+          "8:12: 'pulse_us' is 501 us, but must be at most 500 us (half the period of 'cam0', "
+          "which 'test' shows); lower it"}});
 }
 
 TEST_CASE("configuration_check: what a model of IMU can do is what its part does on the board") {
@@ -749,7 +762,7 @@ TEST_CASE("configuration_check: no IMU is faster than the board can read it") {
         wire::Configuration all{};
         change(all);
         all.imus[port].rate_millihertz = UINT32_MAX;
-        Refusals refusals;
+        CheckRefusals refusals;
         firmware::check(all, {wire::present_all, board}, refusals);
         REQUIRE(refusals.all.size() == 1);
         CHECK(refusals.all[0].field == wire::ConfigurationField::imu_rate);
@@ -797,13 +810,14 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
         for (unsigned i = 0, count = static_cast<unsigned>(any(4)); i < count; ++i) {
             const double hz = rate();
             const double period = 1e6 / hz;
-            text += camera(fmt::format("cam{}", i), i) + fmt::format("rate_hz = {:.17g}\n", hz) +
-                    line("phase_us", near(period)) + line("latency_us", near(period)) +
-                    line("gap_us", near(period)) + line("pulse_us", near(period)) +
-                    line("exposure_us", near(period)) + line("max_exposure_us", near(period)) +
-                    line("glitch_us", near(25.5)) + flag("strobe = \"none\"\n");
+            text += camera_section(fmt::format("cam{}", i), i) +
+                    fmt::format("rate_hz = {:.17g}\n", hz) + line("phase_us", near(period)) +
+                    line("latency_us", near(period)) + line("gap_us", near(period)) +
+                    line("pulse_us", near(period)) + line("exposure_us", near(period)) +
+                    line("max_exposure_us", near(period)) + line("glitch_us", near(25.5)) +
+                    flag("strobe = \"none\"\n");
         }
-        if (any(4) == 0) text += camera("last", 3, "master = \"cam0\"\n");
+        if (any(4) == 0) text += camera_section("last", 3, "master = \"cam0\"\n");
         return text;
     };
     const auto imus = [&] {
@@ -842,7 +856,7 @@ TEST_CASE("configuration_check: whatever is accepted, the board takes") {
         const auto configuration = load_configuration(directory.write("c", text));
         if (!configuration) continue;
         ++loaded;
-        Refusals refusals;
+        CheckRefusals refusals;
         firmware::check(board_configuration(*configuration), {wire::present_all, 8'000'000},
                         refusals);
         INFO(text);

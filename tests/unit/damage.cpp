@@ -11,7 +11,7 @@ using namespace versavis::liar;
 
 namespace {
 
-constexpr Duration period = milliseconds(10);
+constexpr Duration damage_period = milliseconds(10);
 
 /// Payload sizes of the document.
 const std::map<Type, std::size_t> sizes{
@@ -19,7 +19,7 @@ const std::map<Type, std::size_t> sizes{
     {Type::health, 96},   {Type::clock_follow_up, 16}, {Type::log, 96}};
 
 /// The packets of a board: of each type in turn, each with instants and numbers of its own.
-class Board {
+class DamagedBoard {
  public:
     Packet next() {
         const auto& [type, size] = *std::next(sizes.begin(), sequence_ % sizes.size());
@@ -52,7 +52,7 @@ class Board {
 };
 
 /// What `packet` is without the number that the liar writes into samples.
-Bytes plain(Packet packet) {
+Bytes plain_bytes(Packet packet) {
     if (packet.type == Type::imu_sample) {
         set(packet, imu_sample::magnetic_x, 0);
         set(packet, imu_sample::magnetic_y, 0);
@@ -61,7 +61,7 @@ Bytes plain(Packet packet) {
 }
 
 std::vector<Bytes> pass_all(Liar& liar, int count) {
-    Board board;
+    DamagedBoard board;
     std::vector<Bytes> out;
     for (int i = 0; i < count; ++i)
         for (const Packet& damaged : liar.pass(board.next(), HostTime{i}))
@@ -77,13 +77,13 @@ bool keeps_its_messages(Way way) {
 }  // namespace
 
 TEST_CASE("damage: without orders everything passes as it is") {
-    Liar liar(1, period);
-    Board board;
+    Liar liar(1, damage_period);
+    DamagedBoard board;
     for (int i = 0; i < 100; ++i) {
         const Packet packet = board.next();
         const auto out = liar.pass(packet, HostTime{i});
         REQUIRE(out.size() == 1);
-        CHECK(plain(out[0]) == packet.payload);
+        CHECK(plain_bytes(out[0]) == packet.payload);
         CHECK(out[0].sequence == packet.sequence);
     }
     CHECK(liar.damaged() == 0);
@@ -92,9 +92,9 @@ TEST_CASE("damage: without orders everything passes as it is") {
 TEST_CASE("damage: each kind reaches each of its fields and nothing else, unseen by the CRC") {
     for (const Kind& kind : kinds()) {
         INFO(kind.name);
-        Liar liar(3, period);
+        Liar liar(3, damage_period);
         liar.obey({{&kind}, 1});
-        Board board;
+        DamagedBoard board;
         std::map<Type, std::set<unsigned>> changed;
         std::uint32_t expected = 0;
         for (int i = 0; i < 3000; ++i) {
@@ -108,7 +108,7 @@ TEST_CASE("damage: each kind reaches each of its fields and nothing else, unseen
             }
             if (!keeps_its_messages(kind.way)) continue;
             REQUIRE(passed.size() == 1);
-            const Bytes after = plain(passed[0]);
+            const Bytes after = plain_bytes(passed[0]);
             for (unsigned at = 0; at < after.size(); ++at)
                 if (after[at] != packet.payload[at]) changed[packet.type].insert(at);
         }
@@ -136,7 +136,7 @@ TEST_CASE("damage: the seed chooses") {
     std::vector<const Kind*> every;
     for (const Kind& kind : kinds()) every.push_back(&kind);
     const auto run = [&](std::uint64_t seed) {
-        Liar liar(seed, period);
+        Liar liar(seed, damage_period);
         liar.obey({every, 0.5});
         return pass_all(liar, 2000);
     };
@@ -145,7 +145,7 @@ TEST_CASE("damage: the seed chooses") {
 }
 
 TEST_CASE("damage: as many as ordered") {
-    Liar liar(1, period);
+    Liar liar(1, damage_period);
     const Kind* kind = find_kind("start");
     liar.obey({{kind}, 1, 1});
     pass_all(liar, 700);
@@ -163,9 +163,9 @@ TEST_CASE("damage: as many as ordered") {
 
 TEST_CASE("damage: messages that change places are all reported") {
     for (const char* name : {"swap-messages", "swap-fields"}) {
-        Liar liar(1, period);
+        Liar liar(1, damage_period);
         liar.obey({{find_kind(name)}, 1});
-        Board board;
+        DamagedBoard board;
         std::multiset<std::int64_t> numbers;
         for (int i = 0; i < 3500; ++i) {
             if (i == 3493) liar.obey({});
@@ -178,14 +178,14 @@ TEST_CASE("damage: messages that change places are all reported") {
 }
 
 TEST_CASE("damage: a clock that steps does so in every message, and by whole periods") {
-    Liar liar(1, period);
+    Liar liar(1, damage_period);
     liar.obey({{find_kind("clock-step")}, 1, 1});
-    Board board;
+    DamagedBoard board;
     const Packet first = board.next();
     const std::int64_t step =
         get(liar.pass(first, {}).at(0), exposure::start) - get(first, exposure::start);
     CHECK(step != 0);
-    CHECK(step % period.ns == 0);
+    CHECK(step % damage_period.ns == 0);
     for (int i = 0; i < 700; ++i) {
         const Packet packet = board.next();
         const Packet damaged = liar.pass(packet, {}).at(0);
@@ -194,13 +194,13 @@ TEST_CASE("damage: a clock that steps does so in every message, and by whole per
     }
     liar.forget();
     const Packet packet = board.next();
-    CHECK(plain(liar.pass(packet, {}).at(0)) == packet.payload);
+    CHECK(plain_bytes(liar.pass(packet, {}).at(0)) == packet.payload);
 }
 
 TEST_CASE("damage: what was not observed stays so") {
-    Liar liar(1, period);
+    Liar liar(1, damage_period);
     liar.obey({{find_kind("record")}, 1});
-    Packet packet = Board().next();
+    Packet packet = DamagedBoard().next();
     REQUIRE(packet.type == Type::exposure);
     set(packet, exposure::end, unobserved);
     const Packet damaged = liar.pass(packet, {}).at(0);
@@ -211,9 +211,9 @@ TEST_CASE("damage: what was not observed stays so") {
 TEST_CASE("damage: a sample's true number outlives every lie, and so does a frame's tick") {
     std::vector<const Kind*> every;
     for (const Kind& kind : kinds()) every.push_back(&kind);
-    Liar liar(5, period);
+    Liar liar(5, damage_period);
     liar.obey({every, 1});
-    Board board;
+    DamagedBoard board;
     std::set<std::uint32_t> given;
     for (int i = 0; i < 7000; ++i) {
         const Packet packet = board.next();

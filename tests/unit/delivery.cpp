@@ -9,8 +9,8 @@ using namespace versavis::daemon;
 namespace {
 
 /// A stream in simulated time, looked at twice a second.
-struct Stream {
-    explicit Stream(double rate) : rate_hz(rate), delivery(rate) { delivery.begin(now); }
+struct DeliveredStream {
+    explicit DeliveredStream(double rate) : rate_hz(rate), delivery(rate) { delivery.begin(now); }
 
     /// It delivers at `share` of its rate. Returns when its state changed, after how long.
     Duration run(double share, Duration duration, bool until_full) {
@@ -34,21 +34,21 @@ struct Stream {
 
 TEST_CASE("delivery: full soon after the start, at any rate") {
     for (const double rate : {5.0, 20.0, 200.0, 1000.0}) {
-        Stream stream(rate);
+        DeliveredStream stream(rate);
         CHECK_FALSE(stream.delivery.report().ever);
         CHECK(stream.run(1, seconds(10), true) <= milliseconds(1500));
         CHECK(stream.delivery.report().ever);
         CHECK(stream.run(1, seconds(60), false) == seconds(120));
         CHECK(stream.delivery.report().rate_hz == Approx(rate).epsilon(0.01));
     }
-    Stream slow(0.5);
+    DeliveredStream slow(0.5);
     CHECK(slow.run(1, seconds(20), true) <= seconds(8));
     CHECK(slow.run(1, seconds(100), false) == seconds(200));
 }
 
 TEST_CASE("delivery: what is missing shows within two seconds, be it all, half or a sixth") {
     for (const double share : {0.0, 0.5, 0.75, 0.82}) {
-        Stream stream(20);
+        DeliveredStream stream(20);
         stream.run(1, seconds(5), true);
         stream.run(1, seconds(20), false);
         INFO(share);
@@ -57,10 +57,10 @@ TEST_CASE("delivery: what is missing shows within two seconds, be it all, half o
 }
 
 TEST_CASE("delivery: one frame in twenty shows in the end, a lost frame now and then does not") {
-    Stream loses(20);
+    DeliveredStream loses(20);
     loses.run(1, seconds(5), true);
     CHECK(loses.run(0.95, seconds(20), false) <= seconds(10));
-    Stream stream(20);
+    DeliveredStream stream(20);
     stream.run(1, seconds(5), true);
     for (int i = 0; i < 10; ++i) {
         stream.items -= 1;
@@ -69,7 +69,7 @@ TEST_CASE("delivery: one frame in twenty shows in the end, a lost frame now and 
 }
 
 TEST_CASE("delivery: a short stall is forgiven, a long one is over three seconds after its end") {
-    Stream stream(20);
+    DeliveredStream stream(20);
     stream.run(1, seconds(5), true);
     stream.items -= 5;
     CHECK(stream.run(1, seconds(5), false) == seconds(10));
@@ -83,7 +83,7 @@ TEST_CASE("delivery: a short stall is forgiven, a long one is over three seconds
 }
 
 TEST_CASE("delivery: slow starts are no deliveries, and a start anew is proved quickly") {
-    Stream stream(20);
+    DeliveredStream stream(20);
     CHECK(stream.run(0.05, seconds(10), true) == seconds(20));
     stream.run(1, seconds(5), true);
     stream.delivery.begin(stream.now);

@@ -15,7 +15,7 @@ std::string verdict(const std::string& text) {
     return good ? "good" : good.error().what;
 }
 
-std::string with(const std::string& nodes) {
+std::string description_with(const std::string& nodes) {
     return "<RegisterDescription><Category Name=\"Root\"></Category>" + nodes +
            "</RegisterDescription>";
 }
@@ -28,37 +28,40 @@ TEST_CASE("description_check: that of an honest camera is good") {
 }
 
 TEST_CASE("description_check: limits that name each other's values are no loop") {
-    CHECK(verdict(with("<Integer Name=\"Width\"><Value>1</Value><pMax>WidthMax</pMax></Integer>"
-                       "<Integer Name=\"Offset\"><Value>1</Value><pMax>OffsetMax</pMax></Integer>"
-                       "<IntSwissKnife Name=\"WidthMax\"><pVariable Name=\"O\">Offset</pVariable>"
-                       "<Formula>100-O</Formula></IntSwissKnife>"
-                       "<IntSwissKnife Name=\"OffsetMax\"><pVariable Name=\"W\">Width</pVariable>"
-                       "<Formula>100-W</Formula></IntSwissKnife>")) == "good");
+    CHECK(verdict(description_with(
+              "<Integer Name=\"Width\"><Value>1</Value><pMax>WidthMax</pMax></Integer>"
+              "<Integer Name=\"Offset\"><Value>1</Value><pMax>OffsetMax</pMax></Integer>"
+              "<IntSwissKnife Name=\"WidthMax\"><pVariable Name=\"O\">Offset</pVariable>"
+              "<Formula>100-O</Formula></IntSwissKnife>"
+              "<IntSwissKnife Name=\"OffsetMax\"><pVariable Name=\"W\">Width</pVariable>"
+              "<Formula>100-W</Formula></IntSwissKnife>")) == "good");
 }
 
 TEST_CASE("description_check: entries of a selector may depend on what is selected") {
-    CHECK(verdict(with("<Enumeration Name=\"Selector\"><EnumEntry Name=\"A\"><Value>0</Value>"
-                       "<pIsAvailable>Able</pIsAvailable></EnumEntry><Value>0</Value></Enumeration>"
-                       "<IntSwissKnife Name=\"Able\"><pVariable Name=\"S\">Selector</pVariable>"
-                       "<Formula>S=0</Formula></IntSwissKnife>")) == "good");
+    CHECK(verdict(description_with(
+              "<Enumeration Name=\"Selector\"><EnumEntry Name=\"A\"><Value>0</Value>"
+              "<pIsAvailable>Able</pIsAvailable></EnumEntry><Value>0</Value></Enumeration>"
+              "<IntSwissKnife Name=\"Able\"><pVariable Name=\"S\">Selector</pVariable>"
+              "<Formula>S=0</Formula></IntSwissKnife>")) == "good");
 }
 
 TEST_CASE("description_check: values and limits that lead back to themselves are refused") {
     const auto loop = Catch::Contains("leads back to itself");
-    CHECK_THAT(verdict(with("<Integer Name=\"A\"><pValue>A</pValue></Integer>")), loop);
-    CHECK_THAT(verdict(with("<Integer Name=\"A\"><pValue>B</pValue></Integer>"
-                            "<Integer Name=\"B\"><pValue>A</pValue></Integer>")),
+    CHECK_THAT(verdict(description_with("<Integer Name=\"A\"><pValue>A</pValue></Integer>")), loop);
+    CHECK_THAT(verdict(description_with("<Integer Name=\"A\"><pValue>B</pValue></Integer>"
+                                        "<Integer Name=\"B\"><pValue>A</pValue></Integer>")),
                loop);
-    CHECK_THAT(verdict(with("<IntReg Name=\"A\"><Address>0</Address><Length>4</Length>"
-                            "<pAddress>A</pAddress></IntReg>")),
+    CHECK_THAT(verdict(description_with("<IntReg Name=\"A\"><Address>0</Address><Length>4</Length>"
+                                        "<pAddress>A</pAddress></IntReg>")),
                loop);
-    CHECK_THAT(verdict(with("<IntReg Name=\"A\"><Length>4</Length>"
-                            "<pIndex pOffset=\"A\">B</pIndex></IntReg>")),
+    CHECK_THAT(verdict(description_with("<IntReg Name=\"A\"><Length>4</Length>"
+                                        "<pIndex pOffset=\"A\">B</pIndex></IntReg>")),
                loop);
-    CHECK_THAT(verdict(with("<StructReg><Address>0</Address><pAddress>A</pAddress><Length>4"
-                            "</Length><StructEntry Name=\"A\"><Bit>1</Bit></StructEntry>"
-                            "</StructReg>")),
-               loop);
+    CHECK_THAT(
+        verdict(description_with("<StructReg><Address>0</Address><pAddress>A</pAddress><Length>4"
+                                 "</Length><StructEntry Name=\"A\"><Bit>1</Bit></StructEntry>"
+                                 "</StructReg>")),
+        loop);
 }
 
 TEST_CASE("description_check: what takes too long to evaluate is refused") {
@@ -66,15 +69,16 @@ TEST_CASE("description_check: what takes too long to evaluate is refused") {
     for (int i = 0; i < 100; ++i)
         chain += "<Integer Name=\"N" + std::to_string(i) + "\"><pValue>N" + std::to_string(i + 1) +
                  "</pValue></Integer>";
-    CHECK_THAT(verdict(with(chain)), Catch::Contains("nested too deep"));
+    CHECK_THAT(verdict(description_with(chain)), Catch::Contains("nested too deep"));
 }
 
 TEST_CASE("description_check: registers have a bounded length, constant where Aravis reads them") {
     const auto reg = [](const std::string& name, const std::string& length) {
-        return with("<StringReg Name=\"" + name + "\"><Address>0</Address>" + length +
-                    "</StringReg><Integer Name=\"L\"><Value>64</Value></Integer>"
-                    "<IntReg Name=\"V\"><Value>64</Value><Address>4</Address><Length>4</Length>"
-                    "</IntReg>");
+        return description_with(
+            "<StringReg Name=\"" + name + "\"><Address>0</Address>" + length +
+            "</StringReg><Integer Name=\"L\"><Value>64</Value></Integer>"
+            "<IntReg Name=\"V\"><Value>64</Value><Address>4</Address><Length>4</Length>"
+            "</IntReg>");
     };
     CHECK(verdict(reg("A", "<Length>64</Length>")) == "good");
     CHECK(verdict(reg("A", "<pLength>L</pLength>")) == "good");
@@ -85,10 +89,11 @@ TEST_CASE("description_check: registers have a bounded length, constant where Ar
     CHECK(verdict(reg("DeviceVendorName", "<pLength>L</pLength>")) == "good");
     CHECK_THAT(verdict(reg("DeviceVendorName", "<pLength>V</pLength>")),
                Catch::Contains("another register"));
-    CHECK_THAT(verdict(with("<IntReg Name=\"B\"><Length>4</Length><pIndex pOffset=\"C\">D</pIndex>"
-                            "</IntReg><IntReg Name=\"C\"><Address>0</Address><pLength>D</pLength>"
-                            "</IntReg><IntReg Name=\"D\"><Address>4</Address><Length>4</Length>"
-                            "</IntReg>")),
+    CHECK_THAT(verdict(description_with(
+                   "<IntReg Name=\"B\"><Length>4</Length><pIndex pOffset=\"C\">D</pIndex>"
+                   "</IntReg><IntReg Name=\"C\"><Address>0</Address><pLength>D</pLength>"
+                   "</IntReg><IntReg Name=\"D\"><Address>4</Address><Length>4</Length>"
+                   "</IntReg>")),
                Catch::Contains("another register"));
 }
 

@@ -13,32 +13,34 @@ using namespace versavis::daemon;
 
 namespace {
 
-Description honest() {
+Description honest_description() {
     const std::string text = rig::gige_xml(640, 480);
     return {{text.begin(), text.end()}, false};
 }
 
-bool never() { return false; }
+bool never_stop() { return false; }
 
 }  // namespace
 
 TEST_CASE("description_sandbox: a good one is looked at once, also in the next life") {
     const test::TemporaryDirectory directory;
     const std::string daemon = test::program("versavisd");
-    CHECK(DescriptionSandbox(daemon, directory.path()).vet("cam0", honest(), never));
-    CHECK(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", honest(), never));
-    auto other = honest();
+    CHECK(
+        DescriptionSandbox(daemon, directory.path()).vet("cam0", honest_description(), never_stop));
+    CHECK(DescriptionSandbox("/bin/false", directory.path())
+              .vet("cam0", honest_description(), never_stop));
+    auto other = honest_description();
     other.bytes.push_back('\n');
-    CHECK_FALSE(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", other, never));
+    CHECK_FALSE(DescriptionSandbox("/bin/false", directory.path()).vet("cam0", other, never_stop));
 }
 
 TEST_CASE("description_sandbox: why one is refused is reported, and kept for this life only") {
     const test::TemporaryDirectory directory;
-    auto broken = honest();
+    auto broken = honest_description();
     broken.bytes.resize(1000);
     DescriptionSandbox vetting(test::program("versavisd"), directory.path());
     for (int i = 0; i < 2; ++i) {
-        const auto refused = vetting.vet("cam0", broken, never);
+        const auto refused = vetting.vet("cam0", broken, never_stop);
         REQUIRE_FALSE(refused);
         CHECK_THAT(refused.error().message(),
                    Catch::Contains("cam0") && Catch::Contains("cut off"));
@@ -52,13 +54,15 @@ TEST_CASE("description_sandbox: what ends its reader, or keeps it busy, is refus
     const std::string hang = directory.write("hang", "#!/bin/sh\nexec sleep 100\n");
     std::filesystem::permissions(crash, std::filesystem::perms::owner_all);
     std::filesystem::permissions(hang, std::filesystem::perms::owner_all);
-    const auto crashed = DescriptionSandbox(crash, directory.path()).vet("cam0", honest(), never);
+    const auto crashed =
+        DescriptionSandbox(crash, directory.path()).vet("cam0", honest_description(), never_stop);
     REQUIRE_FALSE(crashed);
     CHECK_THAT(crashed.error().message(), Catch::Contains("crashes with signal 11"));
     int asked = 0;
-    const auto stopped = DescriptionSandbox(hang, directory.path()).vet("cam0", honest(), [&] {
-        return ++asked > 3;
-    });
+    const auto stopped =
+        DescriptionSandbox(hang, directory.path()).vet("cam0", honest_description(), [&] {
+            return ++asked > 3;
+        });
     REQUIRE_FALSE(stopped);
     CHECK_THAT(stopped.error().message(), Catch::Contains("stopped"));
 }
@@ -71,7 +75,7 @@ TEST_CASE("description_sandbox: one that is slow is looked at again, some times"
     std::filesystem::permissions(slow, std::filesystem::perms::owner_all);
     DescriptionSandbox vetting(slow, directory.path());
     for (int i = 0; i < 5; ++i) {
-        const auto refused = vetting.vet("cam0", honest(), never);
+        const auto refused = vetting.vet("cam0", honest_description(), never_stop);
         REQUIRE_FALSE(refused);
         CHECK_THAT(refused.error().message(), Catch::Contains("too much CPU time"));
     }

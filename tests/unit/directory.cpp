@@ -70,7 +70,7 @@ TEST_CASE("directory: another service is found by its rings, too, and named") {
 namespace {
 
 /// Descriptors of this process that are open now.
-std::set<int> open_files() {
+std::set<int> open_descriptors() {
     std::set<int> found;
     for (int file = 0; file < 1024; ++file)
         if (::fcntl(file, F_GETFD) >= 0) found.insert(file);
@@ -97,21 +97,21 @@ class NoInput {
 TEST_CASE("directory: the lock is one file, which programs that are started do not get") {
     test::TemporaryDirectory parent("/dev/shm");
     const auto path = parent.path() / "instance";
-    const auto before = open_files();
+    const auto before = open_descriptors();
     {
         auto owner = OwnedDirectory::claim(path);
         REQUIRE(owner);
-        const auto locked = open_files();
+        const auto locked = open_descriptors();
         REQUIRE(locked.size() == before.size() + 1);
         for (const int file : locked)
             if (before.count(file) == 0) CHECK((::fcntl(file, F_GETFD) & FD_CLOEXEC) != 0);
         CHECK_FALSE(OwnedDirectory::claim(path));
-        CHECK(open_files() == locked);
+        CHECK(open_descriptors() == locked);
         const OwnedDirectory moved = std::move(*owner);
-        CHECK(open_files() == locked);
+        CHECK(open_descriptors() == locked);
         CHECK_FALSE(OwnedDirectory::claim(path));
     }
-    CHECK(open_files() == before);
+    CHECK(open_descriptors() == before);
 }
 
 TEST_CASE("directory: a service without standard input locks as well, and lets go") {

@@ -17,8 +17,8 @@ LineDelays opto() {
     return lines;
 }
 
-struct Bench {
-    Bench() { edges.set_line_delays(opto()); }
+struct DifferenceBench {
+    DifferenceBench() { edges.set_line_delays(opto()); }
 
     void frames(int count, Duration surplus, Duration start_delay = microseconds(20)) {
         for (int i = 0; i < count; ++i) edges.learn(surplus, start_delay);
@@ -30,7 +30,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("edge_difference: measured against the camera's account, whatever was taken off") {
-    Bench bench;
+    DifferenceBench bench;
     CHECK(bench.edges.report().frames == 0);
     for (int i = 0; i < 40; ++i) bench.frames(1, microseconds(10 + i % 3));
     const EdgeReport report = bench.edges.report();
@@ -44,7 +44,7 @@ TEST_CASE("edge_difference: measured against the camera's account, whatever was 
 }
 
 TEST_CASE("edge_difference: what honest frames agree on leaves little room for others") {
-    Bench bench;
+    DifferenceBench bench;
     // Three sigma of the delays and of the rounded account.
     CHECK(bench.edges.explains(microseconds(65)));
     CHECK_FALSE(bench.edges.explains(microseconds(72)));
@@ -57,7 +57,7 @@ TEST_CASE("edge_difference: what honest frames agree on leaves little room for o
 }
 
 TEST_CASE("edge_difference: single wrong lengths do not move it, however often they come") {
-    Bench bench;
+    DifferenceBench bench;
     bench.frames(8, microseconds(5));
     for (int i = 0; i < 200; ++i) bench.frames(1, i % 2 == 0 ? microseconds(500) : microseconds(5));
     CHECK(absolute(bench.edges.surplus() - microseconds(5)) <= microseconds(1));
@@ -66,14 +66,14 @@ TEST_CASE("edge_difference: single wrong lengths do not move it, however often t
 }
 
 TEST_CASE("edge_difference: lengths that do not agree with each other are learned by nobody") {
-    Bench bench;
+    DifferenceBench bench;
     for (int i = 0; i < 200; ++i) bench.frames(1, microseconds(300 + i * 37 % 700));
     CHECK(bench.edges.surplus().ns == 0);
     CHECK_FALSE(bench.edges.settled());
 }
 
 TEST_CASE("edge_difference: a slow end is taken off when eight frames agree, and named") {
-    Bench bench;
+    DifferenceBench bench;
     bench.frames(7, microseconds(400));
     CHECK_FALSE(bench.edges.explains(microseconds(400)));
     bench.frames(1, microseconds(400));
@@ -94,19 +94,19 @@ TEST_CASE("edge_difference: a slow end is taken off when eight frames agree, and
 }
 
 TEST_CASE("edge_difference: a start is late by no more than it comes after its trigger") {
-    Bench late;
+    DifferenceBench late;
     late.frames(8, -microseconds(400), microseconds(420));
     CHECK(late.edges.correction().start == microseconds(400));
     CHECK(late.edges.correction().end.ns == 0);
     // A pulse of the camera's own length, which begins with the exposure.
-    Bench other_signal;
+    DifferenceBench other_signal;
     other_signal.frames(50, -microseconds(400), microseconds(20));
     CHECK_FALSE(other_signal.edges.explains(-microseconds(400)));
     CHECK(other_signal.edges.correction().middle().ns == 0);
 }
 
 TEST_CASE("edge_difference: no line is slower than a millisecond") {
-    Bench bench;
+    DifferenceBench bench;
     bench.frames(50, microseconds(1001), milliseconds(2));
     bench.frames(50, -microseconds(1001), milliseconds(2));
     CHECK_FALSE(bench.edges.settled());

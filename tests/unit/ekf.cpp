@@ -15,9 +15,10 @@ namespace {
 
 /// A board whose skew walks at random, by 0.01 ppm per sqrt(s), read at host times that never go
 /// back by much.
-class Board {
+class SimulatedBoard {
  public:
-    Board(double skew_ppm, std::mt19937_64& random) : skew_(skew_ppm * 1e-6), random_(random) {}
+    SimulatedBoard(double skew_ppm, std::mt19937_64& random)
+        : skew_(skew_ppm * 1e-6), random_(random) {}
 
     /// Integer nanoseconds on both sides, far from zero, as in a recording.
     BoardTime at(HostTime host) {
@@ -60,10 +61,10 @@ std::vector<double> errors_us(Duration interval, Draw draw) {
     std::vector<double> errors;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
         std::mt19937_64 random(seed);
-        Board board(std::uniform_real_distribution<>(-30, 30)(random), random);
+        SimulatedBoard board(std::uniform_real_distribution<>(-30, 30)(random), random);
         Ekf filter(EkfStart::fair());
-        HostTime next = Board::start;
-        for (HostTime t = Board::start; t < Board::start + seconds(1800);
+        HostTime next = SimulatedBoard::start;
+        for (HostTime t = SimulatedBoard::start; t < SimulatedBoard::start + seconds(1800);
              t = t + milliseconds(100)) {
             if (t >= next) {
                 const auto [there, back] = draw(t, random);
@@ -72,7 +73,7 @@ std::vector<double> errors_us(Duration interval, Draw draw) {
                 filter.add({t, board.at(received), board.at(answered), answered + back});
                 next = next + interval;
             }
-            if (t < Board::start + seconds(300)) continue;
+            if (t < SimulatedBoard::start + seconds(300)) continue;
             errors.push_back(
                 std::abs(static_cast<double>((filter.translate(board.at(t)).time - t).ns)) * 1e-3);
         }
@@ -104,7 +105,7 @@ Delays usb(HostTime at, std::mt19937_64& random) {
     return {{frame + 20'000}, {poll + 20'000 + late() + (preempted ? 2'000'000 : 0)}};
 }
 
-Exchange exact(std::int64_t host_ns, std::int64_t board_ns) {
+Exchange exact_exchange(std::int64_t host_ns, std::int64_t board_ns) {
     return {{host_ns - 100'000}, {board_ns - 1'000}, {board_ns + 1'000}, {host_ns + 100'000}};
 }
 
@@ -136,11 +137,11 @@ TEST_CASE("ekf: the frames of USB bias it by the mean asymmetry") {
 TEST_CASE("ekf: the gain settles where the published noises put it") {
     Ekf filter(EkfStart::fair());
     CHECK(filter.translate({5}).state == ClockState::init);
-    filter.add(exact(1'000'000'000, 0));
+    filter.add(exact_exchange(1'000'000'000, 0));
     CHECK(filter.translate({0}).time == HostTime{1'000'000'000});
     CHECK(filter.translate({0}).state == ClockState::converging);
     for (std::int64_t i = 1; i <= 1000; ++i)
-        filter.add(exact((1 + i) * 1'000'000'000, i * 1'000'000'000));
+        filter.add(exact_exchange((1 + i) * 1'000'000'000, i * 1'000'000'000));
     CHECK(filter.gain() == Approx(0.0515).margin(0.0005));
     const BoardTime last = filter.last_contact();
     CHECK(filter.translate(last).state == ClockState::locked);
@@ -152,10 +153,10 @@ TEST_CASE("ekf: the gain settles where the published noises put it") {
 TEST_CASE("ekf: from its shipped start values it stays outside its own gate for minutes") {
     Ekf filter;
     std::int64_t s = 0;
-    for (; s < 300; ++s) filter.add(exact((1 + s) * 1'000'000'000, s * 1'000'000'000));
+    for (; s < 300; ++s) filter.add(exact_exchange((1 + s) * 1'000'000'000, s * 1'000'000'000));
     CHECK(filter.gated() == 299);
     CHECK(filter.translate(filter.last_contact()).state == ClockState::converging);
-    for (; s < 1200; ++s) filter.add(exact((1 + s) * 1'000'000'000, s * 1'000'000'000));
+    for (; s < 1200; ++s) filter.add(exact_exchange((1 + s) * 1'000'000'000, s * 1'000'000'000));
     CHECK(filter.gated() == Approx(333).margin(2));
     CHECK(filter.translate(filter.last_contact()).state == ClockState::locked);
     CHECK(absolute(filter.last_residual()) < milliseconds(1));
@@ -164,8 +165,9 @@ TEST_CASE("ekf: from its shipped start values it stays outside its own gate for 
 TEST_CASE("ekf: a step beyond the gate locks it out for ever") {
     Ekf filter(EkfStart::fair());
     std::int64_t s = 0;
-    for (; s < 100; ++s) filter.add(exact(s * 1'000'000'000, s * 1'000'000'000));
-    for (; s < 400; ++s) filter.add(exact(s * 1'000'000'000 + 600'000'000, s * 1'000'000'000));
+    for (; s < 100; ++s) filter.add(exact_exchange(s * 1'000'000'000, s * 1'000'000'000));
+    for (; s < 400; ++s)
+        filter.add(exact_exchange(s * 1'000'000'000 + 600'000'000, s * 1'000'000'000));
     CHECK(filter.gated() == 300);
     CHECK(filter.translate(filter.last_contact()).state == ClockState::converging);
 }

@@ -14,9 +14,9 @@ namespace {
 
 /// A board whose clock is off by a constant skew, behind a link of random delays; all in exact
 /// virtual time.
-class Link {
+class SimulatedLink {
  public:
-    Link(double skew_ppm, std::uint64_t seed) : skew_ppm_(skew_ppm), random_(seed) {}
+    SimulatedLink(double skew_ppm, std::uint64_t seed) : skew_ppm_(skew_ppm), random_(seed) {}
 
     BoardTime board(HostTime host) const {
         return {offset_ + host.ns + std::llround(static_cast<double>(host.ns) * skew_ppm_ * 1e-6)};
@@ -43,7 +43,7 @@ class Link {
     std::mt19937_64 random_;
 };
 
-double error_ns(const EnvelopeFilter& filter, const Link& link, HostTime host) {
+double error_ns(const EnvelopeFilter& filter, const SimulatedLink& link, HostTime host) {
     return static_cast<double>((filter.translate(link.board(host)).time - host).ns);
 }
 
@@ -53,7 +53,7 @@ TEST_CASE("envelope_filter: nothing is known before the first exchange, and boun
     EnvelopeFilter filter;
     CHECK_FALSE(filter.initialised());
     CHECK(filter.translate({5}).state == ClockState::init);
-    Link link(30, 1);
+    SimulatedLink link(30, 1);
     const Exchange exchange = link.exchange(HostTime{1'000'000'000});
     filter.add(exchange);
     CHECK(filter.initialised());
@@ -68,7 +68,7 @@ TEST_CASE("envelope_filter: nothing is known before the first exchange, and boun
 
 TEST_CASE("envelope_filter: a first exchange that lies is not believed when the next contradicts") {
     EnvelopeFilter filter;
-    Link link(30, 1);
+    SimulatedLink link(30, 1);
     Exchange lie = link.exchange(HostTime{1'000'000'000});
     const Duration shift = GENERATE(milliseconds(5), -milliseconds(5));
     lie.received = lie.received + shift;
@@ -85,7 +85,7 @@ TEST_CASE("envelope_filter: follows skewed clocks through delays with heavy tail
     const double skew = GENERATE(-100.0, 0.0, 40.0);
     const std::uint64_t seed = GENERATE(1U, 2U, 3U);
     EnvelopeFilter filter;
-    Link link(skew, seed);
+    SimulatedLink link(skew, seed);
     std::vector<double> errors;
     for (HostTime t{1'000'000'000}; t.ns < 120'000'000'000; t = t + milliseconds(100)) {
         filter.add(link.exchange(t));
@@ -102,7 +102,7 @@ TEST_CASE("envelope_filter: follows skewed clocks through delays with heavy tail
 
 TEST_CASE("envelope_filter: sigma grows without contact, and says so") {
     EnvelopeFilter filter;
-    Link link(20, 4);
+    SimulatedLink link(20, 4);
     for (HostTime t{0}; t.ns < 20'000'000'000; t = t + milliseconds(100))
         filter.add(link.exchange(t));
     const BoardTime last = filter.last_contact();
@@ -118,7 +118,7 @@ TEST_CASE("envelope_filter: sigma grows without contact, and says so") {
 
 TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {
     EnvelopeFilter filter;
-    Link link(20, 5);
+    SimulatedLink link(20, 5);
     HostTime t{0};
     for (; t.ns < 30'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
     link.jump(GENERATE(milliseconds(3), -milliseconds(700)));
@@ -130,11 +130,11 @@ TEST_CASE("envelope_filter: a step of the board's clock does not lock it out") {
 
 TEST_CASE("envelope_filter: exchanges at once that contradict it count as one") {
     EnvelopeFilter filter;
-    Link link(20, 5);
+    SimulatedLink link(20, 5);
     HostTime t{0};
     for (; t.ns < 30'000'000'000; t = t + milliseconds(100)) filter.add(link.exchange(t));
     const std::uint64_t before = filter.comparisons();
-    Link liar = link;
+    SimulatedLink liar = link;
     liar.jump(milliseconds(18));
     for (int i = 0; i < 4; ++i) filter.add(liar.exchange(t + milliseconds(i)));
     CHECK(filter.restarts() == 0);
@@ -166,7 +166,7 @@ TEST_CASE("envelope_filter: a slow link locks, too, with a bound that owns up to
 TEST_CASE("envelope_filter: whoever begins an exchange, it says the same") {
     EnvelopeFilter host_began;
     EnvelopeFilter board_began;
-    Link link(20, 6);
+    SimulatedLink link(20, 6);
     for (HostTime t{1'000'000'000}; t.ns < 20'000'000'000; t = t + milliseconds(100)) {
         const Exchange exchange = link.exchange(t);
         host_began.add(exchange);
@@ -185,7 +185,7 @@ TEST_CASE("envelope_filter: one-way messages alone say nothing, with exchanges t
 
     EnvelopeFilter exchanges;
     EnvelopeFilter both;
-    Link link(20, 7);
+    SimulatedLink link(20, 7);
     for (HostTime t{1'000'000'000}; t.ns < 60'000'000'000; t = t + milliseconds(5)) {
         both.add(OneWay{link.board(t), t + link.delay()});
         if (t.ns % 1'000'000'000 != 0) continue;
@@ -202,7 +202,7 @@ TEST_CASE("envelope_filter: one-way messages alone say nothing, with exchanges t
 TEST_CASE("envelope_filter: stamps that count from 1970 are as good as others") {
     constexpr Duration epoch{1'800'000'000'000'000'000};
     EnvelopeFilter filter;
-    Link link(20, 9);
+    SimulatedLink link(20, 9);
     for (HostTime t{1'000'000'000}; t.ns < 20'000'000'000; t = t + milliseconds(100)) {
         const Exchange exchange = link.exchange(t);
         filter.add(Exchange{exchange.sent + epoch, exchange.received, exchange.answered,
@@ -225,17 +225,17 @@ TEST_CASE("envelope_filter: absurd stamps are left out") {
                     const HostEstimate estimate = filter.translate({d});
                     REQUIRE(std::min(estimate.sigma, estimate.bound) >= Duration{});
                 }
-    Link link(0, 8);
+    SimulatedLink link(0, 8);
     for (HostTime t{1'000'000'000}; t.ns < 10'000'000'000; t = t + milliseconds(100))
         filter.add(link.exchange(t));
     CHECK(std::abs(error_ns(filter, link, HostTime{10'000'000'000})) < 100e3);
 }
 
 TEST_CASE("envelope_filter: a message from years ahead is not explained by the error of years") {
-    const Link link(20, 1);
+    const SimulatedLink link(20, 1);
     EnvelopeFilter filter;
     const auto host = [](int i) { return HostTime{} + milliseconds(1000 + i); };
-    for (int i = 0; i < 4; ++i) filter.add(Link(20, 1).exchange(host(i)));
+    for (int i = 0; i < 4; ++i) filter.add(SimulatedLink(20, 1).exchange(host(i)));
     const Duration ahead{std::int64_t{1} << GENERATE(30, 40, 53, 58)};
     filter.add(OneWay{link.board(host(5)) + ahead, host(5) + microseconds(60)});
     CHECK(filter.one_way_messages() == 0);
@@ -262,4 +262,25 @@ TEST_CASE("envelope_filter: a measured asymmetry takes the place of the presumed
     filter.set_asymmetry(Asymmetry{microseconds(3), microseconds(1)});
     CHECK(filter.presumed_asymmetry() == Duration{});
     CHECK(filter.translate({at.ns}).time == before + presumed - microseconds(3));
+}
+
+TEST_CASE("envelope_filter: exchanges against streams that go on must last longer than the truth") {
+    EnvelopeFilter filter;
+    SimulatedLink link(30, 5);
+    HostTime now{1'000'000'000};
+    const int agreed = GENERATE(60, 300, 2000);
+    for (int i = 0; i < agreed; ++i) filter.add(link.exchange(now = now + milliseconds(100)));
+    const std::uint64_t before = filter.restarts();
+    link.jump(GENERATE(milliseconds(5), -milliseconds(5)));
+    const bool witnessed = GENERATE(true, false);
+    int contradicting = 0;
+    while (filter.restarts() == before && contradicting < 5000) {
+        if (witnessed) filter.clock_continues();
+        filter.add(link.exchange(now = now + milliseconds(100)));
+        ++contradicting;
+    }
+    // Some fit by chance: a fiftieth of all delays is longer than the step.
+    const int lasting = std::clamp(2 * agreed, 30, 1200);
+    CHECK(contradicting >= (witnessed ? lasting - 20 : 3));
+    CHECK(contradicting <= (witnessed ? 2 * lasting : 5));
 }

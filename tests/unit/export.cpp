@@ -12,16 +12,17 @@
 
 using namespace versavis;
 using namespace versavis::client;
+using test::content_of;
 
 namespace fs = std::filesystem;
 
 namespace {
 
-struct Sample {
+struct ExportSample {
     test::TemporaryDirectory directory;
     ExportSettings settings;
 
-    Sample() {
+    ExportSample() {
         settings.recording = directory.path() / "a.mcap";
         settings.directory = directory.path() / "out";
         std::ofstream(settings.recording, std::ios::binary)
@@ -45,7 +46,7 @@ std::uint64_t left_out(const ExportReport& report, SkipReason reason) {
 }  // namespace
 
 TEST_CASE("export: suspect frames, incomplete sets and repeated samples are left out and listed") {
-    Sample sample;
+    ExportSample sample;
     const auto report = export_recording(sample.settings);
     REQUIRE(report);
     CHECK(left_out(*report, SkipReason::suspect) == 1);
@@ -60,7 +61,7 @@ TEST_CASE("export: suspect frames, incomplete sets and repeated samples are left
 }
 
 TEST_CASE("export: what was asked for is in") {
-    Sample sample;
+    ExportSample sample;
     sample.settings.choice.include_suspect = true;
     sample.settings.choice.keep_repeated = true;
     sample.settings.choice.streams = {"cam0", "imu0"};
@@ -73,7 +74,7 @@ TEST_CASE("export: what was asked for is in") {
 }
 
 TEST_CASE("export: a directory that is not empty is left alone, an empty one is filled") {
-    Sample sample;
+    ExportSample sample;
     fs::create_directories(sample.settings.directory);
     std::ofstream(sample.settings.directory + "/mine") << "mine";
     const auto refused = export_recording(sample.settings);
@@ -89,7 +90,7 @@ TEST_CASE("export: a directory that is not empty is left alone, an empty one is 
 }
 
 TEST_CASE("export: stopped, or with something wrong, it leaves nothing behind") {
-    Sample sample;
+    ExportSample sample;
     sample.settings.kind = GENERATE(ExportKind::euroc, ExportKind::bag, ExportKind::csv);
     int calls = 0;
     SECTION("stopped") {
@@ -104,7 +105,7 @@ TEST_CASE("export: stopped, or with something wrong, it leaves nothing behind") 
 }
 
 TEST_CASE("export: a calibration that is another camera's is not used, and reported") {
-    Sample sample;
+    ExportSample sample;
     sample.settings.camchain = sample.directory.write(
         "chain.yaml",
         "cam0: {camera_model: pinhole, intrinsics: [1.0, 1.0, 1.0, 1.0], distortion_model: none, "
@@ -127,20 +128,15 @@ constexpr auto two_cameras =
     "distortion_model: none, resolution: [61, 9], rostopic: /cam1/image_raw, T_cn_cnm1: "
     "[[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]]}\n";
 
-std::string content(const fs::path& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 TEST_CASE("export: the camchain follows the order of the cameras") {
-    Sample sample;
+    ExportSample sample;
     sample.settings.camchain = sample.directory.write("chain.yaml", two_cameras);
     sample.settings.choice.streams = {"cam1", "cam0", "imu0"};
     sample.settings.kind = GENERATE(ExportKind::euroc, ExportKind::bag);
     REQUIRE(export_recording(sample.settings));
-    const auto text = content(sample.settings.directory + "/camchain.yaml");
+    const auto text = content_of(sample.settings.directory + "/camchain.yaml");
     const auto chain = parse_camchain(text, "camchain.yaml");
     REQUIRE(chain);
     REQUIRE(chain->size() == 2);
@@ -156,7 +152,7 @@ TEST_CASE("export: the camchain follows the order of the cameras") {
 
 TEST_CASE(
     "export: cameras that the camchain leaves out are reported, and one camera of it is enough") {
-    Sample sample;
+    ExportSample sample;
     std::string text = two_cameras;
     SECTION("the first is not known: there is no chain") {
         text.replace(text.find("61"), 2, "62");
@@ -173,20 +169,20 @@ TEST_CASE(
         const auto report = export_recording(sample.settings);
         REQUIRE(report);
         CHECK(to_text(*report, false).find("cam1 is not in camchain.yaml") != std::string::npos);
-        const auto written = content(sample.settings.directory + "/camchain.yaml");
+        const auto written = content_of(sample.settings.directory + "/camchain.yaml");
         CHECK(parse_camchain(written, "camchain.yaml")->size() == 1);
     }
     SECTION("one of two") {
         sample.settings.camchain = sample.directory.write("chain.yaml", text);
         sample.settings.choice.streams = {"cam1"};
         REQUIRE(export_recording(sample.settings));
-        const auto written = content(sample.settings.directory + "/camchain.yaml");
+        const auto written = content_of(sample.settings.directory + "/camchain.yaml");
         CHECK(parse_camchain(written, "camchain.yaml")->at(0).intrinsics[0] == 2);
     }
 }
 
 TEST_CASE("export: an exposure that is not known has no row, and that is reported") {
-    Sample sample;
+    ExportSample sample;
     test::RecordingFile file;
     for (std::uint64_t i = 0; i < 3; ++i) {
         FrameMetadata frame{};
@@ -213,7 +209,7 @@ TEST_CASE("export: an exposure that is not known has no row, and that is reporte
 }
 
 TEST_CASE("export: a mosaic of 16 bits is written, with a warning that Kalibr does not take it") {
-    Sample sample;
+    ExportSample sample;
     constexpr std::uint32_t bayer_rg12 = 0x01100011;
     std::ofstream(sample.settings.recording, std::ios::binary)
         << test::sample_recording(1, false, false, bayer_rg12);
@@ -225,7 +221,7 @@ TEST_CASE("export: a mosaic of 16 bits is written, with a warning that Kalibr do
 }
 
 TEST_CASE("export: a status that is nested without end is left out of its line") {
-    Sample sample;
+    ExportSample sample;
     const std::string deep = std::string(300'000, '[') + std::string(300'000, ']');
     const auto* bytes = reinterpret_cast<const std::byte*>(deep.data());
     test::RecordingFile file;
@@ -233,6 +229,6 @@ TEST_CASE("export: a status that is nested without end is left out of its line")
     sample.settings.recording = sample.directory.write("b.mcap", file.finish());
     sample.settings.kind = ExportKind::csv;
     REQUIRE(export_recording(sample.settings));
-    CHECK(content(sample.settings.directory + "/status.jsonl").find("\"status\":null") !=
+    CHECK(content_of(sample.settings.directory + "/status.jsonl").find("\"status\":null") !=
           std::string::npos);
 }

@@ -8,24 +8,26 @@ using namespace versavis::daemon;
 
 namespace {
 
-constexpr HostTime begin{100'000'000'000};
-constexpr Duration period = milliseconds(50);
+constexpr HostTime first_exposure{100'000'000'000};
+constexpr Duration exposure_period = milliseconds(50);
 
-CameraConfiguration camera(bool check = true) {
+CameraConfiguration checked_camera(bool check = true) {
     CameraConfiguration configuration;
     configuration.rate_hz = 20;
     configuration.check_exposure = check;
     return configuration;
 }
 
-struct Bench {
-    explicit Bench(bool checks = true) : check(camera(checks)) { check.set_line_delays({}); }
+struct ExposureBench {
+    explicit ExposureBench(bool checks = true) : check(checked_camera(checks)) {
+        check.set_line_delays({});
+    }
 
     /// The next frame, of an exposure that measures `length`; `chunk`: by its own data.
     ExposureVerdict frame(Duration length, Duration chunk = {}) {
         pairing::Exposure exposure;
         exposure.end = exposure.start + length;
-        exposure.earliest_on_host = now = now + period;
+        exposure.earliest_on_host = now = now + exposure_period;
         pairing::Arrival arrival;
         arrival.block_id = ++block_id;
         return check.judge(
@@ -36,12 +38,16 @@ struct Bench {
 
     /// The same, of one that no line shows.
     Duration unseen(Duration chunk, Duration event) {
+        const ExposureVerdict verdict = unseen_verdict(chunk, event);
+        return verdict.confirmed ? verdict.length : Duration{};
+    }
+    ExposureVerdict unseen_verdict(Duration chunk, Duration event) {
         pairing::Exposure exposure;
         exposure.kind = StampKind::trigger_edge;
-        exposure.earliest_on_host = now = now + period;
+        exposure.earliest_on_host = now = now + exposure_period;
         pairing::Arrival arrival;
         arrival.block_id = ++block_id;
-        return check.judge(arrival, {chunk, event}, exposure, {}).length;
+        return check.judge(arrival, {chunk, event}, exposure, {});
     }
 
     bool contradicts(Duration length, Duration chunk = {}) {
@@ -54,14 +60,14 @@ struct Bench {
 
     ExposureCheck check;
     ExposureSource source = ExposureSource::chunk;  ///< of what `chunk` says
-    HostTime now = begin;
+    HostTime now = first_exposure;
     std::uint64_t block_id = 0;
 };
 
 }  // namespace
 
 TEST_CASE("exposure_check: a length is held to what is known of the line, whatever it lasts") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure(milliseconds(19), {});
     CHECK_FALSE(bench.contradicts(microseconds(19060)));
     CHECK(bench.contradicts(microseconds(19200)));
@@ -75,7 +81,7 @@ TEST_CASE("exposure_check: a length is held to what is known of the line, whatev
 }
 
 TEST_CASE("exposure_check: while a setting settles, both lengths pass, and sigma says so") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure(milliseconds(2), {});
     for (int i = 0; i < 40; ++i) bench.frame(milliseconds(2));
     CHECK(bench.check.reported_at(bench.now) == milliseconds(2));
@@ -94,7 +100,7 @@ TEST_CASE("exposure_check: while a setting settles, both lengths pass, and sigma
 }
 
 TEST_CASE("exposure_check: a frame's own data are tight at once, after any change") {
-    Bench bench;
+    ExposureBench bench;
     for (int i = 0; i < 200; ++i) {
         const Duration length = microseconds(2000 + i * 377 % 5000);
         CHECK_FALSE(bench.contradicts(length + microseconds(i % 3), length));
@@ -106,7 +112,7 @@ TEST_CASE("exposure_check: a frame's own data are tight at once, after any chang
 }
 
 TEST_CASE("exposure_check: the camera's events are as good as data of the frame") {
-    Bench bench;
+    ExposureBench bench;
     bench.source = ExposureSource::event;
     for (int i = 0; i < 100; ++i)
         CHECK_FALSE(bench.contradicts(microseconds(2000 + i * 10), microseconds(2000 + i * 10)));
@@ -117,7 +123,7 @@ TEST_CASE("exposure_check: the camera's events are as good as data of the frame"
 
 TEST_CASE(
     "exposure_check: without a line, events show the length if the camera agrees with itself") {
-    Bench bench;
+    ExposureBench bench;
     CHECK(bench.unseen({}, milliseconds(3)).ns == 0);  // nothing else is known
     CHECK(bench.unseen(milliseconds(3), {}).ns == 0);  // it may be of the frame before
     CHECK(bench.unseen(milliseconds(3), microseconds(3050)) == microseconds(3050));
@@ -143,13 +149,31 @@ TEST_CASE(
     CHECK(bench.check.wants_readings());  // there is nothing better against events
 }
 
+TEST_CASE("exposure_check: without a line, one account of the camera is stated, not confirmed") {
+    ExposureBench bench;
+    const auto stated = [&](Duration chunk, Duration event) {
+        const ExposureVerdict verdict = bench.unseen_verdict(chunk, event);
+        CHECK_FALSE(verdict.confirmed);
+        return verdict.length;
+    };
+    CHECK(stated({}, {}).ns == 0);
+    CHECK(stated({}, milliseconds(3)) == milliseconds(3));
+    CHECK(stated(milliseconds(4), {}) == milliseconds(4));
+    bench.check.set_camera_exposure(milliseconds(2), {});
+    CHECK(stated({}, {}) == milliseconds(2));
+    CHECK(stated({}, milliseconds(3)) == milliseconds(2));
+    CHECK(stated(milliseconds(4), {}) == milliseconds(4));
+    bench.check.set_camera_exposure(milliseconds(6), bench.now);  // not yet of each frame
+    CHECK(stated({}, {}) == milliseconds(4));
+}
+
 TEST_CASE("exposure_check: without a line, nothing is believed where checks are switched off") {
-    Bench bench(false);
+    ExposureBench bench(false);
     CHECK(bench.unseen(milliseconds(3), milliseconds(3)).ns == 0);
 }
 
 TEST_CASE("exposure_check: every second or third end that is late is withheld, and no other") {
-    Bench bench;
+    ExposureBench bench;
     const int every = GENERATE(2, 3);
     int withheld = 0;
     for (int i = 0; i < 300; ++i) {
@@ -165,7 +189,7 @@ TEST_CASE("exposure_check: every second or third end that is late is withheld, a
 }
 
 TEST_CASE("exposure_check: a slow falling edge costs eight frames, and is then taken off") {
-    Bench bench;
+    ExposureBench bench;
     for (int i = 0; i < 40; ++i) {
         const Duration exposure = microseconds(3000 + i * 100);
         const ExposureVerdict verdict = bench.frame(exposure + microseconds(400), exposure);
@@ -180,7 +204,7 @@ TEST_CASE("exposure_check: a slow falling edge costs eight frames, and is then t
 }
 
 TEST_CASE("exposure_check: before the line is known, no account is good enough for pairing") {
-    Bench bench;
+    ExposureBench bench;
     CHECK(bench.check.for_pairing(milliseconds(3)).ns == 0);
     for (int i = 0; i < 8; ++i) bench.frame(milliseconds(3), milliseconds(3));
     CHECK(bench.check.for_pairing(milliseconds(3)) == milliseconds(3));
@@ -188,7 +212,7 @@ TEST_CASE("exposure_check: before the line is known, no account is good enough f
 }
 
 TEST_CASE("exposure_check: chunks of the frame before are found out, and used as such") {
-    Bench bench;
+    ExposureBench bench;
     Duration before = milliseconds(3);
     int withheld = 0;
     for (int i = 0; i < 60; ++i) {
@@ -209,7 +233,7 @@ TEST_CASE("exposure_check: chunks of the frame before are found out, and used as
 }
 
 TEST_CASE("exposure_check: what readings cannot confirm is in sigma") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure({}, {});
     CHECK(bench.check.wants_readings());
     CHECK(bench.sigma(milliseconds(3)) >= microseconds(90));
@@ -237,7 +261,7 @@ TEST_CASE("exposure_check: what readings cannot confirm is in sigma") {
 }
 
 TEST_CASE("exposure_check: readings show a slow edge, but only of an exposure that keeps still") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure({}, {});
     for (int i = 0; i < 40; ++i) {
         const Duration exposure = microseconds(3000 + i * 50);
@@ -254,7 +278,7 @@ TEST_CASE("exposure_check: readings show a slow edge, but only of an exposure th
 }
 
 TEST_CASE("exposure_check: an exposure that somebody changes is read, and no slow edge") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure(milliseconds(2), {});
     for (int i = 0; i < 20; ++i) bench.frame(milliseconds(2));
     CHECK_FALSE(bench.check.wants_readings());
@@ -271,7 +295,7 @@ TEST_CASE("exposure_check: an exposure that somebody changes is read, and no slo
 
 TEST_CASE(
     "exposure_check: a slow edge of a fixed exposure is learned by readings that confirm it") {
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure(milliseconds(2), {});
     for (int i = 0; i < 20; ++i) CHECK(bench.contradicts(microseconds(2400)));
     for (int i = 0; i < 8; ++i) {
@@ -283,15 +307,15 @@ TEST_CASE(
 }
 
 TEST_CASE("exposure_check: where nothing is checked, sigma has room for the slowest edge") {
-    Bench ignorant;
+    ExposureBench ignorant;
     CHECK(ignorant.sigma(milliseconds(9)) == microseconds(100));
     CHECK(ignorant.sigma(milliseconds(9)) == microseconds(100));
     CHECK(ignorant.sigma(milliseconds(19)) > milliseconds(5));
-    Bench unwanted(false);
+    ExposureBench unwanted(false);
     unwanted.check.set_camera_exposure(milliseconds(2), {});
     CHECK_FALSE(unwanted.contradicts(milliseconds(9)));
     CHECK(unwanted.sigma(milliseconds(9)) == microseconds(100));
-    Bench bench;
+    ExposureBench bench;
     bench.check.set_camera_exposure(milliseconds(2), {});
     pairing::Exposure predicted;
     predicted.end = predicted.start + milliseconds(9);

@@ -12,7 +12,7 @@ constexpr std::int64_t trigger_ns = 5'000'000'000;
 constexpr std::int64_t start_ns = trigger_ns + 30'000;
 constexpr std::int64_t end_ns = start_ns + 4'000'000;
 
-CameraConfiguration camera() {
+CameraConfiguration completed_camera() {
     CameraConfiguration configuration;
     configuration.latency_us = 25;
     configuration.exposure_us = 3000;
@@ -34,7 +34,7 @@ wire::Exposure record(std::int64_t start, std::int64_t end, std::uint16_t flags 
 }  // namespace
 
 TEST_CASE("exposure_completion: both edges of the camera's own line are a measurement") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     const auto exposure = completion.complete(record(start_ns, end_ns));
     CHECK(exposure.kind == StampKind::measured_middle);
     CHECK(exposure.trigger == 7);
@@ -45,7 +45,7 @@ TEST_CASE("exposure_completion: both edges of the camera's own line are a measur
 }
 
 TEST_CASE("exposure_completion: an end that was not seen lies between start and arrival") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     const auto exposure = completion.complete(record(start_ns, wire::no_time));
     CHECK(exposure.kind == StampKind::predicted_middle);
     CHECK(exposure.end - exposure.start == milliseconds(20));
@@ -54,7 +54,7 @@ TEST_CASE("exposure_completion: an end that was not seen lies between start and 
 }
 
 TEST_CASE("exposure_completion: without any edge the trigger, its latency and history are left") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     const auto first = completion.complete(record(wire::no_time, wire::no_time));
     CHECK(first.kind == StampKind::trigger_edge);
     CHECK_FALSE(first.exposed);
@@ -67,7 +67,7 @@ TEST_CASE("exposure_completion: without any edge the trigger, its latency and hi
 
 TEST_CASE("exposure_completion: edges of another line are not this camera's measurement") {
     for (const std::uint16_t flag : {wire::exposure_predicted, wire::exposure_from_master}) {
-        ExposureCompletion completion(camera());
+        ExposureCompletion completion(completed_camera());
         const auto made = record(start_ns, end_ns, flag);
         CHECK(measured(made));
         const auto exposure = completion.complete(made);
@@ -77,7 +77,7 @@ TEST_CASE("exposure_completion: edges of another line are not this camera's meas
 }
 
 TEST_CASE("exposure_completion: no frame arrives before the end, if the end is known") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     const HostTime middle{100'000'000'000};
     const auto whole = record(start_ns, end_ns);
     auto exposure = completion.complete(whole);
@@ -92,7 +92,7 @@ TEST_CASE("exposure_completion: no frame arrives before the end, if the end is k
 }
 
 TEST_CASE("exposure_completion: the delays of the lines are taken off start, end and middle") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     LineDelays lines;
     lines.trigger = {microseconds(18), microseconds(4)};
     lines.start = {microseconds(36), microseconds(9)};
@@ -114,7 +114,7 @@ TEST_CASE("exposure_completion: the delays of the lines are taken off start, end
 }
 
 TEST_CASE("exposure_completion: without a line of its own, an exposure begins a latency later") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     LineDelays lines;
     lines.trigger.delay = microseconds(18);
     lines.start.delay = lines.end.delay = microseconds(36);
@@ -130,7 +130,7 @@ TEST_CASE("exposure_completion: without a line of its own, an exposure begins a 
 }
 
 TEST_CASE("exposure_completion: delays longer than the exposure leave its middle") {
-    ExposureCompletion completion(camera());
+    ExposureCompletion completion(completed_camera());
     LineDelays lines;
     lines.end.delay = microseconds(60);
     completion.set_line_delays(lines);

@@ -4,14 +4,15 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "nanoseconds.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
 
-constexpr Nanoseconds ms = 1'000'000;
-
-constexpr std::uint16_t measured = wire::exposure_measured;
+constexpr std::uint16_t measured_flag = wire::exposure_measured;
 constexpr std::uint16_t no_start = wire::exposure_no_start;
 constexpr std::uint16_t no_end = wire::exposure_no_end;
 constexpr std::uint16_t predicted = wire::exposure_predicted;
@@ -23,7 +24,7 @@ struct Stray {
     bool operator==(const Stray& other) const { return at == other.at && level == other.level; }
 };
 
-struct Reports final : ChannelReports {
+struct TrackerReports final : ChannelReports {
     std::vector<wire::Exposure> exposures;
     std::vector<Stray> strays;
     void exposure(const wire::Exposure& record) override { exposures.push_back(record); }
@@ -49,9 +50,9 @@ using Strays = std::vector<Stray>;
 
 /// A tracker that waits for triggers at 100, 150, ... ms, on grid points 11, 12, ..., of exposures
 /// of 4 ms, for up to 50 ms, and is patient with exposures of up to a second.
-struct Bench {
-    explicit Bench(unsigned triggers, Nanoseconds latency = 0, std::uint32_t flags = 0,
-                   std::uint32_t rate_uhz = 20'000'000) {
+struct TrackerBench {
+    explicit TrackerBench(unsigned triggers, Nanoseconds latency = 0, std::uint32_t flags = 0,
+                          std::uint32_t rate_uhz = 20'000'000) {
         camera.flags = wire::camera_enabled | flags;
         camera.rate_uhz = rate_uhz;
         camera.latency_ns = static_cast<std::uint32_t>(latency);
@@ -68,14 +69,14 @@ struct Bench {
     }
 
     wire::CameraConfiguration camera{};
-    Reports reports;
+    TrackerReports reports;
     ExposureTracker tracker{3, reports};
 };
 
 }  // namespace
 
 TEST_CASE("exposure_tracker: both edges complete the record of their trigger") {
-    Bench bench(2, ms);
+    TrackerBench bench(2, ms);
     CHECK_FALSE(bench.tracker.empty());
     CHECK(bench.tracker.edge(101 * ms, true).trigger == 0);
     const ExposureTracker::Completed completed = bench.tracker.edge(106 * ms, false);
@@ -83,7 +84,7 @@ TEST_CASE("exposure_tracker: both edges complete the record of their trigger") {
     CHECK(completed.duration == 5 * ms);
     REQUIRE(bench.reports.exposures.size() == 1);
     const wire::Exposure& record = bench.reports.exposures[0];
-    CHECK(record.flags == measured);
+    CHECK(record.flags == measured_flag);
     CHECK(record.trigger == 1);
     CHECK(record.start_ns == 101 * ms);
     CHECK(record.end_ns == 106 * ms);
@@ -95,29 +96,31 @@ TEST_CASE("exposure_tracker: both edges complete the record of their trigger") {
 }
 
 TEST_CASE("exposure_tracker: it takes four triggers that wait for their exposures") {
-    CHECK_FALSE(Bench(3).tracker.full());
-    Bench bench(4);
+    CHECK_FALSE(TrackerBench(3).tracker.full());
+    TrackerBench bench(4);
     CHECK(bench.tracker.full());
     for (Nanoseconds at = 100 * ms; at <= 250 * ms; at += 50 * ms) {
         bench.tracker.edge(at, true);
         bench.tracker.edge(at + 4 * ms, false);
     }
-    CHECK(bench.reports.flags() == Flags{measured, measured, measured, measured});
+    CHECK(bench.reports.flags() ==
+          Flags{measured_flag, measured_flag, measured_flag, measured_flag});
     CHECK(bench.reports.exposures[3].trigger == 4);
 }
 
 TEST_CASE("exposure_tracker: an exposure longer than the period is overlong") {
     for (const Nanoseconds longer : {0, 1}) {
-        Bench bench(1);
+        TrackerBench bench(1);
         bench.tracker.edge(100 * ms, true);
         bench.tracker.edge(150 * ms + longer, false);
         CHECK(bench.reports.flags() ==
-              Flags{longer == 0 ? measured : static_cast<std::uint16_t>(measured | overlong)});
+              Flags{longer == 0 ? measured_flag
+                                : static_cast<std::uint16_t>(measured_flag | overlong)});
     }
-    Bench without_rate(1, 0, 0, 0);
+    TrackerBench without_rate(1, 0, 0, 0);
     without_rate.tracker.edge(100 * ms, true);
     without_rate.tracker.edge(900 * ms, false);
-    CHECK(without_rate.reports.flags() == Flags{measured});
+    CHECK(without_rate.reports.flags() == Flags{measured_flag});
 }
 
 TEST_CASE("exposure_tracker: a start sooner than half the latency belongs to no trigger") {
@@ -126,40 +129,41 @@ TEST_CASE("exposure_tracker: a start sooner than half the latency belongs to no 
         {{0, 0}, {200'000, 0}, {200'002, 100'001}, {10 * ms, 5 * ms}}));
     CAPTURE(latency);
     for (const Nanoseconds early : {0, 1}) {
-        Bench bench(2, latency);
+        TrackerBench bench(2, latency);
         bench.tracker.edge(100 * ms + soonest - early, true);
         CHECK(bench.reports.strays.size() == (early == 0 ? 0 : 1));
         bench.tracker.edge(150 * ms + soonest - early, true);
         bench.tracker.edge(160 * ms, false);
         // The second edge is soon enough for the first trigger.
-        CHECK(bench.reports.flags() == (early == 0 ? Flags{no_end, measured} : Flags{measured}));
+        CHECK(bench.reports.flags() ==
+              (early == 0 ? Flags{no_end, measured_flag} : Flags{measured_flag}));
         CHECK(bench.reports.exposures.back().trigger == (early == 0 ? 2 : 1));
     }
 }
 
 TEST_CASE(
     "exposure_tracker: a start belongs to the newest trigger, the camera ignored the others") {
-    Bench bench(4);
+    TrackerBench bench(4);
     bench.tracker.edge(199 * ms, true);
     bench.tracker.edge(203 * ms, false);
-    CHECK(bench.reports.flags() == Flags{no_start, measured});
+    CHECK(bench.reports.flags() == Flags{no_start, measured_flag});
     CHECK(bench.reports.exposures[1].trigger == 2);
     bench.tracker.edge(250 * ms, true);
-    CHECK(bench.reports.flags() == Flags{no_start, measured, no_start});
+    CHECK(bench.reports.flags() == Flags{no_start, measured_flag, no_start});
     CHECK(bench.reports.exposures[2].start_ns == wire::no_time);
     CHECK(bench.tracker.edge(254 * ms, false).trigger == 4);
 }
 
 TEST_CASE("exposure_tracker: a new start ends the wait for an end that was missed") {
-    Bench bench(2);
+    TrackerBench bench(2);
     bench.tracker.edge(100 * ms, true);
     bench.tracker.edge(150 * ms, true);
     CHECK(bench.tracker.edge(154 * ms, false).duration == 4 * ms);
-    CHECK(bench.reports.flags() == Flags{no_end, measured});
+    CHECK(bench.reports.flags() == Flags{no_end, measured_flag});
 }
 
 TEST_CASE("exposure_tracker: a second start of one trigger ends it, and belongs to none") {
-    Bench bench(2);
+    TrackerBench bench(2);
     bench.tracker.edge(100 * ms, true);
     bench.tracker.edge(110 * ms, true);
     bench.tracker.edge(112 * ms, false);
@@ -170,7 +174,7 @@ TEST_CASE("exposure_tracker: a second start of one trigger ends it, and belongs 
 }
 
 TEST_CASE("exposure_tracker: edges without a trigger are reported, and complete nothing") {
-    Bench bench(1);
+    TrackerBench bench(1);
     CHECK(bench.tracker.edge(99 * ms, true).trigger == 0);
     CHECK(bench.tracker.edge(101 * ms, false).trigger == 0);
     bench.tracker.edge(102 * ms, true);
@@ -179,11 +183,11 @@ TEST_CASE("exposure_tracker: edges without a trigger are reported, and complete 
     CHECK(bench.tracker.edge(108 * ms, true).trigger == 0);
     CHECK(bench.reports.strays ==
           Strays{{99 * ms, 1}, {101 * ms, 0}, {107 * ms, 0}, {108 * ms, 1}});
-    CHECK(bench.reports.flags() == Flags{measured});
+    CHECK(bench.reports.flags() == Flags{measured_flag});
 }
 
 TEST_CASE("exposure_tracker: after lost edges no end is taken for that of a start seen before") {
-    Bench bench(2);
+    TrackerBench bench(2);
     bench.tracker.edge(100 * ms, true);
     bench.tracker.edges_lost();
     bench.tracker.edge(149 * ms, false);
@@ -201,7 +205,7 @@ TEST_CASE("exposure_tracker: after lost edges no end is taken for that of a star
 
 TEST_CASE("exposure_tracker: what does not come in time is given up, at an edge as well") {
     const bool by_edge = GENERATE(false, true);
-    Bench bench(1, ms);
+    TrackerBench bench(1, ms);
     const auto pass = [&](Nanoseconds at) {
         if (by_edge)
             bench.tracker.edge(at, false);
@@ -215,7 +219,7 @@ TEST_CASE("exposure_tracker: what does not come in time is given up, at an edge 
     CHECK(bench.reports.flags() == Flags{no_start});
     CHECK(bench.tracker.busy_until(152 * ms) < 0);
 
-    Bench begun(2);
+    TrackerBench begun(2);
     begun.tracker.edge(110 * ms, true);
     CHECK(begun.tracker.next_deadline() == 1110 * ms);
     begun.tracker.expire(1110 * ms - 1);
@@ -227,7 +231,7 @@ TEST_CASE("exposure_tracker: what does not come in time is given up, at an edge 
 }
 
 TEST_CASE("exposure_tracker: without an exposure line the record follows from the trigger") {
-    Bench bench(2, ms, wire::camera_no_strobe);
+    TrackerBench bench(2, ms, wire::camera_no_strobe);
     CHECK(bench.tracker.next_deadline() == 105 * ms);
     bench.tracker.expire(105 * ms - 1);
     CHECK(bench.reports.exposures.empty());
@@ -244,7 +248,7 @@ TEST_CASE("exposure_tracker: without an exposure line the record follows from th
 }
 
 TEST_CASE("exposure_tracker: all are given up at once, each as far as it came") {
-    Bench bench(3);
+    TrackerBench bench(3);
     bench.tracker.edge(100 * ms, true);
     bench.tracker.give_up();
     CHECK(bench.reports.flags() == Flags{no_end, no_start, no_start});
@@ -256,7 +260,7 @@ TEST_CASE("exposure_tracker: all are given up at once, each as far as it came") 
 TEST_CASE("exposure_tracker: a word that left late corrects its trigger's time, and says so") {
     const unsigned moved = GENERATE(0, 1, 2);
     const bool late = GENERATE(true, false);
-    Bench bench(3);
+    TrackerBench bench(3);
     const Nanoseconds asked = (100 + 50 * moved) * ms;
     bench.tracker.moved(asked, asked + ms, late);
     bench.tracker.give_up();
@@ -268,7 +272,7 @@ TEST_CASE("exposure_tracker: a word that left late corrects its trigger's time, 
 }
 
 TEST_CASE("exposure_tracker: it is busy as long as the newest exposure is expected to last") {
-    Bench bench(1, ms);
+    TrackerBench bench(1, ms);
     CHECK(bench.tracker.busy_until(90 * ms) == 105 * ms);
     bench.tracker.edge(102 * ms, true);
     CHECK(bench.tracker.busy_until(102 * ms) == 106 * ms);
@@ -278,13 +282,13 @@ TEST_CASE("exposure_tracker: it is busy as long as the newest exposure is expect
     bench.tracker.configure(bench.camera, 0);
     CHECK(bench.tracker.busy_until(104 * ms) < 0);
 
-    Bench two(2, ms);
+    TrackerBench two(2, ms);
     two.tracker.edge(101 * ms, true);
     CHECK(two.tracker.busy_until(105 * ms) == 155 * ms);
 }
 
 TEST_CASE("exposure_tracker: an exposure that is overdue may last for any time") {
-    Bench bench(2);
+    TrackerBench bench(2);
     bench.tracker.edge(100 * ms, true);
     CHECK(bench.tracker.busy_until(104 * ms) == 154 * ms);
     // A gap may be added to it.
@@ -293,7 +297,7 @@ TEST_CASE("exposure_tracker: an exposure that is overdue may last for any time")
 
 TEST_CASE(
     "exposure_tracker: the grid point of the newest trigger is known, also after its record") {
-    Bench bench(2);
+    TrackerBench bench(2);
     CHECK(bench.tracker.tick_at(100 * ms - 1) == 0);
     CHECK(bench.tracker.tick_at(100 * ms) == 11);
     CHECK(bench.tracker.tick_at(150 * ms - 1) == 11);

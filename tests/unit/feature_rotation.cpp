@@ -11,8 +11,8 @@ using Catch::Contains;
 
 namespace {
 
-constexpr int width = 320;
-constexpr int height = 240;
+constexpr int scene_width = 320;
+constexpr int scene_height = 240;
 
 /// A texture at infinity: waves over the direction in which one looks.
 class Sky {
@@ -70,11 +70,11 @@ Eigen::Vector3d direction(const CameraModel& camera, double u, double v) {
 GreyImage picture(const CameraModel& camera, const Eigen::Quaterniond& orientation,
                   int hood_rows = 0) {
     static const Sky sky;
-    GreyImage image{width, height, {}};
-    for (int v = 0; v < height; ++v)
-        for (int u = 0; u < width; ++u) {
+    GreyImage image{scene_width, scene_height, {}};
+    for (int v = 0; v < scene_height; ++v)
+        for (int u = 0; u < scene_width; ++u) {
             const Eigen::Vector3d seen = direction(camera, u, v);
-            const double grey = v >= height - hood_rows ? sky(seen) : sky(orientation * seen);
+            const double grey = v >= scene_height - hood_rows ? sky(seen) : sky(orientation * seen);
             image.pixels.push_back(static_cast<std::uint8_t>(std::clamp(grey, 0.0, 255.0)));
         }
     return image;
@@ -134,7 +134,8 @@ TEST_CASE("feature_rotation: what turns along does not pull", "[feature_rotation
 TEST_CASE("feature_rotation: nothing to follow, nothing reported", "[feature_rotation]") {
     auto tracker = FeatureRotation::create(pinhole());
     REQUIRE(tracker);
-    const GreyImage blank{width, height, std::vector<std::uint8_t>(width * height, 100)};
+    const GreyImage blank{scene_width, scene_height,
+                          std::vector<std::uint8_t>(scene_width * scene_height, 100)};
     REQUIRE(tracker->add(blank, {1}));
     const auto second = tracker->add(blank, {2});
     REQUIRE(second);

@@ -12,7 +12,7 @@ using namespace versavis::client;
 
 namespace {
 
-const HostTime zero{1'000'000'000};
+const HostTime scene_begin{1'000'000'000};
 
 struct Scene {
     std::vector<FrameRotation> frames;
@@ -32,7 +32,7 @@ Scene look(double seconds_long, Duration exposure, std::uint64_t seed) {
     scenario.seed = seed;
     scenario.motion.nods = false;
     scenario.cameras = {camera};
-    const rig::Surroundings surroundings(zero, scenario);
+    const rig::Surroundings surroundings(scene_begin, scenario);
     const rig::CameraView view(scenario, camera, surroundings);
     const rig::Pinhole pinhole = view.pinhole();
     auto tracker = FeatureRotation::create(
@@ -44,15 +44,16 @@ Scene look(double seconds_long, Duration exposure, std::uint64_t seed) {
     std::normal_distribution<double> normal(0, 2.4e-4 * std::sqrt(200));
     const Duration all{static_cast<std::int64_t>(seconds_long * 1e9)};
     for (Duration t{0}; t < all + seconds(2); t = t + milliseconds(5)) {
-        Eigen::Vector3d rate = surroundings.motion.rate_rad_s(zero + t);
+        Eigen::Vector3d rate = surroundings.motion.rate_rad_s(scene_begin + t);
         for (int i = 0; i < 3; ++i) rate[i] += normal(random);
-        scene.gyro.push_back({{(zero + t).ns}, rate});
+        scene.gyro.push_back({{(scene_begin + t).ns}, rate});
     }
     std::uint64_t serial = 0;
     for (Duration t = seconds(1); t < all + seconds(1); t = t + milliseconds(50)) {
         GreyImage image{320, 240, std::vector<std::uint8_t>(std::size_t{320} * 240)};
-        view.paint(zero + t - exposure / 2, zero + t + exposure / 2, ++serial, image.pixels);
-        const auto rotation = tracker->add(std::move(image), {(zero + t).ns});
+        view.paint(scene_begin + t - exposure / 2, scene_begin + t + exposure / 2, ++serial,
+                   image.pixels);
+        const auto rotation = tracker->add(std::move(image), {(scene_begin + t).ns});
         REQUIRE(rotation);
         if (*rotation) scene.frames.push_back(**rotation);
     }

@@ -12,13 +12,9 @@
 
 using namespace versavis;
 using Catch::Contains;
+using test::content_of;
 
 namespace {
-
-std::string content(const std::string& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::size_t files_in(const std::filesystem::path& directory) {
     using Entries = std::filesystem::directory_iterator;
@@ -35,7 +31,7 @@ TEST_CASE("file: a new one takes no other's place") {
     REQUIRE_FALSE(again);
     CHECK_THAT(again.error().message(),
                Contains(path + ": cannot be written: File exists") && Contains("name another"));
-    CHECK(content(path) == "first");
+    CHECK(content_of(path) == "first");
 }
 
 TEST_CASE("file: a whole one takes the place of the old one when it is finished") {
@@ -46,10 +42,10 @@ TEST_CASE("file: a whole one takes the place of the old one when it is finished"
         REQUIRE(file);
         REQUIRE(file->write("half of the new one"));
     }
-    CHECK(content(path) == "old");
+    CHECK(content_of(path) == "old");
     CHECK(files_in(directory.path()) == 1);
     REQUIRE(write_whole_file(path, "new"));
-    CHECK(content(path) == "new");
+    CHECK(content_of(path) == "new");
     CHECK(files_in(directory.path()) == 1);
 }
 
@@ -80,7 +76,7 @@ TEST_CASE("file: on a full disk the old one stays, and nothing of the new one") 
     CHECK(test::in_process([&] {
         if (!test::mount_small_disk(directory.path(), "64k")) return true;
         const std::string path = directory.write("file", "old");
-        return !write_whole_file(path, std::string(1 << 20U, 'x')) && content(path) == "old" &&
+        return !write_whole_file(path, std::string(1 << 20U, 'x')) && content_of(path) == "old" &&
                files_in(directory.path()) == 1;
     }));
 }

@@ -48,8 +48,8 @@ Datagram leader(std::uint64_t block, bool extended = false, std::uint16_t type =
     return out;
 }
 
-Datagram data(std::uint64_t block, std::uint32_t id, bool extended = false,
-              std::optional<std::size_t> size = {}) {
+Datagram data_packet(std::uint64_t block, std::uint32_t id, bool extended = false,
+                     std::optional<std::size_t> size = {}) {
     Datagram out = header(block, id, gvsp::Format::payload, extended);
     const std::size_t begin = (id - 1) * per_packet;
     const std::size_t usual = begin < payload ? std::min(per_packet, payload - begin) : per_packet;
@@ -63,16 +63,16 @@ Datagram trailer(std::uint64_t block, std::uint32_t id = trailer_id, bool extend
     return out;
 }
 
-Datagram packet(std::uint64_t block, std::uint32_t id, bool extended = false) {
+Datagram gvsp_packet(std::uint64_t block, std::uint32_t id, bool extended = false) {
     if (id == 0) return leader(block, extended);
-    return id == trailer_id ? trailer(block, id, extended) : data(block, id, extended);
+    return id == trailer_id ? trailer(block, id, extended) : data_packet(block, id, extended);
 }
 
 using Range = std::pair<std::uint32_t, std::uint32_t>;
 
-class Bench : private FrameAssembler::Owner {
+class AssemblerBench : private FrameAssembler::Owner {
  public:
-    explicit Bench(bool extended = false, bool sends_again = true)
+    explicit AssemblerBench(bool extended = false, bool sends_again = true)
         : extended_(extended),
           assembler(
               {payload, 28 + (extended ? 20U : 8U) + per_packet, sends_again, milliseconds(100)},
@@ -80,7 +80,7 @@ class Bench : private FrameAssembler::Owner {
 
     void take(const Datagram& datagram) { assembler.take(datagram, now); }
     void send(std::uint64_t block, const std::vector<std::uint32_t>& ids) {
-        for (const std::uint32_t id : ids) take(packet(block, id, extended_));
+        for (const std::uint32_t id : ids) take(gvsp_packet(block, id, extended_));
     }
     void pass(Duration time) {
         now = now + time;
@@ -129,16 +129,17 @@ class Bench : private FrameAssembler::Owner {
     FrameAssembler assembler;
 };
 
-const std::vector<std::uint32_t> all{0, 1, 2, 3, 4, 5, 6};
+const std::vector<std::uint32_t> all_packets{0, 1, 2, 3, 4, 5, 6};
 
 }  // namespace
 
 TEST_CASE("frame_assembler: a frame is whole with its last packet, in any order") {
     const bool extended = GENERATE(false, true);
     const std::uint64_t block = extended ? 0x100000000 : 0xFFFF;
-    const auto order = GENERATE(std::vector(all), std::vector<std::uint32_t>{6, 5, 4, 3, 2, 1, 0},
-                                std::vector<std::uint32_t>{3, 0, 6, 1, 5, 2, 4});
-    Bench bench(extended);
+    const auto order =
+        GENERATE(std::vector(all_packets), std::vector<std::uint32_t>{6, 5, 4, 3, 2, 1, 0},
+                 std::vector<std::uint32_t>{3, 0, 6, 1, 5, 2, 4});
+    AssemblerBench bench(extended);
     for (const std::uint32_t id : order) {
         bench.pass({});
         CHECK(bench.frames.empty());
@@ -152,8 +153,8 @@ TEST_CASE("frame_assembler: a frame is whole with its last packet, in any order"
 
 TEST_CASE("frame_assembler: any lost packet is asked for, and makes the frame whole") {
     const std::uint32_t lost = GENERATE(0U, 1U, 3U, 5U);
-    Bench bench;
-    for (const std::uint32_t id : all)
+    AssemblerBench bench;
+    for (const std::uint32_t id : all_packets)
         if (id != lost) bench.send(1, {id});
     bench.pass({});
     CHECK(bench.asked() == std::vector<Range>{{lost, lost}});
@@ -168,7 +169,7 @@ TEST_CASE("frame_assembler: any lost packet is asked for, and makes the frame wh
 }
 
 TEST_CASE("frame_assembler: gaps are asked for while the frame still comes, each at once") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 3});
     bench.pass({});
     CHECK(bench.asked() == std::vector<Range>{{2, 2}});
@@ -178,7 +179,7 @@ TEST_CASE("frame_assembler: gaps are asked for while the frame still comes, each
 }
 
 TEST_CASE("frame_assembler: a lost trailer is asked for in silence") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 2, 3, 4, 5});
     bench.pass({});
     CHECK(bench.asked().empty());
@@ -191,7 +192,7 @@ TEST_CASE("frame_assembler: a lost trailer is asked for in silence") {
 }
 
 TEST_CASE("frame_assembler: data of the next frame shows the loss of a frame's end, a leader not") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 2, 3, 4, 5});
     bench.send(2, {0});
     bench.pass({});
@@ -202,7 +203,7 @@ TEST_CASE("frame_assembler: data of the next frame shows the loss of a frame's e
 }
 
 TEST_CASE("frame_assembler: a pause within a frame costs it nothing") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0});
     bench.pass(milliseconds(30));
     bench.send(1, {1, 2});
@@ -218,9 +219,9 @@ TEST_CASE("frame_assembler: a pause within a frame costs it nothing") {
 
 TEST_CASE(
     "frame_assembler: what is not sent again is asked for thrice, then the frame is given up") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 3, 4, 5, 6});
-    bench.send(2, all);
+    bench.send(2, all_packets);
     std::size_t asks = 0;
     for (int i = 0; i < 9; ++i) {
         bench.pass({});
@@ -237,7 +238,7 @@ TEST_CASE(
 }
 
 TEST_CASE("frame_assembler: a camera that sends nothing again is not asked") {
-    Bench bench(false, false);
+    AssemblerBench bench(false, false);
     bench.send(1, {0, 1, 3, 4, 5, 6});
     for (int i = 0; i < 10; ++i) bench.pass(milliseconds(1));
     CHECK(bench.asked().empty());
@@ -246,21 +247,21 @@ TEST_CASE("frame_assembler: a camera that sends nothing again is not asked") {
 }
 
 TEST_CASE("frame_assembler: a frame that ends in silence is given up after its retention") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1});
     bench.pass(microseconds(99'999));
     CHECK(bench.frames.empty());
     bench.pass(microseconds(1));
     REQUIRE(bench.frames.size() == 1);
     CHECK_FALSE(bench.frames[0].complete);
-    bench.send(1, all);  // too late
+    bench.send(1, all_packets);  // too late
     bench.pass({});
     CHECK(bench.frames.size() == 1);
 }
 
 TEST_CASE("frame_assembler: two frames at the same time, across the wrap of their numbers") {
-    Bench bench;
-    for (const std::uint32_t id : all) {
+    AssemblerBench bench;
+    for (const std::uint32_t id : all_packets) {
         bench.send(0xFFFF, {id});
         bench.send(1, {id});
     }
@@ -273,23 +274,23 @@ TEST_CASE("frame_assembler: two frames at the same time, across the wrap of thei
 }
 
 TEST_CASE("frame_assembler: packets that come twice count once, also after their frame") {
-    Bench bench;
-    for (const std::uint32_t id : all) {
+    AssemblerBench bench;
+    for (const std::uint32_t id : all_packets) {
         bench.send(1, {id});
         bench.send(1, {id});
     }
     bench.pass({});
-    bench.send(1, all);
+    bench.send(1, all_packets);
     bench.pass({});
     CHECK(bench.frames.size() == 1);
     CHECK(bench.right(1));
 }
 
 TEST_CASE("frame_assembler: a packet that is too long or empty is as good as lost") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 3, 4, 5, 6});
-    bench.take(data(1, 2, false, per_packet + 1));
-    bench.take(data(1, 2, false, 0));
+    bench.take(data_packet(1, 2, false, per_packet + 1));
+    bench.take(data_packet(1, 2, false, 0));
     bench.pass({});
     CHECK(bench.frames.empty());
     bench.send(1, {2});
@@ -298,9 +299,9 @@ TEST_CASE("frame_assembler: a packet that is too long or empty is as good as los
 }
 
 TEST_CASE("frame_assembler: a short packet within a frame is a hole") {
-    Bench bench;
+    AssemblerBench bench;
     bench.take(leader(1));
-    bench.take(data(1, 2, false, 4));
+    bench.take(data_packet(1, 2, false, 4));
     bench.send(1, {1, 3, 4, 5, 6});
     bench.pass({});
     REQUIRE(bench.frames.size() == 1);
@@ -308,9 +309,9 @@ TEST_CASE("frame_assembler: a short packet within a frame is a hole") {
 }
 
 TEST_CASE("frame_assembler: the last packet may be filled up, but not beyond the frame") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 2, 3, 4});
-    bench.take(data(1, 5, false, per_packet));
+    bench.take(data_packet(1, 5, false, per_packet));
     bench.send(1, {6});
     bench.pass({});
     CHECK(bench.right(1));
@@ -318,14 +319,14 @@ TEST_CASE("frame_assembler: the last packet may be filled up, but not beyond the
 }
 
 TEST_CASE("frame_assembler: smaller and larger frames come with their own size") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 2});
-    bench.take(data(1, 3, false, 3));
+    bench.take(data_packet(1, 3, false, 3));
     bench.take(trailer(1, 4));
     bench.send(2, {0, 1, 2, 3, 4});
-    bench.take(data(2, 5, false, per_packet));
-    bench.take(data(2, 6));
-    bench.take(data(2, 7, false, 1));
+    bench.take(data_packet(2, 5, false, per_packet));
+    bench.take(data_packet(2, 6));
+    bench.take(data_packet(2, 7, false, 1));
     bench.take(trailer(2, 8));
     bench.pass({});
     REQUIRE(bench.frames.size() == 2);
@@ -337,7 +338,7 @@ TEST_CASE("frame_assembler: smaller and larger frames come with their own size")
 }
 
 TEST_CASE("frame_assembler: a trailer amid the data is no end") {
-    Bench bench;
+    AssemblerBench bench;
     bench.send(1, {0, 1, 2, 3});
     bench.take(trailer(1, 2));
     bench.send(1, {4, 5, 6});
@@ -346,7 +347,7 @@ TEST_CASE("frame_assembler: a trailer amid the data is no end") {
 }
 
 TEST_CASE("frame_assembler: a leader of another payload is reported, its packets are dropped") {
-    Bench bench;
+    AssemblerBench bench;
     bench.take(leader(1, false, 0x4001));
     bench.send(1, {1, 2, 3, 4, 5, 6});
     bench.pass({});
@@ -356,7 +357,7 @@ TEST_CASE("frame_assembler: a leader of another payload is reported, its packets
 }
 
 TEST_CASE("frame_assembler: a cut leader is asked for") {
-    Bench bench;
+    AssemblerBench bench;
     Datagram cut = leader(1);
     cut.resize(30);
     bench.take(cut);
@@ -369,19 +370,19 @@ TEST_CASE("frame_assembler: a cut leader is asked for") {
 }
 
 TEST_CASE("frame_assembler: frames that find no room are lost, the next is not") {
-    Bench bench;
+    AssemblerBench bench;
     bench.room = 0;
     bench.send(1, {0, 1, 2});
     bench.room = 1;
     bench.send(1, {3, 4, 5, 6});
-    bench.send(2, all);
+    bench.send(2, all_packets);
     bench.pass({});
     REQUIRE(bench.frames.size() == 1);
     CHECK(bench.right(2));
 }
 
 TEST_CASE("frame_assembler: stray numbers take no more than a few slots") {
-    Bench bench;
+    AssemblerBench bench;
     for (std::uint64_t block = 1; block <= 100; ++block) bench.send(block, {1});
     CHECK(bench.frames.size() == 96);
     CHECK(bench.assembler.close().size() == 4);
@@ -389,7 +390,7 @@ TEST_CASE("frame_assembler: stray numbers take no more than a few slots") {
 
 TEST_CASE(
     "frame_assembler: the time that a frame still takes, for a thread that sleeps meanwhile") {
-    Bench bench;
+    AssemblerBench bench;
     CHECK_FALSE(bench.assembler.time_left(bench.now));
     bench.send(1, {0});
     bench.pass(milliseconds(20));  // an early leader says nothing of the rate
@@ -404,7 +405,7 @@ TEST_CASE(
 }
 
 TEST_CASE("frame_assembler: a frame is expected to take as long as the shortest of late") {
-    Bench bench;
+    AssemblerBench bench;
     std::uint64_t block = 0;
     const auto send = [&](Duration length) {
         bench.send(++block, {0, 1, 2, 3, 4});
@@ -428,10 +429,10 @@ TEST_CASE("frame_assembler: a frame is expected to take as long as the shortest 
 TEST_CASE(
     "frame_assembler: damage of any kind neither writes beside a frame nor ends the service") {
     std::mt19937 random(1);
-    Bench bench;
+    AssemblerBench bench;
     for (int i = 0; i < 200'000; ++i) {
         const auto pick = [&](std::uint32_t end) { return random() % end; };
-        Datagram made = packet(1 + pick(20) + static_cast<std::uint64_t>(i) / 100, pick(9));
+        Datagram made = gvsp_packet(1 + pick(20) + static_cast<std::uint64_t>(i) / 100, pick(9));
         const std::uint32_t damage = pick(4);
         if (damage == 0) made.resize(pick(static_cast<std::uint32_t>(made.size()) + 40));
         for (std::uint32_t k = 0; k < damage && !made.empty(); ++k)
@@ -443,7 +444,7 @@ TEST_CASE(
     CHECK(bench.nothing_beside());
     bench.pass(milliseconds(100));
     bench.assembler.close();
-    bench.send(0x8000, all);
+    bench.send(0x8000, all_packets);
     bench.pass({});
     const auto last = bench.frames.back();
     CHECK((last.complete && last.block_id == 0x8000));

@@ -12,8 +12,8 @@ using namespace versavis::test;
 namespace {
 
 /// Evidence of a camera that was triggered before its start pattern, too.
-struct Camera {
-    explicit Camera(bool camera_clock = true) {
+struct ProvedCamera {
+    explicit ProvedCamera(bool camera_clock = true) {
         Limits limits = Bench::made();
         limits.camera_clock = camera_clock;
         evidence.emplace_back(limits);
@@ -48,7 +48,7 @@ struct Camera {
     std::uint64_t tick = 0;
 };
 
-bool right(const std::vector<ProvedFrame>& proved) {
+bool all_right(const std::vector<ProvedFrame>& proved) {
     for (const ProvedFrame& frame : proved)
         if (frame.arrival.arrived != frame.exposure.end_on_host + milliseconds(20)) return false;
     return true;
@@ -57,12 +57,12 @@ bool right(const std::vector<ProvedFrame>& proved) {
 }  // namespace
 
 TEST_CASE("frame_proof: frames before the lock are proved by those after it") {
-    Camera stream;
+    ProvedCamera stream;
     for (int i = 0; i < 15; ++i) stream.take();
     stream.pattern_and(40);
     const auto proved = stream.proof().finish();
     CHECK(proved.size() == 67);
-    CHECK(right(proved));
+    CHECK(all_right(proved));
     const auto late = std::count_if(proved.begin(), proved.end(),
                                     [](const auto& frame) { return frame.afterwards; });
     CHECK(late >= 5);
@@ -70,28 +70,28 @@ TEST_CASE("frame_proof: frames before the lock are proved by those after it") {
 }
 
 TEST_CASE("frame_proof: without a camera's clock, only what lies between proved frames is proved") {
-    Camera stream(false);
+    ProvedCamera stream(false);
     for (int i = 0; i < 15; ++i) stream.take();
     stream.pattern_and(40);
     const auto proved = stream.proof().finish();
-    CHECK(right(proved));
+    CHECK(all_right(proved));
     CHECK(proved.size() < 67);
 }
 
 TEST_CASE("frame_proof: a frame whose exposure another contradicts stays unproved") {
-    Camera stream;
+    ProvedCamera stream;
     for (int i = 0; i < 5; ++i) stream.take();
     auto& wrong = std::get<Arrival>(stream.evidence[5]);
     wrong.camera_time = wrong.camera_time + period / 2;
     const std::uint64_t wrong_id = wrong.block_id;
     stream.pattern_and(40);
     const auto proved = stream.proof().finish();
-    CHECK(right(proved));
+    CHECK(all_right(proved));
     for (const ProvedFrame& frame : proved) CHECK(frame.arrival.block_id != wrong_id);
 }
 
 TEST_CASE("frame_proof: nothing without the begin of a stream") {
-    Camera stream;
+    ProvedCamera stream;
     stream.evidence.erase(stream.evidence.begin());
     stream.pattern_and(5);
     FrameProof proof = stream.proof();
@@ -101,7 +101,7 @@ TEST_CASE("frame_proof: nothing without the begin of a stream") {
 }
 
 TEST_CASE("frame_proof: streams are not mixed") {
-    Camera stream;
+    ProvedCamera stream;
     stream.pattern_and(20);
     stream.evidence.emplace_back(Reset{});
     stream.evidence.emplace_back(Bench::made());
@@ -109,6 +109,6 @@ TEST_CASE("frame_proof: streams are not mixed") {
     stream.take(40);
     stream.pattern_and(20);
     const auto proved = stream.proof().finish();
-    CHECK(right(proved));
+    CHECK(all_right(proved));
     CHECK(proved.size() >= 60);
 }

@@ -11,8 +11,8 @@ using namespace versavis::daemon;
 
 namespace {
 
-struct Bench : test::Pipelines {
-    Bench() {
+struct PublisherBench : test::Pipelines {
+    PublisherBench() {
         CameraConfiguration configuration;
         configuration.name = "cam0";
         configuration.slots = 9;
@@ -41,7 +41,7 @@ struct Bench : test::Pipelines {
     std::optional<FramePublisher> frames;
 };
 
-pairing::Exposure exposure(StampKind kind) {
+pairing::Exposure stamped_exposure(StampKind kind) {
     pairing::Exposure made;
     made.trigger = 5;
     made.tick = (std::uint64_t{1} << 32U) + 6;
@@ -59,11 +59,12 @@ const clock::Stamp middle_stamp{
 }  // namespace
 
 TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both sigmas") {
-    Bench bench;
+    PublisherBench bench;
     auto reader = bench.reader("cam0");
-    bench.frames->publish_proved(bench.arrival(), exposure(StampKind::measured_middle),
+    bench.frames->publish_proved(bench.arrival(), stamped_exposure(StampKind::measured_middle),
                                  middle_stamp);
-    bench.frames->publish_proved(bench.arrival(), exposure(StampKind::trigger_edge), middle_stamp);
+    bench.frames->publish_proved(bench.arrival(), stamped_exposure(StampKind::trigger_edge),
+                                 middle_stamp);
     const auto first = test::look(reader.next());
     const auto measured = unpack<FrameMetadata>(first.metadata);
     CHECK(first.time == middle_stamp.output);
@@ -85,9 +86,9 @@ TEST_CASE("frame_publisher: a proved frame has its exposure's middle and both si
 }
 
 TEST_CASE("frame_publisher: what is not proved has no sigma, and says so") {
-    Bench bench;
+    PublisherBench bench;
     auto reader = bench.reader("cam0");
-    bench.frames->publish_guessed(bench.arrival(), exposure(StampKind::measured_middle),
+    bench.frames->publish_guessed(bench.arrival(), stamped_exposure(StampKind::measured_middle),
                                   middle_stamp);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, true);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);
@@ -99,7 +100,7 @@ TEST_CASE("frame_publisher: what is not proved has no sigma, and says so") {
 }
 
 TEST_CASE("frame_publisher: larger frames get a new ring, smaller ones do not") {
-    Bench bench;
+    PublisherBench bench;
     auto reader = bench.reader("cam0");
     bench.make_room(100);
     bench.frames->publish_arrived(bench.arrival(), middle_stamp, false);

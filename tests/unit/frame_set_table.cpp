@@ -9,11 +9,11 @@ using client::SkipReason;
 
 namespace {
 
-constexpr OutputTime first{-1000};
-constexpr OutputTime last{1'000'000};
+constexpr OutputTime first_time{-1000};
+constexpr OutputTime last_time{1'000'000};
 
-client::TableFrame frame(std::int64_t time, std::uint64_t tick, std::uint64_t life = 1,
-                         std::uint32_t epoch = 1) {
+client::TableFrame table_frame(std::int64_t time, std::uint64_t tick, std::uint64_t life = 1,
+                               std::uint32_t epoch = 1) {
     return {{time}, tick, life, epoch, tick, {}};
 }
 
@@ -21,15 +21,15 @@ client::TableFrame frame(std::int64_t time, std::uint64_t tick, std::uint64_t li
 
 TEST_CASE("frame_set_table: sets are of one life, epoch and tick, named by the first camera") {
     FrameSetTable table(2);
-    table.add(0, frame(100, 1));
-    table.add(0, frame(200, 2));
-    table.add(0, frame(300, 3));
-    table.add(0, frame(400, 4));
-    table.add(1, frame(101, 1));
-    table.add(1, frame(201, 2, 2));     // another life
-    table.add(1, frame(301, 3, 1, 2));  // another epoch
-    table.add(1, frame(399, 4));
-    const auto sets = table.pair(first, last);
+    table.add(0, table_frame(100, 1));
+    table.add(0, table_frame(200, 2));
+    table.add(0, table_frame(300, 3));
+    table.add(0, table_frame(400, 4));
+    table.add(1, table_frame(101, 1));
+    table.add(1, table_frame(201, 2, 2));     // another life
+    table.add(1, table_frame(301, 3, 1, 2));  // another epoch
+    table.add(1, table_frame(399, 4));
+    const auto sets = table.pair(first_time, last_time);
     REQUIRE(sets.size() == 2);
     CHECK(sets[0].name == OutputTime{100});
     CHECK(sets[1].name == OutputTime{400});
@@ -42,8 +42,8 @@ TEST_CASE("frame_set_table: sets are of one life, epoch and tick, named by the f
 TEST_CASE("frame_set_table: all stamps of a set lie strictly between the IMU's samples") {
     FrameSetTable table(2);
     for (const std::int64_t time : {100, 200, 300}) {
-        table.add(0, frame(time, static_cast<std::uint64_t>(time)));
-        table.add(1, frame(time + 1, static_cast<std::uint64_t>(time)));
+        table.add(0, table_frame(time, static_cast<std::uint64_t>(time)));
+        table.add(1, table_frame(time + 1, static_cast<std::uint64_t>(time)));
     }
     CHECK(table.pair({100}, {301}).size() == 1);
     CHECK(table.frames(1)[0].left_out == SkipReason::outside_imu);
@@ -52,29 +52,29 @@ TEST_CASE("frame_set_table: all stamps of a set lie strictly between the IMU's s
 
 TEST_CASE("frame_set_table: names increase, whatever the clock did") {
     FrameSetTable table(1);
-    table.add(0, frame(100, 1));
-    table.add(0, frame(100, 2));
-    table.add(0, frame(90, 3));
-    table.add(0, frame(101, 4));
-    CHECK(table.pair(first, last).size() == 2);
+    table.add(0, table_frame(100, 1));
+    table.add(0, table_frame(100, 2));
+    table.add(0, table_frame(90, 3));
+    table.add(0, table_frame(101, 4));
+    CHECK(table.pair(first_time, last_time).size() == 2);
     CHECK(table.frames(0)[1].left_out == SkipReason::not_later);
     CHECK(table.frames(0)[2].left_out == SkipReason::not_later);
 }
 
 TEST_CASE("frame_set_table: one camera needs no ticks, two cameras do, and each tick counts once") {
     FrameSetTable one(1);
-    auto untriggered = frame(5, 0);
+    auto untriggered = table_frame(5, 0);
     untriggered.tick.reset();
     one.add(0, untriggered);
-    CHECK(one.pair(first, last).size() == 1);
+    CHECK(one.pair(first_time, last_time).size() == 1);
     FrameSetTable two(2);
     two.add(0, untriggered);
     two.add(1, untriggered);
-    two.add(0, frame(10, 3));
-    two.add(0, frame(11, 3));
-    two.add(1, frame(10, 3));
-    two.add(1, frame(11, 3));
-    CHECK(two.pair(first, last).size() == 1);
+    two.add(0, table_frame(10, 3));
+    two.add(0, table_frame(11, 3));
+    two.add(1, table_frame(10, 3));
+    two.add(1, table_frame(11, 3));
+    CHECK(two.pair(first_time, last_time).size() == 1);
     CHECK(two.frames(0)[0].left_out == SkipReason::incomplete);
     CHECK(two.frames(0)[2].left_out == SkipReason::incomplete);
     CHECK(two.frames(1)[2].left_out == SkipReason::incomplete);

@@ -27,10 +27,10 @@ using namespace versavis::ring;
 namespace {
 
 /// Words with values of their own.
-struct Words {
+struct FutexWords {
     std::array<std::atomic<std::uint32_t>, 200> words{};
 
-    Words() {
+    FutexWords() {
         for (std::uint32_t i = 0; i < words.size(); ++i) words[i] = i + 1;
     }
     std::vector<FutexWord> first(std::size_t count) const {
@@ -72,7 +72,7 @@ bool forbid_waiting_for_any(unsigned error) {
 
 }  // namespace
 
-TEST_CASE_METHOD(Words, "futex: a wait without news lasts as long as was asked") {
+TEST_CASE_METHOD(FutexWords, "futex: a wait without news lasts as long as was asked") {
     if (!kernel_waits_for_any()) {
         WARN("not tested: this kernel cannot wait for several words");
         return;
@@ -86,7 +86,7 @@ TEST_CASE_METHOD(Words, "futex: a wait without news lasts as long as was asked")
     CHECK(span_of([&] { futex_wait_any(first(2), 1'100'000'000); }) >= milliseconds(1100));
 }
 
-TEST_CASE_METHOD(Words, "futex: each of several words wakes who waits for all [threads]",
+TEST_CASE_METHOD(FutexWords, "futex: each of several words wakes who waits for all [threads]",
                  "[threads]") {
     if (!kernel_waits_for_any()) {
         WARN("not tested: this kernel cannot wait for several words");
@@ -100,7 +100,7 @@ TEST_CASE_METHOD(Words, "futex: each of several words wakes who waits for all [t
         }
 }
 
-TEST_CASE_METHOD(Words, "futex: a word that has changed before costs no sleep") {
+TEST_CASE_METHOD(FutexWords, "futex: a word that has changed before costs no sleep") {
     auto changed = first(2);
     ++words[1];
     const long before = sleeps_of_this_thread();
@@ -108,7 +108,8 @@ TEST_CASE_METHOD(Words, "futex: a word that has changed before costs no sleep") 
     CHECK(sleeps_of_this_thread() - before < 50);
 }
 
-TEST_CASE_METHOD(Words, "futex: who cannot wait for several words waits for the first, not long") {
+TEST_CASE_METHOD(FutexWords,
+                 "futex: who cannot wait for several words waits for the first, not long") {
     for (const unsigned error : {ENOSYS, EPERM}) {
         if (!test::in_process([&] { return forbid_waiting_for_any(error); })) {
             WARN("not tested: no system call can be forbidden here");

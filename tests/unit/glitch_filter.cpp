@@ -27,7 +27,7 @@ struct Line {
     std::vector<std::pair<Nanoseconds, bool>> edges;
 };
 
-using Edges = std::vector<std::pair<Nanoseconds, bool>>;
+using FilteredEdges = std::vector<std::pair<Nanoseconds, bool>>;
 
 }  // namespace
 
@@ -39,12 +39,12 @@ TEST_CASE("glitch_filter: clean edges count from their own instants, once they h
     line.settle(5'999);
     CHECK(line.edges.empty());
     line.settle(6'000);
-    CHECK(line.edges == Edges{{1'000, true}});
+    CHECK(line.edges == FilteredEdges{{1'000, true}});
     CHECK(line.filter.next_wake() == never);
     CHECK(line.filter.settled(10'000) == 10'000);
     line.edge(20'000, false);
     line.settle(25'000);
-    CHECK(line.edges == Edges{{1'000, true}, {20'000, false}});
+    CHECK(line.edges == FilteredEdges{{1'000, true}, {20'000, false}});
     CHECK(line.filter.take_left_out() == 0);
 }
 
@@ -58,7 +58,7 @@ TEST_CASE("glitch_filter: a line that bounces changes with its first edge") {
     line.settle(12'099);
     CHECK(line.edges.empty());
     line.settle(12'100);
-    CHECK(line.edges == Edges{{1'000, true}});
+    CHECK(line.edges == FilteredEdges{{1'000, true}});
     CHECK(line.filter.take_left_out() == 4);
     CHECK(line.filter.take_left_out() == 0);
 }
@@ -75,7 +75,7 @@ TEST_CASE("glitch_filter: a level that does not last is left out, on an idle lin
     line.edge(30'100, true);
     line.edge(40'000, false);
     line.settle(45'000);
-    CHECK(line.edges == Edges{{20'000, true}, {40'000, false}});
+    CHECK(line.edges == FilteredEdges{{20'000, true}, {40'000, false}});
     CHECK(line.filter.take_left_out() == 2);
 }
 
@@ -84,7 +84,7 @@ TEST_CASE("glitch_filter: after a missed edge the next one counts, whatever its 
     line.edge(1'000, true);
     line.edge(20'000, true);
     line.settle(30'000);
-    CHECK(line.edges == Edges{{1'000, true}, {20'000, true}});
+    CHECK(line.edges == FilteredEdges{{1'000, true}, {20'000, true}});
     line.edge(40'000, false);
     line.filter.edges_lost();
     line.settle(50'000);
@@ -101,10 +101,10 @@ TEST_CASE("glitch_filter: the first level after lost edges does not count, but i
         line.edge(22'000, !first);
         line.edge(24'000, first);
         line.settle(30'000);
-        CHECK(line.edges == Edges{{1'000, true}});
+        CHECK(line.edges == FilteredEdges{{1'000, true}});
         line.edge(40'000, !first);
         line.settle(50'000);
-        CHECK(line.edges == Edges{{1'000, true}, {40'000, !first}});
+        CHECK(line.edges == FilteredEdges{{1'000, true}, {40'000, !first}});
     }
 }
 
@@ -119,7 +119,7 @@ TEST_CASE("glitch_filter: configured anew, it forgets what was pending") {
     line.edge(20'000, false);
     CHECK(line.filter.next_wake() == 27'000);
     line.settle(27'000);
-    CHECK(line.edges == Edges{{20'000, false}});
+    CHECK(line.edges == FilteredEdges{{20'000, false}});
 }
 
 TEST_CASE("glitch_filter: what is left out is counted, an edge from rest always may count") {
@@ -127,7 +127,7 @@ TEST_CASE("glitch_filter: what is left out is counted, an edge from rest always 
     line.edge(0, true);
     line.edge(1'000, true);  // the fall in between was missed
     line.settle(6'000);
-    CHECK(line.edges == Edges{{0, true}});
+    CHECK(line.edges == FilteredEdges{{0, true}});
     CHECK(line.filter.take_left_out() == 1);
     line.edge(20'000, true);
     line.edge(21'000, false);

@@ -3,17 +3,12 @@
 
 #include <catch2/catch.hpp>
 
+#include "pixel_formats.hpp"
+
 using namespace versavis;
 using namespace versavis::client;
+using namespace versavis::test;
 using Pixels = std::vector<std::uint8_t>;
-
-namespace {
-
-constexpr std::uint32_t mono8 = 0x01080001;
-constexpr std::uint32_t mono12 = 0x01100005;
-constexpr std::uint32_t bayer_rg8 = 0x01080009;
-
-}  // namespace
 
 TEST_CASE("grey_image: eight bits stay as they are", "[grey_image]") {
     const GreyImage image = grey_image({2, 2, {1, 2, 3, 255}, 255}, mono8);

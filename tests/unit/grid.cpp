@@ -9,7 +9,7 @@ using versavis::firmware::Nanoseconds;
 namespace {
 
 /// Of whole ticks, computed with 128 bits.
-Nanoseconds exact(std::uint64_t ticks, std::uint32_t rate_uhz) {
+Nanoseconds exact_time(std::uint64_t ticks, std::uint32_t rate_uhz) {
     return static_cast<Nanoseconds>(static_cast<__int128>(ticks) * 1'000'000'000'000'000 /
                                     rate_uhz);
 }
@@ -20,10 +20,10 @@ TEST_CASE("grid: no rate drifts, whole or not") {
     const std::uint32_t rate_uhz = GENERATE(100'000U, 100'001U, 7'000'000U, 14'000'000U,
                                             29'970'000U, 90'000'000U, 1'000'000'000U);
     Grid grid(1'000, rate_uhz);
-    CHECK(grid.period() == exact(1, rate_uhz));
+    CHECK(grid.period() == exact_time(1, rate_uhz));
     constexpr std::uint64_t ticks = 100'000;
     for (std::uint64_t i = 0; i < ticks; ++i) {
-        if (i < 1000 || i % 1000 == 0) REQUIRE(grid.next() == 1'000 + exact(i, rate_uhz));
+        if (i < 1000 || i % 1000 == 0) REQUIRE(grid.next() == 1'000 + exact_time(i, rate_uhz));
         grid.advance();
     }
     CHECK(grid.tick() == ticks);
@@ -40,10 +40,10 @@ TEST_CASE("grid: many ticks at once are as many single ones") {
         grid.advance_by(ticks);
         tick += static_cast<std::uint64_t>(ticks);
         REQUIRE(grid.tick() == tick);
-        REQUIRE(grid.next() == 7 + exact(tick, rate_uhz));
+        REQUIRE(grid.next() == 7 + exact_time(tick, rate_uhz));
         grid.advance();
         ++tick;
-        REQUIRE(grid.next() == 7 + exact(tick, rate_uhz));
+        REQUIRE(grid.next() == 7 + exact_time(tick, rate_uhz));
     }
 }
 
@@ -53,7 +53,7 @@ TEST_CASE("grid: it skips to a tick within a period before an instant, and never
          {0LL, 5'000LL, 100'000'000LL, 1'234'567'890'123LL, 31'536'000'000'000'000LL}) {
         Grid grid(5'000, rate_uhz);
         grid.skip_before(at);
-        CHECK(grid.next() == 5'000 + exact(grid.tick(), rate_uhz));
+        CHECK(grid.next() == 5'000 + exact_time(grid.tick(), rate_uhz));
         CHECK(grid.next() <= (at < 5'000 ? 5'000 : at));
         CHECK(at - grid.next() <= grid.period());
     }

@@ -23,8 +23,8 @@ void compare(clock::Translator& translator, BoardTime begin, BoardTime end, Dura
         translator.add({host_of(at) - way, at, at, host_of(at) + way});
 }
 
-struct Bench {
-    explicit Bench(bool align = true) : alignment(settings(align), board()) {}
+struct AlignmentBench {
+    explicit AlignmentBench(bool align = true) : alignment(settings(align), board()) {}
 
     static ClockConfiguration settings(bool align) {
         ClockConfiguration clock;
@@ -44,7 +44,7 @@ struct Bench {
     GridAlignment alignment;
 };
 
-wire::Exposure exposure(std::uint64_t tick, std::uint16_t flags = wire::exposure_measured) {
+wire::Exposure aligned_exposure(std::uint64_t tick, std::uint16_t flags = wire::exposure_measured) {
     wire::Exposure record{};
     record.camera = 2;
     record.tick = tick;
@@ -55,7 +55,7 @@ wire::Exposure exposure(std::uint64_t tick, std::uint16_t flags = wire::exposure
 }  // namespace
 
 TEST_CASE("grid_alignment: the board learns where the next whole second of the output clock lies") {
-    Bench bench;
+    AlignmentBench bench;
     compare(bench.translator, BoardTime{}, BoardTime{60'000'000'000}, microseconds(100));
     const HostTime now = host_of(BoardTime{60'000'000'000});
     const auto message = bench.alignment.message(now, bench.translator);
@@ -76,21 +76,21 @@ TEST_CASE("grid_alignment: the board learns where the next whole second of the o
 TEST_CASE("grid_alignment: nothing is said that is not wanted, or not known well enough") {
     const HostTime now = host_of(BoardTime{10'000'000'000});
     SECTION("not wanted") {
-        Bench bench(false);
+        AlignmentBench bench(false);
         compare(bench.translator, BoardTime{}, BoardTime{10'000'000'000}, microseconds(100));
         CHECK_FALSE(bench.alignment.message(now, bench.translator));
     }
     SECTION("no exchange yet") {
-        Bench bench;
+        AlignmentBench bench;
         CHECK_FALSE(bench.alignment.message(now, bench.translator));
     }
     SECTION("a link that is too slow to know the time by") {
-        Bench bench;
+        AlignmentBench bench;
         compare(bench.translator, BoardTime{}, BoardTime{10'000'000'000}, milliseconds(40));
         CHECK_FALSE(bench.alignment.message(now, bench.translator));
     }
     SECTION("no contact for long") {
-        Bench bench;
+        AlignmentBench bench;
         compare(bench.translator, BoardTime{}, BoardTime{10'000'000'000}, microseconds(100));
         CHECK_FALSE(bench.alignment.message(now + seconds(5), bench.translator));
         CHECK(bench.alignment.message(now, bench.translator));
@@ -98,7 +98,7 @@ TEST_CASE("grid_alignment: nothing is said that is not wanted, or not known well
 }
 
 TEST_CASE("grid_alignment: where the grid truly lies is seen by the middles of exposures") {
-    Bench bench;
+    AlignmentBench bench;
     compare(bench.translator, BoardTime{}, BoardTime{10'000'000'000}, microseconds(100));
     const HostTime now = host_of(BoardTime{10'000'000'000});
     CHECK_FALSE(bench.alignment.report(now).aligned);
@@ -110,10 +110,10 @@ TEST_CASE("grid_alignment: where the grid truly lies is seen by the middles of e
             const auto since = static_cast<std::int64_t>(static_cast<double>(tick) / 29.97 * 1e9);
             const Duration odd = tick == 1'000'002 ? milliseconds(20)
                                                    : Duration{};  // an exposure that nobody foresaw
-            bench.alignment.exposure(exposure(tick),
+            bench.alignment.exposure(aligned_exposure(tick),
                                      OutputTime{77'005'000'000 + since} + error + odd, now);
         }
-        bench.alignment.exposure(exposure(5, wire::exposure_no_end), OutputTime{1}, now);
+        bench.alignment.exposure(aligned_exposure(5, wire::exposure_no_end), OutputTime{1}, now);
     };
     see(microseconds(-7));
     CHECK(bench.alignment.report(now).error.ns == Approx(-7'000).margin(50));

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "nanoseconds.hpp"
+
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
-constexpr Nanoseconds second = 1'000'000'000;
 
 /// True time as this board has it.
 Nanoseconds board_time(Nanoseconds host, std::int64_t ppb) {

@@ -16,7 +16,7 @@ Datagram image_leader(std::uint8_t payload_type) {
             0, 0, 4, 0xB0,         0, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0};
 }
 
-Datagram with(Datagram bytes, std::size_t at, std::uint8_t value) {
+Datagram with_byte(Datagram bytes, std::size_t at, std::uint8_t value) {
     bytes[at] = value;
     return bytes;
 }
@@ -47,12 +47,12 @@ TEST_CASE("gvsp: packets that are none are refused") {
     for (const Datagram& whole : {plain_header, extended_header})
         for (std::size_t size = 0; size < whole.size(); ++size)
             CHECK_FALSE(parse_packet(Bytes(whole).first(size)));
-    CHECK_FALSE(parse_packet(with(plain_header, 0, 0x80)));  // "I do not have it"
-    CHECK_FALSE(parse_packet(with(plain_header, 4, 4)));     // all in one
-    CHECK_FALSE(parse_packet(with(plain_header, 4, 7)));     // multipart
-    CHECK_FALSE(parse_packet(with(plain_header, 4, 1)));     // a leader that is not the first
-    CHECK_FALSE(parse_packet({{0, 0, 0, 1, 3, 0, 0, 0}}));   // data that is the first
-    CHECK_FALSE(parse_packet({{0, 0, 0, 0, 3, 0, 0, 1}}));   // of block 0
+    CHECK_FALSE(parse_packet(with_byte(plain_header, 0, 0x80)));  // "I do not have it"
+    CHECK_FALSE(parse_packet(with_byte(plain_header, 4, 4)));     // all in one
+    CHECK_FALSE(parse_packet(with_byte(plain_header, 4, 7)));     // multipart
+    CHECK_FALSE(parse_packet(with_byte(plain_header, 4, 1)));     // a leader that is not the first
+    CHECK_FALSE(parse_packet({{0, 0, 0, 1, 3, 0, 0, 0}}));        // data that is the first
+    CHECK_FALSE(parse_packet({{0, 0, 0, 0, 3, 0, 0, 1}}));        // of block 0
 }
 
 TEST_CASE("gvsp: the leader of a plain image, and of all else") {
@@ -67,7 +67,7 @@ TEST_CASE("gvsp: the leader of a plain image, and of all else") {
     const Datagram whole = image_leader(1);
     for (std::size_t size = 0; size < whole.size(); ++size)
         CHECK_FALSE(parse_leader(Bytes(whole).first(size)));
-    CHECK_FALSE(parse_leader(with(image_leader(1), 2, 0x40))->image);  // with chunks
+    CHECK_FALSE(parse_leader(with_byte(image_leader(1), 2, 0x40))->image);  // with chunks
     CHECK_FALSE(parse_leader(Bytes(image_leader(10)).first(4))->image);
 }
 
@@ -79,13 +79,13 @@ TEST_CASE("gvsp: what an IP packet carries, by the lengths of its headers") {
     const Bytes body = udp_body(packet);
     REQUIRE(body.size() == 2);
     CHECK(body[0] == 0xAA);
-    CHECK(udp_body(with(packet, 0, 0x46)).empty());  // options where there are none
-    CHECK(udp_body(with(packet, 25, 12)).empty());   // cut
-    CHECK(udp_body(with(packet, 25, 7)).empty());
+    CHECK(udp_body(with_byte(packet, 0, 0x46)).empty());  // options where there are none
+    CHECK(udp_body(with_byte(packet, 25, 12)).empty());   // cut
+    CHECK(udp_body(with_byte(packet, 25, 7)).empty());
     for (std::size_t size = 0; size < 30; ++size)
         CHECK(udp_body(Bytes(packet).first(size)).empty());
     packet.insert(packet.begin() + 20, 4, 0);
-    CHECK(udp_body(with(packet, 0, 0x46)).size() == 2);
+    CHECK(udp_body(with_byte(packet, 0, 0x46)).size() == 2);
 }
 
 TEST_CASE("gvsp: data that packets of a size carry") {

@@ -10,7 +10,7 @@ using namespace versavis::device;
 namespace {
 
 /// Hears hellos, and answers after some of them.
-struct Listener {
+struct HandshakeListener {
     int answers_after = 1;
     std::vector<wire::Header> hellos{};
     std::vector<Duration> waits{};
@@ -53,7 +53,7 @@ std::optional<Greeting> read_back(const T& message) {
 }  // namespace
 
 TEST_CASE("handshake: hellos go on, numbered and under one nonce, until one is answered") {
-    Listener board;
+    HandshakeListener board;
     board.answers_after = GENERATE(1, 3);
     // What was left unfinished before ends here.
     const std::uint8_t rest[]{7, 7};
@@ -69,7 +69,7 @@ TEST_CASE("handshake: hellos go on, numbered and under one nonce, until one is a
 }
 
 TEST_CASE("handshake: a board that does not answer is given up after 1.25 s") {
-    Listener board;
+    HandshakeListener board;
     board.answers_after = 100;
     Encoder encoder;
     CHECK_FALSE(*board.greeted_by(encoder));

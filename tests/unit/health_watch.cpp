@@ -9,8 +9,8 @@ using namespace versavis::daemon;
 namespace {
 
 /// A service with one camera at 20 Hz, in simulated time, looked at twice a second.
-struct Bench {
-    Bench() {
+struct HealthBench {
+    HealthBench() {
         status.started = now;
         status.board.state = BoardState::running;
         status.board.connections = 1;
@@ -54,7 +54,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("health_watch: from the start to full, to a loss within two seconds, and back") {
-    Bench bench;
+    HealthBench bench;
     CHECK(bench.step().health == Health::starting);
     for (int i = 0; i < 3; ++i) bench.step();
     CHECK(bench.status.cameras[0].diagnosis.health == Health::ok);
@@ -72,7 +72,7 @@ TEST_CASE("health_watch: from the start to full, to a loss within two seconds, a
 }
 
 TEST_CASE("health_watch: a slow start's few triggers are looked at together") {
-    Bench bench;
+    HealthBench bench;
     CameraStatus& camera = bench.status.cameras[0];
     camera.pipeline.pairing = pairing::State::searching;
     const auto look = [&](std::uint64_t triggers) {
@@ -98,7 +98,7 @@ TEST_CASE("health_watch: a slow start's few triggers are looked at together") {
 }
 
 TEST_CASE("health_watch: frames that are published as suspect are not delivered") {
-    Bench bench;
+    HealthBench bench;
     for (int i = 0; i < 6; ++i) bench.step();
     for (int i = 0; i < 4; ++i) {
         bench.status.cameras[0].pipeline.suspect += 10;
@@ -108,7 +108,7 @@ TEST_CASE("health_watch: frames that are published as suspect are not delivered"
 }
 
 TEST_CASE("health_watch: why a camera has no frames outlasts its being opened anew") {
-    Bench bench;
+    HealthBench bench;
     for (int i = 0; i < 6; ++i) bench.step();
     PipelineReport& pipeline = bench.status.cameras[0].pipeline;
     bench.mute = true;
@@ -129,7 +129,7 @@ TEST_CASE("health_watch: why a camera has no frames outlasts its being opened an
 }
 
 TEST_CASE("health_watch: a camera that is opened again and again is not starting for ever") {
-    Bench bench;
+    HealthBench bench;
     bench.status.cameras[0].pipeline.pairing = pairing::State::searching;
     for (int i = 0; i < 20; ++i) {
         ++bench.status.cameras[0].camera.connections;
@@ -140,7 +140,7 @@ TEST_CASE("health_watch: a camera that is opened again and again is not starting
 }
 
 TEST_CASE("health_watch: what recovers keeps its fault until it is trusted again") {
-    Bench bench;
+    HealthBench bench;
     for (int i = 0; i < 6; ++i) bench.step();
     for (int i = 0; i < 4; ++i) bench.step(0.5);
     CHECK(bench.status.cameras[0].diagnosis.fault == Fault::packet_loss);

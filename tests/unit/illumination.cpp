@@ -5,15 +5,15 @@
 #include <catch2/catch.hpp>
 #include <vector>
 
+#include "nanoseconds.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
 
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-
-struct Hardware final : OutputSchedule {
+struct LightHardware final : OutputSchedule {
     std::uint32_t levels = 0;
     unsigned words = 0;
     std::vector<Nanoseconds> changes[output_count];
@@ -26,7 +26,7 @@ struct Hardware final : OutputSchedule {
     }
 };
 
-struct Moves final : OutputMoves {
+struct IgnoredMoves final : OutputMoves {
     void moved(unsigned /*output*/, bool /*level*/, Nanoseconds /*asked*/,
                Nanoseconds /*left*/) override {}
 };
@@ -40,7 +40,7 @@ struct Limited {
     }
 };
 
-struct Reports final : ChannelReports {
+struct LightReports final : ChannelReports {
     std::vector<Limited> all;
     void exposure(const wire::Exposure& /*record*/) override {}
     void event(wire::BoardEventKind kind, std::uint8_t source, Nanoseconds at, std::int64_t value,
@@ -56,8 +56,8 @@ using Times = std::vector<Nanoseconds>;
 
 /// Light for cameras 0, 1 and 7, 0.1 ms before they expose: for up to 10 ms, and a tenth of the
 /// time, unless a test wants it otherwise.
-struct Bench {
-    explicit Bench(Nanoseconds longest = 10 * ms, std::uint32_t duty_ppm = 100'000) {
+struct IlluminationBench {
+    explicit IlluminationBench(Nanoseconds longest = 10 * ms, std::uint32_t duty_ppm = 100'000) {
         configuration.cameras = 0b1000'0011;
         configuration.lead_ns = 100 * us;
         configuration.max_on_ns = static_cast<std::uint32_t>(longest);
@@ -102,9 +102,9 @@ struct Bench {
     const Times& gate() const { return hardware.changes[output_light_gate]; }
     const Times& lead() const { return hardware.changes[output_light_lead]; }
 
-    Hardware hardware;
-    Moves moves;
-    Reports reports;
+    LightHardware hardware;
+    IgnoredMoves moves;
+    LightReports reports;
     OutputQueue queue{hardware, moves, {}};
     Illumination light{queue, reports};
     wire::IlluminationConfiguration configuration{};
@@ -114,7 +114,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("illumination: the gate is open from one lead before the exposure until its end") {
-    Bench bench;
+    IlluminationBench bench;
     CHECK(bench.light.next_wake(7) == never);
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     CHECK(bench.light.next_wake(7) == 11'900 * us + 7);
@@ -130,7 +130,7 @@ TEST_CASE("illumination: the gate is open from one lead before the exposure unti
 }
 
 TEST_CASE("illumination: it is no matter of other cameras, or before it is configured") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(2, 10 * ms, ms, true, ms);
     bench.run(9 * ms);
     CHECK(bench.queue.empty());
@@ -150,7 +150,7 @@ TEST_CASE("illumination: it is no matter of other cameras, or before it is confi
 }
 
 TEST_CASE("illumination: it is on until the last of its cameras is done") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.light.plan(1, 10 * ms, 4 * ms, true, ms);
     bench.edge(10 * ms, 0, true);
@@ -162,7 +162,7 @@ TEST_CASE("illumination: it is on until the last of its cameras is done") {
 
 TEST_CASE("illumination: when no exposure comes, it ends after 2 ms, and not before the lead") {
     const bool strobe = GENERATE(true, false);
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, strobe, ms);
     const Nanoseconds lead_off = strobe ? 10'050 * us : 14 * ms;
     const Nanoseconds end = strobe ? 11'900 * us : 14 * ms;
@@ -175,7 +175,7 @@ TEST_CASE("illumination: when no exposure comes, it ends after 2 ms, and not bef
 }
 
 TEST_CASE("illumination: a second camera that is late gets light, too, whenever it is looked at") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);  // it ignores its trigger
     bench.light.plan(1, 11'500 * us, 4 * ms, true, ms);
     if (GENERATE(true, false)) bench.run(12 * ms);
@@ -185,7 +185,7 @@ TEST_CASE("illumination: a second camera that is late gets light, too, whenever 
 }
 
 TEST_CASE("illumination: an end before the light is not the end of the light") {
-    Bench bench;
+    IlluminationBench bench;
     const bool planned = GENERATE(true, false);
     if (planned) bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.edge(9 * ms, 1, true);
@@ -198,7 +198,7 @@ TEST_CASE("illumination: an end before the light is not the end of the light") {
 
 TEST_CASE("illumination: lost edges leave it on for as long as an exposure may come") {
     const bool ended = GENERATE(true, false);
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.edge(10 * ms, 0, true);
     if (ended) {
@@ -211,7 +211,7 @@ TEST_CASE("illumination: lost edges leave it on for as long as an exposure may c
 }
 
 TEST_CASE("illumination: a line that is stuck costs one longest light, and a dark pause") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.edge(10 * ms, 0, true);
     bench.run(19'900 * us - 1);
@@ -227,13 +227,13 @@ TEST_CASE("illumination: a line that is stuck costs one longest light, and a dar
 TEST_CASE("illumination: light that was not wanted any longer was not limited") {
     // With a budget of 1 ms the gate closes at 10.9 ms.
     for (const Nanoseconds longer : {0, 1}) {
-        Bench bench(ms);
+        IlluminationBench bench(ms);
         for (int i = 0; i < 2; ++i) bench.light.plan(0, 10 * ms, 5 * ms, false, 0);
         bench.light.stop(ms);
         bench.light.plan(0, 10 * ms, 900 * us + longer, false, ms);
         bench.run(11 * ms);
         CHECK(bench.reports.all.size() == (longer == 0 ? 0 : 1));
-        Bench next(ms, 1'000'000);
+        IlluminationBench next(ms, 1'000'000);
         next.light.plan(0, 10 * ms, 500 * us, false, ms);
         next.light.plan(0, 11 * ms - longer, 5 * ms, false, ms);
         next.run(11 * ms);
@@ -244,11 +244,11 @@ TEST_CASE("illumination: light that was not wanted any longer was not limited") 
 }
 
 TEST_CASE("illumination: on-time is earned by the duty, and spent while the gate is open") {
-    Bench full;
+    IlluminationBench full;
     CHECK(full.budget(100'000 * ms) == 10 * ms);
     for (const std::uint32_t duty_ppm : {100'000U, 1U, 123'457U}) {
         CAPTURE(duty_ppm);
-        Bench bench(10 * ms, duty_ppm);
+        IlluminationBench bench(10 * ms, duty_ppm);
         bench.expose(0, 10 * ms, 14 * ms);
         // Of 10 ms at 9.9 ms 5.9 are left, and what the duty gives until 24 ms is earned.
         const auto by_duty = [duty_ppm](Nanoseconds span) { return span * duty_ppm / 1'000'000; };
@@ -256,14 +256,14 @@ TEST_CASE("illumination: on-time is earned by the duty, and spent while the gate
         CHECK(bench.budget(24 * ms) ==
               std::min(10 * ms, left + by_duty(10 * ms) + by_duty(10 * ms)));
     }
-    Bench slow(10 * ms, 1);
+    IlluminationBench slow(10 * ms, 1);
     CHECK(slow.budget(10 * ms) == 10 * ms);
     slow.polled = 999'000 * ms;
     CHECK(slow.budget(1'000'000 * ms) == 999'990);
 }
 
 TEST_CASE("illumination: after years of darkness one longest light has been earned") {
-    Bench bench(1'000 * ms, 1);
+    IlluminationBench bench(1'000 * ms, 1);
     bench.expose(0, 10 * ms, 500 * ms);
     constexpr Nanoseconds years = 300'000'000'000 * ms;
     bench.polled = years;
@@ -276,7 +276,7 @@ TEST_CASE("illumination: with too little on-time it stays dark, and says so") {
     // After 1 ms of light until 10.9 ms, a hundredth of the time since 9.9 is there: enough for the
     // lead and 10 us at 20.9.
     for (const Nanoseconds early : {0, 100}) {
-        Bench bench(ms, 10'000);
+        IlluminationBench bench(ms, 10'000);
         bench.light.plan(0, 10 * ms, ms, true, ms);
         bench.edge(10 * ms, 0, true);
         bench.edge(15 * ms, 0, false);
@@ -296,7 +296,7 @@ TEST_CASE("illumination: with too little on-time it stays dark, and says so") {
 }
 
 TEST_CASE("illumination: a lead whose light was refused ends when another is planned") {
-    Bench bench(ms, 10'000);
+    IlluminationBench bench(ms, 10'000);
     bench.light.plan(0, 10 * ms, ms, true, ms);
     bench.light.plan(1, 10 * ms, ms, true, ms);
     bench.edge(10 * ms, 0, true);
@@ -317,13 +317,13 @@ TEST_CASE("illumination: what leaves late is paid for") {
     for (const Case& one :
          {Case{false, 14 * ms, 14'500 * us, 500 * us}, Case{false, 14 * ms, 1'000 * ms, 10 * ms},
           Case{false, 13 * ms, 17 * ms, 0}, Case{true, 14 * ms, 18 * ms, 0}}) {
-        Bench bench;
+        IlluminationBench bench;
         bench.expose(0, 10 * ms, 14 * ms);
         bench.light.moved(one.open, one.asked, one.left);
         // A tenth of 54.1 ms more.
         CHECK(bench.budget(64 * ms) == std::min(10 * ms, 11'310 * us - one.cost));
     }
-    Bench stuck;
+    IlluminationBench stuck;
     stuck.light.plan(0, 10 * ms, 4 * ms, true, ms);
     stuck.edge(10 * ms, 0, true);
     stuck.edge(30 * ms, 0, false);
@@ -333,7 +333,7 @@ TEST_CASE("illumination: what leaves late is paid for") {
 
 TEST_CASE("illumination: leads that touch or overlap are one") {
     const auto leads = [](Nanoseconds second_start) {
-        Bench bench;
+        IlluminationBench bench;
         bench.light.plan(1, second_start, ms, true, ms);
         bench.light.plan(0, 10 * ms, ms, true, ms);
         bench.run(15 * ms);
@@ -343,7 +343,7 @@ TEST_CASE("illumination: leads that touch or overlap are one") {
     CHECK(leads(10'150 * us) == Times{9'900 * us, 10'200 * us});
     CHECK(leads(10'150 * us + 1) ==
           Times{9'900 * us, 10'050 * us, 10'050 * us + 1, 10'200 * us + 1});
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, false, ms);
     bench.light.plan(1, 11 * ms, ms, true, ms);
     bench.run(10 * ms);
@@ -354,7 +354,7 @@ TEST_CASE("illumination: leads that touch or overlap are one") {
 
 TEST_CASE("illumination: a lead that is over is not begun once more by the next plan") {
     for (const Nanoseconds planned : {10'050 * us - 1, 10'050 * us, 12 * ms}) {
-        Bench bench;
+        IlluminationBench bench;
         bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
         bench.run(10 * ms);
         bench.light.plan(1, 20 * ms, 4 * ms, true, planned);  // before it is polled again
@@ -365,7 +365,7 @@ TEST_CASE("illumination: a lead that is over is not begun once more by the next 
         CHECK(leads.size() == 4);
     }
     // Its end was put off, since nobody polled: it ends at once.
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.run(9 * ms);
     bench.light.plan(1, 20 * ms, 4 * ms, true, 13 * ms);
@@ -376,7 +376,7 @@ TEST_CASE("illumination: a lead that is over is not begun once more by the next 
 
 TEST_CASE("illumination: it stays on for an exposure whose lead is on its way") {
     for (const Nanoseconds later : {0, 1}) {
-        Bench bench;
+        IlluminationBench bench;
         bench.light.plan(0, 10 * ms, ms, true, ms);
         bench.light.plan(1, 12'100 * us + later, ms, true, ms);
         bench.edge(10 * ms, 0, true);
@@ -389,7 +389,7 @@ TEST_CASE("illumination: it stays on for an exposure whose lead is on its way") 
 }
 
 TEST_CASE("illumination: exposures without a pause share one longest light") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, ms, true, ms);
     bench.edge(10 * ms, 0, true);
     bench.run(11 * ms);
@@ -403,7 +403,7 @@ TEST_CASE("illumination: exposures without a pause share one longest light") {
 
 TEST_CASE(
     "illumination: after an exposure that ended, it ends with the lead of one that is missing") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, ms, true, ms);
     bench.light.plan(1, 10'600 * us, ms, true, ms);
     bench.edge(10 * ms, 0, true);
@@ -413,7 +413,7 @@ TEST_CASE(
 }
 
 TEST_CASE("illumination: one that is refused leaves the others that wait as they are") {
-    Bench bench(ms, 10'000);
+    IlluminationBench bench(ms, 10'000);
     bench.light.plan(0, 10 * ms, ms, true, ms);
     bench.edge(10 * ms, 0, true);
     for (const Nanoseconds start : {12 * ms, 40 * ms, 60 * ms})
@@ -427,7 +427,7 @@ TEST_CASE("illumination: one that is refused leaves the others that wait as they
 }
 
 TEST_CASE("illumination: one that is refused brings back none that was forgotten") {
-    Bench bench(ms, 10'000);
+    IlluminationBench bench(ms, 10'000);
     for (const Nanoseconds start : {10 * ms, 40 * ms, 60 * ms})
         bench.light.plan(0, start, ms, true, ms);
     bench.edge(10 * ms, 0, true);
@@ -441,7 +441,7 @@ TEST_CASE("illumination: one that is refused brings back none that was forgotten
 }
 
 TEST_CASE("illumination: eight exposures are planned, one more gets no light and is reported") {
-    Bench bench;
+    IlluminationBench bench;
     for (Nanoseconds n = 1; n <= 8; ++n) bench.light.plan(0, 20 * n * ms, ms, true, 0);
     CHECK(bench.reports.all.empty());
     bench.light.plan(1, 180 * ms, 2 * ms, true, 0);
@@ -452,7 +452,7 @@ TEST_CASE("illumination: eight exposures are planned, one more gets no light and
 }
 
 TEST_CASE("illumination: stopped, it is dark, and what was planned is forgotten") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.light.plan(1, 10'080 * us, 19 * ms, false, ms);
     bench.edge(10 * ms, 0, true);
@@ -468,7 +468,7 @@ TEST_CASE("illumination: stopped, it is dark, and what was planned is forgotten"
 }
 
 TEST_CASE("illumination: stopped before it begins, it has spent nothing") {
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.light.stop(8 * ms);
     bench.run(11 * ms);
@@ -479,7 +479,7 @@ TEST_CASE("illumination: stopped before it begins, it has spent nothing") {
 TEST_CASE("illumination: a new configuration earns no light") {
     const bool paused = GENERATE(false, true);
     const Nanoseconds longest = GENERATE(10 * ms, 3 * ms);
-    Bench bench;
+    IlluminationBench bench;
     bench.expose(0, 10 * ms, 14 * ms);
     if (paused) bench.light.configure({}, 24 * ms);
     bench.configuration.max_on_ns = static_cast<std::uint32_t>(longest);
@@ -492,7 +492,7 @@ TEST_CASE("illumination: a new configuration earns no light") {
 
 TEST_CASE("illumination: configured anew, it is dark at once") {
     const bool lit = GENERATE(true, false);
-    Bench bench;
+    IlluminationBench bench;
     bench.light.plan(0, 10 * ms, 4 * ms, true, ms);
     bench.edge(10 * ms, 0, true);
     bench.light.configure(lit ? bench.configuration : wire::IlluminationConfiguration{},

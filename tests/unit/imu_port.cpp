@@ -11,7 +11,6 @@ using namespace versavis::firmware;
 
 namespace {
 
-using Event = test::ReportedEvent;
 using Reports = test::RecordedReports;
 
 struct Port final : ImuPort {
@@ -26,7 +25,7 @@ struct Port final : ImuPort {
 };
 
 /// A port, and samples of which each is like no other.
-struct World {
+struct PortWorld {
     wire::ImuSample sample(unsigned flags = 0) {
         wire::ImuSample sample{};
         sample.flags = static_cast<std::uint16_t>(flags);
@@ -52,7 +51,7 @@ using NumberAndFlags = std::pair<unsigned, unsigned>;
 
 TEST_CASE(
     "imu_port: numbers count from zero, without those that were missed, which is reported once") {
-    World world;
+    PortWorld world;
     CHECK(world.next() == NumberAndFlags{0, 0});
     CHECK(world.next(wire::imu_stamped) == NumberAndFlags{1, wire::imu_stamped});
     world.port.miss();
@@ -70,7 +69,7 @@ TEST_CASE(
 }
 
 TEST_CASE("imu_port: a sample is repeated if gyro and accelerometer are as in the one before") {
-    World world;
+    PortWorld world;
     wire::ImuSample sample{};
     const auto repeated = [&world, &sample] {
         wire::ImuSample next = sample;
@@ -100,13 +99,13 @@ TEST_CASE("imu_port: a sample is repeated if gyro and accelerometer are as in th
 }
 
 TEST_CASE("imu_port: what a part says is repeated stays so") {
-    World world;
+    PortWorld world;
     CHECK(world.next(wire::imu_repeated) == NumberAndFlags{0, wire::imu_repeated});
     CHECK(world.next() == NumberAndFlags{1, 0});
 }
 
 TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too many") {
-    World world;
+    PortWorld world;
     wire::ImuSample sample{};
     for (int round = 0; round < 2; ++round) {
         for (int i = 1; i < 20; ++i) world.next(wire::imu_check_failed);
@@ -137,7 +136,7 @@ TEST_CASE("imu_port: failed samples are counted, and twenty in a row are too man
 }
 
 TEST_CASE("imu_port: a part's own diagnosis is an error of each sample, and no failure") {
-    World world;
+    PortWorld world;
     for (int i = 0; i < 30; ++i) world.next(wire::imu_self_test_failed);
     CHECK(world.port.errors() == 30);
     world.next(wire::imu_self_test_failed | wire::imu_check_failed);
@@ -145,16 +144,18 @@ TEST_CASE("imu_port: a part's own diagnosis is an error of each sample, and no f
 }
 
 TEST_CASE("imu_port: events name the port, and after a failure at least one sample is missing") {
-    World world;
+    PortWorld world;
     world.port.report_event(wire::BoardEventKind::imu_ready, 7, 100);
     CHECK(world.reports.events ==
-          std::vector<Event>{{wire::BoardEventKind::imu_ready, 1, 7, 100, 0}});
+          std::vector<test::ReportedEvent>{{wire::BoardEventKind::imu_ready, 1, 7, 100, 0}});
     CHECK(world.next() == NumberAndFlags{0, 0});
     world.port.report_failure(wire::BoardEventKind::imu_silent, 8, 9);
     world.port.report_failure(wire::BoardEventKind::imu_failed, 10, 11, 12);
     CHECK(world.port.restarts() == 2);
     REQUIRE(world.reports.events.size() == 3);
-    CHECK(world.reports.events[1] == Event{wire::BoardEventKind::imu_silent, 1, 8, 9, 0});
-    CHECK(world.reports.events[2] == Event{wire::BoardEventKind::imu_failed, 1, 10, 11, 12});
+    CHECK(world.reports.events[1] ==
+          test::ReportedEvent{wire::BoardEventKind::imu_silent, 1, 8, 9, 0});
+    CHECK(world.reports.events[2] ==
+          test::ReportedEvent{wire::BoardEventKind::imu_failed, 1, 10, 11, 12});
     CHECK(world.next() == NumberAndFlags{3, wire::imu_overrun});
 }

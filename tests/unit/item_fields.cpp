@@ -105,26 +105,26 @@ unsigned bit_of(std::uint32_t flag) {
 }
 
 /// A field, as the contract has it.
-struct Row {
+struct FieldRow {
     std::string name;
     std::string type;
     UnknownIf unknown = UnknownIf::never;
     unsigned since = 0;
     unsigned flag = 0;
 
-    bool operator==(const Row&) const = default;
+    bool operator==(const FieldRow&) const = default;
 };
 
-std::ostream& operator<<(std::ostream& out, const Row& row) {
+std::ostream& operator<<(std::ostream& out, const FieldRow& row) {
     return out << row.name << ", " << row.type << ", unknown by " << static_cast<int>(row.unknown)
                << ", since " << row.since << ", flag " << row.flag;
 }
 
 /// By their offsets.
-using Rows = std::map<unsigned, Row>;
+using Rows = std::map<unsigned, FieldRow>;
 
-Row row_of(const std::string& name, const std::string& meaning, const std::string& type) {
-    Row row{name, type, UnknownIf::never, since_of(meaning), 0};
+FieldRow row_of(const std::string& name, const std::string& meaning, const std::string& type) {
+    FieldRow row{name, type, UnknownIf::never, since_of(meaning), 0};
     std::smatch flag;
     const auto says = [&](const char* value) {
         return meaning.find(std::string("; ") + value + ": ") != std::string::npos;
@@ -169,7 +169,7 @@ std::string type_of(const Field& field) {
     }
 }
 
-Row as_documented(const Field& field) {
+FieldRow as_documented(const Field& field) {
     const unsigned flag = field.unknown == UnknownIf::without_flag ? bit_of(field.flags) : 0;
     return {field.name, type_of(field), field.unknown, field.since, flag};
 }
@@ -298,7 +298,7 @@ TEST_CASE("item_fields: the contract has the same names, places, types and unkno
             if (!derived(field)) expected.emplace(field.offset, as_documented(field));
         if (kind == ring::StreamKind::frames)  // the only one that lies in two places
             expected.emplace(offsetof(FrameMetadata, tick_high),
-                             Row{"tick", "u32", UnknownIf::never, 5, 0});
+                             FieldRow{"tick", "u32", UnknownIf::never, 5, 0});
         INFO(heading);
         for (const auto& [offset, row] : documented) CHECK(expected.count(offset) == 1);
         for (const auto& [offset, row] : expected) {

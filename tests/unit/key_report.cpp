@@ -9,7 +9,7 @@ using nlohmann::json;
 
 namespace {
 
-const std::vector<daemon::KeyDescription> keys{
+const std::vector<daemon::KeyDescription> described_keys{
     {"", "instance", "`\"default\"`", "a name", "distinguishes services"},
     {"[[camera]]", "device", "", "text, unique", "address of the camera"},
 };
@@ -17,7 +17,7 @@ const std::vector<daemon::KeyDescription> keys{
 }  // namespace
 
 TEST_CASE("key_report: keys stand below their table, without Markdown") {
-    CHECK(daemon::to_text(keys) ==
+    CHECK(daemon::to_text(described_keys) ==
           "instance            distinguishes services\n"
           "                    a name; default: \"default\"\n"
           "\n[[camera]]\n"
@@ -26,14 +26,15 @@ TEST_CASE("key_report: keys stand below their table, without Markdown") {
 }
 
 TEST_CASE("key_report: in JSON each key has all members") {
-    CHECK(json::parse(daemon::to_json(keys)) == json{{{"table", ""},
-                                                      {"key", "instance"},
-                                                      {"default", "\"default\""},
-                                                      {"range", "a name"},
-                                                      {"meaning", "distinguishes services"}},
-                                                     {{"table", "[[camera]]"},
-                                                      {"key", "device"},
-                                                      {"default", ""},
-                                                      {"range", "text, unique"},
-                                                      {"meaning", "address of the camera"}}});
+    CHECK(json::parse(daemon::to_json(described_keys)) ==
+          json{{{"table", ""},
+                {"key", "instance"},
+                {"default", "\"default\""},
+                {"range", "a name"},
+                {"meaning", "distinguishes services"}},
+               {{"table", "[[camera]]"},
+                {"key", "device"},
+                {"default", ""},
+                {"range", "text, unique"},
+                {"meaning", "address of the camera"}}});
 }

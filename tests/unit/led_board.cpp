@@ -12,12 +12,12 @@ using namespace versavis::test;
 
 namespace {
 
-constexpr Duration period = milliseconds(100);
+constexpr Duration frame_period = milliseconds(100);
 
 Expected<LedPlace> find(LedBench& bench, int pictures, Duration exposure = milliseconds(1)) {
     LedSearch search;
     for (int i = 0; i < pictures; ++i)
-        search.add(bench.picture(HostTime{1} + period * i, exposure));
+        search.add(bench.picture(HostTime{1} + frame_period * i, exposure));
     return search.find("cam0");
 }
 

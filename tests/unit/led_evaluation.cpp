@@ -15,38 +15,39 @@ using namespace versavis::test;
 namespace {
 
 /// Frames of a camera that exposes `late` after what its stamps say.
-struct Camera {
+struct LedCamera {
     std::string name;
     std::unique_ptr<LedBench> bench;
     Duration late;
     Duration phase{};  ///< of its stamps
 };
 
-constexpr Duration exposure = microseconds(1100);
+constexpr Duration led_exposure = microseconds(1100);
 
-void each_frame(Camera& camera, int from, int count,
+void each_frame(LedCamera& camera, int from, int count,
                 const std::function<void(OutputTime, const FrameMetadata&,
                                          const std::vector<std::byte>&)>& take) {
     for (int i = from; i < from + count; ++i) {
         const HostTime middle = HostTime{0} + seconds(1) + camera.phase + milliseconds(100) * i;
-        FrameMetadata frame = LedBench::frame(exposure);
+        FrameMetadata frame = LedBench::frame(led_exposure);
         frame.trigger = static_cast<std::uint64_t>(i + 1);
         frame.set_tick(static_cast<std::uint64_t>(i));
-        const auto pixels = camera.bench->pixels(middle + camera.late - exposure / 2, exposure);
+        const auto pixels =
+            camera.bench->pixels(middle + camera.late - led_exposure / 2, led_exposure);
         take(OutputTime{middle.ns}, frame, pixels);
     }
 }
 
-Expected<LedReport> evaluate(std::vector<Camera>& cameras, int frames,
+Expected<LedReport> evaluate(std::vector<LedCamera>& cameras, int frames,
                              const LedEvaluationSettings& settings,
                              const std::vector<std::string>& required = {}) {
     LedEvaluation evaluation(settings);
-    for (Camera& camera : cameras)
+    for (LedCamera& camera : cameras)
         each_frame(camera, 0, 40, [&](OutputTime, const auto& frame, const auto& pixels) {
             REQUIRE(evaluation.look(camera.name, frame, pixels));
         });
     if (const auto found = evaluation.find(required); !found) return Unexpected(found.error());
-    for (Camera& camera : cameras)
+    for (LedCamera& camera : cameras)
         each_frame(camera, 40, frames, [&](OutputTime time, const auto& frame, const auto& pixels) {
             REQUIRE(evaluation.add(camera.name, 1, time, frame, pixels));
         });
@@ -71,7 +72,7 @@ TEST_CASE("led_evaluation: from pixels to the offset, within 5 us", "[statistics
     const Duration late =
         GENERATE(microseconds(-60), microseconds(0), microseconds(23), microseconds(180));
     const Duration phase = GENERATE(microseconds(0), microseconds(500));
-    std::vector<Camera> cameras;
+    std::vector<LedCamera> cameras;
     cameras.push_back({"cam0", bench(bench_settings(rate_hz, {40, 150, 280, 165})), {}, phase});
     cameras.push_back({"cam1", bench(bench_settings(rate_hz, {240, 60, 70, 30})), late, phase});
     LedEvaluationSettings settings;
@@ -87,7 +88,7 @@ TEST_CASE("led_evaluation: from pixels to the offset, within 5 us", "[statistics
 }
 
 TEST_CASE("led_evaluation: a camera without the board is left out, unless it was asked for") {
-    std::vector<Camera> cameras;
+    std::vector<LedCamera> cameras;
     cameras.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});
     cameras.push_back({"cam1", bench(bench_settings(970, {-2000, -2000, -1000, -1000})), {}});
     LedEvaluationSettings settings;
@@ -96,7 +97,7 @@ TEST_CASE("led_evaluation: a camera without the board is left out, unless it was
     REQUIRE(report);
     CHECK(report->cameras.size() == 1);
     CHECK(report->notes.back() == "cam1: left out, no LED board was found");
-    std::vector<Camera> again;
+    std::vector<LedCamera> again;
     again.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});
     again.push_back({"cam1", bench(bench_settings(970, {-2000, -2000, -1000, -1000})), {}});
     const auto required = evaluate(again, 30, settings, {"cam1"});
@@ -105,12 +106,12 @@ TEST_CASE("led_evaluation: a camera without the board is left out, unless it was
 }
 
 TEST_CASE("led_evaluation: a place and an exposure that are given are used, suspects are not") {
-    std::vector<Camera> cameras;
+    std::vector<LedCamera> cameras;
     cameras.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});
     LedEvaluationSettings settings;
     settings.report.rate_hz = 970;
     settings.places["cam0"] = {40, 150, 280, 165};
-    settings.exposures["cam0"] = exposure;
+    settings.exposures["cam0"] = led_exposure;
     LedEvaluation evaluation(settings);
     CHECK(evaluation.looked_enough("cam0"));
     REQUIRE(evaluation.find({"cam0"}));
@@ -134,11 +135,11 @@ std::string recorded(const TemporaryDirectory& directory, const std::string& con
                      std::uint32_t pixel_format = 0x01080001) {
     RecordingFile file;
     file.add_attachment("configuration.toml", configuration);
-    std::vector<Camera> cameras;
+    std::vector<LedCamera> cameras;
     cameras.push_back({"cam0", bench(bench_settings(970, {40, 150, 280, 165})), {}});
     cameras.push_back({"cam1", bench(bench_settings(970, {240, 60, 70, 30})), microseconds(50)});
     for (int i = 0; i < 60; ++i) {
-        for (Camera& camera : cameras)
+        for (LedCamera& camera : cameras)
             each_frame(camera, i, 1, [&](OutputTime time, FrameMetadata frame, const auto& pixels) {
                 frame.pixel_format = pixel_format;
                 FileItem item;

@@ -46,7 +46,8 @@ std::vector<LedObservation> shots(const Series& series) {
     return out;
 }
 
-LedReport report(const LedObservations& all, double rate_hz = 970, const LedLayout& layout = {}) {
+LedReport report_of(const LedObservations& all, double rate_hz = 970,
+                    const LedLayout& layout = {}) {
     LedReportSettings settings;
     settings.rate_hz = rate_hz;
     settings.layout = layout;
@@ -72,7 +73,7 @@ TEST_CASE("led_report: 400 pairs match, and an offset within a step is found") {
     Series first;
     first.noise = 0.02;
     first.skew = second.skew = 40e-6;
-    const LedReport made = report({{"cam0", shots(first)}, {"cam1", shots(second)}});
+    const LedReport made = report_of({{"cam0", shots(first)}, {"cam1", shots(second)}});
     INFO(to_text(made));
     CHECK(made.ok());
     const LedPairReport& pair = made.pairs.at(0);
@@ -93,7 +94,7 @@ TEST_CASE("led_report: 400 pairs match, and an offset within a step is found") {
 TEST_CASE("led_report: a camera that is a step off, or a whole picture, does not match") {
     Series second;
     second.late_s = GENERATE(1e-3, -3e-3, 0.1, -0.1);
-    const LedReport made = report({{"cam0", shots({})}, {"cam1", shots(second)}});
+    const LedReport made = report_of({{"cam0", shots({})}, {"cam1", shots(second)}});
     CHECK_FALSE(made.ok());
     CHECK(made.pairs.at(0).mismatches == 400);
     CHECK(made.cameras.at(1).wrong_increments == 0);
@@ -103,7 +104,7 @@ TEST_CASE("led_report: a slip in the middle is a wrong increment, and mismatches
     auto slipped = shots({});
     for (std::size_t i = 200; i < slipped.size(); ++i)
         slipped[i].picture = shots({})[i + 1 < slipped.size() ? i + 1 : i].picture;
-    const LedReport made = report({{"cam0", shots({})}, {"cam1", slipped}});
+    const LedReport made = report_of({{"cam0", shots({})}, {"cam1", slipped}});
     CHECK(made.cameras.at(1).wrong_increments == 2);  // the last picture stands still
     CHECK(made.pairs.at(0).mismatches == 199);
 }
@@ -112,7 +113,7 @@ TEST_CASE("led_report: wrong direction and order of bits are reported, with thos
     Series series;
     series.layout.backward = GENERATE(true, false);
     series.layout.high_bit_first = !series.layout.backward;
-    const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}});
+    const LedReport made = report_of({{"cam0", shots(series)}, {"cam1", shots(series)}});
     CHECK_FALSE(made.ok());
     CHECK(notes(made, series.layout.backward
                           ? "they fit with --direction backward --bits low-first"
@@ -122,29 +123,29 @@ TEST_CASE("led_report: wrong direction and order of bits are reported, with thos
 TEST_CASE("led_report: at 1 kHz and 10 Hz there are blind spots, and they are reported") {
     Series series;
     series.rate_hz = 1000;
-    const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 1000);
+    const LedReport made = report_of({{"cam0", shots(series)}, {"cam1", shots(series)}}, 1000);
     CHECK(made.ok());
     CHECK(notes(made, "only 16 of 64 counts ever occur"));
     CHECK(notes(made, "so would the wrong direction"));
     // What is blind: sixteen pictures off.
     Series off = series;
     off.late_s = 1.6;
-    CHECK(report({{"cam0", shots(series)}, {"cam1", shots(off)}}, 1000).ok());
+    CHECK(report_of({{"cam0", shots(series)}, {"cam1", shots(off)}}, 1000).ok());
     series.rate_hz = off.rate_hz = 970;
-    CHECK_FALSE(report({{"cam0", shots(series)}, {"cam1", shots(off)}}).ok());
+    CHECK_FALSE(report_of({{"cam0", shots(series)}, {"cam1", shots(off)}}).ok());
 }
 
 TEST_CASE("led_report: the wrong rate is reported, a rate that is a little off as well") {
-    CHECK(notes(report({{"cam0", shots({})}, {"cam1", shots({})}}, 1003.3), "--rate"));
+    CHECK(notes(report_of({{"cam0", shots({})}, {"cam1", shots({})}}, 1003.3), "--rate"));
     Series series;
     series.rate_hz = 971;
-    CHECK(notes(report({{"cam0", shots(series)}, {"cam1", shots(series)}}, 970), "971.000"));
+    CHECK(notes(report_of({{"cam0", shots(series)}, {"cam1", shots(series)}}, 970), "971.000"));
 }
 
 TEST_CASE("led_report: exposures that are short show counts alone, those that are long nothing") {
     Series series;
     series.exposure_s = 0.2e-3;
-    const LedReport made = report({{"cam0", shots(series)}, {"cam1", shots(series)}});
+    const LedReport made = report_of({{"cam0", shots(series)}, {"cam1", shots(series)}});
     CHECK(made.ok());
     CHECK(made.pairs.at(0).split == 0);
     CHECK(std::isinf(made.pairs.at(0).interval_us));
@@ -159,13 +160,13 @@ TEST_CASE("led_report: exposures that are short show counts alone, those that ar
 TEST_CASE("led_report: saturated LEDs show the count alone, hidden ones nothing") {
     auto bright = shots({});
     for (LedObservation& shot : bright) shot.picture.state = LedState::saturated;
-    const LedReport made = report({{"cam0", shots({})}, {"cam1", bright}});
+    const LedReport made = report_of({{"cam0", shots({})}, {"cam1", bright}});
     CHECK(made.pairs.at(0).matches == 400);
     CHECK(made.pairs.at(0).split == 0);
     CHECK(notes(made, "cam1: its LEDs are saturated"));
     auto hidden = shots({});
     for (LedObservation& shot : hidden) shot.picture.state = LedState::hidden;
-    CHECK(report({{"cam0", shots({})}, {"cam1", hidden}}).pairs.at(0).pairs == 0);
+    CHECK(report_of({{"cam0", shots({})}, {"cam1", hidden}}).pairs.at(0).pairs == 0);
     const auto none = led_report({{"cam1", hidden}}, {});
     REQUIRE_FALSE(none);
     CHECK_THAT(none.error().message(), Catch::Contains("400 without the outermost LEDs"));
@@ -179,8 +180,8 @@ TEST_CASE("led_report: pairs are of one tick, epoch and life, and one camera mak
         if (i >= 300) other[i].life = 1;
         if (i % 2 == 1) other[i].tick += 1000;
     }
-    CHECK(report({{"cam0", shots({})}, {"cam1", other}}).pairs.at(0).pairs == 100);
-    const LedReport alone = report({{"cam0", shots({})}});
+    CHECK(report_of({{"cam0", shots({})}, {"cam1", other}}).pairs.at(0).pairs == 100);
+    const LedReport alone = report_of({{"cam0", shots({})}});
     CHECK_FALSE(alone.ok());
     CHECK(notes(alone, "only one camera"));
 }
@@ -191,10 +192,10 @@ TEST_CASE("led_report: pictures that were not triggered are in no pair, and that
         shot.triggered = false;
         shot.tick = 0;
     }
-    const LedReport free = report({{"cam0", arrived}, {"cam1", arrived}});
+    const LedReport free = report_of({{"cam0", arrived}, {"cam1", arrived}});
     CHECK(free.pairs.at(0).pairs == 0);
     CHECK(free.cameras.at(0).untriggered == 400);
     CHECK(notes(free, "cam0: 400 pictures were not triggered"));
-    CHECK(report({{"cam0", arrived}, {"cam1", shots({})}}).pairs.at(0).pairs == 0);
+    CHECK(report_of({{"cam0", arrived}, {"cam1", shots({})}}).pairs.at(0).pairs == 0);
     CHECK(to_json(free)["cameras"][0]["untriggered"] == 400);
 }

@@ -8,19 +8,19 @@
 #include <fstream>
 #include <random>
 
+#include "pixel_formats.hpp"
 #include "recording/recording.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 
 using namespace versavis;
+using namespace versavis::test;
 using client::McapReader;
 using client::Recording;
 
 namespace {
 
-constexpr std::uint32_t mono8 = 0x01080001;
-
-struct Sample {
+struct ReaderSample {
     test::TemporaryDirectory directory;
     std::string path = (directory.path() / "a.mcap").string();
 
@@ -75,7 +75,7 @@ std::string damage(std::string bytes, std::mt19937_64& random) {
 }  // namespace
 
 TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory than they have") {
-    const Sample sample;
+    const ReaderSample sample;
     const std::string whole[] = {test::sample_recording(1, false, false, mono8),
                                  test::sample_recording(1, true, false, mono8),
                                  test::sample_recording(1, true, true, mono8)};
@@ -90,7 +90,7 @@ TEST_CASE("mcap_reader: 10000 damaged files give errors, and take no more memory
 }
 
 TEST_CASE("mcap_reader: a file that was cut anywhere gives what is whole, in the same order") {
-    const Sample sample;
+    const ReaderSample sample;
     const std::string whole = test::sample_recording(1, false, false, mono8);
     sample.write(whole);
     std::vector<std::pair<std::string, std::uint64_t>> all;
@@ -118,7 +118,7 @@ TEST_CASE("mcap_reader: a file that was cut anywhere gives what is whole, in the
 }
 
 TEST_CASE("mcap_reader: a chunk of another checksum is an error with its place") {
-    const Sample sample;
+    const ReaderSample sample;
     std::string bytes = test::sample_recording(1, false, false, mono8);
     sample.write(bytes);
     const auto chunk = [&] {
@@ -139,7 +139,7 @@ TEST_CASE("mcap_reader: a chunk of another checksum is an error with its place")
 }
 
 TEST_CASE("mcap_reader: a compressed chunk is reported with its compression") {
-    const Sample sample;
+    const ReaderSample sample;
     std::string bytes = test::sample_recording(1, false, false, mono8);
     const std::string content = std::string(28, '\0') + std::string("\4\0\0\0zstd", 8) +
                                 std::string("\1\0\0\0\0\0\0\0x", 9);
@@ -152,7 +152,7 @@ TEST_CASE("mcap_reader: a compressed chunk is reported with its compression") {
 }
 
 TEST_CASE("mcap_reader: a summary that names a place twice, or one in another, is not believed") {
-    const Sample sample;
+    const ReaderSample sample;
     const auto number = [](std::uint64_t value) {
         return std::string(reinterpret_cast<const char*>(&value), sizeof value);
     };
@@ -195,7 +195,7 @@ TEST_CASE("mcap_reader: a summary that names a place twice, or one in another, i
 }
 
 TEST_CASE("mcap_reader: what is no MCAP file is reported, and a directory, and nothing") {
-    const Sample sample;
+    const ReaderSample sample;
     CHECK_FALSE(McapReader::open(sample.path));
     CHECK_FALSE(McapReader::open(sample.directory.path().string()));
     CHECK_FALSE(McapReader::open("/dev/zero"));

@@ -21,15 +21,11 @@
 using namespace versavis;
 using namespace versavis::client;
 using Catch::Matchers::Contains;
+using test::content_of;
 
 namespace {
 
-std::string content_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-std::string text(std::span<const std::byte> bytes) {
+std::string bytes_as_text(std::span<const std::byte> bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
@@ -58,7 +54,7 @@ struct Files {
             REQUIRE(records);
             CHECK(reader->for_each(chunk, *records, [&](const McapRecord& record) {
                 if (record.opcode == McapOpcode::message)
-                    all.push_back(text(parse_message(record.content)->data));
+                    all.push_back(bytes_as_text(parse_message(record.content)->data));
                 return Expected<bool>(true);
             }));
         }
@@ -83,7 +79,8 @@ TEST_CASE_METHOD(Files, "mcap_writer: what is written is read, with its indexes 
     CHECK(writer.chunk_size() == 0);
     writer.write({second, 2, 2000}, "three");
     REQUIRE(writer.close());
-    CHECK(messages() == std::vector<std::string>{"one", "head " + text(body), "two", "three"});
+    CHECK(messages() ==
+          std::vector<std::string>{"one", "head " + bytes_as_text(body), "two", "three"});
 
     const auto reader = McapReader::open(path);
     CHECK(reader->defect().empty());
@@ -204,7 +201,7 @@ TEST_CASE_METHOD(Files, "mcap_writer: a full disk costs the chunk that was open,
                writer->close_before_chunk().has_value();
     }));
     CHECK(McapReader::open(path)->defect().empty());
-    CHECK(messages() == std::vector<std::string>{"first" + text(body)});
+    CHECK(messages() == std::vector<std::string>{"first" + bytes_as_text(body)});
 }
 
 TEST_CASE_METHOD(Files, "mcap_writer: a full disk has room for the summary of many small chunks") {

@@ -28,10 +28,10 @@ std::vector<std::uint8_t> extended_data() {
     return packet;
 }
 
-class Camera {
+class AnsweringCamera {
  public:
-    Camera() : socket_(::socket(AF_INET, SOCK_DGRAM, 0)) {}
-    ~Camera() { ::close(socket_); }
+    AnsweringCamera() : socket_(::socket(AF_INET, SOCK_DGRAM, 0)) {}
+    ~AnsweringCamera() { ::close(socket_); }
 
     void send_from(const char* address, std::uint16_t port, std::span<const std::uint8_t> packet) {
         sockaddr_in own = at(address, 0);
@@ -124,8 +124,8 @@ TEST_CASE("message_channel: events of the camera arrive once and are answered, o
                                  wake.notify_all();
                              });
     REQUIRE(channel);
-    Camera camera;
-    Camera stranger;
+    AnsweringCamera camera;
+    AnsweringCamera stranger;
     auto another = exposure_end;
     another[15] = 8;
     another[6] = 0x55;

@@ -57,7 +57,8 @@ TEST_CASE(
                                                           "sync_lost",
                                                           "sync_taken",
                                                           "configuration_stored",
-                                                          "seconds_differ"});
+                                                          "seconds_differ",
+                                                          "host_undisciplined"});
 }
 
 TEST_CASE("metadata: each reason has its name, and none that is no longer used") {

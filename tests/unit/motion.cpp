@@ -6,11 +6,13 @@
 #include <cmath>
 
 using namespace versavis;
-using namespace versavis::rig;
+using rig::Motion;
+using rig::MotionScenario;
+using rig::Tone;
 
 namespace {
 
-const HostTime zero{1'000'000'000};
+const HostTime motion_begin{1'000'000'000};
 
 MotionScenario wild() {
     MotionScenario scenario;
@@ -34,10 +36,10 @@ Eigen::Vector3d position(const Motion& motion, HostTime at) {
 }  // namespace
 
 TEST_CASE("motion: the gyro shows how the attitude changes") {
-    const Motion motion(zero, wild(), 7);
+    const Motion motion(motion_begin, wild(), 7);
     const Duration step = microseconds(100);
     for (int i = 0; i < 200; ++i) {
-        const HostTime at = zero + milliseconds(37) * i;
+        const HostTime at = motion_begin + milliseconds(37) * i;
         const Eigen::Matrix3d turned =
             motion.attitude(at - step).transpose() * motion.attitude(at + step);
         const Eigen::AngleAxisd angle(turned);
@@ -48,10 +50,10 @@ TEST_CASE("motion: the gyro shows how the attitude changes") {
 }
 
 TEST_CASE("motion: the accelerometer shows gravity and how the position changes") {
-    const Motion motion(zero, wild(), 7);
+    const Motion motion(motion_begin, wild(), 7);
     const Duration step = milliseconds(1);
     for (int i = 0; i < 200; ++i) {
-        const HostTime at = zero + milliseconds(37) * i;
+        const HostTime at = motion_begin + milliseconds(37) * i;
         const Eigen::Vector3d acceleration =
             (position(motion, at + step) + position(motion, at - step) - 2 * position(motion, at)) /
             1e-6;
@@ -65,7 +67,7 @@ TEST_CASE("motion: it is as strong as configured, within its band, and the seed 
     MotionScenario scenario = wild();
     scenario.lowest_hz = 0.5;
     scenario.highest_hz = 3;
-    const Motion motion(zero, scenario, 7);
+    const Motion motion(motion_begin, scenario, 7);
     for (std::size_t i = 0; i < 3; ++i) {
         double squares = 0;
         for (const Tone& tone : motion.angles().at(i)) {
@@ -75,18 +77,18 @@ TEST_CASE("motion: it is as strong as configured, within its band, and the seed 
         }
         CHECK(std::sqrt(squares) == Approx(scenario.rate_rad_s[i]));
     }
-    const HostTime at = zero + seconds(3);
-    CHECK(motion.rate_rad_s(at) == Motion(zero, scenario, 7).rate_rad_s(at));
-    CHECK(motion.rate_rad_s(at) != Motion(zero, scenario, 8).rate_rad_s(at));
+    const HostTime at = motion_begin + seconds(3);
+    CHECK(motion.rate_rad_s(at) == Motion(motion_begin, scenario, 7).rate_rad_s(at));
+    CHECK(motion.rate_rad_s(at) != Motion(motion_begin, scenario, 8).rate_rad_s(at));
 }
 
 TEST_CASE("motion: without a scenario it nods, and stands still on request") {
-    const Motion nodding(zero);
-    CHECK(nodding.roll_rad(zero + milliseconds(500)) == Approx(0.2));
-    CHECK(nodding.rate_rad_s(zero).x() == Approx(0.2 * 3.14159265358979));
+    const Motion nodding(motion_begin);
+    CHECK(nodding.roll_rad(motion_begin + milliseconds(500)) == Approx(0.2));
+    CHECK(nodding.rate_rad_s(motion_begin).x() == Approx(0.2 * 3.14159265358979));
     MotionScenario still = wild();
     still.rate_rad_s = still.acceleration_m_s2 = {0, 0, 0};
-    const Motion none(zero, still, 7);
-    CHECK(none.rate_rad_s(zero + seconds(1)).norm() == 0);
-    CHECK(none.specific_force_m_s2(zero + seconds(1)).z() == Approx(9.80665));
+    const Motion none(motion_begin, still, 7);
+    CHECK(none.rate_rad_s(motion_begin + seconds(1)).norm() == 0);
+    CHECK(none.specific_force_m_s2(motion_begin + seconds(1)).z() == Approx(9.80665));
 }

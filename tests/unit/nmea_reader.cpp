@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "nanoseconds.hpp"
+
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
-
-constexpr Nanoseconds second = 1'000'000'000;
-constexpr Nanoseconds ms = 1'000'000;
 
 /// The sentence of these fields, with its checksum.
 std::string sentence(const std::string& body) {

@@ -13,8 +13,8 @@ using test::SimulatedClocks;
 namespace {
 
 /// A machine and an output clock on it.
-struct Machine {
-    explicit Machine(OutputClockKind kind, bool force_tai = false)
+struct ClockMachine {
+    explicit ClockMachine(OutputClockKind kind, bool force_tai = false)
         : output(make(kind, force_tai, clocks)), kind_(kind) {}
 
     static OutputClock make(OutputClockKind kind, bool force_tai,
@@ -68,7 +68,7 @@ TEST_CASE("output_clock: on the kernel's own clocks, a million readings show no 
 }
 
 TEST_CASE("output_clock: monotonic_raw is the host clock itself") {
-    Machine machine(OutputClockKind::monotonic_raw);
+    ClockMachine machine(OutputClockKind::monotonic_raw);
     CHECK(machine.output.offset().ns == 0);
     machine.clocks->step(seconds(1));
     machine.clocks->pass(seconds(1));
@@ -81,7 +81,7 @@ TEST_CASE("output_clock: monotonic_raw is the host clock itself") {
 }
 
 TEST_CASE("output_clock: a preempted reading is made again") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     const int nth = GENERATE(1, 2, 3, 4);
     machine.clocks->preempt(nth, milliseconds(2));
     const OutputReading reading = machine.output.read();
@@ -92,7 +92,7 @@ TEST_CASE("output_clock: a preempted reading is made again") {
 
 TEST_CASE(
     "output_clock: preempted at each try, the best of them is taken and shows how bad it is") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     // In the third try the least.
     for (int attempt = 0; attempt < 8; ++attempt)
         machine.clocks->preempt(4 * attempt + 2, attempt == 2 ? microseconds(50) : milliseconds(2));
@@ -104,7 +104,7 @@ TEST_CASE(
 }
 
 TEST_CASE("output_clock: each step is seen by the next reading, and once") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     const auto by = GENERATE(seconds(1), -seconds(1), milliseconds(1), -milliseconds(1),
                              microseconds(50), -microseconds(50), microseconds(2));
     const bool notified = GENERATE(true, false);
@@ -124,7 +124,7 @@ TEST_CASE("output_clock: each step is seen by the next reading, and once") {
 }
 
 TEST_CASE("output_clock: a step too small for a comparison is reported by the kernel") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     machine.clocks->step(nanoseconds(400));
     machine.clocks->pass(milliseconds(101));
     CHECK(machine.output.read().steps == 1);
@@ -133,7 +133,7 @@ TEST_CASE("output_clock: a step too small for a comparison is reported by the ke
 }
 
 TEST_CASE("output_clock: a step is seen through a wide reading, too") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     const auto preempt_all = [&] {
         for (int attempt = 0; attempt < 8; ++attempt)
             machine.clocks->preempt(4 * attempt + 3,
@@ -155,7 +155,7 @@ TEST_CASE("output_clock: a step is seen through a wide reading, too") {
 }
 
 TEST_CASE("output_clock: slewing is no step") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     machine.clocks->slew_ppb = GENERATE(500'000, -500'000, 90'000'000, -90'000'000);
     for (int i = 0; i < 3000; ++i) {
         machine.clocks->pass(milliseconds(20));
@@ -167,7 +167,7 @@ TEST_CASE("output_clock: slewing is no step") {
 }
 
 TEST_CASE("output_clock: readings follow a slewed clock") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     machine.clocks->slew_ppb = 500'000;
     const Duration before = machine.output.offset();
     machine.clocks->pass(seconds(10));
@@ -177,7 +177,7 @@ TEST_CASE("output_clock: readings follow a slewed clock") {
 }
 
 TEST_CASE("output_clock: the host clock stands still in a suspend: a step, and counted") {
-    Machine machine(GENERATE(OutputClockKind::realtime, OutputClockKind::tai), true);
+    ClockMachine machine(GENERATE(OutputClockKind::realtime, OutputClockKind::tai), true);
     const Duration before = machine.output.offset();
     machine.clocks->suspend(seconds(60));
     const OutputReading reading = machine.output.read();
@@ -190,7 +190,7 @@ TEST_CASE("output_clock: the host clock stands still in a suspend: a step, and c
 
 TEST_CASE("output_clock: a leap second is a step of UTC, and none of TAI") {
     const auto kind = GENERATE(OutputClockKind::realtime, OutputClockKind::tai);
-    Machine machine(kind, true);
+    ClockMachine machine(kind, true);
     machine.clocks->insert_leap_second();
     for (int i = 0; i < 30; ++i) {
         machine.clocks->pass(milliseconds(50));
@@ -210,7 +210,7 @@ TEST_CASE(
     clocks->kernel.tai_offset_s = 37;
     CHECK(OutputClock::create(OutputClockKind::tai, false, clocks));
 
-    Machine machine(OutputClockKind::tai, true);
+    ClockMachine machine(OutputClockKind::tai, true);
     CHECK(machine.output.kernel_state().tai_offset_s == 0);
     CHECK(absolute(machine.error(machine.output.read())) < nanoseconds(100));
     machine.clocks->kernel.tai_offset_s = 37;
@@ -222,7 +222,7 @@ TEST_CASE(
 
 TEST_CASE(
     "output_clock: a set that falls between a reading and the look is one step, with its offset") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     struct SetLater final : SystemClocks {
         explicit SetLater(SimulatedClocks& on) : inner(on) {}
         std::int64_t read_ns(SystemClock clock) override { return inner.read_ns(clock); }
@@ -248,7 +248,7 @@ TEST_CASE(
 }
 
 TEST_CASE("output_clock: the dear look is rare") {
-    Machine machine(OutputClockKind::realtime);
+    ClockMachine machine(OutputClockKind::realtime);
     const int reads = machine.clocks->reads;
     const int looks = machine.clocks->looks;
     for (int i = 0; i < 1000; ++i) {

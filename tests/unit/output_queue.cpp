@@ -10,7 +10,7 @@ using namespace versavis::firmware;
 
 namespace {
 
-struct Hardware final : OutputSchedule {
+struct QueueHardware final : OutputSchedule {
     std::vector<std::pair<Nanoseconds, std::uint32_t>> words;
     std::size_t capacity = 100;
     Nanoseconds soonest = 0;  ///< that a word can leave
@@ -33,34 +33,34 @@ struct Move {
     }
 };
 
-struct Moves final : OutputMoves {
+struct MoveLog final : OutputMoves {
     std::vector<Move> all;
     void moved(unsigned output, bool level, Nanoseconds asked, Nanoseconds left) override {
         all.push_back({output, level, asked, left});
     }
 };
 
-struct Bench {
-    explicit Bench(const PortFacts& facts = {}) : queue(hardware, moves, facts) {}
-    Hardware hardware;
-    Moves moves;
+struct QueueBench {
+    explicit QueueBench(const PortFacts& facts = {}) : queue(hardware, moves, facts) {}
+    QueueHardware hardware;
+    MoveLog moves;
     OutputQueue queue;
 };
 
-using Words = std::vector<std::pair<Nanoseconds, std::uint32_t>>;
+using SentWords = std::vector<std::pair<Nanoseconds, std::uint32_t>>;
 
 }  // namespace
 
 TEST_CASE("output_queue: edges of all outputs leave in order, those of one instant in one word") {
-    Bench bench;
-    Hardware& hardware = bench.hardware;
+    QueueBench bench;
+    QueueHardware& hardware = bench.hardware;
     OutputQueue& queue = bench.queue;
     queue.set(200, 0, false);
     queue.set(100, 0, true);
     queue.set(100, 2, true);
     queue.set(150, 1, true);
     queue.commit(151 - OutputQueue::horizon);
-    CHECK(hardware.words == Words{{100, 0b101}, {150, 0b111}});
+    CHECK(hardware.words == SentWords{{100, 0b101}, {150, 0b111}});
     CHECK(queue.next_wake() == 200 - 500'000);
     CHECK(queue.commit(0));
     CHECK(hardware.words.back() == std::pair<Nanoseconds, std::uint32_t>{200, 0b110});
@@ -68,7 +68,7 @@ TEST_CASE("output_queue: edges of all outputs leave in order, those of one insta
 }
 
 TEST_CASE("output_queue: what comes too late is put behind what is committed, and says so") {
-    Bench bench;
+    QueueBench bench;
     OutputQueue& queue = bench.queue;
     queue.set(100, 0, true);
     queue.commit(0);
@@ -82,8 +82,8 @@ TEST_CASE("output_queue: what comes too late is put behind what is committed, an
 }
 
 TEST_CASE("output_queue: a full hardware queue delays nothing but the commit") {
-    Bench bench;
-    Hardware& hardware = bench.hardware;
+    QueueBench bench;
+    QueueHardware& hardware = bench.hardware;
     OutputQueue& queue = bench.queue;
     hardware.capacity = 1;
     queue.set(1, 0, true);
@@ -92,12 +92,12 @@ TEST_CASE("output_queue: a full hardware queue delays nothing but the commit") {
     CHECK_FALSE(queue.empty());
     hardware.capacity = 2;
     queue.commit(0);
-    CHECK(hardware.words == Words{{1, 1}, {2, 0}});
+    CHECK(hardware.words == SentWords{{1, 1}, {2, 0}});
 }
 
 TEST_CASE("output_queue: cancelling leaves the output idle and the others alone") {
-    Bench bench;
-    Hardware& hardware = bench.hardware;
+    QueueBench bench;
+    QueueHardware& hardware = bench.hardware;
     OutputQueue& queue = bench.queue;
     queue.set(10, 0, true);
     queue.commit(11 - OutputQueue::horizon);
@@ -109,18 +109,18 @@ TEST_CASE("output_queue: cancelling leaves the output idle and the others alone"
     CHECK_FALSE(queue.has_room(0, 24));
     CHECK_FALSE(queue.cancel(3));
     CHECK(queue.commit(0));
-    CHECK(hardware.words == Words{{10, 1}, {20, 0}, {45, 0b10}});
+    CHECK(hardware.words == SentWords{{10, 1}, {20, 0}, {45, 0b10}});
     CHECK(queue.cancel(1));
 }
 
 TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, and is reported") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.pulse(100'000, 0, true, 50'000);
     bench.queue.pulse(180'000, 0, true, 50'000);
     bench.hardware.soonest = 1'000'000;
     CHECK(bench.queue.commit(1'000'000));
     CHECK(bench.hardware.words ==
-          Words{{1'000'000, 1}, {1'050'000, 0}, {1'060'000, 1}, {1'110'000, 0}});
+          SentWords{{1'000'000, 1}, {1'050'000, 0}, {1'060'000, 1}, {1'110'000, 0}});
     CHECK(bench.moves.all == std::vector<Move>{{0, true, 100'000, 1'000'000},
                                                {0, false, 150'000, 1'050'000},
                                                {0, true, 180'000, 1'060'000},
@@ -129,14 +129,14 @@ TEST_CASE("output_queue: a pulse that is late keeps its width and its distance, 
 }
 
 TEST_CASE("output_queue: a pulse whose rise left late is not cut by a word for another output") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.pulse(100'000, 0, true, 10'000);
     bench.queue.pulse(110'000, 1, true, 10'000);
     bench.hardware.soonest = 105'000;
     CHECK(bench.queue.commit(200'000));
     // The fall of output 0 was due with the rise of output 1.
     CHECK(bench.hardware.words ==
-          Words{{105'000, 0b01}, {110'000, 0b11}, {115'000, 0b10}, {120'000, 0b00}});
+          SentWords{{105'000, 0b01}, {110'000, 0b11}, {115'000, 0b10}, {120'000, 0b00}});
     CHECK(bench.moves.all ==
           std::vector<Move>{{0, true, 100'000, 105'000}, {0, false, 110'000, 115'000}});
 }
@@ -146,31 +146,31 @@ TEST_CASE(
     PortFacts facts;
     facts.output_grain_bits = 3;
     facts.output_step = 24;
-    Bench bench(facts);
+    QueueBench bench(facts);
     CHECK(bench.queue.set(0, 0, false) == 0);
     bench.queue.cancel(0);
     CHECK(bench.queue.soonest(0) == 0);
     CHECK(bench.queue.set(1'003, 0, true) == 1'000);
-    CHECK(Bench(facts).queue.set(1'004, 0, true) == 1'008);
+    CHECK(QueueBench(facts).queue.set(1'004, 0, true) == 1'008);
     CHECK(bench.queue.set(1'005, 1, true) == 1'008);
     CHECK(bench.queue.set(1'021, 2, true) == 1'024);
     bench.queue.set(2'000, 2, false);
     CHECK(bench.queue.commit(1'500 - OutputQueue::horizon));
-    CHECK(bench.hardware.words == Words{{1'000, 0b001}, {1'024, 0b111}});
+    CHECK(bench.hardware.words == SentWords{{1'000, 0b001}, {1'024, 0b111}});
     CHECK(bench.moves.all == std::vector<Move>{{1, true, 1'008, 1'024}});
     CHECK_FALSE(bench.queue.is_late(1'008, 1'024));
     CHECK_FALSE(bench.queue.is_late(1'000, 1'024));
     CHECK(bench.queue.is_late(1'000, 1'025));
     CHECK(bench.queue.set(1'030, 3, true) == 1'048);
 
-    Bench far(facts);
+    QueueBench far(facts);
     for (const Nanoseconds at : {1'000, 1'008, 2'000}) far.queue.set(at, 0, at != 1'008);
     CHECK(far.queue.commit(1'500 - OutputQueue::horizon));
-    CHECK(far.hardware.words == Words{{1'000, 1}, {1'024, 0}});
+    CHECK(far.hardware.words == SentWords{{1'000, 1}, {1'024, 0}});
 }
 
 TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words at a time") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.set(OutputQueue::horizon, 0, true);
     bench.queue.set(OutputQueue::horizon + 1, 0, false);
     CHECK(bench.queue.next_wake() == 500'000);
@@ -181,7 +181,7 @@ TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words
     CHECK(bench.queue.is_overdue(0, 1'000'002));
     CHECK_FALSE(bench.queue.is_overdue(1, 1'000'002));
 
-    Bench busy;
+    QueueBench busy;
     for (Nanoseconds at = 1; at <= 20; ++at) busy.queue.set(at, 7, at % 2 == 1);
     CHECK(busy.queue.commit(0));
     CHECK(busy.hardware.words.size() == 16);
@@ -192,7 +192,7 @@ TEST_CASE("output_queue: what is due within a millisecond is committed, 16 words
 }
 
 TEST_CASE("output_queue: each output has room of its own, that of all fits") {
-    Bench bench;
+    QueueBench bench;
     bench.hardware.capacity = 1000;
     const std::vector<unsigned> rooms = {24, 24, 24, 24, 4, 18, 24, 24};
     Nanoseconds at = 0;
@@ -216,27 +216,27 @@ TEST_CASE("output_queue: each output has room of its own, that of all fits") {
 }
 
 TEST_CASE("output_queue: the most that waited is reported once") {
-    Bench bench;
+    QueueBench bench;
     for (Nanoseconds at = 1; at <= 3; ++at) bench.queue.set(at, 0, true);
     bench.queue.commit(2 - OutputQueue::horizon);
     CHECK(bench.queue.take_high_water() == 3);
     CHECK(bench.queue.take_high_water() == 1);
     bench.queue.set(10, 0, true);
     CHECK(bench.queue.take_high_water() == 2);
-    CHECK(Bench().queue.take_high_water() == 0);
+    CHECK(QueueBench().queue.take_high_water() == 0);
 }
 
 TEST_CASE("output_queue: of edges at one instant that need not last the last one counts") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.set(100, 0, true);
     bench.queue.set(100, 0, false);
     bench.queue.set(100, 1, true);
     CHECK(bench.queue.commit(0));
-    CHECK(bench.hardware.words == Words{{100, 0b10}});
+    CHECK(bench.hardware.words == SentWords{{100, 0b10}});
 }
 
 TEST_CASE("output_queue: a late pulse puts off those behind it, at its own output alone") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.pulse(100'000, 0, true, 50'000);
     bench.queue.pulse(120'000, 1, true, 100'000);
     bench.queue.pulse(160'000, 0, true, 50'000);
@@ -244,14 +244,14 @@ TEST_CASE("output_queue: a late pulse puts off those behind it, at its own outpu
     bench.queue.set(165'000, 2, true);
     bench.hardware.soonest = 110'000;
     for (int i = 0; i < 3; ++i) CHECK(bench.queue.commit(400'000));
-    CHECK(bench.hardware.words == Words{{110'000, 0b001},
-                                        {120'000, 0b011},
-                                        {160'000, 0b010},
-                                        {165'000, 0b110},
-                                        {170'000, 0b111},
-                                        {220'000, 0b100},
-                                        {300'000, 0b101},
-                                        {350'000, 0b100}});
+    CHECK(bench.hardware.words == SentWords{{110'000, 0b001},
+                                            {120'000, 0b011},
+                                            {160'000, 0b010},
+                                            {165'000, 0b110},
+                                            {170'000, 0b111},
+                                            {220'000, 0b100},
+                                            {300'000, 0b101},
+                                            {350'000, 0b100}});
     CHECK(bench.moves.all == std::vector<Move>{{0, true, 100'000, 110'000},
                                                {0, false, 150'000, 160'000},
                                                {0, true, 160'000, 170'000},
@@ -259,30 +259,30 @@ TEST_CASE("output_queue: a late pulse puts off those behind it, at its own outpu
 }
 
 TEST_CASE("output_queue: what is put off is passed by what waits at others, however late it is") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.pulse(100'000, 0, true, 50'000);
     bench.queue.set(100'000, output_light_lead, true);
     bench.queue.set(120'000, 1, true);
     bench.hardware.soonest = 1'000'000;
     CHECK(bench.queue.commit(1'000'000));
     CHECK(bench.hardware.words ==
-          Words{{1'000'000, 0b10'0001}, {1'000'001, 0b10'0011}, {1'050'000, 0b10'0010}});
+          SentWords{{1'000'000, 0b10'0001}, {1'000'001, 0b10'0011}, {1'050'000, 0b10'0010}});
 }
 
 TEST_CASE("output_queue: two edges of one output at one instant leave in two words") {
-    Bench bench;
+    QueueBench bench;
     bench.queue.pulse(20'000, 0, true, 10'000);
     bench.queue.set(30'000, 0, true, 1);
     CHECK(bench.queue.commit(0));
-    CHECK(bench.hardware.words == Words{{20'000, 1}, {30'000, 0}, {30'001, 1}});
+    CHECK(bench.hardware.words == SentWords{{20'000, 1}, {30'000, 0}, {30'001, 1}});
 }
 
 TEST_CASE("output_queue: a pulse of any width has both edges on the grain") {
     PortFacts facts;
     facts.output_grain_bits = 3;
     facts.output_step = 24;
-    Bench bench(facts);
+    QueueBench bench(facts);
     bench.queue.pulse(80'000, 0, true, 1001);
     bench.queue.commit(0);
-    CHECK(bench.hardware.words == Words{{80'000, 1}, {81'000, 0}});
+    CHECK(bench.hardware.words == SentWords{{80'000, 1}, {81'000, 0}});
 }

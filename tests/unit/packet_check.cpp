@@ -9,7 +9,7 @@ using namespace versavis::daemon;
 
 namespace {
 
-wire::BoardHello board() {
+wire::BoardHello hello_of_board() {
     wire::BoardHello hello{};
     hello.cameras = wire::camera_count;
     hello.present = wire::present_all;
@@ -62,7 +62,7 @@ TEST_CASE("packet_check: times before the boot or beyond any life cannot be") {
         wire::Event event{};
         event.time_ns = ns;
         CHECK_FALSE(possible(event));
-        wire::BoardHello hello = board();
+        wire::BoardHello hello = hello_of_board();
         hello.board_time_ns = ns;
         CHECK_FALSE(possible(hello));
         CHECK_FALSE(possible(wire::ClockAnswer{1, 0, ns, 0}));
@@ -75,8 +75,8 @@ TEST_CASE("packet_check: times before the boot or beyond any life cannot be") {
 }
 
 TEST_CASE("packet_check: a board has outputs, as many as it says") {
-    CHECK(possible(board()));
-    wire::BoardHello hello = board();
+    CHECK(possible(hello_of_board()));
+    wire::BoardHello hello = hello_of_board();
     hello.present = wire::present_spi | wire::present_light;
     hello.cameras = 0;
     CHECK_FALSE(possible(hello));

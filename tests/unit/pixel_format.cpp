@@ -21,7 +21,7 @@ struct Known {
 };
 
 /// Aravis knows most of them by their GStreamer or GenICam names, under the same codes.
-const std::vector<Known> all{
+const std::vector<Known> known_formats{
     {ARV_PIXEL_FORMAT_MONO_8, "Mono8"},
     {ARV_PIXEL_FORMAT_MONO_10, "Mono10"},
     {ARV_PIXEL_FORMAT_MONO_12, "Mono12"},
@@ -72,13 +72,13 @@ const std::vector<Known> all{
 }  // namespace
 
 TEST_CASE("pixel_format: codes have the names that another library gives them") {
-    for (const Known& format : all) CHECK(pixel_format_name(format.code) == format.name);
+    for (const Known& format : known_formats) CHECK(pixel_format_name(format.code) == format.name);
     for (const std::uint32_t code : {0U, 1U, 0x12345678U, 0xFFFFFFFFU})
         CHECK(pixel_format_name(code) == std::string("unknown"));
 }
 
 TEST_CASE("pixel_format: the layout fits the bits that the code itself names") {
-    for (const Known& format : all) {
+    for (const Known& format : known_formats) {
         CAPTURE(format.name);
         const PixelLayout layout = pixel_layout(format.code);
         const std::uint32_t bits = format.code >> 16U & 0xFFU;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "play/player.hpp"
 
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <map>
 #include <optional>
+#include <string>
 
 #include "engine/ring/directory.hpp"
 #include "play/playback_clock.hpp"
@@ -18,22 +21,23 @@ using namespace versavis::client;
 
 namespace {
 
-constexpr auto instance = "player-test";
+// Tests run side by side, each in a process of its own.
+const std::string player_instance = "player-test-" + std::to_string(::getpid());
 
-struct Sample {
+struct PlayerSample {
     test::TemporaryDirectory directory;
     std::string path = (directory.path() / "a.mcap").string();
 
-    Sample() {
+    PlayerSample() {
         std::ofstream(path, std::ios::binary) << test::sample_recording(1, true, false, 0x01080001);
     }
-    ~Sample() { std::filesystem::remove_all(instance_directory(instance)); }
+    ~PlayerSample() { std::filesystem::remove_all(instance_directory(player_instance)); }
 };
 
 }  // namespace
 
 TEST_CASE("player: items come out of the rings as they were, once each round, of another life") {
-    const Sample sample;
+    const PlayerSample sample;
     const auto recording = Recording::open(sample.path);
     REQUIRE(recording);
     std::map<std::uint64_t, std::vector<std::byte>> expected;
@@ -46,14 +50,14 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
     std::uint64_t good = 0;
     std::uint64_t restarts = 0;
     PlaySettings settings;
-    settings.instance = instance;
+    settings.instance = player_instance;
     settings.streams = {"cam1"};
     settings.rate = 1000;
     settings.loop = true;
     // The reader looks between any two items: it misses none.
     settings.stop = [&] {
         if (!reader) {
-            auto opened = ring::Reader::open(stream_path(instance, "cam1"),
+            auto opened = ring::Reader::open(stream_path(player_instance, "cam1"),
                                              {ring::Position::oldest, ring::Position::oldest});
             if (!opened) return false;
             reader.emplace(std::move(*opened));
@@ -85,12 +89,12 @@ TEST_CASE("player: items come out of the rings as they were, once each round, of
 }
 
 TEST_CASE("player: an instance that somebody serves is refused") {
-    const Sample sample;
+    const PlayerSample sample;
     const auto recording = Recording::open(sample.path);
-    const auto owned = ring::OwnedDirectory::claim(instance_directory(instance));
+    const auto owned = ring::OwnedDirectory::claim(instance_directory(player_instance));
     REQUIRE(owned);
     PlaySettings settings;
-    settings.instance = instance;
+    settings.instance = player_instance;
     const auto report = play(*recording, settings);
     REQUIRE_FALSE(report);
     CHECK(report.error().what.find("serves this instance") != std::string::npos);
@@ -144,7 +148,7 @@ TEST_CASE("player: what the clock was fed in the minutes before is there at once
     const auto recording = Recording::open(directory.write("a.mcap", file.finish()));
     REQUIRE(recording);
     PlaySettings settings;
-    settings.instance = instance;
+    settings.instance = player_instance;
     const HostTime until = host_now() + seconds(5);
     settings.stop = [&] { return host_now() > until; };
     double all = 0;
@@ -159,5 +163,5 @@ TEST_CASE("player: what the clock was fed in the minutes before is there at once
     settings.rate = 1000;
     REQUIRE(play(*recording, settings));
     CHECK(all == Approx(59));
-    std::filesystem::remove_all(instance_directory(instance));
+    std::filesystem::remove_all(instance_directory(player_instance));
 }

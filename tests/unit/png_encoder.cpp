@@ -4,18 +4,15 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "pixel_formats.hpp"
 #include "recording/ros_image.hpp"
 
 using namespace versavis;
 using namespace versavis::client;
+using namespace versavis::test;
 
 namespace {
 
-constexpr std::uint32_t mono8 = 0x01080001;
-constexpr std::uint32_t mono12 = 0x01100005;
-constexpr std::uint32_t mono12_packed = 0x010C0047;
-constexpr std::uint32_t bayer_rg8 = 0x01080009;
-constexpr std::uint32_t rgb8 = 0x02180014;
 constexpr std::uint32_t bgr8 = 0x02180015;
 
 FrameMetadata frame_of(std::uint32_t format, std::uint32_t width, std::uint32_t height,
@@ -64,6 +61,6 @@ TEST_CASE("png_encoder: what no PNG can hold, or has not all rows, stays as it i
     CHECK_FALSE(can_be_png(frame_of(mono8, 10, 10, 9), 1000));
     CHECK_FALSE(can_be_png(frame_of(mono8, 0, 10, 10), 100));
     CHECK_FALSE(can_be_png(frame_of(mono8, 10, 0, 10), 100));
-    CHECK_FALSE(can_be_png(frame_of(mono12_packed, 10, 10, 15), 150));
+    CHECK_FALSE(can_be_png(frame_of(mono12p, 10, 10, 15), 150));
     CHECK_FALSE(can_be_png(frame_of(mono8, 0xFFFFFFFF, 0xFFFFFFFF, 0xFFFFFFFF), 100));
 }

@@ -3,12 +3,13 @@
 
 #include <catch2/catch.hpp>
 
+#include "nanoseconds.hpp"
+
+using namespace versavis;
 using namespace versavis::firmware;
-using versavis::wire::PpsState;
+using namespace versavis::test;
 
 namespace {
-
-constexpr Nanoseconds second = 1'000'000'000;
 
 /// A monitor that had pulses at `first`, and each `period` after it until `last`.
 PpsMonitor with_pulses(Nanoseconds first, Nanoseconds last, Nanoseconds period = second) {
@@ -21,25 +22,25 @@ PpsMonitor with_pulses(Nanoseconds first, Nanoseconds last, Nanoseconds period =
 
 TEST_CASE("pps_monitor: it trusts the fourth pulse, and reports no error before") {
     PpsMonitor monitor;
-    CHECK(monitor.state(0) == PpsState::none);
+    CHECK(monitor.state(0) == wire::PpsState::none);
     for (int n = 0; n < 3; ++n) {
         const Nanoseconds at = n * (second + 7'000);
         monitor.pulse(at);
-        CHECK(monitor.state(at) == PpsState::acquiring);
+        CHECK(monitor.state(at) == wire::PpsState::acquiring);
         CHECK(monitor.error_ppb(at) == 0);
     }
     const Nanoseconds fourth = 3 * (second + 7'000);
     monitor.pulse(fourth);
-    CHECK(monitor.state(fourth) == PpsState::good);
+    CHECK(monitor.state(fourth) == wire::PpsState::good);
     CHECK(monitor.error_ppb(fourth) == 7'000);
 }
 
 TEST_CASE("pps_monitor: ten seconds after the newest pulse nothing is known") {
     const PpsMonitor monitor = with_pulses(5 * second, 25 * second, second + 7'000);
     const Nanoseconds newest = 24 * second + 19 * 7'000;
-    CHECK(monitor.state(newest + 10 * second) == PpsState::good);
+    CHECK(monitor.state(newest + 10 * second) == wire::PpsState::good);
     CHECK(monitor.error_ppb(newest + 10 * second) == 7'000);
-    CHECK(monitor.state(newest + 10 * second + 1) == PpsState::none);
+    CHECK(monitor.state(newest + 10 * second + 1) == wire::PpsState::none);
     CHECK(monitor.error_ppb(newest + 10 * second + 1) == 0);
 }
 
@@ -48,7 +49,7 @@ TEST_CASE("pps_monitor: pulses are compared over ten seconds, and not over more"
     PpsMonitor monitor = with_pulses(second, 5 * second);
     const Nanoseconds next = 15 * second + longer;
     monitor.pulse(next);
-    CHECK(monitor.state(next) == (longer == 0 ? PpsState::good : PpsState::acquiring));
+    CHECK(monitor.state(next) == (longer == 0 ? wire::PpsState::good : wire::PpsState::acquiring));
 }
 
 TEST_CASE("pps_monitor: pulses that are missing do not change the error") {
@@ -78,7 +79,7 @@ TEST_CASE("pps_monitor: a clock off by 200 ppm is measured, one off by more is n
     PpsMonitor refused;
     for (int n = 0; n < 3; ++n) refused.pulse(n * furthest);
     refused.pulse(3 * furthest + sign);
-    CHECK(refused.state(3 * furthest) == PpsState::acquiring);
+    CHECK(refused.state(3 * furthest) == wire::PpsState::acquiring);
 }
 
 TEST_CASE("pps_monitor: a pulse between two others is no part of them, however regular") {
@@ -86,7 +87,7 @@ TEST_CASE("pps_monitor: a pulse between two others is no part of them, however r
     for (Nanoseconds at = 4 * second; at < 60 * second; at += second) {
         monitor.pulse(at);
         monitor.pulse(at + 300'000'000);
-        CHECK(monitor.state(at + 300'000'000) == PpsState::good);
+        CHECK(monitor.state(at + 300'000'000) == wire::PpsState::good);
         CHECK(monitor.error_ppb(at) == 0);
     }
 }
@@ -94,7 +95,7 @@ TEST_CASE("pps_monitor: a pulse between two others is no part of them, however r
 TEST_CASE("pps_monitor: a pulse that is reported twice counts once") {
     PpsMonitor monitor = with_pulses(0, 2 * second);
     monitor.pulse(2 * second);
-    CHECK(monitor.state(2 * second) == PpsState::acquiring);
+    CHECK(monitor.state(2 * second) == wire::PpsState::acquiring);
 }
 
 TEST_CASE("pps_monitor: the third pulse of a new phase begins anew") {
@@ -103,10 +104,10 @@ TEST_CASE("pps_monitor: the third pulse of a new phase begins anew") {
     for (int n = 1; n < 6; ++n) {
         const Nanoseconds at = phase + n * (second + 9'000);
         monitor.pulse(at);
-        CHECK(monitor.state(at) == (n < 3 ? PpsState::good : PpsState::acquiring));
+        CHECK(monitor.state(at) == (n < 3 ? wire::PpsState::good : wire::PpsState::acquiring));
     }
     const Nanoseconds fourth = phase + 6 * (second + 9'000);
     monitor.pulse(fourth);
-    CHECK(monitor.state(fourth) == PpsState::good);
+    CHECK(monitor.state(fourth) == wire::PpsState::good);
     CHECK(monitor.error_ppb(fourth) == 9'000);
 }

@@ -13,7 +13,7 @@ namespace {
 
 /// Features with their values: of a number, `offered` is empty. LineMode and LineSource are kept
 /// for each line.
-class Camera final : public NodeMap {
+class PresetCamera final : public NodeMap {
  public:
     struct Feature {
         std::string value;
@@ -51,7 +51,7 @@ class Camera final : public NodeMap {
         return found == features.end() ? nullptr : &found->second;
     }
     const Feature* find(const std::string& name) const {
-        return const_cast<Camera*>(this)->find(name);
+        return const_cast<PresetCamera*>(this)->find(name);
     }
 };
 
@@ -59,9 +59,9 @@ PresetStep step(const std::string& feature, std::vector<std::string> values, boo
     return {"LineSelector", "{line}", {feature}, std::move(values), needed};
 }
 
-struct Bench {
+struct PresetBench {
     CameraPreset preset;
-    Camera camera;
+    PresetCamera camera;
     PresetVariables variables{{"line", {"Out1", "Line2"}}};
 
     PresetRun run(std::vector<PresetStep> steps) {
@@ -77,7 +77,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("preset_run: of lines and values the first is taken that this model offers") {
-    Bench bench;
+    PresetBench bench;
     const auto run = bench.run({step("LineMode", {"Strobe", "Output"}, true),
                                 step("LineSource", {"ExposureActive"}, true),
                                 step("StrobeDelay", {"0"}), step("TriggerDelay", {"min"})});
@@ -91,7 +91,7 @@ TEST_CASE("preset_run: of lines and values the first is taken that this model of
 }
 
 TEST_CASE("preset_run: without the selected line nothing is written to another one") {
-    Bench bench;
+    PresetBench bench;
     bench.variables = {{"line", {"Line7"}}};
     const auto run = bench.run({step("LineMode", {"Output"}), step("LineSource", {"Off"}, true)});
     CHECK(run.results()[0].outcome == StepOutcome::left_out);
@@ -101,7 +101,7 @@ TEST_CASE("preset_run: without the selected line nothing is written to another o
 }
 
 TEST_CASE("preset_run: a value that stands already may be refused") {
-    Bench bench;
+    PresetBench bench;
     bench.variables = {{"line", {"Line0"}}};
     const auto run = bench.run({step("LineMode", {"Input"}, true)});
     CHECK(run.verdict());
@@ -112,7 +112,7 @@ TEST_CASE("preset_run: a value that stands already may be refused") {
 }
 
 TEST_CASE("preset_run: what reads otherwise than it was written is found") {
-    Bench bench;
+    PresetBench bench;
     bench.camera.ignores = "LineSource";
     const auto run = bench.run({step("LineSource", {"ExposureActive"}, true)});
     CHECK(run.results()[0].outcome == StepOutcome::differs);
@@ -121,7 +121,7 @@ TEST_CASE("preset_run: what reads otherwise than it was written is found") {
 }
 
 TEST_CASE("preset_run: the lowest value is what the camera says it is") {
-    Bench bench;
+    PresetBench bench;
     CHECK(bench.run({step("StrobeDelay", {"min"})}).results()[0].wanted == "8");
 }
 

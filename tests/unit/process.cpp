@@ -107,7 +107,7 @@ TEST_CASE("process: a writer lives whose stream is open and whose heart beats, u
     auto mapping = *Mapping::open(path, Mapping::Access::read_write);
     Header& header = mapping.header();
     {
-        Pulse pulse;
+        ring::Pulse pulse;
         CHECK(writer_lives(mapping, pulse));
     }
     ++header.writer_start_ticks;  // an earlier process had its number
@@ -115,7 +115,7 @@ TEST_CASE("process: a writer lives whose stream is open and whose heart beats, u
     {
         // Its heart beats on another clock, so it is only asked for by its number.
         const HostTime ahead = host_now() + seconds(500);
-        Pulse pulse;
+        ring::Pulse pulse;
         header.heartbeat_ns = ahead.ns;
         CHECK_FALSE(writer_lives(mapping, pulse));
         header.heartbeat_ns = ahead.ns + 1;
@@ -125,12 +125,12 @@ TEST_CASE("process: a writer lives whose stream is open and whose heart beats, u
     }
     header.state = static_cast<std::uint32_t>(WriterState::live);
     header.heartbeat_ns = (host_now() - milliseconds(150)).ns;
-    Pulse pulse;
+    ring::Pulse pulse;
     CHECK_FALSE(writer_lives(mapping, pulse));
 }
 
 TEST_CASE("process: a heart beats while its last beat is young") {
-    Pulse pulse;
+    ring::Pulse pulse;
     const HostTime now{1'000'000'000'000};
     CHECK(pulse.beats(now, now));
     CHECK(pulse.beats(now, now + milliseconds(2999)));
@@ -141,7 +141,7 @@ TEST_CASE("process: a heart beats while its last beat is young") {
 TEST_CASE("process: a heart on another clock beats while it changes") {
     const HostTime now{1'000'000'000'000};
     for (const Duration off : {seconds(500), seconds(-500)}) {
-        Pulse pulse;
+        ring::Pulse pulse;
         CHECK_FALSE(pulse.beats(now + off, now));
         CHECK_FALSE(pulse.beats(now + off, now + milliseconds(20)));
         CHECK(pulse.beats(now + off + milliseconds(50), now + milliseconds(60)));
@@ -149,7 +149,7 @@ TEST_CASE("process: a heart on another clock beats while it changes") {
         CHECK_FALSE(pulse.beats(now + off + milliseconds(50), now + milliseconds(3060)));
     }
     for (const std::int64_t beat : {INT64_MIN, INT64_MAX}) {
-        Pulse pulse;
+        ring::Pulse pulse;
         CHECK_FALSE(pulse.beats({beat}, now));
         CHECK_FALSE(pulse.beats({beat}, now));
     }

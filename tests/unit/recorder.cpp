@@ -26,6 +26,7 @@
 #include "commands/record_command.hpp"
 #include "engine/ring/writer.hpp"
 #include "mcap_messages.hpp"
+#include "pixel_formats.hpp"
 #include "record/item_writer.hpp"
 #include "recording/recording.hpp"
 #include "recording/repair.hpp"
@@ -34,21 +35,21 @@
 
 using namespace versavis;
 using namespace versavis::client;
+using namespace versavis::test;
 using Catch::Matchers::Contains;
 
 namespace {
 
-constexpr std::uint32_t width = 64;
-constexpr std::uint32_t height = 48;
-constexpr std::uint32_t slots = 8;
-constexpr std::uint32_t mono8 = 0x01080001;
+constexpr std::uint32_t image_width = 64;
+constexpr std::uint32_t image_height = 48;
+constexpr std::uint32_t ring_slots = 8;
 
 std::vector<std::byte> pixels_of(std::uint64_t number) {
-    return std::vector<std::byte>(width * height, static_cast<std::byte>(number + 1));
+    return std::vector<std::byte>(image_width * image_height, static_cast<std::byte>(number + 1));
 }
 
 /// An instance that no service owns, with a camera, an IMU and events.
-struct Instance {
+struct RecordedInstance {
     std::string name = fmt::format("recorder-{}", ::getpid());
     std::filesystem::path directory = instance_directory(name);
     test::TemporaryDirectory files;
@@ -57,11 +58,11 @@ struct Instance {
     std::optional<ring::Writer> events;
     std::uint32_t epoch = 1;
 
-    Instance() {
+    RecordedInstance() {
         std::filesystem::create_directories(directory);
         open();
     }
-    ~Instance() {
+    ~RecordedInstance() {
         close();
         std::filesystem::remove_all(directory);
     }
@@ -70,7 +71,8 @@ struct Instance {
     }
     void open() {
         using Kind = ring::StreamKind;
-        camera = make({"cam0", Kind::frames, 64, slots, std::uint64_t{width} * height});
+        camera =
+            make({"cam0", Kind::frames, 64, ring_slots, std::uint64_t{image_width} * image_height});
         imu = make({"imu0", Kind::imu, 256});
         events = make({"events", Kind::events, 64});
     }
@@ -86,8 +88,8 @@ struct Instance {
         const OutputTime time{1'000'000'000 + static_cast<std::int64_t>(number) * 50'000'000};
         FrameMetadata frame{};
         frame.trigger = number + 1;
-        frame.width = frame.stride = width;
-        frame.height = height;
+        frame.width = frame.stride = image_width;
+        frame.height = image_height;
         frame.pixel_format = mono8;
         frame.epoch = epoch;
         const auto pixels = pixels_of(number);
@@ -187,7 +189,7 @@ std::map<std::string, std::uint64_t> gaps_in(const std::string& path, const std:
 
 }  // namespace
 
-TEST_CASE_METHOD(Instance, "recorder: each item is in the file as it was in the ring") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: each item is in the file as it was in the ring") {
     const bool png = GENERATE(false, true);
     auto settings = this->settings();
     settings.png = png;
@@ -212,7 +214,7 @@ TEST_CASE_METHOD(Instance, "recorder: each item is in the file as it was in the 
     CHECK(samples == 20);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: stamps and events have time, life, and all fields") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: stamps and events have time, life, and all fields") {
     const auto settings = this->settings();
     record(settings, [&](int turn) {
         publish();
@@ -234,7 +236,7 @@ TEST_CASE_METHOD(Instance, "recorder: stamps and events have time, life, and all
     }
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: what is overwritten before it is written is reported as lost") {
     const auto settings = this->settings();
     const RecordReport report = record(settings, [&](int turn) {
@@ -251,7 +253,8 @@ TEST_CASE_METHOD(Instance,
     CHECK(report.streams.at("imu0").lost == 0);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: what is overwritten while it is written is taken back") {
+TEST_CASE_METHOD(RecordedInstance,
+                 "recorder: what is overwritten while it is written is taken back") {
     auto file = McapWriter::create((files.path() / "a.mcap").string(), "a test");
     ItemWriter writer(std::move(*file));
     auto reader = ring::Reader::open(directory / "cam0");
@@ -260,7 +263,7 @@ TEST_CASE_METHOD(Instance, "recorder: what is overwritten while it is written is
     const auto first = reader->next();
     REQUIRE(writer.write_frame("cam0", *first));
     const auto second = reader->next();
-    for (std::uint32_t i = 0; i < slots; ++i) publish();  // as if meanwhile
+    for (std::uint32_t i = 0; i < ring_slots; ++i) publish();  // as if meanwhile
     const auto outcome = writer.write_frame("cam0", *second);
     REQUIRE(outcome);
     CHECK(*outcome == ItemWriter::Outcome::overtaken);
@@ -268,7 +271,7 @@ TEST_CASE_METHOD(Instance, "recorder: what is overwritten while it is written is
     CHECK(frames_in((files.path() / "a.mcap").string()).numbers == from_to(0, 1));
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: a service that ends and comes back is reported, and followed") {
     const auto settings = this->settings();
     const RecordReport report = record(settings, [&](int turn) {
@@ -290,7 +293,7 @@ TEST_CASE_METHOD(Instance,
     CHECK(frames_in(settings.output).numbers == expected);
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: a stream that comes later is recorded from its first item on") {
     std::optional<ring::Writer> late;
     const auto settings = this->settings();
@@ -304,7 +307,7 @@ TEST_CASE_METHOD(Instance,
     CHECK(report.streams.at("late").items == 3);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: the past, as far as the rings go") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: the past, as far as the rings go") {
     for (int i = 0; i < 20; ++i) publish();
     auto settings = this->settings();
     settings.before = milliseconds(200);
@@ -316,7 +319,7 @@ TEST_CASE_METHOD(Instance, "recorder: the past, as far as the rings go") {
     CHECK(frames_in(settings.output).numbers == from_to(15, 22));
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: all that the rings hold, while they are written, is no loss") {
     for (int i = 0; i < 200; ++i) publish();
     auto settings = this->settings();
@@ -327,11 +330,12 @@ TEST_CASE_METHOD(Instance,
     });
     CHECK(report.lost() == 0);
     const auto numbers = frames_in(settings.output).numbers;
-    REQUIRE(numbers.size() >= slots / 2);
+    REQUIRE(numbers.size() >= ring_slots / 2);
     CHECK(numbers == from_to(numbers.front(), 203));
 }
 
-TEST_CASE_METHOD(Instance, "recorder: the past of a stream with nothing new is older than wanted") {
+TEST_CASE_METHOD(RecordedInstance,
+                 "recorder: the past of a stream with nothing new is older than wanted") {
     events->publish(OutputTime{1}, pack(EventMetadata{}));
     for (int i = 0; i < 200; ++i) publish();
     auto settings = this->settings();
@@ -344,7 +348,7 @@ TEST_CASE_METHOD(Instance, "recorder: the past of a stream with nothing new is o
     CHECK(report.streams.at("imu0").items == 10);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: a gap before the first item stands where that does") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: a gap before the first item stands where that does") {
     const auto settings = this->settings();
     const RecordReport report = record(settings, [&](int turn) {
         for (int i = 0; i < (turn == 0 ? 100 : 1); ++i) publish();
@@ -357,7 +361,7 @@ TEST_CASE_METHOD(Instance, "recorder: a gap before the first item stands where t
     });
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: where the next file cannot be made, the one before is whole") {
     auto settings = this->settings();
     settings.split_bytes = 20'000;
@@ -375,7 +379,7 @@ TEST_CASE_METHOD(Instance,
     CHECK(frames_in(settings.output).numbers.size() == report.streams.at("cam0").items);
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(RecordedInstance,
                  "recorder: a name that a later file needs is looked at in the beginning") {
     auto settings = this->settings("split.mcap");
     settings.stop = [] { return true; };
@@ -393,13 +397,13 @@ TEST_CASE_METHOD(Instance,
     CHECK(client::record(settings));
 }
 
-TEST_CASE_METHOD(Instance, "recorder: camera infos have the intrinsics that it is given") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: camera infos have the intrinsics that it is given") {
     auto settings = this->settings();
     const auto calibrated = [](const char* key, const char* lens, const char* topic) {
         return fmt::format(
             "{}: {{camera_model: pinhole, intrinsics: [321.5, 1.0, 1.0, 1.0], {}, resolution: "
             "[{}, {}], rostopic: {}}}\n",
-            key, lens, width, height, topic);
+            key, lens, image_width, image_height, topic);
     };
     constexpr auto radtan = "distortion_model: radtan, distortion_coeffs: [1.0, 2.0, 3.0, 4.0]";
     const bool known = GENERATE(true, false);
@@ -419,7 +423,7 @@ TEST_CASE_METHOD(Instance, "recorder: camera infos have the intrinsics that it i
     CHECK(Recording::open(settings.output)->attachment("calibration/camchain.yaml") != nullptr);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: a status that is none, as of a file that is played") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: a status that is none, as of a file that is played") {
     const std::string text = GENERATE(std::string("[1]"), std::string(R"({"schema":"1"})"),
                                       std::string(200'000, '[') + std::string(200'000, ']'));
     auto status = make({"status", ring::StreamKind::status, 8, 4, 500'000});
@@ -436,7 +440,7 @@ TEST_CASE_METHOD(Instance, "recorder: a status that is none, as of a file that i
     CHECK(Recording::open(settings.output)->attachment("status.json") == nullptr);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: files of a size, each whole in itself") {
     auto settings = this->settings();
     settings.split_bytes = 20'000;
     settings.output = (files.path() / "split.mcap").string();
@@ -455,7 +459,7 @@ TEST_CASE_METHOD(Instance, "recorder: files of a size, each whole in itself") {
     CHECK(id(report.files[0]) == id(report.files[3]));
 }
 
-TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before is whole") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: a full disk ends it, and what came before is whole") {
     const auto settings = this->settings();
     CHECK(test::in_process([&] {
         ::signal(SIGXFSZ, SIG_IGN);
@@ -481,7 +485,7 @@ TEST_CASE_METHOD(Instance, "recorder: a full disk ends it, and what came before 
     CHECK(reported == frames.numbers.size());
 }
 
-TEST_CASE_METHOD(Instance, "recorder: a disk without room for the summary costs no item") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: a disk without room for the summary costs no item") {
     const auto run = [&](const std::string& file) {
         auto settings = this->settings(file);
         return record(settings, [&](int turn) {
@@ -504,7 +508,7 @@ TEST_CASE_METHOD(Instance, "recorder: a disk without room for the summary costs 
     CHECK(frames_in(cut).numbers == from_to(0, 10));
 }
 
-TEST_CASE_METHOD(Instance, "recorder: where no thread is to be had, it packs by itself") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: where no thread is to be had, it packs by itself") {
     auto settings = this->settings();
     settings.png = true;
     std::optional<NoMoreThreads> none;
@@ -520,7 +524,8 @@ TEST_CASE_METHOD(Instance, "recorder: where no thread is to be had, it packs by 
     CHECK(frames.right);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: one that is killed leaves all up to the last whole chunk") {
+TEST_CASE_METHOD(RecordedInstance,
+                 "recorder: one that is killed leaves all up to the last whole chunk") {
     const auto settings = this->settings();
     const pid_t child = ::fork();
     if (child == 0) {
@@ -546,7 +551,7 @@ TEST_CASE_METHOD(Instance, "recorder: one that is killed leaves all up to the la
     CHECK(frames.right);
 }
 
-TEST_CASE_METHOD(Instance, "recorder: what cannot be recorded says why") {
+TEST_CASE_METHOD(RecordedInstance, "recorder: what cannot be recorded says why") {
     const auto refusal = [](const RecordSettings& settings) {
         const auto report = client::record(settings);
         return report ? "" : report.error().message();

@@ -7,18 +7,17 @@
 #include <map>
 
 #include "base/shallow_json.hpp"
+#include "pixel_formats.hpp"
 #include "recording/recording_info.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 
 using namespace versavis;
+using namespace versavis::test;
 using client::RecordedItem;
 using client::Recording;
 
 namespace {
-
-constexpr std::uint32_t mono8 = 0x01080001;
-constexpr std::uint32_t mono12 = 0x01100005;
 
 std::vector<std::byte> without_padding(const FrameMetadata& frame, std::size_t row,
                                        std::span<const std::byte> pixels) {

@@ -25,10 +25,10 @@ using test::RecordingSketch;
 
 namespace {
 
-constexpr Duration output_ahead = seconds(1'700'000'000);  ///< of the host
-constexpr int before_lock = 15;                            ///< frames that were suspect live
+constexpr Duration host_behind = seconds(1'700'000'000);  ///< of the host
+constexpr int before_lock = 15;                           ///< frames that were suspect live
 
-OutputTime shown(HostTime host) { return {host.ns + output_ahead.ns}; }
+OutputTime shown(HostTime host) { return {host.ns + host_behind.ns}; }
 HostTime on_host(BoardTime board) { return {board.ns + test::host_ahead.ns}; }
 
 /// A minute: the board, its clock, a camera and an IMU. Live, stamps were off by some 30 us.
@@ -64,7 +64,7 @@ class Minute {
             if (i % 10 == 0)
                 item("clock", StreamKind::clock, shown(sent),
                      clock::to_metadata(
-                         clock::ClockItem{clock::RecordedOutput{1, sent, output_ahead, {}}}));
+                         clock::ClockItem{clock::RecordedOutput{1, sent, host_behind, {}}}));
         }
     }
 
@@ -73,7 +73,7 @@ class Minute {
     }
 
     void frames() {
-        std::normal_distribution<double> noise(0, 30e3);
+        std::uniform_real_distribution<double> noise(-52e3, 52e3);  // 30 us rms
         const Bench bench;
         pairing::Limits limits = Bench::made();
         evidence(limits, on_host({}));
@@ -275,7 +275,7 @@ TEST_CASE("recording_process: of a recording in several files, the one that is n
                           {}});
             };
             add(clock::RecordedExchange{3, 1, 0, sent, at, at, sent + microseconds(140)});
-            if (i % 10 == 0) add(clock::RecordedOutput{1, sent, output_ahead, {}});
+            if (i % 10 == 0) add(clock::RecordedOutput{1, sent, host_behind, {}});
             ImuMetadata sample{};
             sample.board_time = BoardTime{sent.ns};
             sample.host_time = sent;

@@ -9,28 +9,23 @@
 #include <fstream>
 #include <iterator>
 
+#include "pixel_formats.hpp"
 #include "posix/file_descriptor.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording_file.hpp"
 #include "temporary_directory.hpp"
 
 using namespace versavis;
+using namespace versavis::test;
 using client::repair;
 
 namespace {
 
-constexpr std::uint32_t mono8 = 0x01080001;
-
-std::string content(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-struct Sample {
+struct RepairSample {
     test::TemporaryDirectory directory;
     std::string path = (directory.path() / "a.mcap").string();
 
-    explicit Sample(const std::string& bytes) { write(bytes); }
+    explicit RepairSample(const std::string& bytes) { write(bytes); }
     void write(const std::string& bytes) const {
         std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
     }
@@ -51,20 +46,20 @@ TEST_CASE("repair: a file that was cut off behind a chunk is as if it had been c
     const std::string whole = file.finish();
     const std::string tail =
         GENERATE(std::string(), std::string("\x06half a chunk"), std::string(5000, '\0'));
-    const Sample sample(cut + tail);
+    const RepairSample sample(cut + tail);
     const auto repaired = repair(sample.path, "");
     REQUIRE(repaired);
-    CHECK(content(sample.path) == whole);
+    CHECK(content_of(sample.path) == whole);
     CHECK(repaired->messages == 20);
     CHECK(repaired->cut_bytes == tail.size());
     CHECK(repaired->cut_file.empty() == tail.empty());
-    if (!tail.empty()) CHECK(content(repaired->cut_file) == tail);
+    if (!tail.empty()) CHECK(content_of(repaired->cut_file) == tail);
     CHECK(repair(sample.path, "")->was_whole);
 }
 
 TEST_CASE("repair: cut anywhere, it is whole afterwards, and a new file is the same") {
     const std::string whole = test::sample_recording(1, false, false, mono8);
-    const Sample sample(whole);
+    const RepairSample sample(whole);
     for (std::size_t size = 1000; size < whole.size(); size += 1511) {
         sample.write(whole.substr(0, size));
         const std::string output = sample.path + ".new";
@@ -72,9 +67,9 @@ TEST_CASE("repair: cut anywhere, it is whole afterwards, and a new file is the s
         std::filesystem::remove(sample.path + ".cut");
         const auto copied = repair(sample.path, output);
         REQUIRE(copied);
-        CHECK(content(sample.path) == whole.substr(0, size));
+        CHECK(content_of(sample.path) == whole.substr(0, size));
         REQUIRE(repair(sample.path, ""));
-        CHECK(content(sample.path) == content(output));
+        CHECK(content_of(sample.path) == content_of(output));
         const auto reader = client::McapReader::open(output);
         REQUIRE(reader);
         CHECK(reader->defect().empty());
@@ -83,8 +78,8 @@ TEST_CASE("repair: cut anywhere, it is whole afterwards, and a new file is the s
 }
 
 TEST_CASE("repair: a file that is being written is left alone, and so is what lies there already") {
-    const Sample sample(test::sample_recording(1, false, true, mono8));
-    const std::string before = content(sample.path);
+    const RepairSample sample(test::sample_recording(1, false, true, mono8));
+    const std::string before = content_of(sample.path);
     {
         const FileDescriptor recorder(::open(sample.path.c_str(), O_RDWR | O_CLOEXEC));
         REQUIRE(::flock(recorder.get(), LOCK_EX | LOCK_NB) == 0);
@@ -95,14 +90,14 @@ TEST_CASE("repair: a file that is being written is left alone, and so is what li
     CHECK_FALSE(repair(sample.path, ""));
     std::ofstream(sample.path + ".new") << "kept";
     CHECK_FALSE(repair(sample.path, sample.path + ".new"));
-    CHECK(content(sample.path) == before);
-    CHECK(content(sample.path + ".cut") == "kept");
-    CHECK(content(sample.path + ".new") == "kept");
+    CHECK(content_of(sample.path) == before);
+    CHECK(content_of(sample.path + ".cut") == "kept");
+    CHECK(content_of(sample.path + ".new") == "kept");
 }
 
 TEST_CASE("repair: a damaged chunk in the middle is reported and nothing is changed") {
     std::string bytes = test::sample_recording(1, false, true, mono8);
-    Sample sample(bytes);
+    RepairSample sample(bytes);
     const auto chunk = client::McapReader::open(sample.path)->chunks().at(1);
     bytes[chunk.records_offset + 100] ^= 4;
     sample.write(bytes);
@@ -110,12 +105,12 @@ TEST_CASE("repair: a damaged chunk in the middle is reported and nothing is chan
     REQUIRE_FALSE(repaired);
     CHECK(repaired.error().what.find(std::to_string(chunk.offset)) != std::string::npos);
     CHECK(repaired.error().cure.find("--cut") != std::string::npos);
-    CHECK(content(sample.path) == bytes);
+    CHECK(content_of(sample.path) == bytes);
 }
 
 TEST_CASE("repair: asked to, it cuts at the first chunk that is damaged, and keeps the rest") {
     std::string bytes = test::sample_recording(1, false, GENERATE(true, false), mono8);
-    Sample sample(bytes);
+    RepairSample sample(bytes);
     const auto chunks = client::McapReader::open(sample.path)->chunks();
     bytes[chunks.at(2).records_offset + 100] ^= 4;
     bytes[chunks.at(3).records_offset + 100] ^= 4;
@@ -123,13 +118,14 @@ TEST_CASE("repair: asked to, it cuts at the first chunk that is damaged, and kee
     const std::string output = sample.path + ".new";
     const auto copied = repair(sample.path, output, true);
     REQUIRE(copied);
-    CHECK(content(sample.path) == bytes);
+    CHECK(content_of(sample.path) == bytes);
     const auto cut = repair(sample.path, "", true);
     REQUIRE(cut);
-    CHECK(content(sample.path) == content(output));
+    CHECK(content_of(sample.path) == content_of(output));
     CHECK(cut->chunks == 2);
     CHECK(cut->defect.find(std::to_string(chunks.at(2).offset)) != std::string::npos);
-    CHECK(content(sample.path).substr(0, chunks.at(2).offset) + content(cut->cut_file) == bytes);
+    CHECK(content_of(sample.path).substr(0, chunks.at(2).offset) + content_of(cut->cut_file) ==
+          bytes);
     const auto reader = client::McapReader::open(sample.path);
     REQUIRE(reader);
     CHECK(reader->defect().empty());

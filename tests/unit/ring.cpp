@@ -43,7 +43,7 @@ struct Fixture {
     }
 };
 
-void publish(Writer& writer, std::uint64_t value) {
+void publish_event(Writer& writer, std::uint64_t value) {
     writer.publish(OutputTime{static_cast<std::int64_t>(value)}, {value});
 }
 
@@ -60,7 +60,7 @@ TEST_CASE_METHOD(Fixture, "ring: items come in order, with time and metadata") {
     Writer writer = inline_writer();
     Reader reader = this->reader("numbers");
     CHECK(test::look(reader.next()).found == test::Found::nothing);
-    for (std::uint64_t i = 1; i <= 3; ++i) publish(writer, i);
+    for (std::uint64_t i = 1; i <= 3; ++i) publish_event(writer, i);
     for (std::uint64_t i = 1; i <= 3; ++i) {
         const auto item = test::look(reader.next());
         REQUIRE(item.found == test::Found::item);
@@ -77,7 +77,7 @@ TEST_CASE_METHOD(Fixture,
         GENERATE(std::uint64_t{0}, (std::uint64_t{1} << 32U) - 3, std::uint64_t{1} << 63U);
     Writer writer = inline_writer(start);
     Reader reader = this->reader("numbers");
-    for (std::uint64_t i = 0; i < 20; ++i) publish(writer, i);
+    for (std::uint64_t i = 0; i < 20; ++i) publish_event(writer, i);
     const auto lost = test::look(reader.next());
     REQUIRE(lost.found == test::Found::lost);
     CHECK(lost.lost == 16);
@@ -148,10 +148,10 @@ TEST_CASE_METHOD(Fixture,
                  "ring: a reader sees the restart of its writer, and one that is gone for good") {
     auto first = std::make_unique<Writer>(inline_writer());
     Reader reader = this->reader("numbers");
-    publish(*first, 1);
+    publish_event(*first, 1);
     {
         Writer second = inline_writer();
-        publish(second, 100);
+        publish_event(second, 100);
         first.reset();  // must not take the name away from its successor
         CHECK(test::look(reader.next()).metadata[0] == 1);
         CHECK(test::look(reader.next()).found == test::Found::restarted);
@@ -163,7 +163,7 @@ TEST_CASE_METHOD(Fixture,
     CHECK(test::look(reader.next(milliseconds(1))).found == test::Found::gone);
     CHECK_FALSE(reader.writer_alive());
     Writer third = inline_writer();
-    publish(third, 200);
+    publish_event(third, 200);
     CHECK(test::look(reader.next()).found == test::Found::restarted);
     CHECK(test::look(reader.next()).metadata[0] == 200);
 }
@@ -178,7 +178,7 @@ TEST_CASE_METHOD(Fixture, "ring: a waiting reader is woken [threads]", "[threads
         item = test::look(reader.next(seconds(20)));
     });
     while (!ready) std::this_thread::yield();
-    publish(writer, 5);
+    publish_event(writer, 5);
     waiting.join();
     CHECK(item.found == test::Found::item);
     CHECK(item.metadata[0] == 5);
@@ -400,7 +400,7 @@ TEST_CASE_METHOD(Fixture, "ring: no item is lost when one writer follows another
     std::thread writing([&] {
         auto writer = std::move(first);
         for (std::uint64_t life = 0; life < lives; ++life) {
-            for (std::uint64_t i = 0; i < items; ++i) publish(*writer, life * items + i);
+            for (std::uint64_t i = 0; i < items; ++i) publish_event(*writer, life * items + i);
             // The next follows when the reader has followed so far: it may skip no life.
             while (followed < life) std::this_thread::yield();
             if (life + 1 < lives) writer = std::make_unique<Writer>(inline_writer());

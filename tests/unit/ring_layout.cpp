@@ -35,7 +35,7 @@ struct Ring {
 };
 
 template <typename T>
-T at(const std::string& bytes, std::size_t offset) {
+T layout_at(const std::string& bytes, std::size_t offset) {
     REQUIRE(bytes.size() >= offset + sizeof(T));
     T value;
     std::memcpy(&value, bytes.data() + offset, sizeof value);
@@ -43,10 +43,10 @@ T at(const std::string& bytes, std::size_t offset) {
 }
 
 std::uint64_t u64(const std::string& bytes, std::size_t offset) {
-    return at<std::uint64_t>(bytes, offset);
+    return layout_at<std::uint64_t>(bytes, offset);
 }
 std::uint32_t u32(const std::string& bytes, std::size_t offset) {
-    return at<std::uint32_t>(bytes, offset);
+    return layout_at<std::uint32_t>(bytes, offset);
 }
 
 /// Field 22 of what the kernel reports of this process, whose name has no space.
@@ -104,8 +104,8 @@ TEST_CASE_METHOD(Ring, "ring_layout: the header of a ring with payloads") {
     CHECK(u64(file, 256) == 0);
     CHECK(u32(file, 384) == 0);
     CHECK(u32(file, 512) == 1);
-    CHECK(at<std::int64_t>(file, 640) >= before.ns);
-    CHECK(at<std::int64_t>(file, 640) <= host_now().ns);
+    CHECK(layout_at<std::int64_t>(file, 640) >= before.ns);
+    CHECK(layout_at<std::int64_t>(file, 640) <= host_now().ns);
     CHECK(writer.slot_size() == 8192);
     CHECK(writer.slot_count() == 3);
 }
@@ -162,7 +162,7 @@ TEST_CASE_METHOD(Ring, "ring_layout: an item without payload, in its descriptor"
     CHECK(u64(file, descriptor) == 2 * 9 + 2);
     CHECK(u64(file, descriptor + 8) == 0);
     CHECK(u64(file, descriptor + 16) == 0xFFFFFFFF);
-    CHECK(at<std::int64_t>(file, descriptor + 24) == -5);
+    CHECK(layout_at<std::int64_t>(file, descriptor + 24) == -5);
     for (std::size_t i = 0; i < 12; ++i) CHECK(u64(file, descriptor + 32 + 8 * i) == 100 + i);
     CHECK(u64(file, 256) == 10);
     CHECK(u32(file, 384) == 1);
@@ -188,12 +188,12 @@ TEST_CASE_METHOD(Ring, "ring_layout: a payload, its slot and its generation") {
     writer.abandon(0);
     CHECK(generation(0) == 2);
     const std::string file = bytes("frames");
-    CHECK(at<float>(file, 4096 + 8 * 128 + 64 + 8) == 6.5F);
-    CHECK(at<float>(file, 4096 + 8 * 128 + 64 + 12) == 41);
+    CHECK(layout_at<float>(file, 4096 + 8 * 128 + 64 + 8) == 6.5F);
+    CHECK(layout_at<float>(file, 4096 + 8 * 128 + 64 + 12) == 41);
     CHECK(u64(file, 4096) == 2);
     CHECK(u64(file, 4096 + 8) == 2);
     CHECK(u64(file, 4096 + 16) == (8192ULL << 32U | 1));
-    CHECK(at<std::int64_t>(file, 4096 + 24) == 7);
+    CHECK(layout_at<std::int64_t>(file, 4096 + 24) == 7);
     CHECK(u32(file, 384) == 1);  // giving a slot back is no news
     const std::size_t slots_at = u64(file, 96);
     CHECK(file.substr(slots_at, 8192) == std::string(8192, '\0'));
@@ -203,7 +203,7 @@ TEST_CASE_METHOD(Ring, "ring_layout: a payload, its slot and its generation") {
 TEST_CASE_METHOD(Ring, "ring_layout: state, heartbeat and name follow the writer") {
     auto first = std::make_unique<Writer>(write({"events", StreamKind::events, 8}));
     first->heartbeat(HostTime{12345});
-    CHECK(at<std::int64_t>(bytes("events"), 640) == 12345);
+    CHECK(layout_at<std::int64_t>(bytes("events"), 640) == 12345);
     std::filesystem::create_hard_link(directory.path() / "events", directory.path() / "old");
     {
         const Writer second = write({"events", StreamKind::events, 8});

@@ -32,7 +32,7 @@ using test::in_process;
 
 namespace {
 
-struct Streams {
+struct ReaderStreams {
     test::TemporaryDirectory directory{"/dev/shm"};
 
     Writer events(std::uint32_t descriptors = 8) {
@@ -55,7 +55,7 @@ struct Streams {
     }
 };
 
-void publish(Writer& writer, std::uint32_t length, std::uint8_t fill = 1) {
+void publish_bytes(Writer& writer, std::uint32_t length, std::uint8_t fill = 1) {
     const auto slot = writer.acquire();
     REQUIRE(slot);
     std::memset(writer.slot_data(*slot), fill, length);
@@ -94,7 +94,7 @@ Duration slept_through(const std::atomic<std::uint32_t>& word, const std::functi
 
 }  // namespace
 
-TEST_CASE_METHOD(Streams, "ring_reader: a copy has all of the payload, and nothing beyond") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a copy has all of the payload, and nothing beyond") {
     Writer writer = frames(2);
     Reader reader = open("frames");
     for (std::uint32_t size = 0; size <= 200; ++size) {
@@ -113,12 +113,13 @@ TEST_CASE_METHOD(Streams, "ring_reader: a copy has all of the payload, and nothi
     }
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: the last slot is read to its end, which is the file's") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: the last slot is read to its end, which is the file's") {
     Writer writer = frames(2);
     // The next mapping usually ends where this page begins, which nobody may read.
     const void* guard = ::mmap(nullptr, page_size, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     Reader reader = open("frames");
-    for (int i = 0; i < 2; ++i) publish(writer, page_size, 9);
+    for (int i = 0; i < 2; ++i) publish_bytes(writer, page_size, 9);
     std::vector<std::byte> copy(page_size);
     test::Looked<Item> item;
     for (int i = 0; i < 2; ++i) {
@@ -131,7 +132,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: the last slot is read to its end, which 
     ::munmap(const_cast<void*>(guard), page_size);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: an item without payload is intact, and a copy of nothing") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: an item without payload is intact, and a copy of nothing") {
     Writer writer = events();
     Reader reader = open("events");
     for (int lap = 0; lap < 3; ++lap)
@@ -146,7 +148,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: an item without payload is intact, and a
         }
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: where nothing is, the item says so") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: where nothing is, the item says so") {
     Writer writer = events();
     const auto item = test::look(open("events").next());
     CHECK(item.found == test::Found::nothing);
@@ -159,7 +161,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: where nothing is, the item says so") {
     CHECK(item.payload.size() == 0);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ring back") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: one that wants the past begins half a ring back") {
     Writer writer = events();
     for (std::uint64_t i = 0; i < 3; ++i) writer.publish(OutputTime{}, {i});
     CHECK(test::look(open("events", {Position::middle}).next()).number == 0);
@@ -170,7 +172,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that wants the past begins half a ri
     CHECK(test::look(open("events").next()).found == test::Found::nothing);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: each place is where it says, and holds what is read next") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: each place is where it says, and holds what is read next") {
     Writer writer = events(64);
     const auto first_from = [&](Position position) {
         return test::look(open("events", {position}).next());
@@ -194,12 +197,13 @@ TEST_CASE_METHOD(Streams, "ring_reader: each place is where it says, and holds w
     CHECK(test::look(from_middle.next()).number == 100 - 32);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: the oldest item is found, however many were given back") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: the oldest item is found, however many were given back") {
     constexpr std::uint64_t slots = 8;
     for (std::uint64_t published = 0; published <= 2 * slots; ++published)
         for (std::uint64_t taken = 0; taken <= slots; ++taken) {
             Writer writer = frames(slots);
-            for (std::uint64_t i = 0; i < published; ++i) publish(writer, 10);
+            for (std::uint64_t i = 0; i < published; ++i) publish_bytes(writer, 10);
             for (std::uint64_t i = 0; i < taken; ++i) REQUIRE(writer.acquire());
             const std::uint64_t there = std::min({published, slots, slots - taken});
             Reader reader = open("frames");
@@ -210,16 +214,16 @@ TEST_CASE_METHOD(Streams, "ring_reader: the oldest item is found, however many w
         }
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: the middle is never where the writer is next") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: the middle is never where the writer is next") {
     Writer writer = frames(8);
-    for (int i = 0; i < 8; ++i) publish(writer, 10);
+    for (int i = 0; i < 8; ++i) publish_bytes(writer, 10);
     for (int i = 0; i < 4; ++i) REQUIRE(writer.acquire());
     Reader reader = open("frames", {Position::middle});
     REQUIRE(writer.acquire());
     CHECK(test::look(reader.next()).found == test::Found::item);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a time is sought, and so many items before it") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a time is sought, and so many items before it") {
     Writer writer = events();
     for (const std::int64_t time : {100, 300, 200, 400, 500}) writer.publish(OutputTime{time}, {});
     Reader reader = open("events");
@@ -240,10 +244,10 @@ TEST_CASE_METHOD(Streams, "ring_reader: a time is sought, and so many items befo
     CHECK(test::look(reader.next()).number == 5);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: an item that is lost alone is passed over alone") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: an item that is lost alone is passed over alone") {
     Writer writer = frames(8);
     Reader reader = open("frames");
-    for (int i = 0; i < 8; ++i) publish(writer, 10);
+    for (int i = 0; i < 8; ++i) publish_bytes(writer, 10);
     map("frames").generation(6) += 2;
     for (std::uint64_t i = 0; i < 6; ++i) CHECK(test::look(reader.next()).number == i);
     const auto lost = test::look(reader.next());
@@ -262,10 +266,11 @@ TEST_CASE("ring_reader: each reason why there is no item has a sentence") {
     CHECK(NoItem{}.lost == 0);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one item is lost") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: where only one payload is gone, only one item is lost") {
     Writer writer = frames(4);
     Reader reader = open("frames");
-    publish(writer, 10);
+    publish_bytes(writer, 10);
     for (int i = 0; i < 4; ++i) CHECK(writer.acquire());
     const auto lost = test::look(reader.next());
     CHECK(lost.found == test::Found::lost);
@@ -275,12 +280,12 @@ TEST_CASE_METHOD(Streams, "ring_reader: where only one payload is gone, only one
     CHECK(test::look(reader.next()).number == 1);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a slot that is not there, or too small, is no item") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a slot that is not there, or too small, is no item") {
     Writer writer = frames(2);
     const Mapping mapping = map("frames");
     const auto found_with = [&](std::uint64_t length, std::uint64_t slot) {
         Reader reader = open("frames");
-        publish(writer, 10);
+        publish_bytes(writer, 10);
         Descriptor& descriptor = mapping.descriptor(writer.head() - 1);
         const std::uint64_t real = descriptor.length_and_slot;
         if (slot >= 2) descriptor.slot_generation = 0;  // as the words behind the last one
@@ -293,10 +298,10 @@ TEST_CASE_METHOD(Streams, "ring_reader: a slot that is not there, or too small, 
     CHECK(found_with(10, 0xFFFFFFFE) == test::Found::lost);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: an item outlives its ring, its reader and its file") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: an item outlives its ring, its reader and its file") {
     auto large = std::make_unique<Writer>(frames(4));
     auto reader = std::make_unique<Reader>(open("frames"));
-    for (std::uint8_t i = 0; i < 3; ++i) publish(*large, 10, i);
+    for (std::uint8_t i = 0; i < 3; ++i) publish_bytes(*large, 10, i);
     test::Looked<Item> item;
     for (int i = 0; i < 3; ++i) item = test::look(reader->next());
     Writer small = frames(2);
@@ -310,7 +315,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: an item outlives its ring, its reader an
     CHECK(item.valid());
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies before it") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: the newest item, once, whatever lies before it") {
     Writer writer = events();
     Reader reader = open("events");
     CHECK(test::look(reader.latest()).found == test::Found::nothing);
@@ -327,18 +332,19 @@ TEST_CASE_METHOD(Streams, "ring_reader: the newest item, once, whatever lies bef
     CHECK(test::look(reader.latest()).number == 39);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: the newest item is reported lost where no newer one comes") {
     Writer writer = frames(4);
     Reader reader = open("frames");
-    publish(writer, 10);
+    publish_bytes(writer, 10);
     for (int i = 0; i < 4; ++i) CHECK(writer.acquire());
     CHECK(test::look(reader.latest()).found == test::Found::lost);
     writer.publish(0, 10, OutputTime{}, {});
     CHECK(test::look(reader.latest()).number == 1);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: what is read after the end is stale, after a restart not") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: what is read after the end is stale, after a restart not") {
     auto writer = std::make_unique<Writer>(events());
     Reader reader = open("events");
     const std::uint64_t life = reader.life();
@@ -362,7 +368,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: what is read after the end is stale, aft
     CHECK_FALSE(newest.stale);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a loss is reported though the writer has ended") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a loss is reported though the writer has ended") {
     auto writer = std::make_unique<Writer>(events());
     Reader reader = open("events");
     const bool by_descriptor = GENERATE(false, true);
@@ -375,7 +381,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: a loss is reported though the writer has
     CHECK(test::look(reader.next()).number == lost.lost);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: a writer that falls silent is reported each time, at once") {
     Writer writer = events();
     Reader reader = open("events");
@@ -393,7 +399,7 @@ TEST_CASE_METHOD(Streams,
     }
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: a writer on another clock lives once its heart has beaten") {
     Writer writer = events();
     const HostTime far = host_now() - seconds(1000);
@@ -403,7 +409,7 @@ TEST_CASE_METHOD(Streams,
     CHECK(reader.writer_alive());
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a copy of a segment is no successor") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a copy of a segment is no successor") {
     auto writer = std::make_unique<Writer>(events());
     Reader reader = open("events");
     const auto copy = directory.path() / "copy";
@@ -413,7 +419,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: a copy of a segment is no successor") {
     CHECK(test::look(reader.next()).found == test::Found::gone);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: all that it may read is in memory from the beginning") {
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: all that it may read is in memory from the beginning") {
     const Writer writer = frames(64);
     const Reader reader = open("frames");
     std::ifstream maps("/proc/self/smaps");
@@ -431,7 +438,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: all that it may read is in memory from t
     CHECK(found == 2);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: what a writer taken for dead still published is not skipped") {
     auto first = std::make_unique<Writer>(events());
     Reader reader = open("events");
@@ -446,7 +453,7 @@ TEST_CASE_METHOD(Streams,
     CHECK(test::look(reader.next()).metadata[0] == 2);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: a writer lives while its heart beats, and is found by its start") {
     Writer writer = events();
     Reader reader = open("events");
@@ -473,12 +480,12 @@ TEST_CASE_METHOD(Streams,
     CHECK(open("events").writer_alive());
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader reads on") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: whatever becomes of a header, a reader reads on") {
     Writer writer = frames(4);
     Reader reader = open("frames");
     const Mapping mapping = map("frames");
     const auto read = [&] {
-        publish(writer, 100, 7);
+        publish_bytes(writer, 100, 7);
         const auto item = test::look(reader.next());
         REQUIRE(item.found == test::Found::item);
         std::vector<std::byte> bytes(item.payload.size());
@@ -502,7 +509,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: whatever becomes of a header, a reader r
     }
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a successor of another kind is another stream") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: a successor of another kind is another stream") {
     auto first = std::make_unique<Writer>(
         *Writer::create(directory.path(), {"data", StreamKind::events, 8}));
     Reader reader = open("data");
@@ -515,7 +522,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: a successor of another kind is another s
     CHECK(test::look(reader.next()).found == test::Found::restarted);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read learns so, and what to do") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: whoever may not read learns so, and what to do") {
     CHECK_THAT(refusal("absent"),
                Catch::Contains("no such stream") && Catch::Contains("is the service running?"));
     Writer writer = events();
@@ -529,7 +536,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: whoever may not read learns so, and what
     }));
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: one that waits sleeps") {
     Writer writer = events();
     Reader reader = open("events");
     const HostTime begun = host_now();
@@ -550,7 +557,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps") {
     CHECK(test::look(reader.next()).found == test::Found::item);
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps on its stream's word [threads]",
+TEST_CASE_METHOD(ReaderStreams, "ring_reader: one that waits sleeps on its stream's word [threads]",
                  "[threads]") {
     Writer writer = events();
     Reader reader = open("events");
@@ -565,7 +572,8 @@ TEST_CASE_METHOD(Streams, "ring_reader: one that waits sleeps on its stream's wo
     waiting.join();
 }
 
-TEST_CASE_METHOD(Streams, "ring_reader: a descriptor forgets no item of a busy writer [threads]",
+TEST_CASE_METHOD(ReaderStreams,
+                 "ring_reader: a descriptor forgets no item of a busy writer [threads]",
                  "[threads]") {
     constexpr std::uint64_t last = 20'000;
     Writer writer = events(1024);
@@ -587,7 +595,7 @@ TEST_CASE_METHOD(Streams, "ring_reader: a descriptor forgets no item of a busy w
     CHECK(test::look(reader.next()).found == test::Found::nothing);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: a sleeper wakes at each item, and when the segment ends "
                  "[threads]",
                  "[threads]") {
@@ -610,7 +618,7 @@ TEST_CASE("ring_reader: a wait without news lasts as long as was asked") {
     CHECK(host_now() - begun < seconds(15));
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(ReaderStreams,
                  "ring_reader: no mixture of two items is taken from one descriptor [threads]",
                  "[threads]") {
     Writer writer = events(1);

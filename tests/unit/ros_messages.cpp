@@ -11,9 +11,9 @@ using namespace versavis::client;
 
 namespace {
 
-const OutputTime stamp{1'700'000'000'123'456'789};
+const OutputTime ros_stamp{1'700'000'000'123'456'789};
 
-FrameMetadata frame() {
+FrameMetadata ros_frame() {
     FrameMetadata frame{};
     frame.width = 1920;
     frame.height = 1200;
@@ -23,7 +23,7 @@ FrameMetadata frame() {
 }
 
 template <class T>
-T at(const std::string& message, std::size_t offset) {
+T message_at(const std::string& message, std::size_t offset) {
     T value;
     std::memcpy(&value, message.data() + offset, sizeof value);
     return value;
@@ -32,7 +32,7 @@ T at(const std::string& message, std::size_t offset) {
 }  // namespace
 
 TEST_CASE("ros_messages: an image is what other vendors send, byte for byte") {
-    const std::string head = ros_image_head(stamp, "cam0", frame(), 2304000);
+    const std::string head = ros_image_head(ros_stamp, "cam0", ros_frame(), 2304000);
     CHECK(head.size() + 2304000 == 2304052);  // as CycloneDDS sends it
     const std::string expected(
         "\x00\x01\x00\x00"
@@ -56,41 +56,42 @@ TEST_CASE("ros_messages: an IMU sample without orientation") {
     ImuMetadata sample{};
     sample.gyro[2] = 0.5F;
     sample.accel[0] = -9.75F;
-    const std::string message = ros_imu(stamp, "imu0", sample);
+    const std::string message = ros_imu(ros_stamp, "imu0", sample);
     CHECK(message.size() == 324);  // as CycloneDDS sends it
     constexpr std::size_t orientation = 4 + 24;
-    CHECK(at<double>(message, orientation + 24) == 1);
-    CHECK(at<double>(message, orientation + 32) == -1);
-    CHECK(at<double>(message, orientation + 8 * (4 + 9 + 2)) == 0.5);
-    CHECK(at<double>(message, orientation + 8 * (4 + 9 + 3 + 9)) == -9.75);
+    CHECK(message_at<double>(message, orientation + 24) == 1);
+    CHECK(message_at<double>(message, orientation + 32) == -1);
+    CHECK(message_at<double>(message, orientation + 8 * (4 + 9 + 2)) == 0.5);
+    CHECK(message_at<double>(message, orientation + 8 * (4 + 9 + 3 + 9)) == -9.75);
 }
 
 TEST_CASE("ros_messages: a lens stands in CameraInfo, if it is of the frame's size") {
     const RosLens lens{1920, 1200, 900, 901, 960, 600, "plumb_bob", {-0.25, 0.5, 0, 0, 0}};
-    const std::string message = ros_camera_info(stamp, "cam0", frame(), &lens);
+    const std::string message = ros_camera_info(ros_stamp, "cam0", ros_frame(), &lens);
     const std::size_t d = 4 + 20 + 8 + 4 + 12;
     CHECK(message.substr(36, 10) == std::string("plumb_bob", 10));
-    CHECK(at<std::uint32_t>(message, d) == 5);
-    CHECK(at<double>(message, d + 4) == -0.25);
+    CHECK(message_at<std::uint32_t>(message, d) == 5);
+    CHECK(message_at<double>(message, d + 4) == -0.25);
     const std::size_t k = d + 4 + 5 * 8;
-    CHECK(at<double>(message, k) == 900);
-    CHECK(at<double>(message, k + 2 * 8) == 960);
-    CHECK(at<double>(message, k + 4 * 8) == 901);
-    CHECK(at<double>(message, k + 8 * 8) == 1);
+    CHECK(message_at<double>(message, k) == 900);
+    CHECK(message_at<double>(message, k + 2 * 8) == 960);
+    CHECK(message_at<double>(message, k + 4 * 8) == 901);
+    CHECK(message_at<double>(message, k + 8 * 8) == 1);
     const std::size_t p = k + 18 * 8;
-    CHECK(at<double>(message, p - 8) == 1);
-    CHECK(at<double>(message, p + 6 * 8) == 600);
-    CHECK(at<double>(message, p + 10 * 8) == 1);
-    FrameMetadata other = frame();
+    CHECK(message_at<double>(message, p - 8) == 1);
+    CHECK(message_at<double>(message, p + 6 * 8) == 600);
+    CHECK(message_at<double>(message, p + 10 * 8) == 1);
+    FrameMetadata other = ros_frame();
     other.width /= 2;
-    CHECK(ros_camera_info(stamp, "cam0", other, &lens) == ros_camera_info(stamp, "cam0", other));
-    CHECK(ros_camera_info(stamp, "cam0", other).size() == message.size() - 48);
+    CHECK(ros_camera_info(ros_stamp, "cam0", other, &lens) ==
+          ros_camera_info(ros_stamp, "cam0", other));
+    CHECK(ros_camera_info(ros_stamp, "cam0", other).size() == message.size() - 48);
 }
 
 TEST_CASE("ros_messages: times before 1970 and their rest") {
     const std::string message = ros_utc(OutputTime{-1}, OutputTime{1'000'000'000});
-    CHECK(at<std::int32_t>(message, 4) == -1);
-    CHECK(at<std::uint32_t>(message, 8) == 999'999'999);
+    CHECK(message_at<std::int32_t>(message, 4) == -1);
+    CHECK(message_at<std::uint32_t>(message, 8) == 999'999'999);
 }
 
 TEST_CASE("ros_messages: pixel formats have the names that ROS has") {

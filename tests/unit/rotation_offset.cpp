@@ -20,7 +20,7 @@ struct Wave {
 };
 
 /// What moves, and how it is seen.
-struct World {
+struct MovingWorld {
     double rate_rms = 0.6;  ///< rad/s, each axis
     double bandwidth_hz = 2;
     double seconds = 30;
@@ -40,11 +40,11 @@ struct Seen {
     std::vector<GyroSample> gyro;
 };
 
-OutputTime at(double s) { return {1'700'000'000'000'000'000 + std::llround(s * 1e9)}; }
+OutputTime output_at(double s) { return {1'700'000'000'000'000'000 + std::llround(s * 1e9)}; }
 
-class Simulation {
+class OffsetSimulation {
  public:
-    Simulation(const World& world, unsigned seed) : world_(world), random_(seed) {
+    OffsetSimulation(const MovingWorld& world, unsigned seed) : world_(world), random_(seed) {
         constexpr int count = 12;
         for (int axis = 0; axis < 3; ++axis)
             for (int i = 0; i < count; ++i) {
@@ -58,9 +58,9 @@ class Simulation {
         Seen seen;
         const double interval = 1 / world_.gyro_hz;
         for (int i = 0; i * interval < world_.seconds + 2; ++i)
-            seen.gyro.push_back(
-                {at(i * interval), rate(i * interval) + true_bias +
-                                       noise(world_.gyro_density * std::sqrt(world_.gyro_hz))});
+            seen.gyro.push_back({output_at(i * interval),
+                                 rate(i * interval) + true_bias +
+                                     noise(world_.gyro_density * std::sqrt(world_.gyro_hz))});
         const Eigen::Quaterniond camera = rotation_by(true_rotation);
         constexpr double period = 0.05;
         for (int i = 0; i < world_.seconds / period; ++i) {
@@ -72,8 +72,8 @@ class Simulation {
             Eigen::Quaterniond shown =
                 camera * turn * camera.conjugate() * rotation_by(noise(world_.camera_sigma));
             if (uniform() < world_.outliers) shown = rotation_by(noise(0.05));
-            seen.frames.push_back({at(from - world_.offset_s), at(from + period - world_.offset_s),
-                                   rotation_of(shown),
+            seen.frames.push_back({output_at(from - world_.offset_s),
+                                   output_at(from + period - world_.offset_s), rotation_of(shown),
                                    Eigen::Vector3d::Constant(world_.camera_sigma)});
         }
         return seen;
@@ -94,7 +94,7 @@ class Simulation {
         return {x, y, normal(random_)};
     }
 
-    World world_;
+    MovingWorld world_;
     std::mt19937_64 random_;
     std::vector<Wave> waves_;
 };
@@ -109,11 +109,11 @@ struct Score {
     std::string why;
 };
 
-Score score(const World& world, int runs) {
+Score score(const MovingWorld& world, int run_count) {
     Score result;
     int solved = 0;
-    for (int seed = 0; seed < runs; ++seed) {
-        const Seen seen = Simulation(world, 1000U + static_cast<unsigned>(seed)).run();
+    for (int seed = 0; seed < run_count; ++seed) {
+        const Seen seen = OffsetSimulation(world, 1000U + static_cast<unsigned>(seed)).run();
         const auto found = rotation_offset(seen.frames, seen.gyro);
         if (!found) {
             ++result.refused;
@@ -146,10 +146,10 @@ void shake(std::vector<FrameRotation>& frames, double sigma) {
         for (int i = 0; i < 3; ++i) frame.rotation[i] += normal(random);
 }
 
-constexpr int runs = 30;
+constexpr int run_count = 30;
 
 /// Errors in sigmas of 30 runs: their mean square scatters by 0.26 of itself.
-void honest(const Score& score) {
+void check_score(const Score& score) {
     CAPTURE(score.rms_s, score.sigma_s, score.nees, score.rotation_nees, score.bias_nees,
             score.why);
     CHECK(score.refused == 0);
@@ -164,57 +164,57 @@ void honest(const Score& score) {
 }  // namespace
 
 TEST_CASE("rotation_offset: 30 s of lively motion with good features", "[statistics]") {
-    const Score found = score({}, runs);
-    honest(found);
+    const Score found = score({}, run_count);
+    check_score(found);
     CHECK(found.rms_s < 62e-6 * 1.25);
 }
 
 TEST_CASE("rotation_offset: poor features", "[statistics]") {
-    World world;
+    MovingWorld world;
     world.camera_sigma = 2e-3;
-    const Score found = score(world, runs);
-    honest(found);
+    const Score found = score(world, run_count);
+    check_score(found);
     CHECK(found.rms_s < 236e-6 * 1.25);
 }
 
 TEST_CASE("rotation_offset: one of ten rotations is an outlier", "[statistics]") {
-    World world;
+    MovingWorld world;
     world.camera_sigma = 2e-3;
     world.outliers = 0.1;
-    const Score found = score(world, runs);
-    honest(found);
+    const Score found = score(world, run_count);
+    check_score(found);
     CHECK(found.rms_s < 259e-6 * 1.25);
 }
 
 TEST_CASE("rotation_offset: slow motion shows less, and says so", "[statistics]") {
-    World world;
+    MovingWorld world;
     world.camera_sigma = 2e-3;
     world.rate_rms = 0.2;
     world.bandwidth_hz = 1;
-    const Score found = score(world, runs);
-    honest(found);
+    const Score found = score(world, run_count);
+    check_score(found);
     CHECK(found.rms_s < 1.3e-3 * 1.25);
 }
 
 TEST_CASE("rotation_offset: motion that is too slow is refused", "[statistics]") {
-    World world;
+    MovingWorld world;
     world.camera_sigma = 2e-3;
     world.rate_rms = 0.05;
     world.bandwidth_hz = 0.5;
-    const Score found = score(world, runs);
-    CHECK(found.refused == runs);
+    const Score found = score(world, run_count);
+    CHECK(found.refused == run_count);
     CHECK_THAT(found.why,
                Contains("the motion determines the offset only to within") && Contains("rad/s^2"));
 }
 
 TEST_CASE("rotation_offset: a rig at rest is refused", "[rotation_offset]") {
-    World world;
+    MovingWorld world;
     world.rate_rms = 0;
     CHECK(score(world, 5).refused == 5);
 }
 
 TEST_CASE("rotation_offset: turns about one axis do not show the rotation", "[rotation_offset]") {
-    World world;
+    MovingWorld world;
     world.axes = {0, 0, 1};
     const Score found = score(world, 5);
     CHECK(found.refused == 5);
@@ -228,12 +228,12 @@ TEST_CASE("rotation_offset: periodic motion fits more than once", "[rotation_off
         return Eigen::Vector3d(0.5 * std::sin(phase), 0.5 * std::sin(phase + 1),
                                0.5 * std::cos(2 * phase));
     };
-    for (int i = 0; i < 6400; ++i) seen.gyro.push_back({at(i * 0.005), rate(i * 0.005)});
+    for (int i = 0; i < 6400; ++i) seen.gyro.push_back({output_at(i * 0.005), rate(i * 0.005)});
     const GyroTrack track(seen.gyro, Eigen::Vector3d::Zero());
     for (int i = 0; i < 600; ++i) {
         const double from = 1 + i * 0.05;
         seen.frames.push_back(
-            {at(from), at(from + 0.05),
+            {output_at(from), output_at(from + 0.05),
              rotation_of(track.orientation(from).conjugate() * track.orientation(from + 0.05)),
              Eigen::Vector3d::Constant(1e-3)});
     }
@@ -248,13 +248,14 @@ TEST_CASE("rotation_offset: a steady cone shows a delay as a turn about its axis
     Seen seen;
     for (int i = 0; i < 6400; ++i) {
         const double phase = 2 * pi * 0.7 * i * 0.005;
-        seen.gyro.push_back({at(i * 0.005), {0.5 * std::sin(phase), 0.5 * std::cos(phase), 0}});
+        seen.gyro.push_back(
+            {output_at(i * 0.005), {0.5 * std::sin(phase), 0.5 * std::cos(phase), 0}});
     }
     const GyroTrack track(seen.gyro, Eigen::Vector3d::Zero());
     for (int i = 0; i < 600; ++i) {
         const double from = 1 + i * 0.05;
         seen.frames.push_back(
-            {at(from), at(from + 0.05),
+            {output_at(from), output_at(from + 0.05),
              rotation_of(track.orientation(from).conjugate() * track.orientation(from + 0.05)),
              Eigen::Vector3d::Constant(1e-3)});
     }
@@ -267,10 +268,10 @@ TEST_CASE("rotation_offset: a steady cone shows a delay as a turn about its axis
 TEST_CASE("rotation_offset: offsets of either sign and far off, a slow gyro and gaps in it",
           "[rotation_offset]") {
     for (const double offset : {-0.31, 0.0, 0.4}) {
-        World world;
+        MovingWorld world;
         world.offset_s = offset;
         world.gyro_hz = 100;
-        Seen seen = Simulation(world, 5).run();
+        Seen seen = OffsetSimulation(world, 5).run();
         seen.gyro.erase(seen.gyro.begin() + 1500, seen.gyro.begin() + 1560);
         const auto found = rotation_offset(seen.frames, seen.gyro);
         REQUIRE(found);
@@ -282,15 +283,15 @@ TEST_CASE("rotation_offset: offsets of either sign and far off, a slow gyro and 
 
 TEST_CASE("rotation_offset: an offset out of range or too little data is reported",
           "[rotation_offset]") {
-    const Seen seen = Simulation({}, 5).run();
+    const Seen seen = OffsetSimulation({}, 5).run();
     CHECK_FALSE(rotation_offset({}, seen.gyro));
     CHECK_FALSE(rotation_offset(seen.frames, {}));
     const std::vector<FrameRotation> few(seen.frames.begin(), seen.frames.begin() + 30);
     const auto too_few = rotation_offset(few, seen.gyro);
     REQUIRE_FALSE(too_few);
     CHECK_THAT(too_few.error().message(), Contains("only 30 rotations"));
-    World far;
+    MovingWorld far;
     far.offset_s = 0.3;
-    const Seen other = Simulation(far, 5).run();
+    const Seen other = OffsetSimulation(far, 5).run();
     CHECK_FALSE(rotation_offset(other.frames, other.gyro, {milliseconds(100)}));
 }

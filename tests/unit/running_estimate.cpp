@@ -2,6 +2,7 @@
 #include "engine/plausibility/running_estimate.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <random>
 
 using namespace versavis;
@@ -47,4 +48,28 @@ TEST_CASE("running_estimate: a drift is followed") {
         CHECK(value.fits(drifting));
         value.learn(drifting);
     }
+}
+
+TEST_CASE("running_estimate: a bounded one is not led away, slowly or in steps") {
+    const Duration each = GENERATE(nanoseconds(50), microseconds(1), microseconds(5));
+    auto value = RunningEstimate(milliseconds(1)).within(microseconds(20));
+    for (int i = 0; i < 200; ++i) value.learn(milliseconds(3));
+    Duration drifting = milliseconds(3);
+    for (int i = 0; i < 20'000; ++i, drifting = drifting + each)
+        if (value.fits(drifting)) value.learn(drifting);
+    CHECK_FALSE(value.fits(milliseconds(3) + microseconds(60)));
+    CHECK(absolute(value.value() - milliseconds(3)) <= microseconds(20));
+}
+
+TEST_CASE("running_estimate: a bounded one learns what it scatters by at first") {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<> us(-100, 100);
+    auto value = RunningEstimate(milliseconds(1)).within(microseconds(20));
+    int doubted = 0;
+    for (int i = 0; i < 10'000; ++i) {
+        const Duration honest = milliseconds(3) + nanoseconds(std::llround(1e3 * us(random)));
+        if (!value.fits(honest)) ++doubted;
+        value.learn(honest);
+    }
+    CHECK(doubted == 0);
 }

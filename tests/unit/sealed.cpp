@@ -32,9 +32,9 @@ using test::in_process;
 
 namespace {
 
-constexpr uid_t stranger = 12345;
+constexpr uid_t other_user = 12345;
 
-struct Instance {
+struct SealedInstance {
     test::TemporaryDirectory directory{"/dev/shm"};
 
     std::filesystem::path path() const { return directory.path() / "frames"; }
@@ -48,7 +48,7 @@ struct Instance {
     }
 };
 
-void publish(Writer& writer, int value) {
+void publish_page(Writer& writer, int value) {
     const auto slot = *writer.acquire();
     std::memset(writer.slot_data(slot), value, page_size);
     writer.publish(slot, page_size, OutputTime{value}, {});
@@ -111,15 +111,15 @@ void send(int connection, const std::vector<int>& files) {
     ::sendmsg(connection, &message, MSG_NOSIGNAL);
 }
 
-std::ptrdiff_t open_files() {
+std::ptrdiff_t open_file_count() {
     const std::filesystem::directory_iterator files("/proc/self/fd");
     return std::distance(begin(files), end(files));
 }
 
 }  // namespace
 
-TEST_CASE_METHOD(Instance, "sealed: read as any other stream, by its name") {
-    const auto before = open_files();
+TEST_CASE_METHOD(SealedInstance, "sealed: read as any other stream, by its name") {
+    const auto before = open_file_count();
     {
         Writer writer = write();
         struct stat name {};
@@ -131,17 +131,17 @@ TEST_CASE_METHOD(Instance, "sealed: read as any other stream, by its name") {
         auto reader = Reader::open(path(), only);
         REQUIRE(reader);
         CHECK(reader->writer_alive());
-        publish(writer, 7);
+        publish_page(writer, 7);
         const auto item = test::look(reader->next());
         REQUIRE(item.found == Found::item);
         CHECK(item.payload.data()[page_size - 1] == std::byte{7});
         CHECK(item.valid());
     }
     CHECK(std::filesystem::is_empty(directory.path()));
-    CHECK(open_files() == before);
+    CHECK(open_file_count() == before);
 }
 
-TEST_CASE_METHOD(Instance, "sealed: nobody cuts it short or writes to it, as whoever") {
+TEST_CASE_METHOD(SealedInstance, "sealed: nobody cuts it short or writes to it, as whoever") {
     Writer writer = write();
     const auto handed = open_trusted(path(), std::nullopt);
     REQUIRE(handed);
@@ -169,9 +169,9 @@ TEST_CASE("sealed: only with each of the four seals, and only what can have them
     CHECK_FALSE(is_sealed(socket.get()));
 }
 
-TEST_CASE_METHOD(Instance, "sealed: one that is not can be cut short under its readers") {
+TEST_CASE_METHOD(SealedInstance, "sealed: one that is not can be cut short under its readers") {
     Writer writer = write(false);
-    publish(writer, 7);
+    publish_page(writer, 7);
     CHECK(dies_of_sigbus([&] {
         auto reader = Reader::open(path(), {Position::oldest});
         static_cast<void>(::truncate(path().c_str(), page_size));
@@ -179,7 +179,7 @@ TEST_CASE_METHOD(Instance, "sealed: one that is not can be cut short under its r
     }));
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(SealedInstance,
                  "sealed: who wants nothing else is refused what is not, with the reason") {
     const Writer writer = write(false);
     Options only;
@@ -188,25 +188,26 @@ TEST_CASE_METHOD(Instance,
     CHECK_THAT(refusal(only), Catch::Contains("is not sealed; set 'sealed = true'"));
 }
 
-TEST_CASE_METHOD(Instance, "sealed: readers follow to whatever takes its name") {
+TEST_CASE_METHOD(SealedInstance, "sealed: readers follow to whatever takes its name") {
     const bool to_sealed = GENERATE(true, false);
     const bool from_sealed = GENERATE(true, false);
     CAPTURE(from_sealed, to_sealed);
     Writer writer = write(from_sealed);
     auto reader = Reader::open(path(), {Position::oldest});
     REQUIRE(reader);
-    publish(writer, 1);
+    publish_page(writer, 1);
     {
         Writer next = write(to_sealed);
         writer = std::move(next);
     }
-    publish(writer, 2);
+    publish_page(writer, 2);
     CHECK(test::look(reader->next()).time == OutputTime{1});
     CHECK(test::look(reader->next()).found == Found::restarted);
     CHECK(test::look(reader->next()).time == OutputTime{2});
 }
 
-TEST_CASE_METHOD(Instance, "sealed: of a service that was killed, the name is known for dead") {
+TEST_CASE_METHOD(SealedInstance,
+                 "sealed: of a service that was killed, the name is known for dead") {
     REQUIRE(in_process([&]() -> bool {
         const auto owned = OwnedDirectory::claim(directory.path() / "instance");
         auto writer = Writer::create({owned->path(), true}, {"frames", StreamKind::events, 8});
@@ -223,11 +224,12 @@ TEST_CASE_METHOD(Instance, "sealed: of a service that was killed, the name is kn
     CHECK(Reader::open(owned->path() / "own"));
 }
 
-TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothing of it kept") {
+TEST_CASE_METHOD(SealedInstance,
+                 "sealed: what a liar hands over is refused, and nothing of it kept") {
     directory.write("file", std::string(page_size, 'x'));
     const FileDescriptor plain(::open((directory.path() / "file").c_str(), O_RDONLY | O_CLOEXEC));
     const FileDescriptor soft(::memfd_create("soft", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-    const auto before = open_files();
+    const auto before = open_file_count();
     const auto refusal_of = [&](const std::function<void(int)>& answer) {
         const Peer peer(path(), answer);
         std::string message = refusal();
@@ -244,14 +246,14 @@ TEST_CASE_METHOD(Instance, "sealed: what a liar hands over is refused, and nothi
     for (const std::vector<int>& files : {std::vector<int>{plain.get()}, {soft.get()}, {0, 1, 2}})
         CHECK_THAT(refusal_of([&](int connection) { send(connection, files); }),
                    Catch::Contains("is not sealed, though it should be"));
-    CHECK(open_files() == before);
+    CHECK(open_file_count() == before);
     REQUIRE(::fcntl(soft.get(), F_ADD_SEALS,
                     F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) == 0);
     CHECK_THAT(refusal_of([&](int connection) { send(connection, {soft.get()}); }),
                Catch::Contains("frames"));  // empty: it cannot be mapped
 }
 
-TEST_CASE_METHOD(Instance,
+TEST_CASE_METHOD(SealedInstance,
                  "sealed: where no descriptor is left to connect, that is what is reported") {
     const Writer writer = write();
     CHECK(in_process([&] {
@@ -265,21 +267,22 @@ TEST_CASE_METHOD(Instance,
     }));
 }
 
-TEST_CASE_METHOD(Instance, "sealed: served by another user than its owner, or to another group") {
+TEST_CASE_METHOD(SealedInstance,
+                 "sealed: served by another user than its owner, or to another group") {
     if (::geteuid() != 0) return;  // only root can become somebody else
     REQUIRE(::chmod(directory.path().c_str(), 0755) == 0);
     {
         const Writer writer = write();
         CHECK(in_process([&] {
-            return ::setegid(stranger) == 0 && ::seteuid(stranger) == 0 &&
+            return ::setegid(other_user) == 0 && ::seteuid(other_user) == 0 &&
                    refusal().find("permission denied; join the group") != std::string::npos;
         }));
         REQUIRE(::chmod(path().c_str(), 0664) == 0);  // who may look at it may not connect
         CHECK(in_process([&] {
-            return ::setegid(stranger) == 0 && ::seteuid(stranger) == 0 &&
+            return ::setegid(other_user) == 0 && ::seteuid(other_user) == 0 &&
                    refusal().find("permission denied; join the group") != std::string::npos;
         }));
-        REQUIRE(::chown(path().c_str(), stranger, stranger) == 0);
+        REQUIRE(::chown(path().c_str(), other_user, other_user) == 0);
         CHECK_THAT(refusal(), Catch::Contains("does not belong"));
     }
     const FileDescriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
@@ -289,7 +292,7 @@ TEST_CASE_METHOD(Instance, "sealed: served by another user than its owner, or to
     std::filesystem::remove(path());
     REQUIRE(::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0);
     REQUIRE(in_process([&] {  // who listens is known by the socket from then on
-        return ::seteuid(stranger) == 0 && ::listen(socket.get(), 4) == 0;
+        return ::seteuid(other_user) == 0 && ::listen(socket.get(), 4) == 0;
     }));
     CHECK_THAT(refusal(), Catch::Contains("is served by another user"));
 }

@@ -61,7 +61,7 @@ struct Copies {
 };
 
 /// Bytes of the ring above: 16 descriptors behind the header, two generations, two slots.
-constexpr std::uint64_t total = 4 * page_size;
+constexpr std::uint64_t segment_size = 4 * page_size;
 
 /// From here on, this process runs on a Linux before 5.14.
 bool forget_to_populate() {
@@ -94,7 +94,7 @@ TEST_CASE_METHOD(Copies,
                  "segment: a whole one is mapped, and its parts lie where its header says") {
     const auto mapping = Mapping::open(directory.path() / "frames", Mapping::Access::read_write);
     REQUIRE(mapping);
-    CHECK(mapping->size() == total);
+    CHECK(mapping->size() == segment_size);
     const auto* begin = reinterpret_cast<const std::byte*>(&mapping->header());
     const auto offset = [&](const void* part) {
         return static_cast<const std::byte*>(part) - begin;
@@ -197,11 +197,11 @@ TEST_CASE("segment: a file closes with its owner, whatever its number") {
 }
 
 TEST_CASE_METHOD(Copies, "segment: a size that is not the file's is refused") {
-    CHECK(opens_with(offsetof(Header, total_size), total));
-    CHECK_FALSE(opens_with(offsetof(Header, total_size), total - 1));
-    CHECK_FALSE(opens_with(offsetof(Header, total_size), total + 1));
-    const auto path = changed(offsetof(Header, total_size), total);
-    std::filesystem::resize_file(path, total - page_size);
+    CHECK(opens_with(offsetof(Header, total_size), segment_size));
+    CHECK_FALSE(opens_with(offsetof(Header, total_size), segment_size - 1));
+    CHECK_FALSE(opens_with(offsetof(Header, total_size), segment_size + 1));
+    const auto path = changed(offsetof(Header, total_size), segment_size);
+    std::filesystem::resize_file(path, segment_size - page_size);
     CHECK_FALSE(opens(path));
     const auto refusal = [&] {
         return Mapping::open(path, Mapping::Access::read_only).error().message();
@@ -219,24 +219,25 @@ TEST_CASE_METHOD(Copies, "segment: descriptors are a power of two, aligned, and 
         CHECK_FALSE(opens_with(count, bad));
     const std::size_t place = offsetof(Header, descriptors_at);
     for (const std::uint64_t good :
-         {std::uint64_t{768}, std::uint64_t{4096}, total - std::uint64_t{16} * 128})
+         {std::uint64_t{768}, std::uint64_t{4096}, segment_size - std::uint64_t{16} * 128})
         CHECK(opens_with(place, good));
-    for (const std::uint64_t bad : {std::uint64_t{0}, std::uint64_t{640}, std::uint64_t{4096 + 64},
-                                    total - 15 * 128, total, total + 128, ~std::uint64_t{127}})
+    for (const std::uint64_t bad :
+         {std::uint64_t{0}, std::uint64_t{640}, std::uint64_t{4096 + 64}, segment_size - 15 * 128,
+          segment_size, segment_size + 128, ~std::uint64_t{127}})
         CHECK_FALSE(opens_with(place, bad));
     CHECK(sizeof(Header) == 768);
 }
 
 TEST_CASE_METHOD(Copies, "segment: generations and slots are aligned, and within the file") {
     const std::size_t generations = offsetof(Header, generations_at);
-    CHECK(opens_with(generations, total - 2 * 64));
+    CHECK(opens_with(generations, segment_size - 2 * 64));
     for (const std::uint64_t bad :
-         {total - 64, total, std::uint64_t{4096 + 32}, ~std::uint64_t{63}})
+         {segment_size - 64, segment_size, std::uint64_t{4096 + 32}, ~std::uint64_t{63}})
         CHECK_FALSE(opens_with(generations, bad));
     const std::size_t slots = offsetof(Header, slots_at);
     CHECK(opens_with(slots, std::uint64_t{4096}));
     for (const std::uint64_t bad :
-         {std::uint64_t{12288}, std::uint64_t{8192 + 64}, total, ~std::uint64_t{4095}})
+         {std::uint64_t{12288}, std::uint64_t{8192 + 64}, segment_size, ~std::uint64_t{4095}})
         CHECK_FALSE(opens_with(slots, bad));
     const std::size_t count = offsetof(Header, slot_count);
     CHECK(opens_with(count, 0U));

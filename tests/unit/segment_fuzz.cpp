@@ -26,9 +26,9 @@ using namespace versavis::ring;
 namespace {
 
 /// A ring of 8 items of random bytes, with its words laid open.
-class Victim {
+class FuzzVictim {
  public:
-    explicit Victim(StreamKind kind)
+    explicit FuzzVictim(StreamKind kind)
         : writer_(*Writer::create(directory_.path(), {"victim", kind, 8, 4, page_size})),
           mapping_(*Mapping::open(path(), Mapping::Access::read_write)) {
         for (int i = 0; i < 3; ++i) publish();
@@ -122,7 +122,7 @@ void use_from_c(const std::string& instance) {
 }  // namespace
 
 TEST_CASE("segment_fuzz: 100000 headers lead no reader astray") {
-    Victim victim(StreamKind::frames);
+    FuzzVictim victim(StreamKind::frames);
     std::uint64_t opened = 0;
     std::uint64_t sum = 0;
     for (int i = 0; i < 100'000; ++i) {
@@ -151,7 +151,7 @@ TEST_CASE("segment_fuzz: the tool lists and prints what it can, of every kind") 
             if (std::freopen("/dev/null", "w", stdout) == nullptr ||
                 std::freopen("/dev/null", "w", stderr) == nullptr)
                 return false;
-            Victim victim(kind);
+            FuzzVictim victim(kind);
             for (int i = 0; i < 1500; ++i) {
                 victim.damage();
                 if (!client::list_streams(victim.instance(), i % 2 == 0)) return false;

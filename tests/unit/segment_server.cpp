@@ -44,7 +44,7 @@ bool connects(const FileDescriptor& socket, const std::filesystem::path& path) {
     return ::connect(socket.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
 }
 
-FileDescriptor connect(const std::filesystem::path& path) {
+FileDescriptor connect_client(const std::filesystem::path& path) {
     FileDescriptor socket = make_socket();
     connects(socket, path);
     return socket;
@@ -85,9 +85,9 @@ TEST_CASE("segment_server: a crowd that takes nothing, or leaves at once, stops 
     std::vector<FileDescriptor> crowd;
     for (int i = 0; i < 200; ++i) {
         if (i % 2 == 0)
-            crowd.push_back(connect(path));
+            crowd.push_back(connect_client(path));
         else
-            connect(path);
+            connect_client(path);
         CHECK(open_trusted(path, std::nullopt));
     }
 }
@@ -100,7 +100,7 @@ TEST_CASE(
     const FileDescriptor file = sealed_file();
     const auto server = SegmentServer::open(path, FileDescriptor(::dup(file.get())));
     REQUIRE(server);
-    CHECK(is_handed(connect(path), file));
+    CHECK(is_handed(connect_client(path), file));
 }
 
 TEST_CASE("segment_server: without a descriptor to be had it rests, and lets all in later") {

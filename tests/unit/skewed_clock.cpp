@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 using namespace versavis;
-using namespace versavis::rig;
+using rig::SkewedClock;
 
 TEST_CASE("skewed_clock: there and back is the same instant within a nanosecond, for days") {
     const SkewedClock clock(HostTime{5'000'000'000}, {7'000'000'000, 80.0, 0.01});

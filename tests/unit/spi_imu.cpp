@@ -6,28 +6,28 @@
 #include <map>
 #include <vector>
 
+#include "nanoseconds.hpp"
+
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 
 namespace {
 
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-constexpr Nanoseconds second = 1'000'000'000;
 constexpr std::uint16_t while_running = 0xFFFF;
 
-struct Event {
+struct SpiEvent {
     wire::BoardEventKind kind;
     Nanoseconds at;
     std::int64_t value;
     std::uint16_t detail;
-    bool operator==(const Event& other) const {
+    bool operator==(const SpiEvent& other) const {
         return kind == other.kind && at == other.at && value == other.value &&
                detail == other.detail;
     }
 };
 
-struct Reports final : ChannelReports {
+struct SpiReports final : ChannelReports {
     void exposure(const wire::Exposure& /*record*/) override {}
     void event(wire::BoardEventKind kind, std::uint8_t /*source*/, Nanoseconds at,
                std::int64_t value, std::uint16_t detail) override {
@@ -39,13 +39,13 @@ struct Reports final : ChannelReports {
     std::size_t count(wire::BoardEventKind kind) const {
         return static_cast<std::size_t>(
             std::count_if(events.begin(), events.end(),
-                          [kind](const Event& event) { return event.kind == kind; }));
+                          [kind](const SpiEvent& event) { return event.kind == kind; }));
     }
-    std::vector<Event> events;
+    std::vector<SpiEvent> events;
 };
 
 /// A bus with a part that answers what its set-up expects; the test says when.
-struct Bus final : ImuBus {
+struct Bus final : firmware::ImuBus {
     bool arm(const ImuJob& wanted) override {
         if (!accepts) return false;
         job = wanted;
@@ -128,9 +128,9 @@ struct Bus final : ImuBus {
 };
 
 /// Configured, and asked to do what is due only by the test.
-struct Bench {
-    explicit Bench(unsigned options = wire::imu_data_ready, std::uint32_t rate = 1'000'000,
-                   wire::ImuKind kind = wire::ImuKind::icm42688p, Nanoseconds at = 0)
+struct SpiBench {
+    explicit SpiBench(unsigned options = wire::imu_data_ready, std::uint32_t rate = 1'000'000,
+                      wire::ImuKind kind = wire::ImuKind::icm42688p, Nanoseconds at = 0)
         : now(at) {
         bus.kind = kind;
         imu.configure({kind, 0, static_cast<std::uint8_t>(options), 0, rate}, now);
@@ -153,7 +153,7 @@ struct Bench {
     }
     bool is_running() const { return reports.count(wire::BoardEventKind::imu_ready) > 0; }
 
-    Reports reports;
+    SpiReports reports;
     Bus bus;
     SpiImu imu{0, bus, reports};
     Nanoseconds now = 0;
@@ -161,10 +161,10 @@ struct Bench {
 };
 
 /// Set up and waiting for its first edge, or grid point.
-struct Running : Bench {
-    explicit Running(unsigned options = wire::imu_data_ready, std::uint32_t rate = 1'000'000,
-                     wire::ImuKind kind = wire::ImuKind::icm42688p)
-        : Bench(options, rate, kind) {
+struct RunningSpi : SpiBench {
+    explicit RunningSpi(unsigned options = wire::imu_data_ready, std::uint32_t rate = 1'000'000,
+                        wire::ImuKind kind = wire::ImuKind::icm42688p)
+        : SpiBench(options, rate, kind) {
         while (!is_running()) {
             REQUIRE(now < 2 * second);
             set_up_once();
@@ -191,7 +191,7 @@ struct Running : Bench {
 
 TEST_CASE("spi_imu: set-up begins when the slowest part has powered up") {
     for (const Nanoseconds at : {Nanoseconds{0}, 300 * ms - 1, 300 * ms, 4 * second}) {
-        Bench bench(wire::imu_data_ready, 1'000'000, wire::ImuKind::icm42688p, at);
+        SpiBench bench(wire::imu_data_ready, 1'000'000, wire::ImuKind::icm42688p, at);
         const Nanoseconds begins = std::max(at, 300 * ms);
         CHECK(bench.imu.next_wake(0) == begins);
         if (at < begins) bench.step(begins - 1);
@@ -217,7 +217,7 @@ TEST_CASE("spi_imu: set-up begins when the slowest part has powered up") {
 TEST_CASE("spi_imu: what goes wrong in set-up is reported, with the step, and tried again") {
     enum class Fault { held, hangs, refused, wrong };
     for (const Fault fault : {Fault::held, Fault::hangs, Fault::refused, Fault::wrong}) {
-        Bench bench;
+        SpiBench bench;
         bench.set_up_once();
         bench.now = bench.imu.next_wake(0);
         bench.bus.accepts = fault != Fault::held;
@@ -235,10 +235,10 @@ TEST_CASE("spi_imu: what goes wrong in set-up is reported, with the step, and tr
             bench.step(asked + us);
         }
         const bool wrong = fault == Fault::wrong;
-        const Event event{
+        const SpiEvent event{
             wrong ? wire::BoardEventKind::imu_failed : wire::BoardEventKind::imu_silent, bench.now,
             0, fault == Fault::hangs ? while_running : std::uint16_t{1}};
-        CHECK(bench.reports.events == std::vector<Event>{event});
+        CHECK(bench.reports.events == std::vector<SpiEvent>{event});
         CHECK_FALSE(bench.bus.armed);
         CHECK(bench.imu.restarts() == 1);
         CHECK(bench.imu.next_wake(0) == bench.now + second);
@@ -253,10 +253,10 @@ TEST_CASE("spi_imu: what goes wrong in set-up is reported, with the step, and tr
 
 TEST_CASE("spi_imu: a part that is set up says who it is, and must show edges in time") {
     for (const std::uint32_t rate : {1'000'000U, 12'500U}) {
-        Running world(wire::imu_data_ready, rate);
+        RunningSpi world(wire::imu_data_ready, rate);
         const Nanoseconds began = world.now;
         CHECK(world.reports.events ==
-              std::vector<Event>{{wire::BoardEventKind::imu_ready, began, 0x47, 0}});
+              std::vector<SpiEvent>{{wire::BoardEventKind::imu_ready, began, 0x47, 0}});
         CHECK(world.bus.job.after == began);
         CHECK(world.bus.job.count == 2);
         CHECK(world.bus.job.pause == 0);
@@ -273,7 +273,7 @@ TEST_CASE("spi_imu: a part that is set up says who it is, and must show edges in
         CHECK(world.reports.events.size() == 1);
         world.step(began + 50 * ms + patience);
         CHECK(world.reports.events.back() ==
-              Event{wire::BoardEventKind::imu_silent, world.now, 0, while_running});
+              SpiEvent{wire::BoardEventKind::imu_silent, world.now, 0, while_running});
         CHECK_FALSE(world.bus.armed);
         CHECK(world.imu.next_wake(0) == world.now + second);
         world.step(world.now + second);
@@ -283,7 +283,7 @@ TEST_CASE("spi_imu: a part that is set up says who it is, and must show edges in
 }
 
 TEST_CASE("spi_imu: a reading that does not end sets the part up again, whatever edges come") {
-    Running world;
+    RunningSpi world;
     const Nanoseconds began = world.now;
     for (int i = 0; i < 25; ++i, world.now += ms) {
         world.edge(world.now);
@@ -293,11 +293,11 @@ TEST_CASE("spi_imu: a reading that does not end sets the part up again, whatever
     CHECK(world.reports.events.size() == 1);
     world.step();
     CHECK(world.reports.events.back() ==
-          Event{wire::BoardEventKind::imu_silent, began + 25 * ms, 0, while_running});
+          SpiEvent{wire::BoardEventKind::imu_silent, began + 25 * ms, 0, while_running});
 }
 
 TEST_CASE("spi_imu: what edges showed before the part was set up means nothing") {
-    Bench world;
+    SpiBench world;
     for (int i = 0; i < 6; ++i) world.set_up_once();
     for (Nanoseconds at = world.now - 20 * ms; at < world.now; at += 400 * us)
         world.imu.ready_edge(at, at);  // too fast
@@ -316,7 +316,7 @@ TEST_CASE("spi_imu: what edges showed before the part was set up means nothing")
 }
 
 TEST_CASE("spi_imu: edges count as too fast from when the part was set up") {
-    Bench world;
+    SpiBench world;
     for (int i = 0; i < 9; ++i) world.set_up_once();
     world.step(world.imu.next_wake(0));
     world.bus.run(world.now);
@@ -334,7 +334,7 @@ TEST_CASE("spi_imu: edges count as too fast from when the part was set up") {
 }
 
 TEST_CASE("spi_imu: neither the newest edge nor its echoes start a reading") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read());
     CHECK(world.sample.kind == wire::ImuKind::icm42688p);
     CHECK(world.sample.time_ns == world.now);
@@ -357,7 +357,7 @@ TEST_CASE("spi_imu: neither the newest edge nor its echoes start a reading") {
 }
 
 TEST_CASE("spi_imu: a reading gives its sample once all edges before it are known") {
-    Running world;
+    RunningSpi world;
     world.now += ms;
     world.edge(world.now);
     world.bus.run(world.now + 7 * us);  // its second transfer starts 10 us later
@@ -371,7 +371,7 @@ TEST_CASE("spi_imu: a reading gives its sample once all edges before it are know
 }
 
 TEST_CASE("spi_imu: a second reading of the same data gives no sample") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read());
     const std::uint32_t number = world.sample.number;
     world.bus.run(world.now + 200'000);
@@ -383,7 +383,7 @@ TEST_CASE("spi_imu: a second reading of the same data gives no sample") {
 }
 
 TEST_CASE("spi_imu: edges whose data was not read are missing samples") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read(0));  // an edge at the very start of the reading is its edge
     CHECK(world.sample.time_ns == world.now);
     for (int i = 0; i < 3; ++i) {
@@ -409,7 +409,7 @@ TEST_CASE("spi_imu: edges whose data was not read are missing samples") {
 }
 
 TEST_CASE("spi_imu: a reading whose edge is not known gives no sample, and the next one says so") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read());
     const std::uint32_t number = world.sample.number;
     const Nanoseconds before = world.sample.time_ns;
@@ -429,7 +429,7 @@ TEST_CASE("spi_imu: a reading whose edge is not known gives no sample, and the n
 }
 
 TEST_CASE("spi_imu: an edge after a reading is not its own, if that was lost") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read());
     world.imu.edges_lost();
     world.now += ms;
@@ -450,7 +450,7 @@ TEST_CASE("spi_imu: how many edges were lost follows from the period, unless mor
     for (const Case& made :
          {Case{1'400 * us, 1, 1}, Case{1'500 * us - 1, 1, 1}, Case{1'500 * us, 1, 2},
           Case{7'499'999, 1, 7}, Case{4 * ms, 5, 5}, Case{4 * ms, 3, 4}}) {
-        Running world;
+        RunningSpi world;
         REQUIRE(world.read());
         const Nanoseconds before = world.now;
         world.imu.edges_lost();
@@ -468,7 +468,7 @@ TEST_CASE("spi_imu: how many edges were lost follows from the period, unless mor
         CHECK(world.sample.number == made.numbers + 1);
     }
     // Before the first sample, since the part was set up.
-    Running world;
+    RunningSpi world;
     world.imu.edges_lost();
     world.now += 4 * ms;
     world.edge(world.now);
@@ -479,7 +479,7 @@ TEST_CASE("spi_imu: how many edges were lost follows from the period, unless mor
 
 TEST_CASE("spi_imu: new data within a reading spoils it, within its check it does not") {
     for (const Nanoseconds after_end : {-1, 0, 1, 9'999}) {
-        Running world;
+        RunningSpi world;
         REQUIRE(world.read());
         world.now += ms;
         world.edge(world.now);
@@ -502,7 +502,7 @@ TEST_CASE("spi_imu: twenty bad readings in a row set the part up again") {
     enum class Bad { first_refused, second_refused, spoiled, check_failed };
     for (const Bad bad :
          {Bad::first_refused, Bad::second_refused, Bad::spoiled, Bad::check_failed}) {
-        Running world;
+        RunningSpi world;
         const auto fails = [&world, bad](int times) {
             world.bus.refused = bad == Bad::first_refused ? 1 : bad == Bad::second_refused ? 2 : 0;
             world.bus.lives = bad != Bad::check_failed;
@@ -534,7 +534,7 @@ TEST_CASE("spi_imu: twenty bad readings in a row set the part up again") {
 }
 
 TEST_CASE("spi_imu: edges that come too fast set the part up again") {
-    const auto edges = [](Running& world, int count, Nanoseconds apart) {
+    const auto edges = [](RunningSpi& world, int count, Nanoseconds apart) {
         for (; count > 0; --count) {
             world.edge(world.now += apart);
             world.bus.run(world.now);
@@ -542,7 +542,7 @@ TEST_CASE("spi_imu: edges that come too fast set the part up again") {
             world.now -= 50 * us;
         }
     };
-    Running world;
+    RunningSpi world;
     edges(world, 1, ms);
     edges(world, 19, 750 * us - 1);
     edges(world, 1, 750 * us);
@@ -550,12 +550,12 @@ TEST_CASE("spi_imu: edges that come too fast set the part up again") {
     CHECK(world.reports.events.size() == 1);
     edges(world, 1, 750 * us - 1);
     CHECK(world.reports.events.back() ==
-          Event{wire::BoardEventKind::imu_failed, world.now + 50 * us, 0, while_running});
+          SpiEvent{wire::BoardEventKind::imu_failed, world.now + 50 * us, 0, while_running});
     CHECK_FALSE(world.bus.armed);
 }
 
 TEST_CASE("spi_imu: on I2C a part is read at its address, as fast as the bus allows") {
-    Running world(wire::imu_data_ready | wire::imu_i2c | wire::imu_i2c_second);
+    RunningSpi world(wire::imu_data_ready | wire::imu_i2c | wire::imu_i2c_second);
     CHECK(world.bus.registers[0x4F] == 6);  // written while it was set up
     for (unsigned i = 0; i < 2; ++i) {
         CHECK(world.bus.job.transfers[i].bus == ImuTransfer::Bus::i2c_read);
@@ -563,12 +563,12 @@ TEST_CASE("spi_imu: on I2C a part is read at its address, as fast as the bus all
         CHECK(world.bus.job.transfers[i].bytes[0] == (i == 0 ? 0x1D : 0x4E));
         CHECK(world.bus.job.transfers[i].clock_hz == 400'000);
     }
-    Bench first(wire::imu_data_ready | wire::imu_i2c);
+    SpiBench first(wire::imu_data_ready | wire::imu_i2c);
     first.step(300 * ms);
     CHECK(first.bus.job.transfers[0].bus == ImuTransfer::Bus::i2c_write);
     CHECK(first.bus.job.transfers[0].chip == 0x68);
     CHECK(first.bus.job.transfers[0].bytes[0] == 0x11);
-    Bench spi;
+    SpiBench spi;
     spi.step(300 * ms);
     CHECK(spi.bus.job.transfers[0].bus == ImuTransfer::Bus::spi);
     CHECK(spi.bus.job.transfers[0].chip == 0);
@@ -576,7 +576,7 @@ TEST_CASE("spi_imu: on I2C a part is read at its address, as fast as the bus all
 }
 
 TEST_CASE("spi_imu: a sample is repeated when the part or its words say so") {
-    Running world;
+    RunningSpi world;
     REQUIRE(world.read());
     REQUIRE(world.read());
     CHECK((world.sample.flags & wire::imu_repeated) == 0);
@@ -593,7 +593,7 @@ TEST_CASE("spi_imu: a sample is repeated when the part or its words say so") {
 
 TEST_CASE(
     "spi_imu: readings that differ are compared with one more, and the first of the two counts") {
-    Running world(wire::imu_data_ready, 819'200, wire::ImuKind::adis16445);
+    RunningSpi world(wire::imu_data_ready, 819'200, wire::ImuKind::adis16445);
     CHECK(world.bus.job.pause == 25'000);
     world.bus.updates = 1;
     REQUIRE(world.read());
@@ -690,7 +690,7 @@ TEST_CASE(
     for (const unsigned options :
          {wire::imu_data_ready | wire::imu_accel_ready, wire::imu_data_ready | 0})
         for (const Case& made : cases) {
-            Running world(options, 1'000'000, wire::ImuKind::bmi088);
+            RunningSpi world(options, 1'000'000, wire::ImuKind::bmi088);
             world.bus.length = 38 * us;
             world.now += ms;
             const Nanoseconds at = world.now;
@@ -707,7 +707,8 @@ TEST_CASE(
 
 TEST_CASE("spi_imu: an age of the accelerometer's values that does not fit is not reported") {
     for (const Nanoseconds age : {-32'768 * 32LL, -32'769 * 32LL}) {
-        Running world(wire::imu_data_ready | wire::imu_accel_ready, 100'000, wire::ImuKind::bmi088);
+        RunningSpi world(wire::imu_data_ready | wire::imu_accel_ready, 100'000,
+                         wire::ImuKind::bmi088);
         world.now += 10 * ms;
         world.edge(world.now);
         world.bus.run(world.now - age);  // late
@@ -720,7 +721,8 @@ TEST_CASE("spi_imu: an age of the accelerometer's values that does not fit is no
 }
 
 TEST_CASE("spi_imu: after lost edges of the accelerometer two are needed again") {
-    Running world(wire::imu_data_ready | wire::imu_accel_ready, 1'000'000, wire::ImuKind::bmi088);
+    RunningSpi world(wire::imu_data_ready | wire::imu_accel_ready, 1'000'000,
+                     wire::ImuKind::bmi088);
     world.imu.accel_edge(world.now + 200 * us);
     world.imu.edges_lost();
     world.imu.accel_edge(world.now + 825 * us);
@@ -734,10 +736,10 @@ TEST_CASE("spi_imu: after lost edges of the accelerometer two are needed again")
 }
 
 TEST_CASE("spi_imu: without data-ready it is read at grid points, from a part much faster") {
-    Running world(0, 1'000'000);
-    CHECK(world.bus.registers[0x4F] == 4);                // 4 kHz
-    CHECK(Running(0, 250'000).bus.registers[0x4F] == 6);  // 1 kHz
-    CHECK(Running(0, 300'000).bus.registers[0x4F] == 5);  // 2 kHz
+    RunningSpi world(0, 1'000'000);
+    CHECK(world.bus.registers[0x4F] == 4);                   // 4 kHz
+    CHECK(RunningSpi(0, 250'000).bus.registers[0x4F] == 6);  // 1 kHz
+    CHECK(RunningSpi(0, 300'000).bus.registers[0x4F] == 5);  // 2 kHz
     // The grid began half a millisecond after the configuration.
     const Nanoseconds next = world.imu.grid().next();
     CHECK(next % ms == 500 * us);
@@ -763,7 +765,7 @@ TEST_CASE("spi_imu: without data-ready it is read at grid points, from a part mu
 TEST_CASE("spi_imu: a grid that begins while a part is set up goes on from the first point ahead") {
     // Set-up ends exactly when a reading would be armed, or a moment sooner or later.
     for (const Nanoseconds off : {-1, 0, 1}) {
-        Bench bench(0);
+        SpiBench bench(0);
         while (bench.now < 302 * ms || bench.bus.armed) bench.set_up_once();
         bench.step(bench.imu.next_wake(0));
         bench.bus.run(bench.now);
@@ -778,7 +780,7 @@ TEST_CASE("spi_imu: a grid that begins while a part is set up goes on from the f
 
 TEST_CASE("spi_imu: a grid goes on at once, however long a part did not answer") {
     constexpr Nanoseconds month = 30 * 86'400 * second;
-    Bench bench(0);
+    SpiBench bench(0);
     while (bench.now < 302 * ms || bench.bus.armed) bench.set_up_once();
     bench.step(bench.imu.next_wake(0));
     bench.bus.run(bench.now);
@@ -796,7 +798,7 @@ TEST_CASE("spi_imu: grid points that have passed are skipped together, and missi
     for (const Case& made : {Case{0, 0, true}, Case{1, 1, false}, Case{500 * us - 1, 1, false},
                              Case{500 * us, 1, true}, Case{ms - 1, 1, true}, Case{ms, 2, false},
                              Case{1'000 * ms + 700 * us, 1'001, true}}) {
-        Running world(0);
+        RunningSpi world(0);
         const Nanoseconds due = world.imu.grid().next();
         world.step(due + made.late);
         CHECK(world.bus.armed == made.armed);
@@ -813,7 +815,7 @@ TEST_CASE("spi_imu: grid points that have passed are skipped together, and missi
 
 TEST_CASE("spi_imu: a grid point that finds the bus at work is missing, and one that is refused") {
     for (const bool busy : {true, false}) {
-        Running world(0);
+        RunningSpi world(0);
         const Nanoseconds due = world.imu.grid().next();
         world.bus.accepts = busy;
         world.step(due - 500 * us);
@@ -840,7 +842,7 @@ TEST_CASE("spi_imu: a grid point that finds the bus at work is missing, and one 
 }
 
 TEST_CASE("spi_imu: a reading at a grid point must end in time") {
-    Running world(0, 10'000);
+    RunningSpi world(0, 10'000);
     const Nanoseconds due = world.imu.grid().next();
     CHECK(due % (100 * ms) == 500 * us);
     world.step(due - 500 * us);
@@ -849,7 +851,7 @@ TEST_CASE("spi_imu: a reading at a grid point must end in time") {
     CHECK(world.reports.events.size() == 1);
     world.step(due + 25 * ms);
     CHECK(world.reports.events.back() ==
-          Event{wire::BoardEventKind::imu_silent, due + 25 * ms, 0, while_running});
+          SpiEvent{wire::BoardEventKind::imu_silent, due + 25 * ms, 0, while_running});
     CHECK(world.imu.next_wake(0) == world.now + second);
     // At least one sample is missing when it is back.
     while (world.reports.count(wire::BoardEventKind::imu_ready) < 2) world.set_up_once();
@@ -863,7 +865,7 @@ TEST_CASE("spi_imu: a reading at a grid point must end in time") {
 
 TEST_CASE("spi_imu: another configuration ends what was going on") {
     for (const bool collected : {false, true}) {
-        Running world(wire::imu_data_ready | wire::imu_i2c);
+        RunningSpi world(wire::imu_data_ready | wire::imu_i2c);
         world.now += ms;
         world.edge(world.now);
         if (collected) {

@@ -10,8 +10,8 @@ using daemon::StampGuard;
 
 namespace {
 
-clock::Stamp stamp(std::int64_t ns, std::uint32_t epoch,
-                   clock::ClockState state = clock::ClockState::locked) {
+clock::Stamp guarded_stamp(std::int64_t ns, std::uint32_t epoch,
+                           clock::ClockState state = clock::ClockState::locked) {
     clock::Stamp stamp;
     stamp.output = {ns};
     stamp.epoch = epoch;
@@ -44,43 +44,43 @@ struct StreamOfStamps {
 
 TEST_CASE("stamp_guard: stamps never go backwards within an epoch, and say when they were held") {
     StampGuard guard;
-    CHECK(guard.guard(stamp(100, 1), 10)->time.ns == 100);
-    const auto held = guard.guard(stamp(90, 1), 10);
+    CHECK(guard.guard(guarded_stamp(100, 1), 10)->time.ns == 100);
+    const auto held = guard.guard(guarded_stamp(90, 1), 10);
     REQUIRE(held);
     CHECK(held->time.ns == 101);
     CHECK(held->flags == flag_clamped);
-    CHECK(guard.guard(stamp(50, 2), 10)->time.ns == 50);
-    const auto late = guard.guard(stamp(60, 2, clock::ClockState::holdover), 10);
+    CHECK(guard.guard(guarded_stamp(50, 2), 10)->time.ns == 50);
+    const auto late = guard.guard(guarded_stamp(60, 2, clock::ClockState::holdover), 10);
     CHECK(late->time.ns == 60);
     CHECK(late->flags == flag_holdover);
 }
 
 TEST_CASE("stamp_guard: sigma of a stamp that was held contains the hold") {
     StampGuard guard;
-    guard.guard(stamp(100, 1), 30);
-    CHECK(guard.guard(stamp(61, 1), 30)->sigma_ns == 50);
-    CHECK(guard.guard(stamp(61, 1), sigma_unknown)->sigma_ns == sigma_unknown);
+    guard.guard(guarded_stamp(100, 1), 30);
+    CHECK(guard.guard(guarded_stamp(61, 1), 30)->sigma_ns == 50);
+    CHECK(guard.guard(guarded_stamp(61, 1), sigma_unknown)->sigma_ns == sigma_unknown);
 }
 
 TEST_CASE(
     "stamp_guard: what sigma cannot explain is refused, until three in a row contradict the last") {
     StampGuard guard;
-    guard.guard(stamp(1'000'000, 1), 30);
+    guard.guard(guarded_stamp(1'000'000, 1), 30);
     for (int i = 0; i < 3; ++i) {
         CHECK_FALSE(guard.stuck());
-        CHECK_FALSE(guard.guard(stamp(1000 + i, 1), 30));
+        CHECK_FALSE(guard.guard(guarded_stamp(1000 + i, 1), 30));
     }
     CHECK(guard.stuck());
-    CHECK(guard.guard(stamp(1003, 2), 30)->time.ns == 1003);
+    CHECK(guard.guard(guarded_stamp(1003, 2), 30)->time.ns == 1003);
     CHECK_FALSE(guard.stuck());
 }
 
 TEST_CASE("stamp_guard: a suspect stamp neither holds others up nor is held") {
     StampGuard guard;
-    guard.guard(stamp(100, 1), 30);
-    CHECK(guard.guard(stamp(50, 1), sigma_unknown, true)->time.ns == 50);
-    CHECK(guard.guard(stamp(9000, 1), sigma_unknown, true)->flags == 0);
-    CHECK(guard.guard(stamp(200, 1), 30)->time.ns == 200);
+    guard.guard(guarded_stamp(100, 1), 30);
+    CHECK(guard.guard(guarded_stamp(50, 1), sigma_unknown, true)->time.ns == 50);
+    CHECK(guard.guard(guarded_stamp(9000, 1), sigma_unknown, true)->flags == 0);
+    CHECK(guard.guard(guarded_stamp(200, 1), 30)->time.ns == 200);
 }
 
 TEST_CASE("stamp_guard: a clock that is set back begins a new epoch, with its own time at once") {
@@ -133,7 +133,7 @@ TEST_CASE("stamp_guard: an estimate that goes back further than its sigma explai
 
 TEST_CASE("stamp_guard: a stamp whose second is doubted says so") {
     StampGuard guard;
-    clock::Stamp doubted = stamp(1000, 1);
+    clock::Stamp doubted = guarded_stamp(1000, 1);
     CHECK(guard.guard(doubted, 10)->flags == 0);
     doubted.second_doubted = true;
     doubted.output = {2000};

@@ -69,7 +69,7 @@ class PlayedStream final : public ByteStream {
     std::atomic<int> policy_{-1};  ///< of the thread that reads
 };
 
-struct Bench {
+struct StampingBench {
     /// Bytes and stamps that the reader has for its consumer.
     Expected<> drain() {
         return reader.drain([&](std::span<const std::uint8_t> piece, HostTime received) {
@@ -88,7 +88,7 @@ struct Bench {
 }  // namespace
 
 TEST_CASE("stamping_reader: bytes come in order, each with the stamp of its arrival") {
-    Bench bench;
+    StampingBench bench;
     bench.stream.give({HostTime{100}, {1, 2, 3}});
     bench.stream.give({HostTime{200}, {4}});
     bench.stream.wait_until_read();
@@ -100,7 +100,7 @@ TEST_CASE("stamping_reader: bytes come in order, each with the stamp of its arri
 }
 
 TEST_CASE("stamping_reader: a large chunk keeps one stamp") {
-    Bench bench;
+    StampingBench bench;
     std::vector<std::uint8_t> large(largest_chunk);
     std::iota(large.begin(), large.end(), std::uint8_t{0});
     bench.stream.give({HostTime{100}, large});
@@ -111,7 +111,7 @@ TEST_CASE("stamping_reader: a large chunk keeps one stamp") {
 }
 
 TEST_CASE("stamping_reader: the consumer is woken by bytes and by the end") {
-    Bench bench;
+    StampingBench bench;
     bench.stream.give({HostTime{100}, {1}});
     while (bench.bytes.empty()) {
         bench.wake.wait(seconds(60));
@@ -128,7 +128,7 @@ TEST_CASE("stamping_reader: the consumer is woken by bytes and by the end") {
 }
 
 TEST_CASE("stamping_reader: what came before the end is taken before the error") {
-    Bench bench;
+    StampingBench bench;
     for (std::uint8_t i = 0; i < 50; ++i) bench.stream.give({HostTime{i}, {i}});
     bench.stream.end();
     while (bench.drain()) bench.wake.wait(seconds(60));
@@ -136,7 +136,7 @@ TEST_CASE("stamping_reader: what came before the end is taken before the error")
 }
 
 TEST_CASE("stamping_reader: what finds no room is counted, and what follows is taken again") {
-    Bench bench;
+    StampingBench bench;
     constexpr std::size_t excess = 10;
     for (std::size_t i = 0; i < StampingReader::capacity + excess; ++i)
         bench.stream.give({HostTime{1}, {7, 7}});
@@ -151,7 +151,7 @@ TEST_CASE("stamping_reader: what finds no room is counted, and what follows is t
 }
 
 TEST_CASE("stamping_reader: a stream that never sleeps does not keep real-time priority") {
-    Bench bench;
+    StampingBench bench;
     bench.stream.never_sleep();
     bench.stream.give({HostTime{1}, {1}});
     const HostTime deadline = host_now() + seconds(10);

@@ -45,14 +45,27 @@ void collect(const nlohmann::json& value, std::string prefix, std::vector<std::s
 
 TEST_CASE("status: its summary says why, by the cause, and who else is affected") {
     Status status = healthy();
-    CHECK(summary(status) == "ok");
+    CHECK(summary(status).text == "ok");
     status.imus[0].diagnosis = {Health::starting, Fault::starting, "not yet", {}};
-    CHECK(summary(status) == "starting: imu0: not yet");
+    CHECK(summary(status).text == "starting: imu0: not yet");
     status.cameras[0].diagnosis = {Health::degraded, Fault::no_frames, "check its cable", {}};
-    CHECK(summary(status) == "degraded: cam0: check its cable");
+    CHECK(summary(status).text == "degraded: cam0: check its cable");
     status.board_diagnosis = {Health::degraded, Fault::board_gone, "not found", {}};
     status.imus[0].diagnosis.health = Health::degraded;
-    CHECK(summary(status) == "degraded: board: not found (also degraded: cam0, imu0)");
+    CHECK(summary(status).text == "degraded: board: not found (also degraded: cam0, imu0)");
+}
+
+TEST_CASE("status: its summary names the cause as device and fault, and whether one is dead") {
+    Status status = healthy();
+    status.cameras[0].delivery.rate_hz = 12;
+    CHECK(summary(status).cause.empty());
+    status.cameras[0].diagnosis = {Health::degraded, Fault::packet_loss, "check its cable", {}};
+    CHECK(summary(status).cause == "cam0: packet_loss");
+    CHECK_FALSE(summary(status).dead);  // it is the IMU that has no rate, and that is well
+    status.cameras[0].delivery.rate_hz = 0;
+    CHECK(summary(status).dead);
+    status.cameras[0].diagnosis.health = Health::starting;
+    CHECK_FALSE(summary(status).dead);
 }
 
 TEST_CASE("status: as healthy as the device that is worst off") {
@@ -136,7 +149,8 @@ TEST_CASE("status: the text for a person names what is wrong and what to do") {
     Status status = healthy();
     status.cameras[0].diagnosis = {Health::degraded, Fault::camera_absent,
                                    "no camera answers to this name; check its cable", status.now};
-    const std::string text = client::status_text(nlohmann::json::parse(to_json(status)));
+    const std::string text =
+        client::status_text(nlohmann::json::parse(to_json(status)), client::Detail::full);
     CHECK_THAT(text, Catch::Contains("degraded"));
     CHECK_THAT(text, Catch::Contains("check its cable"));
 }
@@ -146,14 +160,14 @@ TEST_CASE("status: what a board has is named, and of one that was never met noth
     auto document = nlohmann::json::parse(to_json(status));
     CHECK(document["board"]["present"].is_null());
     CHECK(document["board"]["fastest_imu_hz"].is_null());
-    CHECK_THAT(client::status_text(document), !Catch::Contains("it has"));
+    CHECK_THAT(client::status_text(document, client::Detail::full), !Catch::Contains("it has"));
     status.board.connections = 1;
     status.board.present = wire::present_camera0 | wire::present_spi | wire::present_ready0 << 1U;
     status.board.fastest_imu_millihertz = 2'048'500;
     document = nlohmann::json::parse(to_json(status));
     CHECK(document["board"]["present"] == nlohmann::json({"camera0", "spi", "imu1_ready"}));
     CHECK(document["board"]["fastest_imu_hz"] == 2048.5);
-    CHECK_THAT(client::status_text(document),
+    CHECK_THAT(client::status_text(document, client::Detail::full),
                Catch::Contains("it has camera0, spi, imu1_ready; IMUs up to 2048.5 Hz\n"));
 }
 
@@ -221,7 +235,8 @@ TEST_CASE("status: sigma of a clock that is not known is no number, least of all
     const auto document = nlohmann::json::parse(to_json(status));
     CHECK(document["clock"]["sigma_ns"].is_null());
     CHECK(document["clock"]["bound_ns"].is_null());
-    CHECK_THAT(client::status_text(document), Catch::Contains("realtime  unknown"));
+    CHECK_THAT(client::status_text(document, client::Detail::full),
+               Catch::Contains("realtime  unknown"));
     CHECK_THAT(client::clock_text(document), Catch::Contains("sigma                unknown"));
 }
 
@@ -240,7 +255,7 @@ TEST_CASE("status: what was taken off for lines and filters, and what says other
     CHECK(document["cameras"][0]["line_delay_source"] == "preset");
     CHECK(document["cameras"][0]["edge_difference_ns"].is_null());
     CHECK(document["imus"][0]["filter_delay_ns"] == 3'662'000);
-    const std::string text = client::status_text(document);
+    const std::string text = client::status_text(document, client::Detail::full);
     CHECK_THAT(text, Catch::Contains("Line1: start 36.0 us late, end 18.0 us, sigma 7.0 us"));
     CHECK_THAT(text, Catch::Contains("measured: unknown"));
     CHECK_THAT(text, Catch::Contains("filter delay 3662.0 us (model)"));

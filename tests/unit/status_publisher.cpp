@@ -65,14 +65,14 @@ TEST_CASE("status_publisher: health is that of the newest document") {
     test::Pipelines bench;
     auto publisher = StatusPublisher::create(bench.directory.path());
     REQUIRE(publisher);
-    CHECK(publisher->health() == Health::starting);
+    CHECK(publisher->summary().health == Health::starting);
     Status status;
     status.now = HostTime{100'000'000'000};
     publisher->publish(status, bench.translator);  // the board is needed, and not there
-    CHECK(publisher->health() == Health::degraded);
+    CHECK(publisher->summary().health == Health::degraded);
     status.board_needed = false;
     publisher->publish(status, bench.translator);
-    CHECK(publisher->health() == Health::ok);
+    CHECK(publisher->summary().health == Health::ok);
 }
 
 TEST_CASE("status_publisher: a large document is whole, in a larger ring") {

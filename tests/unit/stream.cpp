@@ -7,16 +7,15 @@
 #include "../support/temporary_directory.hpp"
 #include "client/segment.hpp"
 #include "engine/ring/writer.hpp"
+#include "pixel_formats.hpp"
 
 using namespace versavis;
 using namespace versavis::ring;
+using namespace versavis::test;
 
 namespace {
 
-constexpr std::uint32_t mono8 = 0x01080001;
 constexpr std::uint32_t mono16 = 0x01100007;
-constexpr std::uint32_t mono12_packed = 0x010C0006;
-constexpr std::uint32_t rgb8 = 0x02180014;
 
 struct Images {
     test::TemporaryDirectory directory{"/dev/shm"};

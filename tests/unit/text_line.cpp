@@ -8,7 +8,7 @@ using namespace versavis::firmware;
 
 namespace {
 
-std::string text(const TextLine& line) { return {line.data(), line.size()}; }
+std::string line_text(const TextLine& line) { return {line.data(), line.size()}; }
 
 }  // namespace
 
@@ -17,10 +17,10 @@ TEST_CASE("text_line: text, other lines and numbers follow each other") {
     CHECK(line.size() == 0);
     line << ""
          << "a," << 0U << "," << 7U;
-    CHECK(text(line) == "a,0,7");
+    CHECK(line_text(line) == "a,0,7");
     TextLine all;
     all << "<" << line << ">";
-    CHECK(text(all) == "<a,0,7>");
+    CHECK(line_text(all) == "<a,0,7>");
 }
 
 TEST_CASE("text_line: numbers in decimal, of any size") {
@@ -28,13 +28,13 @@ TEST_CASE("text_line: numbers in decimal, of any size") {
         GENERATE(0U, 1U, 9U, 10U, 99U, 100U, 115'200U, 921'600U, 4'000'000'000U, UINT32_MAX);
     TextLine line;
     line << number;
-    CHECK(text(line) == std::to_string(number));
+    CHECK(line_text(line) == std::to_string(number));
 }
 
 TEST_CASE("text_line: bytes in hexadecimal have two digits") {
     TextLine line;
     line.hex(0x00).hex(0x09).hex(0xAF).hex(0xF0) << ".";
-    CHECK(text(line) == "0009AFF0.");
+    CHECK(line_text(line) == "0009AFF0.");
 }
 
 TEST_CASE("text_line: holds 64 characters, and leaves out what is too much") {
@@ -44,5 +44,5 @@ TEST_CASE("text_line: holds 64 characters, and leaves out what is too much") {
     line << "c" << 5U;
     line.hex(1);
     CHECK(line.size() == 64);
-    CHECK(text(line).substr(60) == "abab");
+    CHECK(line_text(line).substr(60) == "abab");
 }

@@ -5,11 +5,12 @@
 #include <thread>
 
 using namespace versavis;
-using namespace versavis::rig;
+using rig::LedScenario;
+using rig::TimingBoard;
 
 namespace {
 
-using Row = TimingBoard::Row;
+using TimingRow = TimingBoard::Row;
 
 constexpr HostTime at_us(std::int64_t us) { return HostTime{us * 1'000}; }
 
@@ -23,14 +24,14 @@ LedScenario present() {
 
 TEST_CASE("timing_board: one of four strides, and four count the strides") {
     TimingBoard board(present());
-    CHECK(board.shown(0) == Row{1, 1, 0, 0, 0, 0, 0, 0, 0, 1});
-    CHECK(board.shown(3) == Row{1, 0, 0, 0, 1, 0, 0, 0, 0, 1});
-    CHECK(board.shown(4) == Row{1, 1, 0, 0, 0, 1, 0, 0, 0, 1});
-    CHECK(board.shown(4 * 11 + 2) == Row{1, 0, 0, 1, 0, 1, 1, 0, 1, 1});
+    CHECK(board.shown(0) == TimingRow{1, 1, 0, 0, 0, 0, 0, 0, 0, 1});
+    CHECK(board.shown(3) == TimingRow{1, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+    CHECK(board.shown(4) == TimingRow{1, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+    CHECK(board.shown(4 * 11 + 2) == TimingRow{1, 0, 0, 1, 0, 1, 1, 0, 1, 1});
     CHECK(board.shown(64) == board.shown(0));
     LedScenario scenario = present();
     scenario.backward = scenario.high_bit_first = true;
-    CHECK(TimingBoard(scenario).shown(4) == Row{1, 0, 0, 0, 1, 0, 0, 0, 1, 1});
+    CHECK(TimingBoard(scenario).shown(4) == TimingRow{1, 0, 0, 0, 1, 0, 0, 0, 1, 1});
 }
 
 TEST_CASE("timing_board: brightness is the share of the exposure that an LED was on") {
@@ -38,14 +39,14 @@ TEST_CASE("timing_board: brightness is the share of the exposure that an LED was
     for (std::int64_t i = 1; i < 100; ++i) board.pulse(at_us(1000 * i));
     board.settle(at_us(99'000));
     CHECK(board.lit(at_us(100), at_us(900)) == board.shown(0));
-    const Row split = board.lit(at_us(1750), at_us(2750));
+    const TimingRow split = board.lit(at_us(1750), at_us(2750));
     CHECK(split.at(2) == Approx(0.25));
     CHECK(split.at(3) == Approx(0.75));
-    const Row turn = board.lit(at_us(3600), at_us(4600));  // a stride ends
+    const TimingRow turn = board.lit(at_us(3600), at_us(4600));  // a stride ends
     CHECK(turn.at(4) == Approx(0.4));
     CHECK(turn.at(1) == Approx(0.6));
     CHECK(turn.at(5) == Approx(0.6));
-    const Row longer = board.lit(at_us(4500), at_us(7000));
+    const TimingRow longer = board.lit(at_us(4500), at_us(7000));
     CHECK(longer.at(1) == Approx(0.2));
     CHECK(longer.at(2) == Approx(0.4));
     CHECK(longer.at(3) == Approx(0.4));

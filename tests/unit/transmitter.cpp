@@ -11,7 +11,7 @@ using namespace versavis::firmware;
 
 namespace {
 
-struct Link final : ByteLink {
+struct SlowLink final : ByteLink {
     std::size_t space = 0;
     std::vector<std::uint8_t> bytes;
     std::size_t watched = 0;  ///< bytes that were written when it was asked
@@ -29,14 +29,14 @@ struct Link final : ByteLink {
     }
 };
 
-struct Clock final : Clock64 {
+struct SendClock final : Clock64 {
     Nanoseconds time = 0;
     Nanoseconds now() override { return time; }
 };
 
-struct Bench {
-    Link link;
-    Clock clock;
+struct TransmitterBench {
+    SlowLink link;
+    SendClock clock;
     Transmitter transmitter{link, clock, 7};
 
     /// What the host has received by now.
@@ -60,7 +60,7 @@ struct Bench {
     }
 };
 
-wire::Exposure exposure(std::uint64_t trigger) {
+wire::Exposure sent_exposure(std::uint64_t trigger) {
     wire::Exposure record{};
     record.trigger = trigger;
     return record;
@@ -88,10 +88,10 @@ TEST_CASE(
     "transmitter: what matters most leaves first, numbered as it leaves, in pieces as small as the "
     "link "
     "takes") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::Log{wire::LogLevel::info, "text"});
     bench.transmitter.send(wire::ImuSample{});
-    bench.transmitter.send(exposure(1));
+    bench.transmitter.send(sent_exposure(1));
     bench.transmitter.send(wire::ClockAnswer{1, 0, 0, 0});
     do {
         bench.link.space = 7;
@@ -110,7 +110,7 @@ TEST_CASE(
 
 TEST_CASE(
     "transmitter: of each class the newest stay, whatever else waits, and the others are counted") {
-    Bench bench;
+    TransmitterBench bench;
     Transmitter& transmitter = bench.transmitter;
     Numbers expected;
     for (int round = 0; round < 2; ++round) {
@@ -159,20 +159,20 @@ TEST_CASE("transmitter: what is stamped as it leaves lies where its words are al
 }
 
 TEST_CASE("transmitter: the most that waited is reported since it was asked for last") {
-    Bench bench;
+    TransmitterBench bench;
     CHECK(bench.transmitter.take_high_water() == 0);
-    for (unsigned i = 1; i <= 3; ++i) bench.transmitter.send(exposure(i));
+    for (unsigned i = 1; i <= 3; ++i) bench.transmitter.send(sent_exposure(i));
     bench.link.space = 100;  // one packet, and a part of the next
     bench.transmitter.pump();
     CHECK(bench.transmitter.take_high_water() == 3);
     CHECK(bench.transmitter.take_high_water() == 1);
-    bench.transmitter.send(exposure(4));
+    bench.transmitter.send(sent_exposure(4));
     CHECK(bench.transmitter.take_high_water() == 2);
     bench.link.space = 1'000;
     bench.transmitter.pump();
     CHECK(bench.transmitter.take_high_water() == 2);
     CHECK(bench.transmitter.take_high_water() == 0);
-    bench.transmitter.send(exposure(5));
+    bench.transmitter.send(sent_exposure(5));
     bench.transmitter.begin();
     CHECK(bench.transmitter.take_high_water() == 1);
     CHECK(bench.transmitter.take_high_water() == 0);
@@ -181,9 +181,9 @@ TEST_CASE("transmitter: the most that waited is reported since it was asked for 
 TEST_CASE(
     "transmitter: a new connection hears nothing of the one before, not even the rest of a "
     "packet") {
-    Bench bench;
-    bench.transmitter.send(exposure(1));
-    bench.transmitter.send(exposure(2));
+    TransmitterBench bench;
+    bench.transmitter.send(sent_exposure(1));
+    bench.transmitter.send(sent_exposure(2));
     bench.link.space = 20;
     bench.transmitter.pump();
     bench.transmitter.begin();
@@ -200,7 +200,7 @@ TEST_CASE(
 }
 
 TEST_CASE("transmitter: nothing to send is nothing written") {
-    Bench bench;
+    TransmitterBench bench;
     bench.link.space = 1'000;
     bench.link.left = 12'345;  // nobody asked
     CHECK_FALSE(bench.transmitter.pump());
@@ -212,7 +212,7 @@ TEST_CASE("transmitter: nothing to send is nothing written") {
 }
 
 TEST_CASE("transmitter: the time of sending is that at which the answer leaves") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::ClockAnswer{1, 0, 500, 0});
     bench.transmitter.pump();
     bench.clock.time = 90'000;
@@ -229,7 +229,7 @@ TEST_CASE("transmitter: the time of sending is that at which the answer leaves")
 TEST_CASE(
     "transmitter: when an answer left follows as soon as the link reports it, before all that "
     "waits") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 20;  // less than the answer
     bench.transmitter.pump();
@@ -239,7 +239,7 @@ TEST_CASE(
     REQUIRE(bench.received<wire::ClockAnswer>().size() == 1);
     CHECK(bench.link.watched == bench.link.bytes.size());
     CHECK(bench.received<wire::ClockFollowUp>().empty());
-    bench.transmitter.send(exposure(1));
+    bench.transmitter.send(sent_exposure(1));
     bench.transmitter.send(wire::ClockAnswer{43, 0, 600, 0});
     bench.link.left = 12'345;
     bench.transmitter.pump();
@@ -252,7 +252,7 @@ TEST_CASE(
 }
 
 TEST_CASE("transmitter: of two answers, each is reported by its own number, and once") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 1'000;
     bench.transmitter.pump();
@@ -276,7 +276,7 @@ TEST_CASE("transmitter: of two answers, each is reported by its own number, and 
 }
 
 TEST_CASE("transmitter: the departure of an answer that a new connection cuts is not asked for") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 20;  // less than the answer
     bench.transmitter.pump();
@@ -288,7 +288,7 @@ TEST_CASE("transmitter: the departure of an answer that a new connection cuts is
 }
 
 TEST_CASE("transmitter: a new connection hears nothing of the departures of the one before") {
-    Bench bench;
+    TransmitterBench bench;
     bench.transmitter.send(wire::ClockAnswer{42, 0, 500, 0});
     bench.link.space = 1'000;
     bench.transmitter.pump();
@@ -301,7 +301,7 @@ TEST_CASE("transmitter: a new connection hears nothing of the departures of the 
 }
 
 TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody knows") {
-    Bench bench;
+    TransmitterBench bench;
     bench.clock.time = 100'000;
     wire::ImuSample sample{};
     sample.time_ns = 90'000;
@@ -327,8 +327,8 @@ TEST_CASE("transmitter: a sample says how old it was as it left, or that nobody 
 
 TEST_CASE("transmitter: one pump writes a bounded part, and says whether the link takes more") {
     for (const std::size_t space : {std::size_t{255}, std::size_t{256}, std::size_t{257}}) {
-        Bench bench;
-        for (unsigned i = 1; i <= 10; ++i) bench.transmitter.send(exposure(i));
+        TransmitterBench bench;
+        for (unsigned i = 1; i <= 10; ++i) bench.transmitter.send(sent_exposure(i));
         bench.link.space = space;
         CHECK(bench.transmitter.pump() == (space > 256));
         CHECK(bench.link.bytes.size() == (space < 256 ? space : 256));

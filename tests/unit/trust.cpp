@@ -22,7 +22,7 @@ namespace {
 
 constexpr uid_t stranger = 12345;
 
-struct Instance {
+struct TrustedInstance {
     test::TemporaryDirectory directory{"/dev/shm"};
     Writer writer = *Writer::create(directory.path(), {"events", StreamKind::events, 8});
 
@@ -51,7 +51,7 @@ bool is_root() { return ::geteuid() == 0; }
 
 }  // namespace
 
-TEST_CASE_METHOD(Instance, "trust: a missing permission is named, with the cure") {
+TEST_CASE_METHOD(TrustedInstance, "trust: a missing permission is named, with the cure") {
     if (!is_root()) return;  // only root can become somebody else
     for (const mode_t mode : {0755U, 0750U}) {
         REQUIRE(::chmod(directory.path().c_str(), mode) == 0);
@@ -61,7 +61,7 @@ TEST_CASE_METHOD(Instance, "trust: a missing permission is named, with the cure"
     }
 }
 
-TEST_CASE_METHOD(Instance, "trust: root's streams are read by everybody whom modes let") {
+TEST_CASE_METHOD(TrustedInstance, "trust: root's streams are read by everybody whom modes let") {
     if (!is_root()) return;
     // To know the name is enough, where the directory is not to be listed.
     for (const mode_t mode : {0755U, 0711U}) {
@@ -71,7 +71,7 @@ TEST_CASE_METHOD(Instance, "trust: root's streams are read by everybody whom mod
     }
 }
 
-TEST_CASE_METHOD(Instance, "trust: a directory that a stranger made first is not trusted") {
+TEST_CASE_METHOD(TrustedInstance, "trust: a directory that a stranger made first is not trusted") {
     if (!is_root()) return;
     const std::string cure =
         "; if the service runs as that user, name it in VERSAVIS_OWNER, or as owner";
@@ -87,7 +87,7 @@ TEST_CASE_METHOD(Instance, "trust: a directory that a stranger made first is not
     CHECK(refusal(other) == "events: belongs to user 12345, not to user 12346" + cure);
 }
 
-TEST_CASE_METHOD(Instance, "trust: the environment names an owner") {
+TEST_CASE_METHOD(TrustedInstance, "trust: the environment names an owner") {
     CHECK(test::in_process([&] {
         ::setenv("VERSAVIS_OWNER", "root", 1);
         const bool root_owns = refusal().empty() == is_root();
@@ -98,7 +98,7 @@ TEST_CASE_METHOD(Instance, "trust: the environment names an owner") {
     }));
 }
 
-TEST_CASE_METHOD(Instance, "trust: a file that somebody else may have made is refused") {
+TEST_CASE_METHOD(TrustedInstance, "trust: a file that somebody else may have made is refused") {
     const std::string message =
         "events: does not belong to the owner of its directory; somebody else may have put it "
         "there: remove it";
@@ -116,7 +116,7 @@ TEST_CASE_METHOD(Instance, "trust: a file that somebody else may have made is re
     }
 }
 
-TEST_CASE_METHOD(Instance, "trust: a lack of descriptors is named") {
+TEST_CASE_METHOD(TrustedInstance, "trust: a lack of descriptors is named") {
     CHECK(test::in_process([&] {
         const rlimit none{0, 0};
         return ::setrlimit(RLIMIT_NOFILE, &none) == 0 &&
@@ -124,7 +124,8 @@ TEST_CASE_METHOD(Instance, "trust: a lack of descriptors is named") {
     }));
 }
 
-TEST_CASE_METHOD(Instance, "trust: links and pipes are not streams, and nobody waits for them") {
+TEST_CASE_METHOD(TrustedInstance,
+                 "trust: links and pipes are not streams, and nobody waits for them") {
     const std::string none =
         ": no such stream; is the service running? 'versavis list' shows the streams";
     std::filesystem::create_symlink("events", directory.path() / "link");
@@ -139,7 +140,7 @@ TEST_CASE_METHOD(Instance, "trust: links and pipes are not streams, and nobody w
               "there: remove it");
 }
 
-TEST_CASE_METHOD(Instance, "trust: what waits under a new ring's name is not written to") {
+TEST_CASE_METHOD(TrustedInstance, "trust: what waits under a new ring's name is not written to") {
     directory.write("victim", "precious");
     for (const char* name : {".cam0.new", "cam0"}) {
         std::filesystem::create_symlink("victim", directory.path() / name);
@@ -152,7 +153,7 @@ TEST_CASE_METHOD(Instance, "trust: what waits under a new ring's name is not wri
     }
 }
 
-TEST_CASE_METHOD(Instance, "trust: whatever the umask, the group may read") {
+TEST_CASE_METHOD(TrustedInstance, "trust: whatever the umask, the group may read") {
     const mode_t before = ::umask(0077);
     const auto made = Writer::create(directory.path(), {"cam0", StreamKind::events, 8});
     ::umask(before);

@@ -19,7 +19,7 @@ using Bytes = std::vector<std::uint8_t>;
 /// Offset of a block's field.
 constexpr std::size_t field(std::size_t block, std::size_t at) { return block * 512 + at; }
 
-struct Damage {
+struct Uf2Damage {
     const char* name;
     std::function<void(Bytes&)> make;
     const char* where;
@@ -59,7 +59,7 @@ TEST_CASE("uf2: the check of the boot stage is the chip's") {
 }
 
 TEST_CASE("uf2: each way in which a file can be wrong is reported with its block") {
-    const Damage damage = GENERATE(values<Damage>({
+    const Uf2Damage damage = GENERATE(values<Uf2Damage>({
         {"empty", [](Bytes& file) { file.clear(); }, "x.uf2:", "is no UF2 file"},
         {"an ELF", [](Bytes& file) { put_word(file, 0, 0x464C457F); }, "x.uf2:", "is no UF2 file"},
         {"second magic", [](Bytes& file) { file[field(3, 4)] ^= 1; }, "block 3",

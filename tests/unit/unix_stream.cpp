@@ -19,18 +19,18 @@ using namespace versavis::daemon;
 namespace {
 
 /// A board's process that listens and accepts nobody by itself.
-class Listener {
+class SocketListener {
  public:
-    explicit Listener(const std::string& path) {
+    explicit SocketListener(const std::string& path) {
         sockaddr_un self{};
         self.sun_family = AF_UNIX;
         std::memcpy(self.sun_path, path.c_str(), path.size() + 1);
         REQUIRE(::bind(socket_, reinterpret_cast<const sockaddr*>(&self), sizeof self) == 0);
         REQUIRE(::listen(socket_, 0) == 0);
     }
-    ~Listener() { ::close(socket_); }
-    Listener(const Listener&) = delete;
-    Listener& operator=(const Listener&) = delete;
+    ~SocketListener() { ::close(socket_); }
+    SocketListener(const SocketListener&) = delete;
+    SocketListener& operator=(const SocketListener&) = delete;
 
     int accept() const { return ::accept4(socket_, nullptr, nullptr, SOCK_CLOEXEC); }
 
@@ -43,7 +43,7 @@ class Listener {
 TEST_CASE("unix_stream: a board whose queue is full is refused at once, with what to do") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.path() / "board";
-    auto listener = std::make_unique<Listener>(path);
+    auto listener = std::make_unique<SocketListener>(path);
     std::vector<std::unique_ptr<ByteStream>> waiting;
     auto refused = std::async(std::launch::async, [&] {
         for (;;) {
@@ -61,7 +61,7 @@ TEST_CASE("unix_stream: a board whose queue is full is refused at once, with wha
 TEST_CASE("unix_stream: bytes go both ways, and the end is an error") {
     const test::TemporaryDirectory directory;
     const std::string path = directory.path() / "board";
-    const Listener listener(path);
+    const SocketListener listener(path);
     auto stream = open_unix_stream(path);
     REQUIRE(stream);
     const int board = listener.accept();

@@ -14,19 +14,18 @@
 #include <string>
 #include <vector>
 
+#include "nanoseconds.hpp"
 #include "recorded_reports.hpp"
 
 using namespace versavis;
 using namespace versavis::firmware;
+using namespace versavis::test;
 using wire::BoardEventKind;
 
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Nanoseconds us = 1'000;
-constexpr Nanoseconds ms = 1'000'000;
-constexpr Nanoseconds second = 1'000'000'000;
 constexpr Nanoseconds base = 1'250 * us;  // of its own samples
 
 std::uint32_t bits_of(float value) {
@@ -36,7 +35,7 @@ std::uint32_t bits_of(float value) {
 }
 
 /// Bit by bit, as the manual says.
-std::uint16_t slow_crc(const Bytes& bytes) {
+std::uint16_t slow_vn100_crc(const Bytes& bytes) {
     unsigned crc = 0;
     for (const unsigned byte : bytes)
         for (unsigned bit = 0x80; bit != 0; bit >>= 1U) {
@@ -52,7 +51,7 @@ std::string framed(const std::string& text) {
     return fmt::format("${}*{:02X}\r\n", text, sum);
 }
 
-Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+Bytes text_bytes(const std::string& text) { return {text.begin(), text.end()}; }
 
 Bytes operator+(Bytes a, const Bytes& b) {
     a.insert(a.end(), b.begin(), b.end());
@@ -81,20 +80,19 @@ struct Packet {
         for (const float* field : fields())
             for (unsigned i = 0; i < 4; ++i)
                 out.push_back(static_cast<std::uint8_t>(bits_of(*field) >> 8U * i));
-        const std::uint16_t crc = slow_crc({out.begin() + 1, out.end()});
+        const std::uint16_t crc = slow_vn100_crc({out.begin() + 1, out.end()});
         out.push_back(static_cast<std::uint8_t>(crc >> 8U));
         out.push_back(static_cast<std::uint8_t>(crc));
         return out;
     }
 };
 
-Bytes packet(std::uint64_t startup = second) {
+Bytes vn100_packet(std::uint64_t startup = second) {
     Packet packet;
     packet.startup = startup;
     return packet.bytes();
 }
 
-using Event = test::ReportedEvent;
 using Reports = test::RecordedReports;
 
 struct Uart final : ImuUart {
@@ -132,9 +130,9 @@ std::string answer_to(const std::string& command) {
     return command.substr(1, command.rfind('*') - 1);
 }
 
-struct World {
-    explicit World(std::uint32_t rate_millihertz, Nanoseconds begin = second,
-                   unsigned options = wire::imu_data_ready)
+struct Vn100World {
+    explicit Vn100World(std::uint32_t rate_millihertz, Nanoseconds begin = second,
+                        unsigned options = wire::imu_data_ready)
         : now(begin) {
         imu.configure(
             {wire::ImuKind::vn100, 0, static_cast<std::uint8_t>(options), 0, rate_millihertz}, now);
@@ -155,7 +153,7 @@ struct World {
         receive(bytes, end);
         return end;
     }
-    void answer(const std::string& text) { receive(bytes_of(framed(text)), now + ms); }
+    void answer(const std::string& text) { receive(text_bytes(framed(text)), now + ms); }
     void answer_last() { answer(answer_to(uart.sent.back())); }
     /// Until the board waits for the answer to that step.
     void reach(unsigned step) {
@@ -178,7 +176,7 @@ struct World {
     /// A sample with its edge; the packet leaves `delay` later.
     void sample(Nanoseconds edge, std::uint64_t startup, Nanoseconds delay = 400 * us) {
         imu.ready_edge(edge);
-        send(packet(startup), edge + delay);
+        send(vn100_packet(startup), edge + delay);
     }
     bool stamped() const { return (samples.back().flags & wire::imu_stamped) != 0; }
 
@@ -189,10 +187,10 @@ struct World {
     std::vector<wire::ImuSample> samples;
 };
 
-struct Running : World {
-    explicit Running(std::uint32_t rate_millihertz = 800'000,
-                     unsigned options = wire::imu_data_ready)
-        : World(rate_millihertz, second, options) {
+struct RunningVn100 : Vn100World {
+    explicit RunningVn100(std::uint32_t rate_millihertz = 800'000,
+                          unsigned options = wire::imu_data_ready)
+        : Vn100World(rate_millihertz, second, options) {
         set_up();
     }
 };
@@ -210,7 +208,7 @@ TEST_CASE("vn100: the CRC of a packet is that of the manual's example, and of it
     for (std::size_t size = 1; size < 200; ++size) {
         Bytes bytes(size);
         for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
-        REQUIRE(vn100_crc(bytes.data(), size) == slow_crc(bytes));
+        REQUIRE(vn100_crc(bytes.data(), size) == slow_vn100_crc(bytes));
     }
 }
 
@@ -270,7 +268,7 @@ TEST_CASE("vn100: set up step by step, at a baud rate that carries its packets")
                                          "VNWRG,32,3,0,0,0,1,1,0,100000,0",
                                          fmt::format("VNWRG,75,1,{},01,0601", divider),
                                          "VNASY,1"};
-    World world(rate);
+    Vn100World world(rate);
     for (std::size_t step = 0; step < steps.size(); ++step) {
         CAPTURE(step);
         if (step == 6) {
@@ -288,7 +286,7 @@ TEST_CASE("vn100: set up step by step, at a baud rate that carries its packets")
         world.answer(steps[step]);
     }
     CHECK(world.reports.events ==
-          std::vector<Event>{{BoardEventKind::imu_ready, 1, world.now, 100, 0}});
+          std::vector<ReportedEvent>{{BoardEventKind::imu_ready, 1, world.now, 100, 0}});
     CHECK(world.imu.next_wake() ==
           world.now + 100 * ms + 20 * second * 1'000 / Vn100::true_rate(rate));
     world.poll(world.now + ms);
@@ -297,17 +295,17 @@ TEST_CASE("vn100: set up step by step, at a baud rate that carries its packets")
 }
 
 TEST_CASE("vn100: it begins when the part has power for long enough, and only if it is chosen") {
-    World early(100'000, 0);
+    Vn100World early(100'000, 0);
     CHECK(early.imu.next_wake() == 300 * ms);
     early.poll(300 * ms - 1);
     CHECK(early.uart.sent.empty());
     early.poll(300 * ms);
     CHECK(early.uart.sent.size() == 1);
-    World later(100'000, 300 * ms + 1);
+    Vn100World later(100'000, 300 * ms + 1);
     CHECK(later.imu.next_wake() == 300 * ms + 1);
     later.imu.configure({wire::ImuKind::none, 0, 0, 0, 0}, 2 * second);
     CHECK(later.imu.next_wake() == never);
-    later.receive(packet(), 3 * second);
+    later.receive(vn100_packet(), 3 * second);
     CHECK(later.uart.sent.empty());
     CHECK(later.uart.waiting.size() == 1);  // it may be a GNSS receiver's
     Reports reports;
@@ -321,15 +319,16 @@ TEST_CASE("vn100: it begins when the part has power for long enough, and only if
 
 TEST_CASE("vn100: a command without an answer is silence, and begins anew after a second") {
     for (const unsigned step : {0U, 1U, 4U, 6U, 7U, 8U}) {
-        World world(200'000);
+        Vn100World world(200'000);
         world.reach(step);
         const Nanoseconds asked = world.now;
         const std::uint32_t first = world.uart.bauds[0];
         world.poll(asked + 300 * ms - 1);
         CHECK(world.reports.events.empty());
         world.poll(asked + 300 * ms);
-        CHECK(world.reports.events == std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now,
-                                                          0, static_cast<int>(step)}});
+        CHECK(world.reports.events ==
+              std::vector<ReportedEvent>{
+                  {BoardEventKind::imu_silent, 1, world.now, 0, static_cast<int>(step)}});
         CHECK(world.imu.restarts() == 1);
         REQUIRE(world.imu.next_wake() == world.now + second);
         const std::size_t sent = world.uart.sent.size();
@@ -348,7 +347,7 @@ TEST_CASE("vn100: a command without an answer is silence, and begins anew after 
 }
 
 TEST_CASE("vn100: a part that changes its baud rate before it answers is asked again at that one") {
-    World world(200'000);
+    Vn100World world(200'000);
     world.reach(5);
     const std::string command = world.uart.sent.back();
     CHECK(world.uart.bauds == std::vector<std::uint32_t>{115'200});
@@ -369,25 +368,25 @@ TEST_CASE("vn100: a part that changes its baud rate before it answers is asked a
     SECTION("it is silent all the same") {
         world.poll(world.imu.next_wake());
         CHECK(world.reports.events ==
-              std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
+              std::vector<ReportedEvent>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
     }
 }
 
 TEST_CASE("vn100: where the baud rate stays, a part is asked for it once") {
-    World world(100'000);
+    Vn100World world(100'000);
     world.reach(5);
     world.poll(world.imu.next_wake());
     CHECK(world.uart.sent.size() == 6);
     CHECK(world.reports.events ==
-          std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
+          std::vector<ReportedEvent>{{BoardEventKind::imu_silent, 1, world.now, 0, 5}});
 }
 
 TEST_CASE("vn100: a new configuration begins at the baud rate of the one before") {
-    Running fast(800'000);
+    RunningVn100 fast(800'000);
     fast.imu.configure({wire::ImuKind::vn100, 0, 0, 0, 100'000}, fast.now);
     fast.poll(fast.now);
     CHECK(fast.uart.baud == 921'600);
-    Running slow(100'000);
+    RunningVn100 slow(100'000);
     slow.imu.configure({wire::ImuKind::vn100, 0, 0, 0, 800'000}, slow.now);
     slow.poll(slow.now);
     CHECK(slow.uart.baud == 115'200);
@@ -396,11 +395,12 @@ TEST_CASE("vn100: a new configuration begins at the baud rate of the one before"
 
 TEST_CASE("vn100: an error that the part reports is a failure, with its code") {
     const unsigned step = GENERATE(0U, 3U, 8U);
-    World world(200'000);
+    Vn100World world(200'000);
     world.reach(step);
     world.answer("VNERR,0C");
-    CHECK(world.reports.events == std::vector<Event>{{BoardEventKind::imu_failed, 1, world.now,
-                                                      '0' * 256 + 'C', static_cast<int>(step)}});
+    CHECK(world.reports.events ==
+          std::vector<ReportedEvent>{
+              {BoardEventKind::imu_failed, 1, world.now, '0' * 256 + 'C', static_cast<int>(step)}});
     CHECK(world.imu.next_wake() == world.now + second);
     world.answer("VNERR,0C");  // of nothing that was asked
     CHECK(world.reports.events.size() == 1);
@@ -408,7 +408,7 @@ TEST_CASE("vn100: an error that the part reports is a failure, with its code") {
 
 TEST_CASE("vn100: only an intact answer to the command ends a step") {
     const auto step = GENERATE(0U, 1U, 8U);
-    World world(200'000);
+    Vn100World world(200'000);
     world.reach(step);
     const std::string good = framed(answer_to(world.uart.sent.back()));
     const std::string other = step == 1 ? "VNASY,0" : "VNWRG,06,0";
@@ -434,17 +434,17 @@ TEST_CASE("vn100: only an intact answer to the command ends a step") {
     }
     for (const std::string& text : wrong) {
         CAPTURE(text);
-        world.receive(bytes_of(text), world.now + ms / 10);
+        world.receive(text_bytes(text), world.now + ms / 10);
         REQUIRE(world.uart.sent.size() == step + 1);
         REQUIRE(world.reports.events.empty());
     }
-    world.receive(bytes_of("$junk" + good), world.now + ms / 10);
+    world.receive(text_bytes("$junk" + good), world.now + ms / 10);
     CHECK(world.uart.sent.size() == (step < 8 ? step + 2 : 9));
     CHECK(world.reports.events.size() == (step < 8 ? 0 : 1));
 }
 
 TEST_CASE("vn100: an answer comes in pieces, or among packets, and has 64 characters at most") {
-    World world(200'000);
+    Vn100World world(200'000);
     world.reach(1);
     const auto waits = [&world] { return world.uart.sent.size() == 2; };
     SECTION("byte by byte") {
@@ -456,7 +456,8 @@ TEST_CASE("vn100: an answer comes in pieces, or among packets, and has 64 charac
         CHECK(world.uart.sent.size() == 6);
     }
     SECTION("between packets") {
-        world.receive(packet() + bytes_of(framed("VNWRG,06,0")) + packet(), world.now + ms);
+        world.receive(vn100_packet() + text_bytes(framed("VNWRG,06,0")) + vn100_packet(),
+                      world.now + ms);
         CHECK_FALSE(waits());
         CHECK(world.samples.empty());
     }
@@ -473,8 +474,8 @@ TEST_CASE("vn100: an answer comes in pieces, or among packets, and has 64 charac
 }
 
 TEST_CASE("vn100: what arrived before it is asked does not count") {
-    World world(200'000);
-    world.receive(bytes_of("$VNA"), world.now - 1);
+    Vn100World world(200'000);
+    world.receive(text_bytes("$VNA"), world.now - 1);
     world.poll(world.imu.next_wake());
     REQUIRE(world.uart.sent.size() == 1);
     world.answer("VNASY,0");
@@ -488,7 +489,7 @@ TEST_CASE("vn100: what arrived before it is asked does not count") {
 }
 
 TEST_CASE("vn100: what a packet says") {
-    Running world;
+    RunningVn100 world;
     Packet packet;
     packet.accel = {1, -2, 3.5F};
     packet.gyro = {0.5F, -0.25F, 0.125F};
@@ -514,7 +515,7 @@ TEST_CASE("vn100: what a packet says") {
 }
 
 TEST_CASE("vn100: what does not fit into a word stays at its ends") {
-    Running world;
+    RunningVn100 world;
     Packet packet;
     packet.magnetic = {3.9998779F, 4.5F, -4.5F};
     packet.temperature = 300;
@@ -540,7 +541,7 @@ TEST_CASE("vn100: what does not fit into a word stays at its ends") {
 
 TEST_CASE("vn100: a packet with a float that is no number is sent, and says that the part failed") {
     for (std::size_t i = 0; i < 11; ++i) {
-        Running world;
+        RunningVn100 world;
         Packet packet;
         *packet.fields().at(i) = std::numeric_limits<float>::quiet_NaN();
         world.send(packet.bytes(), world.now);
@@ -551,8 +552,8 @@ TEST_CASE("vn100: a packet with a float that is no number is sent, and says that
 }
 
 TEST_CASE("vn100: packets are recognised by their header and CRC, wherever they begin") {
-    Running world;
-    const Bytes good = packet();
+    RunningVn100 world;
+    const Bytes good = vn100_packet();
     SECTION("byte by byte") {
         for (std::size_t i = 0; i < good.size(); ++i) {
             CHECK(world.samples.empty());
@@ -560,16 +561,18 @@ TEST_CASE("vn100: packets are recognised by their header and CRC, wherever they 
         }
     }
     SECTION("after bytes of others") {
-        world.receive(bytes_of("\r\nabc") + Bytes{0xFA, 0xFA, 0x01, 0xFA, 0x01, 0x01} + good,
+        world.receive(text_bytes("\r\nabc") + Bytes{0xFA, 0xFA, 0x01, 0xFA, 0x01, 0x01} + good,
                       world.now + ms);
     }
-    SECTION("after a line") { world.receive(bytes_of(framed("VNYMR,1,2")) + good, world.now + ms); }
+    SECTION("after a line") {
+        world.receive(text_bytes(framed("VNYMR,1,2")) + good, world.now + ms);
+    }
     SECTION("after a line without an end, of 64 bytes at least") {
-        world.receive(bytes_of("$VNYM") + good, world.now + ms);
+        world.receive(text_bytes("$VNYM") + good, world.now + ms);
         CHECK(world.samples.empty());
-        world.receive(bytes_of("."), world.now + ms);
+        world.receive(text_bytes("."), world.now + ms);
         CHECK(world.samples.size() == 1);
-        world.receive(bytes_of("$VNYMR") + packet(second + 1), world.now + ms);
+        world.receive(text_bytes("$VNYMR") + vn100_packet(second + 1), world.now + ms);
         CHECK(world.samples.size() == 2);
         return;
     }
@@ -578,7 +581,7 @@ TEST_CASE("vn100: packets are recognised by their header and CRC, wherever they 
             Bytes damaged = good;
             damaged[i] ^= 0x10U;
             world.receive(damaged, world.now + ms / 10);
-            world.receive(bytes_of("\n"), world.now + ms / 10);
+            world.receive(text_bytes("\n"), world.now + ms / 10);
             CHECK(world.samples.empty());
         }
         // Those whose header is damaged are not known for packets.
@@ -598,12 +601,12 @@ TEST_CASE("vn100: packets are recognised by their header and CRC, wherever they 
 }
 
 TEST_CASE("vn100: while it is set up, packets are neither samples nor errors") {
-    World world(200'000);
+    Vn100World world(200'000);
     world.reach(3);
-    Bytes damaged = packet();
+    Bytes damaged = vn100_packet();
     damaged[20] ^= 1U;
-    world.receive(packet(), world.now + ms);
-    world.receive(damaged + bytes_of("\n"), world.now + ms);
+    world.receive(vn100_packet(), world.now + ms);
+    world.receive(damaged + text_bytes("\n"), world.now + ms);
     CHECK(world.samples.empty());
     CHECK(world.imu.errors() == 0);
     world.answer_last();
@@ -612,11 +615,12 @@ TEST_CASE("vn100: while it is set up, packets are neither samples nor errors") {
 
 TEST_CASE("vn100: a sample without an edge has the time of its packet's first byte") {
     const std::uint32_t rate = GENERATE(100'000U, 800'000U);
-    Running world(rate);
+    RunningVn100 world(rate);
     const Nanoseconds begin = world.now;
     // Two at once, and the beginning of a third.
     const auto period = static_cast<std::uint64_t>(second * 1'000 / rate);
-    const Bytes three = packet() + packet(second + period) + packet(second + 2 * period);
+    const Bytes three =
+        vn100_packet() + vn100_packet(second + period) + vn100_packet(second + 2 * period);
     const Nanoseconds end = world.send({three.begin(), three.begin() + 130}, begin);
     REQUIRE(world.samples.size() == 2);
     CHECK(std::abs(world.samples[0].time_ns - begin) <= 2);
@@ -627,11 +631,11 @@ TEST_CASE("vn100: a sample without an edge has the time of its packet's first by
 }
 
 TEST_CASE("vn100: samples that were lost on the way are missing by number") {
-    Running world(400'000);  // every 2.5 ms
+    RunningVn100 world(400'000);  // every 2.5 ms
     std::uint64_t startup = 7 * second;
     const auto next = [&](std::int64_t since) {
         startup += static_cast<std::uint64_t>(since);
-        world.send(packet(startup), world.now + 2 * base);
+        world.send(vn100_packet(startup), world.now + 2 * base);
         return world.samples.back().number;
     };
     CHECK(next(0) == 0);  // the first: whatever its clock shows
@@ -651,7 +655,7 @@ TEST_CASE("vn100: samples that were lost on the way are missing by number") {
 
 TEST_CASE("vn100: a sample has the time of the newest edge before its packet") {
     const Nanoseconds delay = GENERATE(Nanoseconds{1}, 400 * us, base - 1);
-    Running world;
+    RunningVn100 world;
     const Nanoseconds begin = 2 * second;
     for (int i = 0; i < 5; ++i) {
         const Nanoseconds edge = begin + i * base;
@@ -664,18 +668,18 @@ TEST_CASE("vn100: a sample has the time of the newest edge before its packet") {
 }
 
 TEST_CASE("vn100: a packet that comes twice is stamped once") {
-    Running world;
+    RunningVn100 world;
     const Nanoseconds edge = 2 * second;
     world.sample(edge, second);
     world.sample(edge + base, second + static_cast<std::uint64_t>(base));
     CHECK(world.stamped());
-    world.send(packet(second + static_cast<std::uint64_t>(base)), edge + base + 900 * us);
+    world.send(vn100_packet(second + static_cast<std::uint64_t>(base)), edge + base + 900 * us);
     REQUIRE(world.samples.size() == 3);
     CHECK_FALSE(world.stamped());
 }
 
 TEST_CASE("vn100: without a data-ready line no sample is stamped by an edge") {
-    Running world(800'000, 0);
+    RunningVn100 world(800'000, 0);
     for (int i = 0; i < 5; ++i) {
         world.sample(2 * second + i * base, second + static_cast<std::uint64_t>(i * base));
         CHECK_FALSE(world.stamped());
@@ -684,7 +688,7 @@ TEST_CASE("vn100: without a data-ready line no sample is stamped by an edge") {
 }
 
 TEST_CASE("vn100: a packet that begins with an edge, or long after one, is not stamped by it") {
-    Running world(100'000);
+    RunningVn100 world(100'000);
     const auto sample = [&world](int i, Nanoseconds delay) {
         world.sample(2 * second + i * 8 * base, second + static_cast<std::uint64_t>(i * 8 * base),
                      delay);
@@ -702,9 +706,10 @@ TEST_CASE("vn100: a packet that begins with an edge, or long after one, is not s
 }
 
 TEST_CASE("vn100: more bytes wait than there is room for") {
-    Running world;
+    RunningVn100 world;
     Bytes many;
-    for (int i = 0; i < 8; ++i) many = many + packet(second + static_cast<std::uint64_t>(i * base));
+    for (int i = 0; i < 8; ++i)
+        many = many + vn100_packet(second + static_cast<std::uint64_t>(i * base));
     const Nanoseconds end = world.send({many.begin(), many.begin() + 50}, world.now);
     world.send({many.begin() + 50, many.end()}, end);
     CHECK(world.samples.size() == 8);
@@ -712,7 +717,7 @@ TEST_CASE("vn100: more bytes wait than there is room for") {
 }
 
 TEST_CASE("vn100: an edge that the part's own clock does not confirm stamps nothing") {
-    Running world;
+    RunningVn100 world;
     std::uint64_t startup = second;
     Nanoseconds edge = 2 * second;
     world.sample(edge, startup);
@@ -737,16 +742,17 @@ TEST_CASE("vn100: an edge that the part's own clock does not confirm stamps noth
 }
 
 TEST_CASE("vn100: echoes of an edge, up to 300 us after it, are no edges") {
-    Running world;
+    RunningVn100 world;
     world.sample(2 * second, second);
     world.imu.ready_edge(2 * second + base);
     world.imu.ready_edge(2 * second + base + 300 * us - 1);
-    world.send(packet(second + static_cast<std::uint64_t>(base)), 2 * second + base + 400 * us);
+    world.send(vn100_packet(second + static_cast<std::uint64_t>(base)),
+               2 * second + base + 400 * us);
     CHECK(world.stamped());
     CHECK(world.samples.back().time_ns == 2 * second + base);
     world.imu.ready_edge(2 * second + 2 * base);
     world.imu.ready_edge(2 * second + 2 * base + 300 * us);
-    world.send(packet(second + static_cast<std::uint64_t>(2 * base)),
+    world.send(vn100_packet(second + static_cast<std::uint64_t>(2 * base)),
                2 * second + 2 * base + 400 * us);
     CHECK(world.stamped());
     CHECK(world.samples.back().time_ns == 2 * second + 2 * base + 300 * us);
@@ -754,13 +760,13 @@ TEST_CASE("vn100: echoes of an edge, up to 300 us after it, are no edges") {
 
 TEST_CASE("vn100: packets that are read late find their edges, up to fifteen edges later") {
     const int later = GENERATE(1, 14, 15, 16, 17);
-    Running world;
+    RunningVn100 world;
     const Nanoseconds begin = 2 * second;
     world.sample(begin, second);
     world.sample(begin + base, second + static_cast<std::uint64_t>(base));
     CHECK(world.stamped());
     for (int i = 2; i <= 2 + later; ++i) world.imu.ready_edge(begin + i * base);
-    world.uart.waiting.emplace_back(packet(second + static_cast<std::uint64_t>(2 * base)),
+    world.uart.waiting.emplace_back(vn100_packet(second + static_cast<std::uint64_t>(2 * base)),
                                     begin + 2 * base + 400 * us + world.uart.line_time(58));
     world.poll(begin + (3 + later) * base);
     REQUIRE(world.samples.size() == 3);
@@ -769,36 +775,36 @@ TEST_CASE("vn100: packets that are read late find their edges, up to fifteen edg
 }
 
 TEST_CASE("vn100: a part that falls silent is set up again, at the other baud rate first") {
-    Running world(400'000);
-    const Nanoseconds end = world.send(packet(), world.now);
+    RunningVn100 world(400'000);
+    const Nanoseconds end = world.send(vn100_packet(), world.now);
     const Nanoseconds patience = 150 * ms;  // and 20 periods
     CHECK(world.imu.next_wake() == end + patience);
     world.poll(end + patience - 1);
     CHECK(world.reports.events.empty());
     world.poll(end + patience);
     CHECK(world.reports.events ==
-          std::vector<Event>{{BoardEventKind::imu_silent, 1, world.now, 0, 0xFFFF}});
+          std::vector<ReportedEvent>{{BoardEventKind::imu_silent, 1, world.now, 0, 0xFFFF}});
     CHECK(world.uart.sent.empty());
     CHECK(world.imu.next_wake() == world.now + second);
-    world.send(packet(2 * second), world.now + ms);  // it is not running
+    world.send(vn100_packet(2 * second), world.now + ms);  // it is not running
     CHECK(world.samples.size() == 1);
     // Running again: the first number shows that at least one sample is missing.
     world.reports.events.clear();
     world.uart.sent.clear();
     world.set_up();
-    world.send(packet(9 * second), world.now + ms);
+    world.send(vn100_packet(9 * second), world.now + ms);
     REQUIRE(world.samples.size() == 2);
     CHECK(world.samples.back().number == 2);
     CHECK(world.samples.back().flags == (wire::imu_overrun | wire::imu_repeated));
 }
 
 TEST_CASE("vn100: damaged packets alone are silence") {
-    Running world;
-    Bytes damaged = packet();
+    RunningVn100 world;
+    Bytes damaged = vn100_packet();
     damaged[40] ^= 1U;
     const Nanoseconds until = world.imu.next_wake();
     for (Nanoseconds at = until - 10 * ms; at < until; at += ms)
-        world.receive(damaged + bytes_of("\n"), at);
+        world.receive(damaged + text_bytes("\n"), at);
     CHECK(world.imu.next_wake() == until);
     CHECK(world.imu.errors() >= 10);
     world.poll(until);

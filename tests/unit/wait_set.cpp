@@ -28,7 +28,7 @@ using namespace versavis::ring;
 
 namespace {
 
-struct Streams {
+struct WaitStreams {
     test::TemporaryDirectory directory{"/dev/shm"};
 
     Writer writer(const std::string& name) const {
@@ -44,7 +44,7 @@ struct Streams {
     }
 };
 
-struct TwoStreams : Streams {
+struct TwoStreams : WaitStreams {
     Writer a = writer("a");
     Writer b = writer("b");
     Reader of_a = reader("a");
@@ -81,7 +81,7 @@ TEST_CASE_METHOD(TwoStreams, "wait_set: it names who has something, and takes tu
     CHECK(seen.size() == 2);
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(WaitStreams,
                  "wait_set: turns begin with the first, and whoever has something has one") {
     std::vector<Writer> writers;
     std::vector<Reader> readers;
@@ -128,7 +128,7 @@ TEST_CASE_METHOD(TwoStreams, "wait_set: each of its streams wakes it [threads]",
     }
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: an end is news once, a successor again") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: an end is news once, a successor again") {
     auto first = std::make_unique<Writer>(writer("a"));
     Reader of_a = reader("a");
     WaitSet set;
@@ -144,7 +144,7 @@ TEST_CASE_METHOD(Streams, "wait_set: an end is news once, a successor again") {
     CHECK_FALSE(set.wait({}));
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: what cannot be followed is not news for ever") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: what cannot be followed is not news for ever") {
     auto first = std::make_unique<Writer>(writer("a"));
     Reader of_a = reader("a");
     WaitSet set;
@@ -156,7 +156,7 @@ TEST_CASE_METHOD(Streams, "wait_set: what cannot be followed is not news for eve
     CHECK_FALSE(set.wait({}));
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: a dead writer is news once, though its file stays") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: a dead writer is news once, though its file stays") {
     Writer writing = writer("a");
     Reader of_a = reader("a");
     WaitSet set;
@@ -199,7 +199,7 @@ TEST_CASE_METHOD(TwoStreams, "wait_set: its descriptor is readable until nothing
     CHECK(readable(*descriptor, 20'000));
 }
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(WaitStreams,
                  "wait_set: a reader's own descriptor reports items, ends and restarts "
                  "[threads]",
                  "[threads]") {
@@ -231,7 +231,7 @@ TEST_CASE_METHOD(Streams,
     CHECK(of_a.next());
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: any time is a time to wait [threads]", "[threads]") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: any time is a time to wait [threads]", "[threads]") {
     Writer a = writer("a");
     Reader of_a = reader("a");
     WaitSet set;
@@ -246,7 +246,8 @@ TEST_CASE_METHOD(Streams, "wait_set: any time is a time to wait [threads]", "[th
     writing.join();
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: a writer on another clock is no news while its heart beats") {
+TEST_CASE_METHOD(WaitStreams,
+                 "wait_set: a writer on another clock is no news while its heart beats") {
     Writer writing = writer("a");
     Reader reading = reader("a");
     const HostTime far = host_now() - seconds(1000);
@@ -262,7 +263,8 @@ TEST_CASE_METHOD(Streams, "wait_set: a writer on another clock is no news while 
     CHECK(readable(*descriptor, 20'000));
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: the library's threads take none of the program's signals") {
+TEST_CASE_METHOD(WaitStreams,
+                 "wait_set: the library's threads take none of the program's signals") {
     const Writer writing = writer("a");
     Reader reading = reader("a");
     const auto before = test::threads();  // other libraries may have some of their own
@@ -277,7 +279,7 @@ TEST_CASE_METHOD(Streams, "wait_set: the library's threads take none of the prog
     test::await_sleep(std::stoi(own));  // nothing is to be done
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: a successor that could not be followed is tried again") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: a successor that could not be followed is tried again") {
     Writer writing = writer("a");
     Reader reading = reader("a");
     enum class By { time, descriptor, set };
@@ -296,7 +298,7 @@ TEST_CASE_METHOD(Streams, "wait_set: a successor that could not be followed is t
     CHECK(reading.next(seconds(20)).error().why == Pause::restarted);
 }
 
-TEST_CASE_METHOD(Streams, "wait_set: too many streams are refused") {
+TEST_CASE_METHOD(WaitStreams, "wait_set: too many streams are refused") {
     const Writer a = writer("a");
     Reader of_a = reader("a");
     WaitSet set;
@@ -323,7 +325,7 @@ bool forbid_threads() {
 
 }  // namespace
 
-TEST_CASE_METHOD(Streams,
+TEST_CASE_METHOD(WaitStreams,
                  "wait_set: where no descriptor or thread is to be had, that is reported") {
     const Writer a = writer("a");
     Reader of_a = reader("a");

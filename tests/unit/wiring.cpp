@@ -28,9 +28,9 @@ struct TrueCamera {
     bool incomplete = false;  ///< its frames
 };
 
-class World {
+class WiredWorld {
  public:
-    explicit World(std::vector<TrueCamera> cameras) : cameras_(std::move(cameras)) {}
+    explicit WiredWorld(std::vector<TrueCamera> cameras) : cameras_(std::move(cameras)) {}
 
     std::vector<CameraWiring> check(std::vector<WiredCamera> believed = {
                                         {"a", 0, true, microseconds(30)},
@@ -107,7 +107,7 @@ TrueCamera wired(std::vector<unsigned> outputs, std::vector<unsigned> inputs) {
     return camera;
 }
 
-TrueCamera right(unsigned port) { return wired({port}, {port}); }
+TrueCamera right_camera(unsigned port) { return wired({port}, {port}); }
 
 std::vector<std::string> codes(const CameraWiring& camera) {
     std::vector<std::string> codes;
@@ -118,15 +118,15 @@ std::vector<std::string> codes(const CameraWiring& camera) {
 using Codes = std::vector<std::string>;
 
 /// What is said of the first camera; the second must be right.
-Codes first(const TrueCamera& camera) {
-    const auto wirings = World({camera, right(1)}).check();
+Codes first_code(const TrueCamera& camera) {
+    const auto wirings = WiredWorld({camera, right_camera(1)}).check();
     CHECK(codes(wirings[1]) == Codes{"right"});
     CHECK(wirings[0].right == (codes(wirings[0]) == Codes{"right"}));
     return codes(wirings[0]);
 }
 
-TrueCamera with(void (*change)(TrueCamera&)) {
-    TrueCamera camera = right(0);
+TrueCamera camera_with(void (*change)(TrueCamera&)) {
+    TrueCamera camera = right_camera(0);
     change(camera);
     return camera;
 }
@@ -134,32 +134,36 @@ TrueCamera with(void (*change)(TrueCamera&)) {
 }  // namespace
 
 TEST_CASE("wiring: what is right is said to be, with figures") {
-    const auto wirings = World({right(0), right(1)}).check();
+    const auto wirings = WiredWorld({right_camera(0), right_camera(1)}).check();
     CHECK(codes(wirings[0]) == Codes{"right"});
     CHECK_THAT(wirings[0].findings[0].text, Catch::Contains("triggered by output 0, 32 of 32"));
 }
 
 TEST_CASE("wiring: each fault of one camera is named, and no other") {
-    CHECK(first(wired({}, {0})) == Codes{"no_trigger"});
-    CHECK(first(wired({0}, {})) == Codes{"no_exposure_line"});
-    CHECK(first(wired({2}, {0})) == Codes{"wrong_output"});
-    CHECK(first(wired({0}, {3})) == Codes{"wrong_input"});
-    CHECK(first(wired({3}, {3})) == Codes{"wrong_port"});
-    CHECK(first(wired({3}, {2})) == Codes{"wrong_output", "wrong_input"});
-    CHECK(first(wired({0, 2}, {0})) == Codes{"two_outputs"});
-    CHECK(first(wired({0}, {0, 2})) == Codes{"lines_joined"});
-    CHECK(first(with([](auto& c) { c.at_end = true; })) == Codes{"trigger_edge"});
-    CHECK(first(with([](auto& c) { c.inverted = true; })) == Codes{"exposure_inverted"});
-    CHECK(first(with([](auto& c) { c.fixed = milliseconds(2); })) == Codes{"fixed_length"});
-    CHECK(first(with([](auto& c) { c.longer = microseconds(400); })) == Codes{"slow_edge"});
-    CHECK(first(with([](auto& c) { c.longer = milliseconds(5); })) == Codes{"readout"});
-    CHECK(first(with([](auto& c) { c.delay = milliseconds(5); })) == Codes{"late_start"});
-    CHECK(first(with([](auto& c) { c.ignores = 0.3; })) == Codes{"lost"});
-    CHECK(first(with([](auto& c) { c.loses = 1; })) == Codes{"no_frames"});
-    CHECK(first(with([](auto& c) { c.incomplete = true; })) == Codes{"incomplete"});
-    CHECK(first(with([](auto& c) { c.bursts = 2; })) == Codes{"frames_for_each"});
-    CHECK(first(with([](auto& c) { c.idle_frames = 20; })) == Codes{"free_run"});
-    CHECK(first(with([](auto& c) { c.bounces = true; })) == Codes{"bounces"});
+    CHECK(first_code(wired({}, {0})) == Codes{"no_trigger"});
+    CHECK(first_code(wired({0}, {})) == Codes{"no_exposure_line"});
+    CHECK(first_code(wired({2}, {0})) == Codes{"wrong_output"});
+    CHECK(first_code(wired({0}, {3})) == Codes{"wrong_input"});
+    CHECK(first_code(wired({3}, {3})) == Codes{"wrong_port"});
+    CHECK(first_code(wired({3}, {2})) == Codes{"wrong_output", "wrong_input"});
+    CHECK(first_code(wired({0, 2}, {0})) == Codes{"two_outputs"});
+    CHECK(first_code(wired({0}, {0, 2})) == Codes{"lines_joined"});
+    CHECK(first_code(camera_with([](auto& c) { c.at_end = true; })) == Codes{"trigger_edge"});
+    CHECK(first_code(camera_with([](auto& c) { c.inverted = true; })) ==
+          Codes{"exposure_inverted"});
+    CHECK(first_code(camera_with([](auto& c) { c.fixed = milliseconds(2); })) ==
+          Codes{"fixed_length"});
+    CHECK(first_code(camera_with([](auto& c) { c.longer = microseconds(400); })) ==
+          Codes{"slow_edge"});
+    CHECK(first_code(camera_with([](auto& c) { c.longer = milliseconds(5); })) == Codes{"readout"});
+    CHECK(first_code(camera_with([](auto& c) { c.delay = milliseconds(5); })) ==
+          Codes{"late_start"});
+    CHECK(first_code(camera_with([](auto& c) { c.ignores = 0.3; })) == Codes{"lost"});
+    CHECK(first_code(camera_with([](auto& c) { c.loses = 1; })) == Codes{"no_frames"});
+    CHECK(first_code(camera_with([](auto& c) { c.incomplete = true; })) == Codes{"incomplete"});
+    CHECK(first_code(camera_with([](auto& c) { c.bursts = 2; })) == Codes{"frames_for_each"});
+    CHECK(first_code(camera_with([](auto& c) { c.idle_frames = 20; })) == Codes{"free_run"});
+    CHECK(first_code(camera_with([](auto& c) { c.bounces = true; })) == Codes{"bounces"});
 }
 
 TEST_CASE("wiring: what shows the trigger pulse is not taken for an exposure") {
@@ -186,7 +190,7 @@ TEST_CASE("wiring: what shows the trigger pulse is not taken for an exposure") {
 
 TEST_CASE("wiring: two cameras that are mixed up are reported as swapped") {
     const auto both = [](const TrueCamera& a, const TrueCamera& b) {
-        const auto wirings = World({a, b}).check();
+        const auto wirings = WiredWorld({a, b}).check();
         CHECK_THAT(wirings[0].findings[0].text, Catch::Contains("swap"));
         CHECK(codes(wirings[0]) == codes(wirings[1]));
         return codes(wirings[0]);
@@ -197,14 +201,14 @@ TEST_CASE("wiring: two cameras that are mixed up are reported as swapped") {
 }
 
 TEST_CASE("wiring: a camera on another's output is reported with the output where it belongs") {
-    const auto wirings = World({right(0), wired({0}, {1})}).check();
+    const auto wirings = WiredWorld({right_camera(0), wired({0}, {1})}).check();
     CHECK(codes(wirings[0]) == Codes{"right"});
     CHECK(codes(wirings[1]) == Codes{"shared_trigger"});
     CHECK_THAT(wirings[1].findings[0].text, Catch::Contains("move it to 1"));
 }
 
 TEST_CASE("wiring: exposures too long for their rate are found at the configured one") {
-    World world({right(0), right(1)});
+    WiredWorld world({right_camera(0), right_camera(1)});
     world.busy_beyond = milliseconds(7);
     CHECK(codes(world.check()[0]) == Codes{"overlap"});
 }
@@ -266,10 +270,10 @@ TEST_CASE("wiring: a camera that exposes for as long as the pulse is right") {
 
 TEST_CASE("wiring: without an exposure line only the trigger is judged") {
     const std::vector<WiredCamera> believed{{"a", 0, false, {}}};
-    CHECK(codes(World({wired({0}, {})}).check(believed)[0]) == Codes{"right"});
-    CHECK(codes(World({right(0)}).check(believed)[0]) == Codes{"strobe_unused"});
-    CHECK(codes(World({wired({1}, {})}).check(believed)[0]) == Codes{"wrong_output"});
-    const CameraWiring unseen = World({wired({}, {})}).check(believed)[0];
+    CHECK(codes(WiredWorld({wired({0}, {})}).check(believed)[0]) == Codes{"right"});
+    CHECK(codes(WiredWorld({right_camera(0)}).check(believed)[0]) == Codes{"strobe_unused"});
+    CHECK(codes(WiredWorld({wired({1}, {})}).check(believed)[0]) == Codes{"wrong_output"});
+    const CameraWiring unseen = WiredWorld({wired({}, {})}).check(believed)[0];
     CHECK(codes(unseen) == Codes{"no_trigger"});
     CHECK_THAT(unseen.findings[0].text, Catch::Contains("no frame arrive"));
 }

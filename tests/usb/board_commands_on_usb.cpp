@@ -29,7 +29,7 @@ constexpr auto sync_input =
     static_cast<std::uint8_t>(firmware::input_pulse + unsigned{wire::pulse_sync});
 
 /// A bus and the tool.
-struct Bench {
+struct BoardBench {
     /// Its exit code; `said` is what it printed.
     int board(const std::vector<std::string>& arguments) {
         std::vector<std::string> command{program("versavis"), "--instance", "no-such-service",
@@ -69,7 +69,7 @@ std::vector<std::int64_t> edges_of(const std::vector<OutputChange>& changes, std
 }  // namespace
 
 TEST_CASE("board: info shows version, parts and counters, in words and in JSON") {
-    Bench bench;
+    BoardBench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
     CHECK(bench.board({"info"}) == 0);
     CHECK_THAT(bench.said, Contains("LOOP0001 at usb:1-1") && Contains("firmware versavis ") &&
@@ -89,7 +89,7 @@ TEST_CASE("board: info shows version, parts and counters, in words and in JSON")
 }
 
 TEST_CASE("board: info of a boot loader says what can be done with it") {
-    Bench bench;
+    BoardBench bench;
     const SimulatedPico pico(bench.testbed.get(), {"PICO0001", "1-1", ""});
     CHECK(bench.board({"info"}) == 0);
     CHECK_THAT(bench.said, Contains("usb:1-1, in its boot loader") && Contains("versavis flash"));
@@ -100,7 +100,7 @@ TEST_CASE("board: info of a boot loader says what can be done with it") {
 }
 
 TEST_CASE("board: reset begins a new life, and starts what the boot loader has") {
-    Bench bench;
+    BoardBench bench;
     {
         const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
         CHECK(bench.board({"reset", "--json"}) == 0);
@@ -116,7 +116,7 @@ TEST_CASE("board: reset begins a new life, and starts what the boot loader has")
 }
 
 TEST_CASE("board: without a board, each command says what to do") {
-    Bench bench;
+    BoardBench bench;
     for (const char* command : {"info", "reset", "selftest"}) {
         CHECK(bench.board({command}) == 69);
         CHECK_THAT(bench.said, Contains("no board") && Contains("plug it in"));
@@ -124,7 +124,7 @@ TEST_CASE("board: without a board, each command says what to do") {
 }
 
 TEST_CASE("board: the service has it and says what it is; reset and self-test are refused") {
-    Bench bench;
+    BoardBench bench;
     Stack stack({"boardbusy", 33, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_rig();
     UsbBridge bridge(bench.testbed.get(), stack.socket_path(), "RIG0001");
@@ -149,7 +149,7 @@ TEST_CASE("board: the service has it and says what it is; reset and self-test ar
 }
 
 TEST_CASE("board: the self-test measures what wires join, and leaves the outputs at rest") {
-    Bench bench;
+    BoardBench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001",
                             {{firmware::pin_test, aux0},
                              {firmware::pin_sync, sync_input},
@@ -188,7 +188,7 @@ TEST_CASE("board: the self-test measures what wires join, and leaves the outputs
 }
 
 TEST_CASE("board: the self-test finds lines that are loaded, and wires that are not there") {
-    Bench bench;
+    BoardBench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001",
                             {{firmware::pin_test, aux0, 0, 60'000}, {0, 0, 30'000, 30'000}});
     CHECK(bench.board({"selftest", "--wire", "sync=sync_input"}) == 1);
@@ -202,7 +202,7 @@ TEST_CASE("board: the self-test finds lines that are loaded, and wires that are 
 }
 
 TEST_CASE("board: a self-test of a board without wires does not pass") {
-    Bench bench;
+    BoardBench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
     CHECK(bench.board({"selftest"}) == 1);
     CHECK_THAT(bench.said, Contains("nothing was tested") && Contains("docs/user/board.md"));
@@ -253,7 +253,7 @@ TEST_CASE("board: the bring-up sends in each step what its row in the manual say
 }
 
 TEST_CASE("board: a bring-up that nobody looks at tests the loops") {
-    Bench bench;
+    BoardBench bench;
     {
         const LoopedBoard board(bench.testbed.get(), "LOOP0001", all_loops);
         const int code = bench.board({"selftest", "--bringup", "--json"});

@@ -76,11 +76,11 @@ TEST_CASE("usb: a boot loader where the board should be is named, with what to d
     const SimulatedPico pico(testbed.get(), settings);
     Stack stack({"bootusb", 35, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_service();
-    stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
-    std::string said;
-    stack.tool({"status"}, &said);
-    CHECK_THAT(said, Catch::Contains("no device 1209:5653, but " + std::string(words)) &&
-                         Catch::Contains(cure));
+    const auto status =
+        stack.wait_for_status([](const auto& s) { return s["health"] == "degraded"; });
+    CHECK_THAT(
+        status["board"]["hint"].get<std::string>(),
+        Catch::Contains("no device 1209:5653, but " + std::string(words)) && Catch::Contains(cure));
     CHECK(stack.service().terminate() == 0);
 }
 

@@ -30,7 +30,7 @@ enum Id : std::uint8_t {
     read_memory = 0x84,
 };
 
-enum Status : std::uint32_t {
+enum PicobootStatus : std::uint32_t {
     ok = 0,
     unknown_command = 1,
     wrong_command_length = 2,

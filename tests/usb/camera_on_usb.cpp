@@ -94,7 +94,7 @@ TEST_CASE("usb: a USB3 Vision camera streams, stalls, is unplugged and comes bac
         status = stack.wait_for_status(
             [](const auto& s) { return s["cameras"][0]["state"] == "absent"; });
         CHECK_THAT(status["cameras"][0]["hint"].get<std::string>(),
-                   Catch::Contains("no camera answers to this name"));
+                   Catch::Contains("it answered before, and does not any more"));
         rig.device.plug();
         status = stack.wait_for_status(healthy);
         CHECK(status["cameras"][0]["connections"] == 3);

@@ -26,8 +26,8 @@ const std::string old_version = "versavis 0.0.1";
 const std::string new_version = "versavis 0.0.2";
 
 /// A bus, a file of the new version, and the tool.
-struct Bench {
-    Bench() { write(uf2_file(pico_firmware(new_version, pages))); }
+struct FlashBench {
+    FlashBench() { write(uf2_file(pico_firmware(new_version, pages))); }
 
     void write(const std::vector<std::uint8_t>& bytes) {
         file = directory.write("new.uf2", as_text(bytes));
@@ -54,7 +54,7 @@ bool holds(const SimulatedPico& pico, const std::string& version) {
 }  // namespace
 
 TEST_CASE("flash: a board that runs gets new firmware, and both versions are reported") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     // What lies behind the image are the board's own settings.
     const std::vector<std::uint8_t> settings(256, 0x5A);
@@ -68,7 +68,7 @@ TEST_CASE("flash: a board that runs gets new firmware, and both versions are rep
 }
 
 TEST_CASE("flash: a board in its boot loader is found, too, and the outcome may be JSON") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {"PICO0007", "1-1", ""});
     CHECK(bench.flash({"--json"}) == 0);
     const auto outcome = nlohmann::json::parse(bench.said);
@@ -81,7 +81,7 @@ TEST_CASE("flash: a board in its boot loader is found, too, and the outcome may 
 }
 
 TEST_CASE("flash: a board whose program hangs is rebooted by 1200 baud") {
-    Bench bench;
+    FlashBench bench;
     PicoSettings settings;
     settings.hangs = true;
     SimulatedPico pico(bench.testbed.get(), settings);
@@ -91,7 +91,7 @@ TEST_CASE("flash: a board whose program hangs is rebooted by 1200 baud") {
 }
 
 TEST_CASE("flash: firmware of another protocol is replaced, and info says that it must be") {
-    Bench bench;
+    FlashBench bench;
     PicoSettings settings;
     settings.protocol = 2;
     SimulatedPico pico(bench.testbed.get(), settings);
@@ -103,13 +103,13 @@ TEST_CASE("flash: firmware of another protocol is replaced, and info says that i
 }
 
 TEST_CASE("flash: without a board, it says what to do") {
-    Bench bench;
+    FlashBench bench;
     CHECK(bench.flash() == 69);
     CHECK_THAT(bench.said, Contains("1209:5653") && Contains("2e8a:0003") && Contains("BOOTSEL"));
 }
 
 TEST_CASE("flash: a wrong file is refused before the board is touched") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     auto file = uf2_file(pico_firmware(new_version, pages));
     SECTION("of another chip") {
@@ -152,7 +152,7 @@ TEST_CASE("flash: a wrong file is refused before the board is touched") {
 }
 
 TEST_CASE("flash: unplugged in the middle, the board is flashed again") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     BootLoaderFaults faults;
     faults.gone_at = 20 * client::flash_page;
@@ -168,7 +168,7 @@ TEST_CASE("flash: unplugged in the middle, the board is flashed again") {
 }
 
 TEST_CASE("flash: what reads back otherwise does not start") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     const std::size_t at = 17 * client::flash_page + 3;
     const std::uint8_t wanted = pico_firmware(new_version, pages)[at];
@@ -182,7 +182,7 @@ TEST_CASE("flash: what reads back otherwise does not start") {
 }
 
 TEST_CASE("flash: a boot loader that refuses or does not answer is reported, with the command") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {"PICO0001", "1-1", ""});
     struct Case {
         std::uint8_t id;
@@ -205,7 +205,7 @@ TEST_CASE("flash: a boot loader that refuses or does not answer is reported, wit
 }
 
 TEST_CASE("flash: a boot loader that does not answer is reported") {
-    Bench bench;
+    FlashBench bench;
     PicoSettings settings;
     settings.faults.held_command = 0x05;
     SimulatedPico pico(bench.testbed.get(), settings);
@@ -215,7 +215,7 @@ TEST_CASE("flash: a boot loader that does not answer is reported") {
 }
 
 TEST_CASE("flash: a board that does not reboot into its boot loader is reported") {
-    Bench bench;
+    FlashBench bench;
     PicoSettings settings;
     settings.obeys = false;
     SimulatedPico pico(bench.testbed.get(), settings);
@@ -226,7 +226,7 @@ TEST_CASE("flash: a board that does not reboot into its boot loader is reported"
 }
 
 TEST_CASE("flash: new firmware that says nothing is reported") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     auto image = pico_firmware(new_version, pages);
     image[client::flash_page] = 0;  // its version: it does not speak
@@ -237,7 +237,7 @@ TEST_CASE("flash: new firmware that says nothing is reported") {
 }
 
 TEST_CASE("flash: of two boards one is chosen") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico first(bench.testbed.get(), {"PICO0001", "1-1"});
     SimulatedPico second(bench.testbed.get(), {"PICO0002", "1-2"});
     CHECK(bench.flash() == 69);
@@ -257,7 +257,7 @@ TEST_CASE("flash: of two boards one is chosen") {
 }
 
 TEST_CASE("flash: the firmware that was installed is taken, else the one that was built") {
-    Bench bench;
+    FlashBench bench;
     SimulatedPico pico(bench.testbed.get(), {});
     const auto prefix = bench.directory.path();
     const auto tool = prefix / "bin/versavis";
@@ -282,7 +282,7 @@ TEST_CASE("flash: the firmware that was installed is taken, else the one that wa
 }
 
 TEST_CASE("flash: all boards of a fleet, whatever becomes of one of them") {
-    Bench bench;
+    FlashBench bench;
     CHECK(bench.flash({"--all"}) == 69);
     CHECK_THAT(bench.said, Contains("no board") && Contains("BOOTSEL"));
     SimulatedPico first(bench.testbed.get(), {"PICO0001", "1-1"});
@@ -311,7 +311,7 @@ TEST_CASE("flash: all boards of a fleet, whatever becomes of one of them") {
 }
 
 TEST_CASE("flash: a Pico 2 is refused, and does not stand in the way of a board") {
-    Bench bench;
+    FlashBench bench;
     PicoSettings settings{"", "1-2", ""};
     settings.faults.product = 0x000F;
     const SimulatedPico other(bench.testbed.get(), settings);
@@ -342,7 +342,7 @@ TEST_CASE("flash: the firmware of this build may be flashed") {
 }
 
 TEST_CASE("flash: interrupted, it says what state the board is in") {
-    Bench bench;
+    FlashBench bench;
     BootLoaderFaults faults;
     faults.held_command = 0x03;
     SimulatedPico pico(bench.testbed.get(), {});
@@ -367,7 +367,7 @@ TEST_CASE("flash: interrupted, it says what state the board is in") {
 }
 
 TEST_CASE("flash: a board that the service has is left alone") {
-    Bench bench;
+    FlashBench bench;
     Stack stack({"flashbusy", 32, 1, 20, "", "", "", 320, 240, "usb"});
     stack.start_rig();
     UsbBridge bridge(bench.testbed.get(), stack.socket_path(), "RIG0001");

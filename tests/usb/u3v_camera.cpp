@@ -21,7 +21,7 @@ constexpr std::size_t control_header = 12;
 constexpr std::uint16_t acknowledge_wanted = 1U << 14U;
 constexpr std::uint16_t image = 0x0001;
 constexpr std::uint16_t image_with_chunks = 0x4001;
-enum Status : std::uint16_t {
+enum U3vStatus : std::uint16_t {
     success = 0,
     not_implemented = 0x8001,
     invalid_parameter = 0x8002,

@@ -10,6 +10,7 @@ namespace {
 
 constexpr Nanoseconds us = 1'000;
 constexpr Nanoseconds ms = 1'000'000;
+constexpr double pi = 3.14159265358979323846;
 constexpr std::uint32_t burst_clock_limit_hz = 1'000'000;
 constexpr std::uint32_t clock_limit_hz = 2'000'000;
 
@@ -29,20 +30,20 @@ std::uint16_t crc16(const std::vector<std::uint16_t>& words, std::size_t first, 
 const AdisDevice::Map& AdisDevice::map(AdisModel model) {
     static const std::map<AdisModel, Map> maps{
         {AdisModel::adis16445,
-         {0x403D, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.01, 0.00025, 0.07386, 31, 819.2, true, false,
-          9 * us, 55 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x403D, 0x56,       0x3E, 0x34,  0x36,   0x38,    0.01,    0.00025, 0.07386, 31,
+          819.2,  {404, 757}, true, false, 9 * us, 55 * ms, 40 * us, 0x0006,  0x0001,  0x0402}},
         {AdisModel::adis16448a,
-         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true,
-          9 * us, 90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x4040, 0x56,       0x3E, 0x34, 0x36,   0x38,    0.04,    1.0 / 1200, 0.07386, 31,
+          819.2,  {404, 757}, true, true, 9 * us, 90 * ms, 40 * us, 0x0006,     0x0001,  0x0402}},
         {AdisModel::adis16448b,
-         {0x4040, 0x56, 0x3E, 0x34, 0x36, 0x38, 0.04, 1.0 / 1200, 0.07386, 31, 819.2, true, true,
-          9 * us, 90 * ms, 40 * us, 0x0006, 0x0001, 0x0402}},
+         {0x4040, 0x56,       0x3E, 0x34, 0x36,   0x38,    0.04,    1.0 / 1200, 0.07386, 31,
+          819.2,  {404, 757}, true, true, 9 * us, 90 * ms, 40 * us, 0x0006,     0x0001,  0x0402}},
         {AdisModel::adis16460,
-         {0x404C, 0x56, 0x3E, 0x32, 0x36, 0x38, 0.005, 0.00025, 0.05, 25, 2048, false, false,
-          16 * us, 225 * ms, 24 * us, 0x00C1, 0x0000, 0x0500}},
+         {0x404C, 0x56,       0x3E,  0x32,  0x36,    0x38,     0.005,   0.00025, 0.05,   25,
+          2048,   {456, 854}, false, false, 16 * us, 225 * ms, 24 * us, 0x00C1,  0x0000, 0x0500}},
         {AdisModel::adis16470,
-         {0x4056, 0x72, 0x68, 0x60, 0x64, 0x5C, 0.1, 0.00125, 0.1, 0, 2000, false, false, 16 * us,
-          193 * ms, 24 * us, 0x00C1, 0x0000, 0x0000}},
+         {0x4056, 0x72,        0x68,  0x60,  0x64,    0x5C,     0.1,     0.00125, 0.1,    0,
+          2000,   {668, 1253}, false, false, 16 * us, 193 * ms, 24 * us, 0x00C1,  0x0000, 0x0000}},
     };
     return maps.at(model);
 }
@@ -84,8 +85,15 @@ unsigned AdisDevice::averaged() const {
 
 Nanoseconds AdisDevice::motion_shown(Nanoseconds at) const {
     const UpdateTimes times = updates();
-    const double delay = (taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz;
-    return times.time(times.index_at(at)) - std::llround(delay * 1e9);
+    return times.time(times.index_at(at)) - delays().gyro;
+}
+
+/// Of the element and of the averages that follow each other.
+SampleDelays AdisDevice::delays() const {
+    const double element = 1 / (2 * pi * map_.poles_hz[0]) + 1 / (2 * pi * map_.poles_hz[1]);
+    const double averages = (taps() - 1 + (averaged() - 1) / 2.0) / map_.base_hz;
+    const Nanoseconds delay = std::llround((element + averages) * 1e9);
+    return {delay, delay};
 }
 
 /// Of the newest sample and those before it: the mean over the taps, over these means again, and
@@ -101,16 +109,24 @@ std::vector<double> AdisDevice::weights() const {
     return weights;
 }
 
+/// The element remembers the motion for the time constants of its poles: shown here by two instants
+/// with the mean and the spread of its response.
 Inertial AdisDevice::filtered(Nanoseconds at) const {
     Inertial felt = world_(at);
     felt.gyro_deg_s = felt.accel_g = {};
+    const double first = 1 / (2 * pi * map_.poles_hz[0]), second = 1 / (2 * pi * map_.poles_hz[1]);
+    const double spread = std::hypot(first, second);
     double back = 0;
     for (const double weight : weights()) {
-        const Inertial then = world_(at - std::llround(back++ / map_.base_hz * 1e9));
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            felt.gyro_deg_s.at(axis) += weight * then.gyro_deg_s.at(axis);
-            felt.accel_g.at(axis) += weight * then.accel_g.at(axis);
+        for (const double element : {first + second - spread, first + second + spread}) {
+            const double age = back / map_.base_hz + element;
+            const Inertial then = world_(at - std::llround(age * 1e9));
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                felt.gyro_deg_s.at(axis) += weight / 2 * then.gyro_deg_s.at(axis);
+                felt.accel_g.at(axis) += weight / 2 * then.accel_g.at(axis);
+            }
         }
+        ++back;
     }
     return felt;
 }

@@ -20,10 +20,10 @@ class AdisDevice final : public SpiImuDevice {
                   std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+    SampleDelays delays() const override;
     void brown_out(Nanoseconds at) override { reset(at + map_.reset); }
 
-    /// When the motion was that it shows at `at`: its newest sample then, less the delay of
-    /// averages that follow each other.
+    /// When the motion was that it shows at `at`.
     Nanoseconds motion_shown(Nanoseconds at) const;
 
     /// The next `bursts` have a flipped bit.
@@ -41,6 +41,7 @@ class AdisDevice final : public SpiImuDevice {
         unsigned product_at, command_at, control_at, rate_at, filter_at;
         double gyro_lsb, accel_lsb, temperature_lsb, temperature_zero;
         double base_hz;
+        double poles_hz[2];  ///< of its sensor element
         bool octaves;
         bool magnetic;
         Nanoseconds stall, reset;

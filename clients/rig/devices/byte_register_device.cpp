@@ -64,13 +64,38 @@ void Icm42688pDevice::write(unsigned address, std::uint8_t value, Nanoseconds at
     registers_[address] = value;
 }
 
+/// By the data sheet's table of group delays, for filters of second order: a row for each rate,
+/// from GYRO_ODR = 3 (8 kHz) on, in units of 0.1 ms.
+Nanoseconds Icm42688pDevice::filter_delay(unsigned filter) const {
+    static const std::map<unsigned, std::array<unsigned, 8>> rows{
+        {3, {2, 2, 2, 2, 2, 2, 2, 2}},
+        {4, {4, 4, 4, 4, 4, 4, 4, 4}},
+        {5, {8, 8, 8, 8, 8, 8, 8, 8}},
+        {6, {7, 21, 24, 32, 37, 52, 61, 120}},
+        {15, {13, 41, 47, 64, 73, 104, 122, 240}},
+        {7, {33, 51, 58, 80, 91, 129, 153, 300}},
+        {8, {65, 51, 58, 80, 91, 129, 153, 300}},
+        {9, {129, 51, 58, 80, 91, 129, 153, 300}},
+        {10, {257, 51, 58, 80, 91, 129, 153, 300}},
+        {11, {257, 51, 58, 80, 91, 129, 153, 300}}};
+    const auto row = rows.find(registers_[0x4F] & 0x0FU);
+    return row == rows.end() ? 0 : row->second.at(filter & 7U) * 100 * us;
+}
+
+/// With the anti-alias filters before them, of 585 and 1163 Hz.
+SampleDelays Icm42688pDevice::delays() const {
+    return {filter_delay(registers_[0x52] & 0x0FU) + 385 * us,
+            filter_delay(registers_[0x52] >> 4U) + 193 * us};
+}
+
 std::uint8_t Icm42688pDevice::read(unsigned address, Nanoseconds at) {
     if (address < 0x1D || address > 0x2D) return registers_[address];
     if (!running() || at < on_at_ + 30 * ms) return address % 2 == 1 ? 0x80 : 0x00;
     if (address == 0x2D) return status(at);
     const UpdateTimes times = updates();
-    const Inertial felt = world_(times.time(times.index_at(std::min(at, frozen_at_))));
+    const Nanoseconds taken = times.time(times.index_at(std::min(at, frozen_at_)));
     const unsigned word = (address - 0x1D) / 2;
+    const Inertial felt = world_(taken - (word > 3 ? delays().gyro : delays().accel));
     std::int16_t value = 0;
     if (word == 0)
         value = counts(felt.temperature_c - 25, 1 / 132.48);

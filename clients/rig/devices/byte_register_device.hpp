@@ -20,6 +20,7 @@ class Icm42688pDevice final : public SpiImuDevice {
              std::span<std::uint8_t> received) override;
     UpdateTimes updates() const override;
     bool signals(Nanoseconds at) const override;
+    SampleDelays delays() const override;
 
     /// Its interface is wired for I2C, at this address.
     void wire_i2c(std::uint8_t address) { address_ = address; }
@@ -38,6 +39,7 @@ class Icm42688pDevice final : public SpiImuDevice {
     void write(unsigned address, std::uint8_t value, Nanoseconds at);
     std::uint8_t read(unsigned address, Nanoseconds at);
     std::uint8_t status(Nanoseconds at);
+    Nanoseconds filter_delay(unsigned filter) const;
     bool running() const { return (registers_[0x4E] & 0x0FU) == 0x0F; }
 
     World world_;

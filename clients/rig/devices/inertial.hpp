@@ -36,6 +36,12 @@ struct UpdateTimes {
     bool operator==(const UpdateTimes&) const = default;
 };
 
+/// How much later than the motion samples are.
+struct SampleDelays {
+    Nanoseconds gyro = 0;
+    Nanoseconds accel = 0;
+};
+
 /// A part on the SPI bus, at register level.
 class SpiImuDevice {
  public:
@@ -55,6 +61,8 @@ class SpiImuDevice {
     virtual UpdateTimes updates() const = 0;
     /// False: the data-ready line does not pulse with the present settings.
     virtual bool signals(Nanoseconds at) const = 0;
+    /// By the element and the filters as they are set up.
+    virtual SampleDelays delays() const { return {}; }
 
     /// The same of an accelerometer with a clock and a line of its own.
     virtual UpdateTimes accel_updates() const { return {}; }

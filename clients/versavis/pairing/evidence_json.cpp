@@ -72,7 +72,8 @@ json describe(const RecordLimits& limits) {
             {"max_exposure_ns", limits.max_exposure.ns},
             {"grid_slew_ppm", limits.grid_slew_ppm},
             {"wired", limits.wired},
-            {"slave", limits.slave}};
+            {"slave", limits.slave},
+            {"fixed_grid", limits.fixed_grid}};
 }
 
 /// Times that the board does not know are null.
@@ -90,7 +91,8 @@ json describe(const ReceivedRecord& received) {
             {"exchanges", received.exchanges},
             {"expected_ns", received.expected_ns},
             {"arrival", static_cast<std::uint32_t>(received.arrival)},
-            {"clock_contradicted", received.clock_contradicted}};
+            {"clock_contradicted", received.clock_contradicted},
+            {"promptness", static_cast<std::uint32_t>(received.promptness)}};
 }
 
 json describe(const TriggersSkipped& skipped) {
@@ -143,6 +145,7 @@ RecordLimits record_limits(const json& line) {
     limits.grid_slew_ppm = line.at("grid_slew_ppm");
     limits.wired = line.at("wired");
     limits.slave = line.at("slave");
+    limits.fixed_grid = line.value("fixed_grid", false);  // older: not recorded
     return limits;
 }
 
@@ -162,6 +165,7 @@ ReceivedRecord received_record(const json& line) {
     received.expected_ns = line.at("expected_ns");
     received.arrival = static_cast<EventReason>(line.at("arrival").get<std::uint32_t>());
     received.clock_contradicted = line.at("clock_contradicted");
+    received.promptness = static_cast<Promptness>(line.value("promptness", std::uint8_t{0}));
     return received;
 }
 

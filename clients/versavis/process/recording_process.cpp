@@ -9,9 +9,11 @@
 #include <optional>
 
 #include "base/shallow_json.hpp"
+#include "engine/rounding.hpp"
 #include "process/frame_proof.hpp"
 #include "process/mcap_copy.hpp"
 #include "process/restamping.hpp"
+#include "process/stamp_choice.hpp"
 #include "recording/item_fields.hpp"
 #include "recording/recording.hpp"
 
@@ -21,8 +23,14 @@ namespace {
 
 using nlohmann::json;
 
-// Stamps that are off the link's by more were made by PPS, which is better than messages are.
-constexpr double pps_differs_ns = 2000;
+// A frame that is proved where stamps are not by the recomputed clock takes over what those around
+// it, so far away at most, are off from it. Half: gaps leave it suspect. Twice: it is off by what
+// the clocks wander within ten seconds.
+constexpr Duration next_to_it = seconds(5);
+
+// Stamps of another clock that show by how much the recomputed ones are wrong. Half: those next to
+// a step may pass for them. Twice: short stretches say nothing.
+constexpr std::size_t least_of_other_clock = 20;
 
 constexpr std::uint32_t no_proof = UINT32_MAX;
 
@@ -37,13 +45,24 @@ struct Change {
     bool restamped = true;           ///< false: it stays, unless it must be held
 };
 
+/// A stamp as it was recorded, and what becomes of it.
+struct Candidate {
+    Change change;
+    std::optional<Restamping::Stamp> stamp;  ///< recomputed
+    Duration least_sigma;                    ///< live, of the clock alone, at least ...
+    Duration most_sigma;                     ///< ... and at most
+    std::uint64_t life = 0;
+    std::uint32_t epoch = 0;
+    bool suspect = false;
+    Choice choice = Choice::no_clock;
+};
+
 struct Stream {
     ring::StreamKind kind = ring::StreamKind::frames;
+    std::vector<Candidate> candidates;
     std::vector<Change> changes;  ///< by `before`
     std::vector<ProvedFrame> proofs;
     ProcessedStream counts;
-    std::uint64_t life = 0;
-    std::uint32_t epoch = 0;
     std::optional<OutputTime> newest;  ///< of this epoch, suspects aside
 };
 
@@ -61,15 +80,24 @@ Duration uncertain(const ProvedFrame& proof, HostTime middle) {
 }
 
 /// How the link's asymmetry was subtracted live.
-Duration asymmetry_of(const Recording& recording) {
+std::optional<clock::Asymmetry> asymmetry_of(const Recording& recording) {
     const Attachment* status = recording.attachment("status.json");
-    if (status == nullptr) return {};
+    if (status == nullptr) return std::nullopt;
     const json document = parse_shallow_json(status->content);
-    if (!document.is_object() || !document.contains("clock")) return {};
+    if (!document.is_object() || !document.contains("clock")) return std::nullopt;
     const json& clock = document["clock"];
-    if (!clock.is_object() || clock.value("asymmetry_source", json()) == json("none")) return {};
-    const json value = clock.value("asymmetry_ns", json());
-    return {value.is_number() ? value.get<std::int64_t>() : std::int64_t{0}};
+    if (!clock.is_object() || clock.value("asymmetry_source", json("none")) == json("none"))
+        return std::nullopt;
+    const json offset = clock.value("asymmetry_ns", json());
+    const json sigma = clock.value("asymmetry_sigma_ns", json());
+    if (!offset.is_number() || !sigma.is_number()) return std::nullopt;
+    return clock::Asymmetry{{offset.get<std::int64_t>()}, {sigma.get<std::int64_t>()}};
+}
+
+Duration without(std::uint32_t total, Duration part) {
+    const auto whole = static_cast<double>(total);
+    const auto other = static_cast<double>(part.ns);
+    return rounded(std::sqrt(std::max(whole * whole - other * other, 0.0)));
 }
 
 class Processing {
@@ -79,14 +107,22 @@ class Processing {
         : recording_(recording),
           report_(report),
           go_on_(go_on),
-          restamping_(clocks, asymmetry_of(recording)) {}
+          restamping_(clocks, asymmetry_of(recording)) {
+        for (const PpsPulse& pulse : clocks.pulses)
+            if (pulse.sigma.ns >= 0) live_sigmas_.add(pulse.host, pulse.sigma);
+    }
 
     Expected<> plan() {
         auto done = pair_again();
-        if (done) done = ask_whether_pps();
-        if (done) done = restamp();
+        if (done) done = read_stamps();
         if (!done) return done;
-        for (auto& [name, stream] : streams_) finish(name, stream);
+        live_sigmas_.sort();
+        recomputed_off_ = off_from_other_clock();
+        for (auto& [name, stream] : streams_) {
+            choose_all(stream);
+            restamp(stream);
+            finish(name, stream);
+        }
         return {};
     }
 
@@ -138,52 +174,182 @@ class Processing {
         return {};
     }
 
-    /// Live, PPS may have made the stamps; messages would make them worse.
-    Expected<> ask_whether_pps() {
-        std::vector<double> off;
-        auto done =
-            each(names({ring::StreamKind::imu, ring::StreamKind::frames}),
-                 [&](const RecordedItem& item) {
-                     const HostTime host = host_of(item);
-                     const auto shown = restamping_.output(host);
-                     if (shown && off.size() < 100'000)
-                         off.push_back(std::abs(static_cast<double>((item.time - *shown).ns)));
-                 });
-        if (!done || off.empty()) return done;
-        const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-        std::nth_element(off.begin(), middle, off.end());
-        by_pps_ = *middle > pps_differs_ns;
-        if (by_pps_)
-            report_.notes.emplace_back(
-                "PPS made the stamps: the clock was not smoothed, since messages are less "
-                "accurate");
-        return {};
-    }
-
-    static HostTime host_of(const RecordedItem& item) {
-        return item.kind == ring::StreamKind::imu ? unpack<ImuMetadata>(item.metadata).host_time
-                                                  : unpack<FrameMetadata>(item.metadata).host_time;
-    }
-
-    Expected<> restamp() {
+    Expected<> read_stamps() {
         return each(names({ring::StreamKind::imu, ring::StreamKind::frames}),
                     [this](const RecordedItem& item) {
                         Stream& stream = streams_[item.stream];
                         stream.kind = item.kind;
                         ++stream.counts.items;
                         if (item.kind == ring::StreamKind::imu)
-                            restamp_sample(item, stream);
+                            read_sample(item, stream);
                         else
-                            restamp_frame(item, stream);
+                            read_frame(item, stream);
                     });
+    }
+
+    template <class Metadata>
+    static Candidate candidate(const RecordedItem& item, const Metadata& metadata) {
+        Candidate read;
+        read.change = {item.time, item.time, metadata.host_time, metadata.sigma_ns, metadata.flags,
+                       no_proof,  false};
+        read.life = item.life;
+        read.epoch = metadata.epoch;
+        read.suspect = (metadata.flags & flag_suspect) != 0;
+        return read;
+    }
+
+    void read_sample(const RecordedItem& item, Stream& stream) {
+        const auto sample = unpack<ImuMetadata>(item.metadata);
+        Candidate read = candidate(item, sample);
+        if (!read.suspect) {
+            read.stamp =
+                restamping_.stamp(sample.board_time - sample.filter_delay, sample.host_time);
+            read.choice = Choice::no_estimate;
+        }
+        stream.candidates.push_back(read);
+    }
+
+    void read_frame(const RecordedItem& item, Stream& stream) {
+        const auto frame = unpack<FrameMetadata>(item.metadata);
+        Candidate read = candidate(item, frame);
+        const std::uint32_t index = proof_of(frame, stream.proofs);
+        const ProvedFrame* proof = index == no_proof ? nullptr : &stream.proofs[index];
+        if (read.suspect) {
+            ++stream.counts.suspect;
+            if (proof != nullptr) {
+                const pairing::Exposure& exposure = proof->exposure;
+                read.change.proof = index;
+                read.stamp = restamping_.stamp(middle(exposure.start, exposure.end), frame.arrival);
+            }
+            stream.candidates.push_back(read);
+            return;
+        }
+        const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
+        stream.counts.contradicted += contradicted ? 1U : 0U;
+        if (frame.stamp_kind() != StampKind::arrival && !contradicted) {
+            read.stamp = restamping_.stamp(frame.board_time, frame.host_time);
+            read.choice = Choice::no_estimate;
+            const bool measured = frame.stamp_kind() == StampKind::measured_middle;
+            const bool clamped = (frame.flags & flag_clamped) != 0;
+            if (proof != nullptr && measured && !clamped && frame.sigma_ns != sigma_unknown)
+                live_sigmas_.add(frame.host_time,
+                                 without(frame.sigma_ns, proof->exposure.delay_sigma));
+        }
+        stream.candidates.push_back(read);
+    }
+
+    /// Sigma of the clock alone, live: known from others that have it at this time, or between that
+    /// of a service that knew the messages of the recording alone, and the least of it.
+    void bound_sigma(Candidate& one) const {
+        const Duration total{std::int64_t{one.change.sigma_ns}};
+        if (const auto known = live_sigmas_.at(one.change.host)) {
+            one.least_sigma = one.most_sigma = std::min(*known, total);
+            return;
+        }
+        Duration least;
+        if (const auto replayed = restamping_.live_sigma(one.change.host)) {
+            one.most_sigma = std::min(replayed->then, total);
+            least = replayed->least;
+        }
+        if (const auto of_all = live_sigmas_.least()) least = std::min(least, *of_all);
+        one.least_sigma = std::min(least, total);
+    }
+
+    /// What else is uncertain of a sample, its filter's delay, is the same for all of a stream.
+    static void share_other(Stream& stream) {
+        std::map<std::uint64_t, double> others;  // by life of the service
+        const auto usable = [](const Candidate& one) {
+            return one.choice != Choice::no_clock && one.change.sigma_ns != sigma_unknown;
+        };
+        for (const Candidate& one : stream.candidates) {
+            if (!usable(one)) continue;
+            const auto other =
+                static_cast<double>(without(one.change.sigma_ns, one.least_sigma).ns);
+            const auto known = others.emplace(one.life, other).first;
+            known->second = std::min(known->second, other);
+        }
+        for (Candidate& one : stream.candidates) {
+            if (!usable(one)) continue;
+            const Duration other{static_cast<std::int64_t>(others.at(one.life))};
+            one.least_sigma = std::max(one.least_sigma, without(one.change.sigma_ns, other));
+            one.most_sigma = std::max(one.most_sigma, one.least_sigma);
+        }
+    }
+
+    /// Where PPS, say, made the stamps, it shows by how much the recomputed ones are wrong: about
+    /// as much elsewhere, as most of it is the link's asymmetry.
+    Duration off_from_other_clock() const {
+        std::vector<Duration> off;
+        for (const auto& [name, stream] : streams_)
+            for (const Candidate& one : stream.candidates)
+                if (one.choice == Choice::no_estimate && one.stamp &&
+                    by_other_clock(live_stamp(one), restamping_))
+                    off.push_back(absolute(one.change.before - one.stamp->output));
+        if (off.size() < least_of_other_clock) return {};
+        const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
+        std::nth_element(off.begin(), middle, off.end());
+        return *middle;
+    }
+
+    static LiveStamp live_stamp(const Candidate& one) {
+        return {one.change.before, one.change.host, one.least_sigma, one.most_sigma,
+                (one.change.flags & flag_clamped) != 0};
+    }
+
+    void choose_all(Stream& stream) const {
+        for (Candidate& one : stream.candidates) {
+            if (one.choice != Choice::no_clock) bound_sigma(one);
+            if (one.stamp) one.stamp->sigma = Duration{sigma_of(one.stamp->sigma, recomputed_off_)};
+        }
+        if (stream.kind == ring::StreamKind::imu) share_other(stream);
+        std::vector<DatedChoice> choices;
+        for (Candidate& one : stream.candidates) {
+            if (one.choice != Choice::no_clock)
+                one.choice = choose(live_stamp(one), one.stamp, restamping_);
+            choices.push_back({one.change.host, one.choice});
+        }
+        spread(choices);
+        for (std::size_t i = 0; i < choices.size(); ++i)
+            stream.candidates[i].choice = choices[i].choice;
+    }
+
+    void restamp(Stream& stream) const {
+        for (std::size_t i = 0; i < stream.candidates.size(); ++i) {
+            const Candidate& one = stream.candidates[i];
+            ProcessedEpoch& epoch = epoch_of(one, stream);
+            ++epoch.items;
+            if (one.suspect) {
+                prove(i, stream);
+                continue;
+            }
+            Change change = one.change;
+            if (one.choice == Choice::improved) {
+                // Other uncertainties, such as of a filter's delay, are not stored separately.
+                const Duration other = without(change.sigma_ns, one.least_sigma);
+                epoch.sigma_before_ns += change.sigma_ns;
+                set(change, *one.stamp);
+                if (change.sigma_ns != sigma_unknown)
+                    change.sigma_ns = std::min(change.sigma_ns, sigma_of(one.stamp->sigma, other));
+                epoch.sigma_after_ns += change.sigma_ns;
+            }
+            ++epoch.stamps[static_cast<std::size_t>(one.choice)];
+            hold(change, stream);
+        }
+    }
+
+    /// The newest one. Stamps of another epoch, or of another life of the service, do not compare.
+    static ProcessedEpoch& epoch_of(const Candidate& one, Stream& stream) {
+        std::vector<ProcessedEpoch>& epochs = stream.counts.epochs;
+        if (epochs.empty() || epochs.back().life != one.life || epochs.back().epoch != one.epoch) {
+            stream.newest.reset();
+            epochs.push_back({one.life, one.epoch});
+        }
+        return epochs.back();
     }
 
     /// Within an epoch each stamp is later than the previous one, as live: one that would not be is
     /// held just after it, and flagged.
-    static void hold(Change change, std::uint64_t life, std::uint32_t epoch, Stream& stream) {
-        if (life != stream.life || epoch != stream.epoch) stream.newest.reset();
-        stream.life = life;
-        stream.epoch = epoch;
+    static void hold(Change change, Stream& stream) {
         if (stream.newest && change.after <= *stream.newest) {
             const OutputTime held = *stream.newest + nanoseconds(1);
             change.flags |= flag_clamped;
@@ -196,47 +362,6 @@ class Processing {
         if (new_stamp) stream.changes.push_back(change);
     }
 
-    void restamp_sample(const RecordedItem& item, Stream& stream) const {
-        const auto sample = unpack<ImuMetadata>(item.metadata);
-        if ((sample.flags & flag_suspect) != 0) return;
-        Change change{item.time, item.time, sample.host_time, sample.sigma_ns, sample.flags,
-                      no_proof,  false};
-        const auto stamp = clock_of(sample.board_time - sample.filter_delay, sample.host_time);
-        // Other uncertainties, such as the filter's delay, are not stored separately, so sigma
-        // stays.
-        if (stamp) set(change, *stamp);
-        hold(change, item.life, sample.epoch, stream);
-    }
-
-    void restamp_frame(const RecordedItem& item, Stream& stream) const {
-        const auto frame = unpack<FrameMetadata>(item.metadata);
-        const bool suspect = (frame.flags & flag_suspect) != 0;
-        stream.counts.suspect += suspect ? 1U : 0U;
-        const std::uint32_t index = proof_of(frame, stream.proofs);
-        const ProvedFrame* proof = index == no_proof ? nullptr : &stream.proofs[index];
-        if (suspect) {
-            if (proof != nullptr) prove(item, frame, index, stream);
-            return;
-        }
-        Change change{item.time, item.time, frame.host_time, frame.sigma_ns, frame.flags,
-                      no_proof,  false};
-        const bool contradicted = proof != nullptr && proof->exposure.trigger != frame.trigger;
-        stream.counts.contradicted += contradicted ? 1U : 0U;
-        const bool by_board = frame.stamp_kind() != StampKind::arrival && !contradicted;
-        const auto stamp = by_board ? clock_of(frame.board_time, frame.host_time) : std::nullopt;
-        if (stamp) {
-            set(change, *stamp);
-            if (proof != nullptr)
-                change.sigma_ns = std::min(change.sigma_ns,
-                                           sigma_of(stamp->sigma, uncertain(*proof, stamp->host)));
-        }
-        hold(change, item.life, frame.epoch, stream);
-    }
-
-    std::optional<Restamping::Stamp> clock_of(BoardTime board, HostTime about) const {
-        return by_pps_ ? std::nullopt : restamping_.stamp(board, about);
-    }
-
     static void set(Change& change, const Restamping::Stamp& stamp) {
         change.after = stamp.output;
         change.host = stamp.host;
@@ -244,20 +369,53 @@ class Processing {
         change.restamped = true;
     }
 
-    void prove(const RecordedItem& item, const FrameMetadata& frame, std::uint32_t index,
-               Stream& stream) const {
-        const ProvedFrame& proof = stream.proofs[index];
-        const BoardTime board = middle(proof.exposure.start, proof.exposure.end);
-        const auto stamp = restamping_.stamp(board, frame.arrival);
-        if (!stamp) return;
-        Change change{item.time, item.time, {}, 0, 0, index, true};
+    /// What the recomputed stamp lacks to fit those around it that stay: none where they do not.
+    static std::optional<Restamping::Stamp> fitting(std::size_t index, const Stream& stream) {
+        const Candidate& one = stream.candidates[index];
+        Restamping::Stamp stamp = *one.stamp;
+        const Candidate* nearest = nullptr;
+        const auto look = [&](const Candidate& other) {
+            const bool near = absolute(other.change.host - stamp.host) < next_to_it;
+            const bool usable = !other.suspect && other.choice != Choice::no_clock;
+            if (near && usable &&
+                (nearest == nullptr || absolute(other.change.host - stamp.host) <
+                                           absolute(nearest->change.host - stamp.host)))
+                nearest = &other;
+            return near && !usable;
+        };
+        for (std::size_t i = index; i-- > 0 && look(stream.candidates[i]);) {
+        }
+        for (std::size_t i = index + 1; i < stream.candidates.size() && look(stream.candidates[i]);
+             ++i) {
+        }
+        if (nearest == nullptr) return stamp;
+        if (nearest->choice == Choice::improved || nearest->choice == Choice::no_better)
+            return stamp;
+        if (!nearest->stamp || nearest->epoch != one.epoch) return std::nullopt;
+        stamp.output = stamp.output + (nearest->change.before - nearest->stamp->output);
+        stamp.host = stamp.host + (nearest->change.host - nearest->stamp->host);
+        stamp.sigma = std::max(stamp.sigma, nearest->most_sigma);
+        return stamp;
+    }
+
+    void prove(std::size_t index, Stream& stream) const {
+        const Candidate& one = stream.candidates[index];
+        ProcessedEpoch& epoch = stream.counts.epochs.back();
+        const auto stamp = one.stamp ? fitting(index, stream) : std::nullopt;
+        if (!stamp || restamping_.epoch(stamp->host) != one.epoch) {
+            ++epoch.stamps[static_cast<std::size_t>(Choice::no_clock)];
+            return;
+        }
+        const ProvedFrame& proof = stream.proofs[one.change.proof];
+        Change change = one.change;
         set(change, *stamp);
-        change.flags = (frame.flags & ~static_cast<std::uint32_t>(stamp_kind_mask | flag_suspect |
-                                                                  flag_clamped | flag_holdover)) |
-                       static_cast<std::uint32_t>(proof.exposure.kind);
+        change.flags =
+            (change.flags & ~static_cast<std::uint32_t>(stamp_kind_mask | flag_suspect)) |
+            static_cast<std::uint32_t>(proof.exposure.kind);
         change.sigma_ns = sigma_of(stamp->sigma, uncertain(proof, stamp->host));
-        hold(change, item.life, frame.epoch, stream);
+        hold(change, stream);
         ++stream.counts.proved;
+        ++epoch.proved;
     }
 
     static std::uint32_t proof_of(const FrameMetadata& frame,
@@ -273,6 +431,12 @@ class Processing {
 
     void finish(const std::string& name, Stream& stream) {
         ProcessedStream& counts = stream.counts;
+        stream.candidates = {};
+        for (ProcessedEpoch& epoch : counts.epochs) {
+            const auto improved = static_cast<double>(std::max<std::uint64_t>(epoch.improved(), 1));
+            epoch.sigma_before_ns /= improved;
+            epoch.sigma_after_ns /= improved;
+        }
         counts.restamped = stream.changes.size();
         std::uint64_t steady = 0;
         for (const Change& change : stream.changes) {
@@ -309,8 +473,9 @@ class Processing {
     ProcessReport& report_;
     const std::function<bool(double)>& go_on_;
     Restamping restamping_;
+    LiveSigmas live_sigmas_;
+    Duration recomputed_off_;  ///< from another clock, where that made the stamps
     std::map<std::string, Stream> streams_;
-    bool by_pps_ = false;
 };
 
 /// Where an item's parts lie (docs/contracts/recording-format.md).
@@ -440,6 +605,57 @@ Expected<ProcessReport> process_recording(const std::string& path, const std::st
     return report;
 }
 
+namespace {
+
+/// Of each Choice: its name, and as the end of a sentence.
+constexpr struct {
+    const char* name;
+    const char* text;
+} choices[] = {
+    {"improved", ""},
+    {"other_clock", "by PPS, or another clock that is not the messages'"},
+    {"disagrees", "differing from the recomputed ones by more than sigma explains"},
+    {"no_better", "as good as recomputed ones"},
+    {"no_estimate", "without messages around them, or next to a step of a clock"},
+    {"no_clock", "not by the clock: of the arrival, suspect, or paired otherwise now"},
+};
+
+json epochs_json(const std::vector<ProcessedEpoch>& epochs) {
+    json list = json::array();
+    for (const ProcessedEpoch& epoch : epochs) {
+        json left = json::object();
+        for (std::size_t i = 1; i < std::size(choices); ++i)
+            left[choices[i].name] = epoch.stamps[i];
+        const bool improved = epoch.improved() > 0;
+        list.push_back({{"life", epoch.life},
+                        {"epoch", epoch.epoch},
+                        {"items", epoch.items},
+                        {"improved", epoch.improved()},
+                        {"proved", epoch.proved},
+                        {"left", left},
+                        {"sigma_before_ns", improved ? json(epoch.sigma_before_ns) : json()},
+                        {"sigma_after_ns", improved ? json(epoch.sigma_after_ns) : json()}});
+    }
+    return list;
+}
+
+std::string epoch_text(const ProcessedEpoch& epoch) {
+    std::string text = fmt::format("  epoch {}: ", epoch.epoch);
+    if (epoch.improved() == 0)
+        text += fmt::format("none of {} stamps improved", epoch.items);
+    else
+        text += fmt::format("{} of {} stamps improved, sigma {:.2f} -> {:.2f} us", epoch.improved(),
+                            epoch.items, epoch.sigma_before_ns * 1e-3, epoch.sigma_after_ns * 1e-3);
+    if (epoch.proved > 0) text += fmt::format(", {} proved", epoch.proved);
+    text += "\n";
+    for (std::size_t i = 1; i < std::size(choices); ++i)
+        if (epoch.stamps[i] > 0)
+            text += fmt::format("    {} left as they were: {}\n", epoch.stamps[i], choices[i].text);
+    return text;
+}
+
+}  // namespace
+
 json to_json(const ProcessReport& report) {
     json streams = json::object();
     for (const auto& [name, stream] : report.streams)
@@ -450,7 +666,8 @@ json to_json(const ProcessReport& report) {
                          {"contradicted", stream.contradicted},
                          {"change_rms_ns", stream.change_rms_ns},
                          {"change_max_ns", stream.change_max_ns},
-                         {"sigma_ns", stream.sigma_after_ns}};
+                         {"sigma_ns", stream.sigma_after_ns},
+                         {"epochs", epochs_json(stream.epochs)}};
     return {{"file", report.file}, {"streams", streams}, {"notes", report.notes}};
 }
 
@@ -467,6 +684,7 @@ std::string to_text(const ProcessReport& report) {
             text += fmt::format("; {} would now be paired differently, and were left as they are",
                                 stream.contradicted);
         text += "\n";
+        for (const ProcessedEpoch& epoch : stream.epochs) text += epoch_text(epoch);
     }
     for (const std::string& note : report.notes) text += "note: " + note + "\n";
     return text + report.file + "\n";

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Recomputes a recording: frames are paired again, all stamps come from the smoothed clock.
+// Recomputes a recording: frames are paired again, and stamps come from the smoothed clock where
+// that is better.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -9,9 +11,23 @@
 #include <string>
 #include <vector>
 
+#include "process/stamp_choice.hpp"
 #include "versavis/error.hpp"
 
 namespace versavis::client {
+
+/// What became of the stamps of one stream within one epoch.
+struct ProcessedEpoch {
+    std::uint64_t life = 0;  ///< of the service
+    std::uint32_t epoch = 0;
+    std::uint64_t items = 0;
+    std::array<std::uint64_t, 6> stamps{};  ///< by Choice, but for those proved
+    std::uint64_t proved = 0;               ///< suspect frames that have their stamps now
+    double sigma_before_ns = 0;             ///< mean of the improved ones
+    double sigma_after_ns = 0;
+
+    std::uint64_t improved() const { return stamps[static_cast<std::size_t>(Choice::improved)]; }
+};
 
 /// What became of one stream of frames or samples.
 struct ProcessedStream {
@@ -23,6 +39,7 @@ struct ProcessedStream {
     double change_rms_ns = 0;        ///< of stamps that were proved before
     double change_max_ns = 0;
     double sigma_after_ns = 0;  ///< mean of the recomputed ones
+    std::vector<ProcessedEpoch> epochs;
 };
 
 struct ProcessReport {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <string_view>
 
 namespace versavis::client {
@@ -19,11 +20,29 @@ std::uint64_t count(const json& object, const char* key) {
     return object.value(key, std::uint64_t{0});
 }
 
+/// What follows the names of devices, and continues them.
+constexpr std::size_t indent = 9;
+constexpr std::size_t columns = 80;
+
+/// In lines that fit a terminal.
+std::string wrapped(std::string line) {
+    std::size_t begin = 0;
+    while (line.size() - begin > columns) {
+        std::size_t blank = line.rfind(' ', begin + columns);
+        if (blank <= begin + indent) blank = line.find(' ', begin + columns);
+        if (blank == std::string::npos) break;
+        line.replace(blank, 1, "\n" + std::string(indent, ' '));
+        begin = blank + 1;
+    }
+    return line + "\n";
+}
+
 /// In a line of its own, after its word.
 std::string hint(const json& part) {
     const std::string fault = text(part, "fault");
     if (text(part, "hint").empty()) return "";
-    return fmt::format("\n         {}{}{}", fault, fault.empty() ? "" : ": ", text(part, "hint"));
+    return wrapped(fmt::format("{:{}}{}{}{}", "", indent, fault, fault.empty() ? "" : ": ",
+                               text(part, "hint")));
 }
 
 /// What the board has, where it says so.
@@ -34,15 +53,32 @@ std::string parts_line(const json& board) {
     for (const json& name : present)
         if (name.is_string()) names += (names.empty() ? "" : ", ") + name.get<std::string>();
     if (names.empty() || !fastest.is_number()) return "";
-    return fmt::format("         it has {}; IMUs up to {:g} Hz\n", names, fastest.get<double>());
+    return wrapped(fmt::format("{:{}}it has {}; IMUs up to {:g} Hz", "", indent, names,
+                               fastest.get<double>()));
 }
 
-std::string board_line(const json& board) {
-    return fmt::format(
-        "board    {:<10} {} {}  lost packets {}, late outputs {}, IMU errors {}{}\n{}",
-        text(board, "state"), text(board, "serial"), text(board, "firmware"),
-        count(board, "lost_packets"), count(board, "late_outputs"), count(board, "imu_errors"),
-        hint(board), parts_line(board));
+/// Counters that should be zero; in a summary only those that are not.
+struct Counter {
+    const char* name;
+    std::uint64_t count;
+};
+
+std::string listed(std::initializer_list<Counter> counters, Detail detail) {
+    std::string out;
+    for (const Counter& counter : counters)
+        if (counter.count != 0 || detail == Detail::full)
+            out += fmt::format(", {} {}", counter.name, counter.count);
+    return out;
+}
+
+std::string board_lines(const json& board, Detail detail) {
+    const std::string line = fmt::format("board    {:<10} {} {}", text(board, "state"),
+                                         text(board, "serial"), text(board, "firmware")) +
+                             listed({{"lost packets", count(board, "lost_packets")},
+                                     {"late outputs", count(board, "late_outputs")},
+                                     {"IMU errors", count(board, "imu_errors")}},
+                                    detail);
+    return wrapped(line) + hint(board) + (detail == Detail::full ? parts_line(board) : "");
 }
 
 /// Of a time in ns, without the unit; what is not known is null, and no zero.
@@ -54,49 +90,60 @@ std::string in_us(const json& object, const char* key) {
 }
 
 /// Of a clock that is not known there are no figures.
-std::string clock_figures(const json& clock) {
+std::string clock_figures(const json& clock, Detail detail) {
     if (text(clock, "state") == "init" || text(clock, "state") == "reset") return "unknown";
-    return fmt::format("sigma {} us, bound {} us, skew {:+.3f} ppm, round trip {:.0f} us",
-                       in_us(clock, "sigma_ns"), in_us(clock, "bound_ns"),
-                       clock.value("skew_ppm", 0.0), clock.value("round_trip_ns", 0.0) / 1e3);
+    std::string figures =
+        fmt::format("sigma {} us, bound {} us", in_us(clock, "sigma_ns"), in_us(clock, "bound_ns"));
+    if (detail == Detail::full)
+        figures +=
+            fmt::format(", skew {:+.3f} ppm, round trip {:.0f} us", clock.value("skew_ppm", 0.0),
+                        clock.value("round_trip_ns", 0.0) / 1e3);
+    return figures;
 }
 
-std::string clock_line(const json& clock) {
-    return fmt::format("clock    {:<10} {}  {}{}\n", text(clock, "state"), text(clock, "output"),
-                       clock_figures(clock), hint(clock));
+std::string clock_lines(const json& clock, Detail detail) {
+    return wrapped(fmt::format("clock    {:<10} {}  {}", text(clock, "state"),
+                               text(clock, "output"), clock_figures(clock, detail))) +
+           hint(clock);
 }
 
-std::string imu_line(const json& imu) {
-    return fmt::format(
-        "{:<8} {:<10} {}  {:.1f} of {:g} Hz, published {}, lost {}, faulty {}, filter delay {} us "
-        "({}){}\n",
-        text(imu, "name"), text(imu, "state"), text(imu, "model"), imu.value("delivered_hz", 0.0),
-        imu.value("configured_hz", 0.0), count(imu, "published"), count(imu, "lost"),
-        count(imu, "faulty"), in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source"),
-        hint(imu));
+/// Name, state and model of a device, and how much of its rate it delivers.
+std::string delivery(const json& device) {
+    return fmt::format("{:<8} {:<10} {}  {:.1f} of {:g} Hz", text(device, "name"),
+                       text(device, "state"), text(device, "model"),
+                       device.value("delivered_hz", 0.0), device.value("configured_hz", 0.0));
+}
+
+std::string imu_lines(const json& imu, Detail detail) {
+    std::string line = delivery(imu);
+    if (detail == Detail::full) line += fmt::format(", published {}", count(imu, "published"));
+    line += listed({{"lost", count(imu, "lost")}, {"faulty", count(imu, "faulty")}}, detail);
+    const std::string filter =
+        wrapped(fmt::format("{:{}}filter delay {} us ({})", "", indent,
+                            in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source")));
+    return wrapped(line) + hint(imu) + (detail == Detail::full ? filter : "");
 }
 
 /// What is taken off the middle of its exposures, before it is known: nothing.
 std::string delay_line(const json& camera) {
     if (text(camera, "line").empty()) return "";
-    return fmt::format(
-        "         {}: start {} us late, end {} us, sigma {} us ({}); end less start, measured: {} "
-        "us\n",
-        text(camera, "line"), in_us(camera, "line_delay_start_ns"),
+    return wrapped(fmt::format(
+        "{:{}}{}: start {} us late, end {} us, sigma {} us ({}); end less start, measured: {} us",
+        "", indent, text(camera, "line"), in_us(camera, "line_delay_start_ns"),
         in_us(camera, "line_delay_end_ns"), in_us(camera, "line_delay_sigma_ns"),
-        text(camera, "line_delay_source"), in_us(camera, "edge_difference_ns"));
+        text(camera, "line_delay_source"), in_us(camera, "edge_difference_ns")));
 }
 
-std::string camera_line(const json& camera) {
-    return fmt::format(
-        "{:<8} {:<10} {}  {:.1f} of {:g} Hz, pairing {}, published {}, incomplete {}, without "
-        "trigger {}, triggers without frame {}, slips {}{}\n{}",
-        text(camera, "name"), text(camera, "state"), text(camera, "model"),
-        camera.value("delivered_hz", 0.0), camera.value("configured_hz", 0.0),
-        text(camera, "pairing"), count(camera, "frames_published"),
-        count(camera, "frames_incomplete"), count(camera, "frames_without_trigger"),
-        count(camera, "triggers_without_frame"), count(camera, "slips"), hint(camera),
-        delay_line(camera));
+std::string camera_lines(const json& camera, Detail detail) {
+    std::string line = delivery(camera) + ", pairing " + text(camera, "pairing");
+    if (detail == Detail::full)
+        line += fmt::format(", published {}", count(camera, "frames_published"));
+    line += listed({{"incomplete", count(camera, "frames_incomplete")},
+                    {"without trigger", count(camera, "frames_without_trigger")},
+                    {"triggers without frame", count(camera, "triggers_without_frame")},
+                    {"slips", count(camera, "slips")}},
+                   detail);
+    return wrapped(line) + hint(camera) + (detail == Detail::full ? delay_line(camera) : "");
 }
 
 struct ClockFact {
@@ -206,15 +253,17 @@ std::string clock_text(const json& status) {
     return out;
 }
 
-std::string status_text(const json& status) {
+std::string status_text(const json& status, Detail detail) {
     const double up_s =
         (status.value("host_time_ns", 0.0) - status.value("started_ns", 0.0)) * 1e-9;
     std::string out = fmt::format("versavisd '{}': {}, up {:.0f} s\n", text(status, "instance"),
                                   text(status, "health"), up_s);
-    if (status.contains("board")) out += board_line(status["board"]);
-    if (status.contains("clock")) out += clock_line(status["clock"]);
-    for (const json& camera : status.value("cameras", json::array())) out += camera_line(camera);
-    for (const json& imu : status.value("imus", json::array())) out += imu_line(imu);
+    if (status.contains("board")) out += board_lines(status["board"], detail);
+    if (status.contains("clock")) out += clock_lines(status["clock"], detail);
+    for (const json& camera : status.value("cameras", json::array()))
+        out += camera_lines(camera, detail);
+    for (const json& imu : status.value("imus", json::array())) out += imu_lines(imu, detail);
+    if (detail == Detail::summary) return out;
     for (const json& stream : status.value("streams", json::array()))
         out +=
             fmt::format("stream   {:<10} {:<7} {:>10} items {:>8.1f} Hz\n", text(stream, "name"),

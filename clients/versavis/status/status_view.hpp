@@ -7,7 +7,12 @@
 
 namespace versavis::client {
 
-std::string status_text(const nlohmann::json& status);
+enum class Detail {
+    summary,  ///< what fits a terminal, and of the counters those that say something
+    full,
+};
+
+std::string status_text(const nlohmann::json& status, Detail detail);
 
 /// The clock's part alone, one fact per line; keys that this version does not know are shown as
 /// they are.

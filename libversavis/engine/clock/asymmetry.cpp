@@ -23,10 +23,11 @@ double square(double x) { return x * x; }
 
 }  // namespace
 
-double asymmetry_variance(const std::optional<Asymmetry>& measured, double shortest_delay_ns) {
+double asymmetry_variance(const std::optional<Asymmetry>& measured, double shortest_delay_ns,
+                          double doubt_ns) {
     if (measured) return square(static_cast<double>(measured->sigma.ns));
-    return square(share * shortest_delay_ns) +
-           square(std::min(share_of_short * shortest_delay_ns, most_of_short_ns));
+    const double of_short = std::min(share_of_short * shortest_delay_ns, most_of_short_ns);
+    return square(share * shortest_delay_ns) + square(std::max(of_short, doubt_ns));
 }
 
 }  // namespace versavis::clock

@@ -15,7 +15,8 @@ struct Asymmetry {
 };
 
 /// Variance of the host time by the asymmetry, in ns^2: as measured, or else an allowance by the
-/// shortest delay of a message.
-double asymmetry_variance(const std::optional<Asymmetry>& measured, double shortest_delay_ns);
+/// shortest delay of a message, and no less than an estimate of it may be wrong by.
+double asymmetry_variance(const std::optional<Asymmetry>& measured, double shortest_delay_ns,
+                          double doubt_ns = 0);
 
 }  // namespace versavis::clock

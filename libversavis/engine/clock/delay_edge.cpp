@@ -128,8 +128,7 @@ void DelayEdge::begin(double scale_ns) {
     shortest_.reset();
     samples_.clear();
     newest_least_ns_.reset();
-    judged_ = 0;
-    lower_quarter_ns_ = lower_half_ns_ = 0;
+    shape_ = {};
     scale_ns_ = scale_ns;
 }
 
@@ -162,14 +161,18 @@ void DelayEdge::judge_shape() {
     if (delays_.size() < remembered_slots) return;
     sorted_ = delays_;
     std::sort(sorted_.begin(), sorted_.end());
-    judged_ = std::min(judged_ + 1, shape_memory);
-    const double gain = 1 / static_cast<double>(judged_);
-    const double least = sorted_.front();
-    lower_quarter_ns_ += gain * (sorted_[sorted_.size() / 4] - least - lower_quarter_ns_);
-    lower_half_ns_ += gain * (sorted_[sorted_.size() / 2] - least - lower_half_ns_);
+    shape_.add(sorted_);
 }
 
-double DelayEdge::overshoot_ns() const {
+void DelayShape::add(const std::vector<double>& sorted_ns) {
+    judged_ = std::min(judged_ + 1, shape_memory);
+    const double gain = 1 / static_cast<double>(judged_);
+    const double least = sorted_ns.front();
+    lower_quarter_ns_ += gain * (sorted_ns[sorted_ns.size() / 4] - least - lower_quarter_ns_);
+    lower_half_ns_ += gain * (sorted_ns[sorted_ns.size() / 2] - least - lower_half_ns_);
+}
+
+double DelayShape::overshoot_ns() const {
     const double bend = lower_quarter_ns_ - (exponential_bend + bend_slack) * lower_half_ns_;
     const double most = std::min(largest_overshoot_ns, most_overshoot_of_half * lower_half_ns_);
     return std::clamp(overshoot_by_bend * bend, 0.0, most);

@@ -45,6 +45,22 @@ double edge_blur(double scale_ns);
 /// 1.4 times as much. Twice as many: the clocks' wandering blurs them.
 constexpr std::size_t remembered_slots = 64;
 
+/// How the shortest delays of slots thin out towards the shortest possible one.
+class DelayShape {
+ public:
+    /// Of the remembered slots, sorted, in ns.
+    void add(const std::vector<double>& sorted_ns);
+
+    /// By how much even the shortest delays seen probably exceed the shortest possible one, in ns:
+    /// 0 where delays break off sharply, more where they thin out, as those of a host's wake-ups.
+    double overshoot_ns() const;
+
+ private:
+    std::size_t judged_ = 0;       ///< windows that the next two are averaged over
+    double lower_quarter_ns_ = 0;  ///< between the least delay and the one a quarter are below
+    double lower_half_ns_ = 0;     ///< and the one half are below
+};
+
 /// The delays of one direction: the shortest of the present slot, and how those of the last slots
 /// spread.
 class DelayEdge {
@@ -74,9 +90,7 @@ class DelayEdge {
     double sign() const { return static_cast<double>(direction_); }
     double scale_ns() const { return scale_ns_; }
 
-    /// By how much even the shortest delays seen probably exceed the shortest possible one, in ns:
-    /// 0 where delays break off sharply, more where they thin out, as those of a host's wake-ups.
-    double overshoot_ns() const;
+    double overshoot_ns() const { return shape_.overshoot_ns(); }
 
     /// The least delay of the newest slots; none: there are too few.
     std::optional<double> newest_least_ns() const { return newest_least_ns_; }
@@ -94,9 +108,7 @@ class DelayEdge {
     std::vector<double> sorted_;
     double scale_ns_ = 0;
     std::optional<double> newest_least_ns_;
-    std::size_t judged_ = 0;       ///< windows that the next two are averaged over
-    double lower_quarter_ns_ = 0;  ///< between the least delay and the one a quarter are below
-    double lower_half_ns_ = 0;     ///< and the one half are below
+    DelayShape shape_;
 };
 
 }  // namespace versavis::clock

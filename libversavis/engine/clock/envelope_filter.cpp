@@ -59,10 +59,11 @@ constexpr double contradicting = 6.0;
 // Six: a step is followed 0.3 s later.
 constexpr int contradictions_to_restart = 3;
 
-// The same while the board's other messages go on as before, so that its clock cannot have stepped:
-// then the exchanges are wrong, or the estimate was. Half: lies that last 1.5 s are followed.
-// Twice: an estimate that began wrong is doubted for 6 s.
-constexpr int contradictions_against_witnesses = 30;
+// The same while the board's other messages go on, and take as long to the host, as before: then
+// its clock cannot have stepped, and the exchanges are wrong, or the estimate was. They must last,
+// for 3 s of ten exchanges a second at least. Half: shorter lies are followed after a beginning.
+// Twice: an estimate that began wrong is doubted for twice as long.
+constexpr std::uint64_t least_contradictions_to_prevail = 30;
 
 // In ns/s; no two clocks differ by 1000 ppm. Half or twice is as far from any crystal.
 constexpr double largest_skew = 1e6;
@@ -150,16 +151,18 @@ void EnvelopeFilter::add(const Exchange& exchange) {
         if (!confirmed_) return restart(exchange, round_trip);  // one of the two is wrong
         if (contradictions_ > 0 && !anew) return;
         ++contradictions_;
+        const bool prevails = persistence_.contradict(least_contradictions_to_prevail);
         // An estimate that just began may itself be what is wrong.
-        if (!continued_ || slots_ < slots_to_trust) ++unwitnessed_contradictions_;
+        const bool witnessed = continued_ && slots_ >= slots_to_trust;
+        unwitnessed_contradictions_ = witnessed ? 0 : unwitnessed_contradictions_ + 1;
         continued_ = false;
-        if (unwitnessed_contradictions_ >= contradictions_to_restart ||
-            contradictions_ >= contradictions_against_witnesses)
+        if (unwitnessed_contradictions_ >= contradictions_to_restart || prevails)
             restart(exchange, round_trip);
         return;
     }
     if (old) return;  // it was held up on its way
     confirmed_ = true;
+    persistence_.agree();
     contradictions_ = unwitnessed_contradictions_ = 0;
     continued_ = false;
     contradiction_ = {};
@@ -199,6 +202,7 @@ void EnvelopeFilter::begin(const Exchange& exchange, Duration round_trip) {
     confirmed_ = false;
     reset_ = false;
     contradictions_ = unwitnessed_contradictions_ = 0;
+    persistence_.forget();
     continued_ = false;
     contradiction_ = {};
     const double scale = start_scale_of_round_trip * static_cast<double>(round_trip.ns);
@@ -369,14 +373,16 @@ HostEstimate EnvelopeFilter::translate(BoardTime board) const {
     const Duration since = board - reference_;
     const double variance = state_.offset_variance_after(since);
     const double offset = state_.offset_after(since);
-    const double doubt = static_cast<double>(contradiction_.ns);
+    const Duration contradiction = std::max(contradiction_, doubt_);
+    const double doubt = static_cast<double>(std::max(contradiction, allowance_).ns);
     const Duration asymmetry = asymmetry_ ? asymmetry_->offset : presumed_asymmetry();
     estimate.time = HostTime{board.ns} + base_ + rounded(offset) - asymmetry;
     estimate.sigma = rounded(
         std::sqrt(variance + asymmetry_variance(asymmetry_, state_.mean[3]) + square(doubt)));
+    estimate.spread = rounded(std::sqrt(variance));
     estimate.bound = smallest_round_trip() / 2 + absolute(asymmetry) +
                      rounded(bound_sigmas * std::sqrt(variance) + doubt);
-    if (doubt > 0)
+    if (contradiction.ns > 0)
         estimate.state = ClockState::step;
     else if ((board - last_contact_).ns > holdover_after_ns)
         estimate.state = ClockState::holdover;

@@ -12,6 +12,7 @@
 #include "engine/clock/estimate.hpp"
 #include "engine/clock/gaussian_state.hpp"
 #include "engine/clock/messages.hpp"
+#include "engine/plausibility/persistence.hpp"
 #include "versavis/time.hpp"
 
 namespace versavis::clock {
@@ -39,10 +40,17 @@ class EnvelopeFilter {
     void add(const Exchange& exchange);
     void add(const OneWay& message);
 
+    /// Other messages contradict the exchanges by so much, from now on, or allow them to be off.
+    void doubt(Duration by, Duration allowance) {
+        doubt_ = by;
+        allowance_ = allowance;
+    }
+
     /// The board restarted: its clock starts over, with the same crystal and link.
     void board_restarted();
 
-    /// A message that is no exchange shows that the board's clock did not step.
+    /// A message that is no exchange, and took as long as usual, shows that the board's clock did
+    /// not step.
     void clock_continues() { continued_ = true; }
 
     /// A measured asymmetry takes the place of the presumed one, and of the allowance for it.
@@ -57,14 +65,16 @@ class EnvelopeFilter {
 
     bool initialised() const { return begun_; }
     bool confirmed() const { return confirmed_; }  ///< a second exchange agrees with the first
-    bool contradicted() const { return contradictions_ > 0 || !confirmed_; }  ///< by the newest
+    /// By the newest exchange, or by other messages.
+    bool contradicted() const { return contradictions_ > 0 || doubt_ > Duration{} || !confirmed_; }
     std::uint64_t exchanges() const { return exchanges_; }
     std::uint64_t comparisons() const { return comparisons_; }  ///< without those at once
     std::uint64_t one_way_messages() const { return one_way_messages_; }
     std::uint64_t restarts() const { return restarts_; }
     std::uint64_t surprises() const { return surprises_; }  ///< delays well below the edge
     std::uint64_t slots() const { return slots_; }
-    double skew_ppm() const { return state_.mean[1] * 1e-3; }  ///< host clock against board clock
+    double skew() const { return state_.mean[1]; }  ///< host clock against board clock, ns/s
+    double skew_ppm() const { return skew() * 1e-3; }
     double skew_sigma_ppm() const;
     Duration last_residual() const {
         return last_residual_;
@@ -112,11 +122,14 @@ class EnvelopeFilter {
     Duration smallest_in_window_{INT64_MAX};
     Duration smallest_before_{INT64_MAX};
     bool down_in_slot_ = false;
-    double recent_surprises_ = 0;  ///< fading
-    int contradictions_ = 0;       ///< exchanges in a row
-    int unwitnessed_contradictions_ = 0;
+    double recent_surprises_ = 0;         ///< fading
+    int contradictions_ = 0;              ///< exchanges in a row
+    int unwitnessed_contradictions_ = 0;  ///< of them, the newest in a row
+    Persistence persistence_;             ///< of contradicting exchanges
     HostTime last_comparison_;
     bool continued_ = false;  ///< since the newest exchange
+    Duration doubt_;          ///< by which exchanges are off
+    Duration allowance_;      ///< by which they may be off
     Duration contradiction_;  ///< by which the newest was impossible
     std::uint64_t slots_ = 0;
     std::uint64_t exchanges_ = 0;

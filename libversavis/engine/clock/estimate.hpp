@@ -22,9 +22,10 @@ constexpr double bound_sigmas = 3.3;
 
 struct HostEstimate {
     HostTime time;
-    Duration sigma;  ///< one standard deviation, if the shortest delays of both directions are
-                     ///< nearly equal
-    Duration bound;  ///< what the error cannot exceed, however unequal they are, but for 1 in 1000
+    Duration sigma;   ///< one standard deviation, if the shortest delays of both directions are
+                      ///< nearly equal
+    Duration bound;   ///< what the error cannot exceed, however unequal they are, but for 1 in 1000
+    Duration spread;  ///< the part of sigma that differences of two delays have, too
     ClockState state = ClockState::init;
 };
 

@@ -3,8 +3,10 @@
 // together.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "engine/clock/asymmetry.hpp"
 #include "engine/clock/envelope_filter.hpp"
 #include "engine/clock/gaussian_state.hpp"
 #include "engine/clock/messages.hpp"
@@ -17,11 +19,13 @@ namespace versavis::clock {
 /// reset, a new segment begins. Used by one thread, after recording.
 class Smoother {
  public:
-    /// In the order in which they became available.
-    explicit Smoother(const std::vector<Message>& messages);
+    /// In the order in which they became available. `asymmetry`: of the link, if it was measured.
+    explicit Smoother(const std::vector<Message>& messages,
+                      const std::optional<Asymmetry>& asymmetry = {});
 
     /// Of the segment that holds `board`, or else the one that begins last before it. State: locked
-    /// within 3 s of the messages of the segment, holdover beyond, init when there were none.
+    /// within 3 s of the messages of the segment, holdover beyond, init when there were none; step
+    /// where one segment ended and the next had not begun: a clock was stepped somewhere there.
     HostEstimate translate(BoardTime board) const;
 
     std::size_t segments() const { return segments_.size(); }
@@ -32,6 +36,7 @@ class Smoother {
         double precision =
             0;  ///< what the message says about the level of its edge, in natural parameters
         double precision_mean = 0;
+        double presumed_asymmetry_ns = 0;  ///< as the shape of the delays around it says
         GaussianState filtered;
         GaussianState smoothed;
     };
@@ -50,6 +55,8 @@ class Smoother {
     static void thin(Segment& segment);
     static void rescale(Segment& segment, Direction direction);
     static void weigh(Segment& segment);
+    static void presume_asymmetry(Segment& segment);
+    static std::vector<double> overshoots(const std::vector<double>& delays_ns);
     static void judge(SmootherStep& step, double level_ns, double mean, double variance,
                       double share);
     static double level_ns(const Segment& segment, const SmootherStep& step);
@@ -57,6 +64,7 @@ class Smoother {
     const Segment* segment_of(BoardTime board) const;
 
     std::vector<Segment> segments_;
+    std::optional<Asymmetry> asymmetry_;
 };
 
 }  // namespace versavis::clock

@@ -47,6 +47,7 @@ void Translator::board_restarted() {
     const std::lock_guard lock(mutex_);
     ++board_lives_;
     filter_.board_restarted();
+    witnesses_.clock_stepped();
     pps_.board_restarted();
     pps_used_ = false;
     newest_ = {};
@@ -69,7 +70,36 @@ void Translator::clock_continues() {
 
 void Translator::add(const Exchange& exchange) {
     const std::lock_guard lock(mutex_);
+    const std::uint64_t restarts = filter_.restarts();
     filter_.add(exchange);
+    if (filter_.restarts() != restarts) witnesses_.clock_stepped();
+    witnesses_.exchanged(exchange, filter_.skew());
+    filter_.doubt(witnesses_.doubt(), witnesses_.allowance());
+}
+
+std::size_t Translator::add_stream(bool witness) {
+    const std::lock_guard lock(mutex_);
+    return witnesses_.add_stream(witness);
+}
+
+void Translator::heard(std::size_t stream, const OneWay& message, bool fits) {
+    const std::lock_guard lock(mutex_);
+    witnesses_.heard(stream, {message.sent, {message.arrived.ns - message.sent.ns}}, fits);
+}
+
+std::optional<Duration> Translator::departure(std::size_t stream) const {
+    const std::lock_guard lock(mutex_);
+    return witnesses_.departure(stream);
+}
+
+bool Translator::steers(std::size_t stream) const {
+    const std::lock_guard lock(mutex_);
+    return witnesses_.steers(stream);
+}
+
+std::optional<bool> Translator::confirms_others(std::size_t stream) const {
+    const std::lock_guard lock(mutex_);
+    return witnesses_.confirms_others(stream);
 }
 
 void Translator::add(const OneWay& message) {

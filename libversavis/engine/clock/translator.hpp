@@ -11,6 +11,7 @@
 #include "engine/clock/envelope_filter.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "engine/clock/pps_reference.hpp"
+#include "engine/clock/stream_witnesses.hpp"
 
 namespace versavis::clock {
 
@@ -103,8 +104,18 @@ class Translator {
     void add(const OneWay& message);
     ClockContact contact() const;
 
-    /// A message that its own stream confirms shows that the board's clock did not step.
+    /// A message that its own stream confirms, and the time that it took, shows that the board's
+    /// clock did not step.
     void clock_continues();
+
+    /// A stream of messages that are compared with the exchanges, those of the other streams, and
+    /// each other: see StreamWitnesses. `witness`: counts when exchanges are in doubt. `fits`: it
+    /// agrees with those of its stream before it.
+    std::size_t add_stream(bool witness = true);
+    void heard(std::size_t stream, const OneWay& message, bool fits);
+    std::optional<Duration> departure(std::size_t stream) const;
+    bool steers(std::size_t stream) const;
+    std::optional<bool> confirms_others(std::size_t stream) const;
 
     /// The board saw a pulse of PPS, or a receiver says which second, ns since 1970, that pulse
     /// began. The latter returns by how many seconds labels and host differ, when that changes.
@@ -144,6 +155,7 @@ class Translator {
     std::uint32_t first_epoch_;
     mutable std::mutex mutex_;
     EnvelopeFilter filter_;
+    StreamWitnesses witnesses_;
     OutputClock output_;
     PpsReference pps_;
     bool pps_used_ = false;

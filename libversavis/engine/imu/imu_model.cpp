@@ -17,11 +17,11 @@ namespace {
 constexpr double fastest_i2c_hz = 1000;
 
 constexpr std::array<ImuModel, 8> models{{
-    {"adis16448b", wire::ImuKind::adis16448b, 819.2, 6},
-    {"adis16448a", wire::ImuKind::adis16448a, 819.2, 6},
-    {"adis16445", wire::ImuKind::adis16445, 819.2, 6},
-    {"adis16460", wire::ImuKind::adis16460, 2048, 6},
-    {"adis16470", wire::ImuKind::adis16470, 2000, 6},
+    {"adis16448b", wire::ImuKind::adis16448b, 819.2, 6, 0, false, 330},
+    {"adis16448a", wire::ImuKind::adis16448a, 819.2, 6, 0, false, 330},
+    {"adis16445", wire::ImuKind::adis16445, 819.2, 6, 0, false, 330},
+    {"adis16460", wire::ImuKind::adis16460, 2048, 6, 0, false, 375},
+    {"adis16470", wire::ImuKind::adis16470, 2000, 6, 0, false, 550},
     {"icm42688p", wire::ImuKind::icm42688p, 8000, 7, fastest_i2c_hz},
     {"bmi088", wire::ImuKind::bmi088, 2000, 2, 0, true},
     {"vn100", wire::ImuKind::vn100, 800, 0},
@@ -34,10 +34,30 @@ const ImuModel* find(Matches matches) {
     return nullptr;
 }
 
-/// What a part's digital filters leave out: the sensor element's own bandwidth. The published
-/// offsets of the ADIS16448 with 4 and 16 taps, less that with one, are off by 0.05 to 0.14 ms. At
-/// half, those are not covered; at twice, the filters look worse known than they are.
+/// Delay of the element of an ADIS, in periods of its bandwidth. The maker states two poles for the
+/// ADIS16364, 404 and 757 Hz (EngineerZone, "Gyro filter delay"): together 332 Hz, as its data
+/// sheet says, and 0.604 ms.
+constexpr double element_periods = 0.2;
+
+/// Share of it by which the element of another part may differ: 0.16 periods are of one pole alone,
+/// and bandwidths are typical values.
+constexpr double element_spread = 0.25;
+
+/// How well the digital filters of an ADIS are known: the published offsets of the ADIS16448 with 4
+/// and 16 taps, less that with one, are off by 0.05 to 0.14 ms.
 constexpr Duration adis_rest = microseconds(100);
+
+/// An ICM-42688-P delays by its UI filters, of second order after a reset (data sheet 1.8, 5.5, the
+/// tables of group delay). Below 2 kHz the codes from 1 on are parts of the larger of the rate and
+/// 400 Hz, for which they delay so; code 0 is half of the rate, from 25 Hz on.
+constexpr std::array<double, 8> icm42688p_ms_at_400_hz{0, 5.1, 5.8, 8.0, 9.1, 12.9, 15.3, 30.0};
+constexpr double icm42688p_periods_of_code_0 = 0.643;
+constexpr double icm42688p_periods_when_fast = 1.6;
+/// Before them is an anti-alias filter of second order, after a reset at 585 Hz (5.3, 15.3): for
+/// the angular rate 0.225 periods.
+constexpr double icm42688p_alias_s = 0.225 / 585;
+/// The tables round to 0.1 ms, and the notch filter, trimmed to 1 to 3 kHz, adds 0.01 to 0.1 ms.
+constexpr Duration icm42688p_rest = microseconds(100);
 
 /// Delay of a low-pass filter of unknown shape, in periods of its bandwidth: 0.16 with one pole,
 /// 0.22 with two or with a plain average, more with more poles. At half, the true delay is often
@@ -70,10 +90,11 @@ double adis_averaged(const ImuModel& model, double rate_hz) {
     return any ? whole : std::exp2(std::floor(std::log2(whole)));
 }
 
-/// ICM-42688-P, GYRO_ACCEL_CONFIG0: a half of the rate, or a part of the larger of it and 400 Hz.
-double icm42688p_bandwidth_hz(unsigned filter, double rate_hz) {
-    constexpr std::array<double, 8> parts{2, 4, 5, 8, 10, 16, 20, 40};
-    return (filter == 0 ? rate_hz : std::max(400.0, rate_hz)) / parts.at(std::min(filter, 7U));
+/// The slowest that is not below the wanted one, as the board sets it up.
+double icm42688p_rate(double wanted_hz) {
+    constexpr std::array<double, 10> rates{12.5, 25, 50, 100, 200, 500, 1000, 2000, 4000, 8000};
+    const auto* const found = std::lower_bound(rates.begin(), rates.end(), wanted_hz);
+    return found == rates.end() ? rates.back() : *found;
 }
 
 /// BMI088, GYRO_BANDWIDTH, the widest at each rate; its accelerometer has 131 Hz at least.
@@ -87,11 +108,26 @@ double bmi088_bandwidth_hz(double rate_hz) {
 
 Duration from_s(double seconds) { return {std::llround(seconds * 1e9)}; }
 
-/// By their data sheets: two averages in a row over 2^filter samples (a Bartlett window), then one
-/// over the samples that make one of the output.
+/// By their data sheets: the element, two averages in a row over 2^filter samples (a Bartlett
+/// window), then one over the samples that make one of the output.
 FilterDelay adis_delay(const ImuModel& model, unsigned filter, double rate_hz) {
     const double samples = std::exp2(filter) - 1 + (adis_averaged(model, rate_hz) - 1) / 2;
-    return {from_s(samples / model.fastest_hz), adis_rest, FilterDelaySource::model};
+    const double element_s = element_periods / model.element_hz;
+    const double rest_s = static_cast<double>(adis_rest.ns) * 1e-9;
+    return {from_s(samples / model.fastest_hz + element_s),
+            from_s(std::hypot(rest_s, element_spread * element_s)), FilterDelaySource::model};
+}
+
+FilterDelay icm42688p_delay(unsigned filter, double wanted_hz) {
+    const double rate_hz = icm42688p_rate(wanted_hz);
+    double delay_s = icm42688p_alias_s;
+    if (rate_hz >= 2000)
+        delay_s += icm42688p_periods_when_fast / rate_hz;
+    else if (filter == 0)
+        delay_s += icm42688p_periods_of_code_0 / std::max(25.0, rate_hz);
+    else
+        delay_s += icm42688p_ms_at_400_hz.at(std::min(filter, 7U)) * 0.4 / std::max(400.0, rate_hz);
+    return {from_s(delay_s), icm42688p_rest, FilterDelaySource::model};
 }
 
 FilterDelay unknown(double bandwidth_hz) {
@@ -101,8 +137,7 @@ FilterDelay unknown(double bandwidth_hz) {
 /// Without the age of what the board reads.
 FilterDelay of_filters(const ImuModel& model, unsigned filter, double rate_hz) {
     if (is_adis(model)) return adis_delay(model, filter, rate_hz);
-    if (model.kind == wire::ImuKind::icm42688p)
-        return unknown(icm42688p_bandwidth_hz(filter, rate_hz));
+    if (model.kind == wire::ImuKind::icm42688p) return icm42688p_delay(filter, rate_hz);
     if (model.kind == wire::ImuKind::bmi088) return unknown(bmi088_bandwidth_hz(rate_hz));
     return {{}, vn100_window, FilterDelaySource::unknown};
 }

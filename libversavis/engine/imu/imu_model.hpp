@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Raw IMU words to SI units, and the delay of the part's filter, as its data sheet has it.
+// Raw IMU words to SI units, and the delay of the part's filters, as its data sheet has it.
 #pragma once
 
 #include <optional>
@@ -19,6 +19,7 @@ struct ImuModel {
     unsigned strongest_filter = 0;  ///< as the configuration numbers them, from 0
     double fastest_i2c_hz = 0;      ///< 0: it cannot be on I2C
     bool accel_ready = false;       ///< its accelerometer has a data-ready line of its own
+    double element_hz = 0;          ///< -3 dB bandwidth of its gyro element; 0: in other filters
 };
 
 /// Names of all models, as the configuration has them.
@@ -32,8 +33,9 @@ const ImuModel* find_model(const std::string& name);
 enum class FilterDelaySource { unknown, model, configuration };
 const char* to_string(FilterDelaySource source);
 
-/// How much later than the motion its sample is: by the filters that the part is set up with, and,
-/// without its data-ready line, by the age of what the board reads.
+/// How much later than the motion its sample is: by the part's element, by the filters that it is
+/// set up with, and, without its data-ready line, by the age of what the board reads. Of the
+/// angular rate; the acceleration may be some tenths of a millisecond earlier.
 struct FilterDelay {
     Duration delay;
     Duration sigma;  ///< one standard deviation

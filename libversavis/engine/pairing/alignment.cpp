@@ -30,6 +30,11 @@ constexpr std::ptrdiff_t longer_gaps = 2;
 // with the others. At half starts with some jitter fail; at twice one period late passes.
 constexpr double lateness_spread = 0.6;
 
+// How far the board's time may have stepped ahead of its estimate, in smallest gaps. Then frames
+// seem to come before they were exposed, and records to be there that are not. At half steps by
+// three periods hide the truth from a start; at twice starts take some frames longer.
+constexpr double unseen_step = 4;
+
 // How far the camera's own exposure time may be off from the measured one. At half the ramps of
 // some exposure outputs look like another exposure; at twice short exposures are distinguished
 // less.
@@ -70,19 +75,28 @@ class Search {
           exposures_(exposures),
           instant_(instant),
           limits_(limits),
+          stepped_(limits),
           gap_ns_(exposures.smallest_gap_ns()),
-          takes_seen_(exposures.takes_seen()) {}
-
-    unsigned faults_to_refute() const {
-        return takes_seen_ ? pairing::faults_to_refute : unseen_faults_to_refute;
+          takes_seen_(exposures.takes_seen()) {
+        if (instant_ == Instant::arrival) return;
+        stepped_.earliest_arrival.ns -= part_of(gap_ns_, unseen_step);
     }
 
-    /// Differences of the clocks that bring some frame and some exposure together.
+    /// Faults that rule out an alignment. Nobody sees how many triggers a camera without exposure
+    /// line ignores: by leaving out any number of steady ones, its frames imitate the pattern. Then
+    /// they seem to be late, and are of newer exposures: those no fault rules out.
+    unsigned faults_to_refute(bool newer) const {
+        if (takes_seen_) return pairing::faults_to_refute;
+        return newer ? impossible_step : unseen_faults_to_refute;
+    }
+
+    /// Differences of the clocks that bring some frame and some exposure together, the one to the
+    /// newest exposures first.
     std::vector<std::int64_t> candidates() const {
         std::vector<std::int64_t> differences;
         for (const Arrival& frame : frames_)
             for (std::size_t i = 0; i < exposures_.size(); ++i)
-                if (arrival_possible(limits_, frame, exposures_[i].exposure))
+                if (arrival_possible(stepped_, frame, exposures_[i].exposure))
                     differences.push_back(time_ns(frame, instant_) -
                                           exposures_[i].instant_ns(instant_));
         std::sort(differences.begin(), differences.end());
@@ -95,8 +109,8 @@ class Search {
     }
 
     /// What must have gone wrong if the frames' clock differs from the board's by so much. None: it
-    /// cannot be.
-    std::optional<Alignment> explain(std::int64_t difference_ns) const {
+    /// cannot be, or takes `refuted` faults.
+    std::optional<Alignment> explain(std::int64_t difference_ns, unsigned refuted) const {
         Alignment alignment;
         const Record* last = nullptr;
         const Arrival* last_frame = nullptr;
@@ -104,7 +118,7 @@ class Search {
             const std::int64_t at_ns = time_ns(frame, instant_) - difference_ns;
             const Record* record = exposures_.near(instant_, at_ns, tolerance_ns());
             if (record == nullptr) {
-                if (!exposures_.lost_near(instant_, at_ns, 0))
+                if (!exposures_.lost_near(instant_, at_ns, 0) && !on_its_way(at_ns))
                     return std::nullopt;  // no pulse then
                 alignment.unknown = true;
                 continue;
@@ -113,6 +127,7 @@ class Search {
             if (last != nullptr)
                 alignment.faults +=
                     step_faults(frame.block_id - last_frame->block_id, *last, *record);
+            if (alignment.faults >= refuted) return std::nullopt;
             last = record;
             last_frame = &frame;
             alignment.triggers.push_back(record->exposure.trigger);
@@ -173,7 +188,9 @@ class Search {
                 ++i;
                 continue;
             }
-            late.push_back((frames_[late.size()].arrived - exposures_[i].end_on_host).ns);
+            const Arrival& frame = frames_[late.size()];
+            if (!arrival_possible(limits_, frame, exposure)) return {};
+            late.push_back((frame.arrived - exposures_[i].end_on_host).ns);
         }
         const std::int64_t least = *std::min_element(late.begin(), late.end());
         std::vector<std::uint64_t> kept;
@@ -191,6 +208,13 @@ class Search {
  private:
     std::int64_t tolerance_ns() const { return part_of(gap_ns_, coincidence); }
 
+    /// The record of an exposure there may not have come yet.
+    bool on_its_way(std::int64_t at_ns) const {
+        if (instant_ == Instant::arrival || exposures_.empty()) return false;
+        const std::int64_t after_ns = at_ns - exposures_.back().instant_ns(instant_);
+        return after_ns > 0 && after_ns < part_of(gap_ns_, unseen_step);
+    }
+
     std::size_t frames_needed() const {
         const bool by_clock = instant_ != Instant::arrival;
         return by_clock && !takes_seen_ ? unseen_frames_by_clock : frames_for_proof(by_clock);
@@ -198,7 +222,7 @@ class Search {
 
     bool possible(const Arrival& frame, const Record& record) const {
         return !record.used && record.exposure.exposed &&
-               arrival_possible(limits_, frame, record.exposure) &&
+               arrival_possible(stepped_, frame, record.exposure) &&
                !length_contradicts(frame, record.exposure);
     }
 
@@ -206,6 +230,7 @@ class Search {
     const ExposureLog& exposures_;
     Instant instant_;
     const Limits& limits_;
+    Limits stepped_;  ///< for an alignment that only speaks against another
     std::int64_t gap_ns_;
     bool takes_seen_;
 };
@@ -253,13 +278,15 @@ std::vector<std::uint64_t> align(const std::vector<Arrival>& frames, const Expos
     std::optional<Alignment> found;
     for (const Instant instant : instants) {
         const Search search(frames, exposures, instant, limits);
+        bool newer = true;  // than the one without fault
         for (const std::int64_t difference : search.candidates()) {
-            auto alignment = search.explain(difference);
-            if (!alignment || alignment->faults >= search.faults_to_refute()) continue;
+            auto alignment = search.explain(difference, search.faults_to_refute(newer));
+            if (!alignment) continue;
             if (alignment->faults > 0 || alignment->unknown) return {};
             // Neighbouring differences may lead to the same, and so may the instants.
             if (found && found->triggers != alignment->triggers) return {};
             found = std::move(alignment);
+            newer = false;
         }
     }
     return found ? Search(frames, exposures, instants.front(), limits).proved(found->triggers)

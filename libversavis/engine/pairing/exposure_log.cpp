@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 namespace versavis::pairing {
 
@@ -74,11 +75,15 @@ void ExposureLog::measure() {
     }
 }
 
-Record* ExposureLog::find(std::uint64_t trigger) {
+const Record* ExposureLog::find(std::uint64_t trigger) const {
     const auto found = std::find_if(records_.begin(), records_.end(), [&](const Record& record) {
         return record.exposure.trigger == trigger;
     });
     return found == records_.end() ? nullptr : &*found;
+}
+
+Record* ExposureLog::find(std::uint64_t trigger) {
+    return const_cast<Record*>(std::as_const(*this).find(trigger));
 }
 
 /// Exposures are in order of their starts, and of no other instant: a long one may end after the

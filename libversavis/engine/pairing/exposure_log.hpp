@@ -42,6 +42,7 @@ class ExposureLog {
     const Record& back() const { return records_.back(); }
     Record pop_front();
 
+    const Record* find(std::uint64_t trigger) const;
     Record* find(std::uint64_t trigger);
 
     /// The exposure closest to `instant_ns`, if it is within the tolerance; else null.

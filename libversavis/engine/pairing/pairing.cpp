@@ -9,9 +9,10 @@ namespace versavis::pairing {
 
 namespace {
 
-// Newest frames that a search tries to align; the oldest may be of another life of the camera. At
-// half a stale frame at the start costs another pattern; at twice each search takes longer.
-constexpr std::size_t frames_in_search = 12;
+// Newest frames that a search tries to align: a whole pattern; the oldest may be of another life of
+// the camera. At half a fault within a start costs another pattern; at twice each search takes
+// longer.
+constexpr std::size_t frames_in_search = 20;
 
 // Fewest exposures remembered. At half a fast camera that waits for records loses some; at twice a
 // search looks at more that are too old to matter.
@@ -228,6 +229,7 @@ void Pairing::refuse_early(const Exposure& exposure) {
 
 void Pairing::add(const Arrival& arrival) {
     last_arrival_ = arrival.arrived;
+    ++frames_;
     ++frames_since_start_;
     if (state_ == State::searching) {
         const bool by_clock = limits_.camera_clock && arrival.camera_time.ns != 0;
@@ -270,11 +272,14 @@ bool Pairing::records_complete(const Arrival& arrival) const {
 /// alignment. The newest wait for their records, which may always be some frames behind.
 void Pairing::search() {
     const std::size_t enough = frames_for_proof(by_clock_ && start_ != Start::slow);
-    const auto complete =
-        std::find_if_not(arrivals_.begin(), arrivals_.end(),
-                         [this](const Arrival& arrival) { return records_complete(arrival); });
     std::vector<Arrival> all(given_up_.begin(), given_up_.end());
-    all.insert(all.end(), arrivals_.begin(), complete);
+    all.insert(all.end(), arrivals_.begin(), arrivals_.end());
+    const auto incomplete = std::find_if_not(
+        all.begin(), all.end(), [this](const Arrival& frame) { return records_complete(frame); });
+    const std::uint64_t newest = frames_ - static_cast<std::uint64_t>(all.end() - incomplete);
+    all.erase(incomplete, all.end());
+    if (newest == searched_) return;  // a record more says nothing of frames before it
+    searched_ = newest;
     const std::size_t oldest = all.size() - std::min(all.size(), frames_in_search);
     for (std::size_t first = oldest; first + enough <= all.size(); ++first) {
         const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first);
@@ -291,10 +296,22 @@ void Pairing::search() {
 
 std::vector<std::uint64_t> Pairing::find_alignment(const std::vector<Arrival>& frames) const {
     auto found = align(frames, exposures_, instants(), limits_);
+    if (by_clock_ && !exposures_.takes_seen() && quicker_than_ever(frames, found)) found.clear();
     // Slow triggers are regular, but so far apart that arrivals alone prove it.
     if (found.empty() && start_ == Start::slow)
         found = align(frames, exposures_, std::array{Instant::arrival}, limits_);
     return found;
+}
+
+/// Frames of a camera that ignores triggers unseen may imitate a place that is newer than theirs:
+/// then they seem to come sooner than any did.
+bool Pairing::quicker_than_ever(const std::vector<Arrival>& frames,
+                                const std::vector<std::uint64_t>& triggers) const {
+    for (std::size_t i = 0; i < triggers.size() && quickest_ns_; ++i)
+        if (triggers[i] != 0 &&
+            quicker_than(*quickest_ns_, frames[i], *exposures_.find(triggers[i])))
+            return true;
+    return false;
 }
 
 void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
@@ -319,6 +336,7 @@ void Pairing::lock(const std::vector<std::uint64_t>& triggers) {
         } else {
             drop_front(EventReason::unproved);
         }
+    given_up_.clear();
 }
 
 /// The pauses between starts are over, but not a start that the board may still carry out.
@@ -400,8 +418,13 @@ std::int64_t Pairing::lateness_ns(const Arrival& arrival, const Record& record) 
 
 /// A frame may be late, but not earlier than the quickest ever was.
 bool Pairing::early(const Arrival& arrival, const Record& record) const {
-    const std::int64_t delay = (arrival.arrived - record.end_on_host).ns;
-    return in_gaps(delay - shortest_delay_ns_, exposures_.smallest_gap_ns()) < -early_part;
+    return quicker_than(shortest_delay_ns_, arrival, record);
+}
+
+bool Pairing::quicker_than(std::int64_t delay_ns, const Arrival& arrival,
+                           const Record& record) const {
+    const std::int64_t own_ns = (arrival.arrived - record.end_on_host).ns;
+    return own_ns < delay_ns - part_of(exposures_.smallest_gap_ns(), early_part);
 }
 
 /// Frames that come later and later wait for each other somewhere. When one of them is dropped, the
@@ -498,7 +521,9 @@ bool Pairing::decide_checking() {
     const Record* late = by_latency(arrival);
     const Reading reading = read(arrival);
     const bool all_agree = reading.verified && reading.record == late && steady(arrival, reading);
-    if (all_agree && by_clock_) {
+    // Where ids leave a choice, a late frame of a clock that stepped by as much agrees as well.
+    const bool choice = all_agree && perhaps_not_taken(proved_->record, *late) != 0;
+    if (all_agree && by_clock_ && !choice) {
         relock(*late);  // nothing stepped after all
         return true;
     }
@@ -615,7 +640,9 @@ const Record& Pairing::learn(const Arrival& arrival, std::uint64_t trigger) {
     Record& record = *exposures_.find(trigger);
     record.used = true;
     if (arrival.camera_time.ns != 0) clock_.track(arrival.camera_time, record);
-    shortest_delay_ns_ = std::min(shortest_delay_ns_, (arrival.arrived - record.end_on_host).ns);
+    const std::int64_t delay_ns = (arrival.arrived - record.end_on_host).ns;
+    shortest_delay_ns_ = std::min(shortest_delay_ns_, delay_ns);
+    quickest_ns_ = quickest_ns_ ? std::min(*quickest_ns_, delay_ns) : delay_ns;
     if (!latency_.known() || punctual(arrival, record))
         latency_.track(arrival.arrived.ns, record.end_on_host.ns);
     proved_ = Pair{arrival, record};
@@ -696,6 +723,7 @@ void Pairing::set_limits(const Limits& limits) {
     exposures_ = ExposureLog(limits.period);
     delay_ = RecordDelay(limits);
     clock_ = CameraClock(limits.stamped);
+    quickest_ns_.reset();
 }
 
 void Pairing::reset() {

@@ -67,6 +67,9 @@ class Pairing {
     void add(const Arrival& arrival);
     void add(const Shortfall& shortfall);
 
+    /// For RecordDelay::compared().
+    void compared(std::uint64_t exchanges, bool agree) { delay_.compared(exchanges, agree); }
+
     /// Gives up what has waited too long.
     void advance(HostTime now);
 
@@ -81,6 +84,9 @@ class Pairing {
     void reset();
 
     State state() const { return state_; }
+
+    /// By how much the newest record came later than usual, while nothing is decided for that.
+    Duration records_late_by() const { return delay_.late_by(); }
 
     /// What the camera stamps, by what was said or found out.
     Instant stamped() const { return clock_.stamped(); }
@@ -131,6 +137,8 @@ class Pairing {
     bool records_complete(const Arrival& arrival) const;
     void search();
     std::vector<std::uint64_t> find_alignment(const std::vector<Arrival>& frames) const;
+    bool quicker_than_ever(const std::vector<Arrival>& frames,
+                           const std::vector<std::uint64_t>& triggers) const;
     void end_start_soon();
     void lock(const std::vector<std::uint64_t>& triggers);
 
@@ -146,6 +154,7 @@ class Pairing {
     bool punctual(const Arrival& arrival, const Record& record) const;
     bool late(const Arrival& arrival, const Record& record) const;
     bool early(const Arrival& arrival, const Record& record) const;
+    bool quicker_than(std::int64_t delay_ns, const Arrival& arrival, const Record& record) const;
     bool needs_witness(const Arrival& arrival, const Record& record) const;
     bool has_witness() const;
     const Record* by_clock(const Arrival& arrival) const;
@@ -180,11 +189,14 @@ class Pairing {
     int early_ = 0;                 ///< records in a row that came too early
     std::deque<Arrival> arrivals_;  ///< not decided yet
     std::deque<Arrival> given_up_;  ///< by the search, for want of room: their times still count
+    std::uint64_t frames_ = 0;      ///< that came
+    std::uint64_t searched_ = 0;    ///< of those, up to the newest that was searched for
     std::deque<Shortfall> shortfalls_;
     CameraClock clock_;
-    std::int64_t shortest_delay_ns_ = 0;  ///< from end of exposure to arrival, since the lock
-    Relation latency_{false};             ///< arrival against its end on the host
-    std::optional<Pair> proved_;          ///< the newest that was published
+    std::int64_t shortest_delay_ns_ = 0;       ///< from end of exposure to arrival, since the lock
+    std::optional<std::int64_t> quickest_ns_;  ///< the same of all that was proved of this stream
+    Relation latency_{false};                  ///< arrival against its end on the host
+    std::optional<Pair> proved_;               ///< the newest that was published
     std::array<SlipHypothesis, 3> hypotheses_{};  ///< by Stepped
     bool waits_for_witness_ = false;              ///< the oldest frame does
     int undecided_ = 0;                           ///< frames since the slip

@@ -25,6 +25,11 @@ constexpr int records_to_confirm = 4;
 // clock's estimate has moved; at twice a step back is forgotten twice as soon.
 constexpr double delay_forgotten = 1e-3;
 
+// Exchanges that agree with the estimate of the board's clock, while records are late, until that
+// is the link. At half those that were on the way during a step of the clock may count; at twice
+// frames are withheld for another second.
+constexpr std::uint64_t exchanges_to_confirm = 10;
+
 /// As far apart as they claim to be: lies may differ by more than 64 bits hold.
 template <class Time>
 double apart_ns(Time from, Time to) {
@@ -68,9 +73,33 @@ void RecordDelay::learn(const Exposure& exposure) {
                                   std::llround(delay_forgotten * std::max(since_ns, 0.0));
     confirmed_ = delay_ns < least_ns - part_of(period_.ns, off_delay) ? 0 : confirmed_ + 1;
     least_delay_ns_ = std::min(least_ns, delay_ns);
-    const std::int64_t late_ns = delay_ns - *least_delay_ns_;
+    const std::int64_t late_ns = lateness_ns(delay_ns);
     prompt_ = delay_ns <= latest_.ns && late_ns <= part_of(period_.ns, off_delay);
     if (first || delay_ns > latest_.ns || late_ns > tolerance_ns()) late_until_ = exposure.recorded;
+    late_ns_ = late_ns;
+}
+
+/// Against the usual delay, which a link that became slower moves. What is too early does not
+/// follow it: it may be as quick again at any time.
+std::int64_t RecordDelay::lateness_ns(std::int64_t delay_ns) {
+    if (delay_ns < usual_delay_ns_ - tolerance_ns()) usual_delay_ns_ = quickest;
+    const std::int64_t late_ns = delay_ns - std::max(usual_delay_ns_, *least_delay_ns_);
+    if (late_ns <= tolerance_ns()) {
+        late_run_.reset();
+        return late_ns;
+    }
+    if (!late_run_) late_run_ = {exchanges_.value_or(0), delay_ns};
+    late_run_->least_delay_ns = std::min(late_run_->least_delay_ns, delay_ns);
+    if (exchanges_.value_or(0) - late_run_->exchanges >= exchanges_to_confirm) {
+        usual_delay_ns_ = late_run_->least_delay_ns;
+        late_run_.reset();
+    }
+    return late_ns;
+}
+
+void RecordDelay::compared(std::uint64_t exchanges, bool agree) {
+    if (!agree || !exchanges_ || exchanges < *exchanges_) late_run_.reset();
+    exchanges_ = exchanges;
 }
 
 }  // namespace versavis::pairing

@@ -26,6 +26,22 @@ constexpr std::int64_t wander_parts = 10'000;
 /// A trigger that leaves late says so, and is sent no later than this.
 constexpr Duration latest_trigger = milliseconds(2);
 
+/// How far a trigger may be off its grid point, on a fixed grid.
+constexpr Duration grid_tolerance = microseconds(10);
+
+/// The period is rounded to 1 ns.
+constexpr Duration grid_rounding = nanoseconds(1);
+
+/// How far a camera's latency, or an exposure that it keeps to, may wander while it runs: lines
+/// that warm up, and the crystals of camera and board.
+constexpr Duration latency_reach = microseconds(20);
+
+/// An exposure that was announced and the one that the line shows may differ by the line's delays.
+constexpr Duration announced_difference = microseconds(500);
+
+/// By which factor an exposure whose record is missing may differ from those around it.
+constexpr std::int64_t unseen_change = 2;
+
 /// How far the second latency, or the second exposure of equal length, may be off from the first.
 constexpr Duration first_tolerance = milliseconds(1);
 
@@ -81,10 +97,11 @@ std::optional<Implausibility> contradicts_itself(const wire::Exposure& record,
 RecordHistory::RecordHistory(const RecordLimits& limits)
     : period_(limits.period),
       slave_(limits.slave),
+      fixed_grid_(limits.fixed_grid && !limits.slave),
       slew_(rounded(static_cast<double>(period_.ns) * limits.grid_slew_ppm * 1e-6)),
       pace_(period_, period_ / first_pace_parts),
-      latency_(first_tolerance),
-      length_(first_tolerance) {
+      latency_(RunningEstimate(first_tolerance).within(latency_reach)),
+      length_(RunningEstimate(first_tolerance).within(latency_reach)) {
     lengths_[length_count_++] = limits.exposure;
 }
 
@@ -92,8 +109,7 @@ std::optional<Implausibility> RecordHistory::doubt(const ReceivedRecord& receive
     const wire::Exposure& record = received.record;
     if (newest_)
         if (auto doubt = number_doubt(record)) return doubt;
-    if (newest_ && grid_known_)
-        if (auto doubt = trigger_doubt(record)) return doubt;
+    if (auto doubt = trigger_doubt(record)) return doubt;
     if (auto doubt = start_doubt(record)) return doubt;
     return end_doubt(received);
 }
@@ -118,7 +134,68 @@ bool RecordHistory::may_skip(const wire::Exposure& record, std::uint64_t points)
     return points <= skips_ || slave_ || has(record, sparse) || has(*newest_, sparse);
 }
 
+bool RecordHistory::only_skips(const wire::Exposure& record) const {
+    return newest_ && record.tick > newest_->tick && record.trigger > newest_->trigger &&
+           record.trigger - newest_->trigger <= record.tick - newest_->tick &&
+           !trigger_doubt(record);
+}
+
 std::optional<Implausibility> RecordHistory::trigger_doubt(const wire::Exposure& record) const {
+    if (grid_)
+        if (auto doubt = grid_doubt(record)) return doubt;
+    return newest_ && grid_known_ ? pace_doubt(record) : std::nullopt;
+}
+
+std::optional<Implausibility> RecordHistory::grid_doubt(const wire::Exposure& record) const {
+    const GridPoint said = by_trigger(record);
+    const auto grid = predicted(record.tick);
+    Implausibility doubt{EventReason::implausible_time, record.trigger_ns, record.trigger_ns};
+    if (!grid) return doubt;
+    const Duration late = has(record, wire::exposure_late) ? latest_trigger : Duration{};
+    const Duration early_by = grid->earliest - grid_tolerance - said.latest;
+    const Duration late_by = said.earliest - late - (grid->latest + grid_tolerance);
+    if (early_by.ns <= 0 && late_by.ns <= 0) return std::nullopt;
+    doubt.expected += early_by.ns > 0 ? early_by.ns : -late_by.ns;
+    return doubt;
+}
+
+/// A fixed grid is where it always was, to the rounding of the period.
+/// None: ticks that far apart cannot be.
+std::optional<RecordHistory::GridPoint> RecordHistory::predicted(std::uint64_t tick) const {
+    const auto ticks = static_cast<std::int64_t>(tick - grid_->tick);
+    if (std::abs(static_cast<double>(ticks)) * static_cast<double>(period_.ns) > furthest_ns)
+        return std::nullopt;
+    const Duration moved = period_ * ticks;
+    const Duration rounding = grid_rounding * std::abs(ticks);
+    return GridPoint{tick, grid_->earliest + moved - rounding, grid_->latest + moved + rounding};
+}
+
+/// The board sends a trigger half the exposure that it expects before the grid point.
+RecordHistory::GridPoint RecordHistory::by_trigger(const wire::Exposure& record) const {
+    Lengths expected = lengths(record);
+    const bool all_seen =
+        length_count_ > remembered_lengths && (record.trigger == seen_ + 1 || commanded_.ns != 0);
+    if (!all_seen) expected = {expected.shortest / unseen_change, expected.longest * unseen_change};
+    if (has(record, wire::exposure_announced)) {
+        expected.shortest = expected.shortest - announced_difference;
+        expected.longest = expected.longest + announced_difference;
+    }
+    const BoardTime trigger{record.trigger_ns};
+    return {record.tick, trigger + expected.shortest / 2, trigger + expected.longest / 2};
+}
+
+/// What is known gets narrower, and never moves.
+void RecordHistory::learn_grid(const wire::Exposure& record) {
+    if (!fixed_grid_ || has(record, wire::exposure_late)) return;
+    const GridPoint said = by_trigger(record);
+    const auto grid = grid_ ? predicted(record.tick) : std::nullopt;
+    grid_ = said;
+    if (!grid) return;
+    grid_->earliest = std::clamp(said.earliest, grid->earliest, grid->latest);
+    grid_->latest = std::clamp(said.latest, grid->earliest, grid->latest);
+}
+
+std::optional<Implausibility> RecordHistory::pace_doubt(const wire::Exposure& record) const {
     const Duration since{record.trigger_ns - punctual_->trigger_ns};
     const std::uint64_t ticks = record.tick - punctual_->tick;
     const Implausibility doubt{EventReason::implausible_time, record.trigger_ns,
@@ -137,19 +214,21 @@ std::optional<Implausibility> RecordHistory::trigger_doubt(const wire::Exposure&
     return Implausibility{doubt.reason, doubt.said, (Duration{record.trigger_ns} - off).ns};
 }
 
+/// Exposures among which the one may be that the board expected when it placed the trigger.
+RecordHistory::Lengths RecordHistory::lengths(const wire::Exposure& record) const {
+    const std::size_t known = std::min(length_count_, remembered_lengths);
+    auto [shortest, longest] = std::minmax_element(lengths_, lengths_ + known);
+    Lengths range{*shortest, *longest};
+    if (!has_start(record) || !has_end(record)) return range;
+    const Duration own{record.end_ns - record.start_ns};
+    return {std::min(range.shortest, own), std::max(range.longest, own)};
+}
+
 /// By how much two triggers may lie closer or further apart, because other exposures were expected
 /// of them.
 Duration RecordHistory::compensation(const wire::Exposure& record) const {
-    const std::size_t known = std::min(length_count_, remembered_lengths);
-    auto [shortest, longest] = std::minmax_element(lengths_, lengths_ + known);
-    Duration low = *shortest;
-    Duration high = *longest;
-    if (has_start(record) && has_end(record)) {
-        const Duration own{record.end_ns - record.start_ns};
-        low = std::min(low, own);
-        high = std::max(high, own);
-    }
-    return (high - low) / 2;
+    const Lengths expected = lengths(record);
+    return (expected.longest - expected.shortest) / 2;
 }
 
 std::optional<Implausibility> RecordHistory::start_doubt(const wire::Exposure& record) const {
@@ -170,11 +249,13 @@ std::optional<Implausibility> RecordHistory::end_doubt(const ReceivedRecord& rec
 
 void RecordHistory::learn(const ReceivedRecord& received) {
     const wire::Exposure& record = received.record;
+    learn_grid(record);
     if (grid_known_ && !has(record, wire::exposure_late) && !has(*punctual_, wire::exposure_late) &&
         compensation(record) * 2 < equal_exposures) {
         const auto ticks = static_cast<std::int64_t>(record.tick - punctual_->tick);
         pace_.learn({(record.trigger_ns - punctual_->trigger_ns) / ticks});
     }
+    see(record);
     if (!grid_known_ || !has(record, wire::exposure_late)) punctual_ = record;
     newest_ = record;
     grid_known_ = true;
@@ -182,11 +263,16 @@ void RecordHistory::learn(const ReceivedRecord& received) {
     if (!has_start(record)) return;
     latency_.learn({record.start_ns - record.trigger_ns});
     if (!has_end(record)) return;
-    const Duration length{record.end_ns - record.start_ns};
-    lengths_[length_count_++ % remembered_lengths] = length;
-    if (received.commanded != commanded_) length_ = RunningEstimate(first_tolerance);
+    if (received.commanded != commanded_)
+        length_ = RunningEstimate(first_tolerance).within(latency_reach);
     commanded_ = received.commanded;
-    length_.learn(length);
+    length_.learn({record.end_ns - record.start_ns});
+}
+
+void RecordHistory::see(const wire::Exposure& record) {
+    seen_ = record.trigger;
+    if (has_start(record) && has_end(record))
+        lengths_[length_count_++ % remembered_lengths] = {record.end_ns - record.start_ns};
 }
 
 bool RecordHistory::repeats(const ReceivedRecord& received) const {
@@ -212,11 +298,20 @@ RecordVerdict RecordFilter::judge(const ReceivedRecord& received) {
     verdict_.doubt = filter_.judge(received, received.exchanges, arrival);
     verdict_.overturned = filter_.overturned();
     if (verdict_.doubt && !arrival && !received.clock_contradicted &&
-        filter_.stepped(received.exchanges)) {
+        may_adopt(received, *verdict_.doubt)) {
         filter_.adopt(received);
         verdict_.step = std::exchange(verdict_.doubt, std::nullopt);
     }
+    if (verdict_.doubt && received.commanded.ns == 0) filter_.believed().see(received.record);
     return verdict_;
+}
+
+bool RecordFilter::may_adopt(const ReceivedRecord& received, const Implausibility& doubt) {
+    if (received.promptness == Promptness::not_recorded) return filter_.stepped(received.exchanges);
+    const bool decided = doubt.reason == EventReason::implausible_number
+                             ? filter_.believed().only_skips(received.record)
+                             : arrival_confirms(received.promptness, {doubt.said - doubt.expected});
+    return decided ? filter_.stepped(received.exchanges) : filter_.prevailed(received.exchanges);
 }
 
 }  // namespace versavis::pairing

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "engine/plausibility/delay_floor.hpp"
 #include "engine/plausibility/implausibility.hpp"
 #include "engine/plausibility/majority_filter.hpp"
 #include "engine/plausibility/running_estimate.hpp"
@@ -22,6 +23,7 @@ struct RecordLimits {
     double grid_slew_ppm = 0;                  ///< by which the grid's rate may change
     bool wired = true;                         ///< its exposure line
     bool slave = false;                        ///< triggered by another camera's exposure line
+    bool fixed_grid = false;                   ///< its grid points follow no clock but the board's
 };
 
 /// A record as it came, and what was known then beside its own fields.
@@ -33,6 +35,7 @@ struct ReceivedRecord {
     std::int64_t expected_ns = 0;  ///< latest time of the board by the host's clock
     EventReason arrival = EventReason::none;  ///< what contradicts the time of its arrival
     bool clock_contradicted = false;          ///< exchanges contradict the estimate of the clock
+    Promptness promptness = Promptness::not_recorded;
 };
 
 /// The newest instant that the record names.
@@ -52,14 +55,23 @@ class RecordHistory {
     std::optional<Implausibility> doubt(const ReceivedRecord& received) const;
     void learn(const ReceivedRecord& received);
 
+    /// It is not believed, but the board may expect the exposure that it names, which varies.
+    void see(const wire::Exposure& record);
+
     /// All may have moved: the next record is held against latency and exposure alone.
     void rebase() {
         newest_.reset();
+        grid_.reset();
         grid_known_ = false;
     }
 
-    /// The grid may have moved; triggers are counted as before.
+    /// The camera is started anew, and a grid that moves may have moved; triggers are counted as
+    /// before.
     void forget_grid() { grid_known_ = false; }
+
+    /// The record belongs where it says, but triggers were left out before it of which nothing is
+    /// known: what the board said of them is lost.
+    bool only_skips(const wire::Exposure& record) const;
 
     /// The board said that so many of the next grid points have no trigger.
     void triggers_skipped(std::uint64_t count) { skips_ += count; }
@@ -78,17 +90,38 @@ class RecordHistory {
     /// Exposures that the expected one of a trigger may be among.
     static constexpr std::size_t remembered_lengths = 8;
 
+    struct Lengths {
+        Duration shortest;
+        Duration longest;
+    };
+
+    /// Where the grid point of a tick lies.
+    struct GridPoint {
+        std::uint64_t tick = 0;
+        BoardTime earliest;
+        BoardTime latest;
+    };
+
     std::optional<Implausibility> number_doubt(const wire::Exposure& record) const;
     bool may_skip(const wire::Exposure& record, std::uint64_t points) const;
     std::optional<Implausibility> trigger_doubt(const wire::Exposure& record) const;
+    std::optional<Implausibility> grid_doubt(const wire::Exposure& record) const;
+    std::optional<Implausibility> pace_doubt(const wire::Exposure& record) const;
     std::optional<Implausibility> start_doubt(const wire::Exposure& record) const;
     std::optional<Implausibility> end_doubt(const ReceivedRecord& received) const;
+    Lengths lengths(const wire::Exposure& record) const;
     Duration compensation(const wire::Exposure& record) const;
+    GridPoint by_trigger(const wire::Exposure& record) const;
+    std::optional<GridPoint> predicted(std::uint64_t tick) const;
+    void learn_grid(const wire::Exposure& record);
 
     Duration period_;
     bool slave_;
+    bool fixed_grid_;
+    std::optional<GridPoint> grid_;  ///< by the records so far, if it is fixed
     Duration lengths_[remembered_lengths];
     std::size_t length_count_ = 0;
+    std::uint64_t seen_ = 0;  ///< trigger of the newest record, believed or not
     std::optional<wire::Exposure> newest_;
     std::optional<wire::Exposure> punctual_;  ///< the newest whose trigger did not leave late
     bool grid_known_ = false;                 ///< the next tick follows from the newest record's
@@ -102,15 +135,16 @@ class RecordHistory {
 
 struct RecordVerdict {
     std::optional<Implausibility> doubt;  ///< none: the record is believed
-    std::optional<Implausibility> step;   ///< it is, although this speaks against it: the board's
-                                          ///< time has stepped
+    std::optional<Implausibility> step;   ///< it is, although this speaks against it: those before
+                                          ///< were of another time or count
     bool overturned = false;  ///< records that were believed before it are void: which of them lied
                               ///< is unknown
 };
 
 /// The one judge of records, for the service and for whoever pairs its evidence again: a record is
-/// believed when it agrees with itself, with the time of its arrival and with those before it, and
-/// a change when several records agree on it. Not thread-safe.
+/// believed when it agrees with itself, with the time of its arrival and with those before it; a
+/// change when several records agree on it and their arrival confirms it, or when nothing but time
+/// can decide. Not thread-safe.
 class RecordFilter {
  public:
     explicit RecordFilter(const RecordLimits& limits);
@@ -132,6 +166,8 @@ class RecordFilter {
     }
 
  private:
+    bool may_adopt(const ReceivedRecord& received, const Implausibility& doubt);
+
     RecordLimits limits_;
     MajorityFilter<RecordHistory> filter_;
     RecordVerdict verdict_;

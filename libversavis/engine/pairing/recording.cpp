@@ -26,7 +26,7 @@ static_assert(offsetof(Shortfall, reason) == 8 && offsetof(StartRequest, now) ==
 static_assert(offsetof(RecordLimits, latency) == 8 && offsetof(RecordLimits, exposure) == 16 &&
               offsetof(RecordLimits, max_exposure) == 24 &&
               offsetof(RecordLimits, grid_slew_ppm) == 32 && offsetof(RecordLimits, wired) == 40 &&
-              offsetof(RecordLimits, slave) == 41);
+              offsetof(RecordLimits, slave) == 41 && offsetof(RecordLimits, fixed_grid) == 42);
 static_assert(offsetof(wire::Exposure, flags) == 2 && offsetof(wire::Exposure, trigger) == 8 &&
               offsetof(wire::Exposure, tick) == 16 && offsetof(wire::Exposure, trigger_ns) == 24 &&
               offsetof(wire::Exposure, start_ns) == 32 && offsetof(wire::Exposure, end_ns) == 40);
@@ -34,7 +34,8 @@ static_assert(offsetof(ReceivedRecord, commanded) == 48 &&
               offsetof(ReceivedRecord, exchanges) == 56 &&
               offsetof(ReceivedRecord, expected_ns) == 64 &&
               offsetof(ReceivedRecord, arrival) == 72 &&
-              offsetof(ReceivedRecord, clock_contradicted) == 76);
+              offsetof(ReceivedRecord, clock_contradicted) == 76 &&
+              offsetof(ReceivedRecord, promptness) == 77);
 
 /// A bool is 0 or 1, whatever byte somebody stored.
 template <class Item, std::size_t size>
@@ -46,6 +47,7 @@ void make_bools(std::array<unsigned char, size>& bytes) {
     if constexpr (std::is_same_v<Item, RecordLimits>) {
         make(offsetof(RecordLimits, wired));
         make(offsetof(RecordLimits, slave));
+        make(offsetof(RecordLimits, fixed_grid));
     }
     if constexpr (std::is_same_v<Item, ReceivedRecord>)
         make(offsetof(ReceivedRecord, clock_contradicted));
@@ -118,6 +120,7 @@ const char* impossible(const ReceivedRecord& received) {
     if (!possible(BoardTime{received.record.trigger_ns})) return "trigger_ns";
     if (!possible_or_unknown(received.record.start_ns)) return "start_ns";
     if (!possible_or_unknown(received.record.end_ns)) return "end_ns";
+    if (received.promptness > Promptness::late) return "promptness";
     return is_length(received.commanded) ? nullptr : "commanded_ns";
 }
 
@@ -181,6 +184,8 @@ void apply(Pairing& pairing, const Evidence& evidence) {
                 pairing.reset();
             else if constexpr (std::is_same_v<Item, StartRequest>)
                 pairing.start_requested(item.start, item.now);
+            else if constexpr (std::is_same_v<Item, ReceivedRecord>)
+                pairing.compared(item.exchanges, !item.clock_contradicted);
             else if constexpr (std::is_same_v<Item, Exposure> || std::is_same_v<Item, Arrival> ||
                                std::is_same_v<Item, Shortfall>)
                 pairing.add(item);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/plausibility/implausibility.hpp"
+#include "engine/plausibility/persistence.hpp"
 
 namespace versavis {
 
@@ -38,7 +39,10 @@ class MajorityFilter {
         const Message& message, std::uint64_t exchanges,
         const std::optional<Implausibility>& arrival = std::nullopt) {
         overturned_ = voted_ = false;
-        if (!confirmed()) return arrival ? arrival : judge_unconfirmed(message);
+        if (!confirmed()) {
+            believed_since_ = exchanges;
+            return arrival ? arrival : judge_unconfirmed(message);
+        }
         const auto doubt = believed_.doubt(message);
         if (doubt) vote(message, exchanges);
         if (arrival || doubt) return arrival ? arrival : doubt;
@@ -61,10 +65,19 @@ class MajorityFilter {
                exchanges - rival_since_ >= exchanges_to_confirm;
     }
 
+    /// The same where nothing but the stream itself can say which of the two is right: they have
+    /// agreed for twice as long as those that were believed before, and for `least` exchanges.
+    bool prevailed(std::uint64_t exchanges, std::uint64_t least = 0) const {
+        const std::uint64_t believed_for = rival_since_ - believed_since_;
+        return stepped(exchanges) &&
+               exchanges - rival_since_ >= std::clamp(believed_for * 2, least, most_to_prevail);
+    }
+
     /// From now on those are believed, of which `message` is the newest.
     template <class Message>
     void adopt(const Message& message) {
         forget();
+        believed_since_ = rival_since_;
         if (believed_.doubt(message))
             believed_ = rival_;
         else
@@ -134,6 +147,7 @@ class MajorityFilter {
     int votes_ = 0;  ///< for the rival
     bool voted_ = false;
     std::uint64_t rival_since_ = 0;
+    std::uint64_t believed_since_ = 0;
     int to_confirm_;
     int agreed_ = 0;
     bool overturned_ = false;

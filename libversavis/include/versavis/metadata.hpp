@@ -114,13 +114,15 @@ enum class EventKind : std::uint32_t {
     imu_silent = 20,            ///< no data-ready edge, end of transfer or bytes arrived
     utc_label = 21,  ///< the PPS pulse at this time was labelled; value: UTC seconds since 1970
     message_doubted = 22,  ///< its witnesses contradict a message of the board: it was not used
-    stream_stepped = 23,   ///< several messages agree against all before: a new epoch begins
+    stream_stepped = 23,   ///< messages of one stream agree against those before: they are believed
     output_clock_stepped = 24,  ///< value: ns by which its offset to the host's clock changed
     triggers_skipped = 25,  ///< grid points in a row that were too late; value: tick of the first
     sync_lost = 26,         ///< pulses of the sync input do not fit the grid; value: ns off it
     sync_taken = 27,        ///< the grid follows the sync pulses; value: ns that it moves for that
     configuration_stored = 28,  ///< on the board; value: 1 when it is safe, 0 when that failed
-    seconds_differ = 29,  ///< value: whole seconds of the receiver at the board less the host's
+    seconds_differ = 29,      ///< value: whole seconds of the receiver at the board less the host's
+    host_undisciplined = 30,  ///< the clock that names the PPS pulses' seconds; value: 1, or 0 when
+                              ///< it is disciplined again
 };
 
 /// Why a trigger has no frame, or a frame no trigger.

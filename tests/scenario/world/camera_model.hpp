@@ -9,14 +9,15 @@
 #include <vector>
 
 #include "base/hal.hpp"
+#include "nanoseconds.hpp"
 
 namespace versavis::scenario {
 
 using firmware::Nanoseconds;
 
-inline constexpr Nanoseconds us = 1'000;
-inline constexpr Nanoseconds ms = 1'000'000;
-inline constexpr Nanoseconds second = 1'000'000'000;
+using test::ms;
+using test::second;
+using test::us;
 
 /// What is wrong with one exposure.
 enum class Fault {

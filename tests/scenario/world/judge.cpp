@@ -17,7 +17,8 @@ namespace {
 constexpr std::size_t longest_report = 2000;
 constexpr double radians = 3.14159265358979 / 180;
 constexpr double gravity = 9.80665;
-constexpr Nanoseconds longest_reading = 20'000;  ///< of registers that change in between
+constexpr Nanoseconds longest_reading = 20'000;           ///< of registers that change in between
+constexpr Duration filter_tolerance = microseconds(150);  ///< data sheets round delays
 
 template <class... Args>
 void complain(std::string& out, fmt::format_string<Args...> text, Args&&... args) {
@@ -152,8 +153,12 @@ void World::judge_imu(unsigned port, std::string& out) {
     const Duration filtered_for =
         imu::filter_delay(model, asked.filter, (paced ? 1 : 4) * asked.rate_millihertz * 1e-3, true)
             .delay;
-    const double gyro_lsb =
-        filtered_for.ns == 0 ? 0.6 : 0.7;  // an average also flattens the motion
+    // The part shows the motion as late as its registers make it, which the board has written.
+    const devices::SampleDelays late =
+        port == 0 && spi_imu_ ? spi_imu_->delays() : devices::SampleDelays{};
+    if (absolute(Duration{late.gyro} - filtered_for) > filter_tolerance)
+        complain(out, "IMU {}: its filters delay by {}, not {}", port, late.gyro, filtered_for.ns);
+    const double gyro_lsb = late.gyro == 0 ? 0.6 : 0.7;  // an average also flattens the motion
     std::ptrdiff_t last_index = -1;
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const wire::ImuSample& sample = samples[i];
@@ -192,16 +197,18 @@ void World::judge_imu(unsigned port, std::string& out) {
         if ((sample.flags & wire::imu_accel_stamped) != 0) judge_accel_age(sample, out);
         const ImuMetadata si = imu::to_si(model, sample);
         const wire::ImuScale scale = wire::imu_scale(sample.kind);
-        const devices::Inertial felt = motion(taken - filtered_for.ns);
-        const devices::Inertial later = motion((paced ? taken : newest) - filtered_for.ns);
+        const Nanoseconds last = paced ? taken : newest;
+        const devices::Inertial turned = motion(taken - late.gyro);
+        const devices::Inertial felt = motion(taken - late.accel);
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double rate = felt.gyro_deg_s[axis] * radians;
+            const double rate = turned.gyro_deg_s[axis] * radians;
             const double acceleration = felt.accel_g[axis] * gravity;
-            if (beyond(si.gyro[axis], rate, later.gyro_deg_s[axis] * radians,
+            if (beyond(si.gyro[axis], rate, motion(last - late.gyro).gyro_deg_s[axis] * radians,
                        gyro_lsb * scale.gyro_rad_s + 1e-6))
                 complain(out, "IMU {} sample {}: gyro {} is {}, not {}", port, sample.number, axis,
                          si.gyro[axis], rate);
-            if (beyond(si.accel[axis], acceleration, later.accel_g[axis] * gravity,
+            if (beyond(si.accel[axis], acceleration,
+                       motion(last - late.accel).accel_g[axis] * gravity,
                        0.7 * scale.accel_m_s2 + 1e-5))
                 complain(out, "IMU {} sample {}: accelerometer {} is {}, not {}", port,
                          sample.number, axis, si.accel[axis], acceleration);

@@ -23,6 +23,19 @@ class Score {
         sorted_ = false;
     }
 
+    void add(const Score& other) {
+        errors_ns_.insert(errors_ns_.end(), other.errors_ns_.begin(), other.errors_ns_.end());
+        squares_ += other.squares_;
+        beyond_bound_ += other.beyond_bound_;
+        sorted_ = false;
+    }
+
+    double rms_us() const {
+        double sum = 0;
+        for (const double error_ns : errors_ns_) sum += error_ns * error_ns;
+        return std::sqrt(sum / static_cast<double>(errors_ns_.size())) * 1e-3;
+    }
+
     /// The error that a share of them does not exceed, in us.
     double quantile_us(double share) {
         if (errors_ns_.empty()) return 0;

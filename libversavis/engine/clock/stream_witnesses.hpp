@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Compares how long the messages of each stream take to the host with how long the answers of
+// exchanges do, whatever the estimate of the clock makes of either.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "engine/clock/delay_edge.hpp"
+#include "engine/clock/messages.hpp"
+#include "engine/plausibility/persistence.hpp"
+#include "versavis/time.hpp"
+
+namespace versavis::clock {
+
+/// Half a minute of ten exchanges a second, until messages are believed that no answer confirms.
+constexpr std::uint64_t exchanges_to_believe = 300;
+
+/// How much longer than answers the quickest messages of a stream take.
+class UsualLead {
+ public:
+    bool known() const;
+
+    /// How far `value` is from it, if that is more than it scatters by, or one of so many parts of
+    /// that; else 0.
+    Duration departure(Duration value, std::int64_t parts = 1) const;
+    void learn(Duration value, HostTime now);
+
+ private:
+    Duration value_;
+    HostTime newest_;
+    double deviation_ns_ = 0;  ///< mean
+    double widest_ns_ = 0;     ///< once it is settled
+    int count_ = 0;
+};
+
+/// All messages of the board take the same way, so the delays of the quickest ones of a stream and
+/// of the quickest answers at the same time differ by a constant. If a stream's times step or drift
+/// away from those of the exchanges, that difference changes, even while the estimate of the clock
+/// follows one of the two. Where it changes for all streams alike, the exchanges are in doubt, and
+/// not the streams. A change that lasts (see Persistence) is the new usual.
+///
+/// Not thread-safe; Translator calls it under its lock.
+class StreamWitnesses {
+ public:
+    /// The number of a new stream. `witness`: counts when exchanges are in doubt.
+    std::size_t add_stream(bool witness);
+
+    /// A message and whether it fits those of its stream before it.
+    void heard(std::size_t stream, const OffsetSample& message, bool fits);
+
+    /// `skew`: host clock against board clock, ns/s.
+    void exchanged(const Exchange& exchange, double skew);
+
+    /// By how much all streams have left the exchanges, so that these may be wrong; 0: they have
+    /// not.
+    Duration doubt() const { return doubt_; }
+
+    /// By how much exchanges may be off without being in doubt: what all streams have left them by,
+    /// or what nothing can deny as the streams are too new. 0 where fewer than two streams talk.
+    Duration allowance() const { return allowance_; }
+
+    /// By how much the times of a stream are later than the exchanges allow, or earlier if
+    /// negative; none: they are not.
+    std::optional<Duration> departure(std::size_t stream) const;
+
+    /// Its messages agree so well with the exchanges that the clock may be estimated by them, or
+    /// exchanges may be wrong.
+    bool steers(std::size_t stream) const;
+
+    /// Those messages of a stream that do not fit those before agree with the exchanges; none: too
+    /// little is known.
+    std::optional<bool> confirms_others(std::size_t stream) const;
+
+    /// Messages of before cannot be compared with later ones. The link is the same.
+    void clock_stepped();
+
+ private:
+    /// Between two exchanges.
+    struct Interval {
+        std::optional<OffsetSample> quickest;
+        int messages = 0;
+
+        void add(const OffsetSample& message);
+    };
+    /// The quickest of all that are compared, and of the newest.
+    struct Answers {
+        Duration all;
+        Duration newest;
+    };
+    struct Track {
+        Interval open;
+        std::deque<Interval> closed;  ///< the newest in front
+
+        void close();
+        std::optional<OffsetSample> quickest(const StreamWitnesses& at) const;
+    };
+    struct Stream {
+        Track fitting;
+        Track others;
+        UsualLead lead;
+        Duration departure;
+        Duration unusual;         ///< the same, by less
+        std::size_t late = 0;     ///< intervals in a row
+        Persistence persistence;  ///< of what departs
+        bool others_confirmed = false;
+        bool witness = true;
+
+        void forget_lead();
+    };
+
+    Duration aligned(const OffsetSample& sample) const;
+    Duration quickest_answer(std::size_t newest) const;
+    void close_interval(HostTime now);
+    bool talks(const Stream& witness) const;
+    bool too_new() const;
+    Duration common(Duration Stream::*off) const;
+    void compare(Stream& stream, const Answers& quickest_answers, HostTime now);
+
+    std::vector<Stream> streams_;
+    std::deque<OffsetSample> answers_;  ///< the newest in front
+    Duration doubt_;
+    Duration allowance_;
+    bool all_unusual_ = false;
+    BoardTime now_;
+    HostTime closed_;
+    double skew_ = 0;
+};
+
+}  // namespace versavis::clock

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How long the messages of one stream take to the host at least, and whether one took as long.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "versavis/time.hpp"
+
+namespace versavis {
+
+/// How long a message took on its way, by the time that it names, beside those of its stream that
+/// were believed. One that names another time than the true one is off by that much.
+enum class Promptness : std::uint8_t {
+    not_recorded = 0,  ///< by a service that did not judge it
+    unknown = 1,       ///< too few were believed, or the clock is not known well enough
+    early = 2,         ///< less than any
+    usual = 3,         ///< as long as the quickest
+    late = 4,          ///< longer: it waited somewhere, or names too early a time
+};
+
+/// How far the delay of a usual message may be off the shortest, beside the error of the clock, for
+/// which there is as much at most.
+constexpr Duration usual_delay_tolerance = microseconds(100);
+
+/// Two accounts of an instant are `apart`: the delay of the message shows that its own is right.
+inline bool arrival_confirms(Promptness promptness, Duration apart) {
+    return promptness == Promptness::usual && absolute(apart) > usual_delay_tolerance * 4;
+}
+
+/// Not thread-safe.
+class DelayFloor {
+ public:
+    /// `sigma`: of the clock that `delay` is measured with.
+    Promptness of(Duration delay, Duration sigma) const {
+        if (count_ < messages_to_know || sigma * sigmas > usual_delay_tolerance)
+            return Promptness::unknown;
+        const Duration allowed = usual_delay_tolerance + sigma * sigmas;
+        if (delay < least_ - allowed) return Promptness::early;
+        return delay > least_ + allowed ? Promptness::late : Promptness::usual;
+    }
+
+    /// Of a message that is believed.
+    void learn(Duration delay, HostTime received) {
+        if (count_ > 0) least_ = least_ + forgotten(received - newest_);
+        least_ = count_ == 0 ? delay : std::min(least_, delay);
+        newest_ = received;
+        count_ = std::min(count_ + 1, messages_to_know);
+    }
+
+    void forget() { count_ = 0; }
+
+ private:
+    /// 2 us/s: a link that became slower is followed within a minute or so, a stream that drifts by
+    /// more is not.
+    static Duration forgotten(Duration passed) {
+        return std::clamp(passed, Duration{}, seconds(1)) / 500'000;
+    }
+
+    static constexpr int messages_to_know = 16;
+    static constexpr std::int64_t sigmas = 3;
+
+    Duration least_;
+    HostTime newest_;
+    int count_ = 0;
+};
+
+}  // namespace versavis

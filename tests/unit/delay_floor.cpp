@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/plausibility/delay_floor.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace versavis;
+
+namespace {
+
+constexpr Duration good_clock = microseconds(5);
+
+/// Messages that took 300 us, one each millisecond.
+struct DelayBench {
+    void learn(int messages, Duration delay) {
+        for (int i = 0; i < messages; ++i) floor.learn(delay, now = now + milliseconds(1));
+    }
+    Promptness of(Duration delay, Duration sigma = good_clock) const {
+        return floor.of(delay, sigma);
+    }
+
+    DelayFloor floor;
+    HostTime now{1'000'000'000};
+};
+
+}  // namespace
+
+TEST_CASE("delay_floor: few messages, or a bad clock, decide nothing") {
+    DelayBench bench;
+    bench.learn(15, microseconds(300));
+    CHECK(bench.of(seconds(5)) == Promptness::unknown);
+    bench.learn(1, microseconds(300));
+    CHECK(bench.of(seconds(5)) == Promptness::late);
+    CHECK(bench.of(seconds(5), microseconds(40)) == Promptness::unknown);
+    bench.floor.forget();
+    CHECK(bench.of(seconds(5)) == Promptness::unknown);
+}
+
+TEST_CASE("delay_floor: the shortest delay counts, however many are longer") {
+    DelayBench bench;
+    bench.learn(20, milliseconds(3));
+    bench.learn(1, microseconds(300));
+    bench.learn(20, milliseconds(3));
+    CHECK(bench.of(microseconds(400)) == Promptness::usual);
+    CHECK(bench.of(microseconds(450)) == Promptness::late);
+    CHECK(bench.of(microseconds(200)) == Promptness::usual);
+    CHECK(bench.of(microseconds(150)) == Promptness::early);
+    CHECK(bench.of(microseconds(450), microseconds(30)) == Promptness::usual);
+}
+
+TEST_CASE("delay_floor: a link that stays slower is followed, a silence is not") {
+    DelayBench bench;
+    bench.learn(20, microseconds(300));
+    bench.learn(30'000, microseconds(500));
+    CHECK(bench.of(microseconds(500)) == Promptness::late);
+    bench.learn(70'000, microseconds(500));
+    CHECK(bench.of(microseconds(500)) == Promptness::usual);
+    bench.now = bench.now + seconds(86'400);
+    bench.learn(1, microseconds(500));
+    CHECK(bench.of(microseconds(370)) == Promptness::early);
+}
+
+TEST_CASE("delay_floor: only what is larger than its tolerance is confirmed by a usual delay") {
+    CHECK(arrival_confirms(Promptness::usual, milliseconds(1)));
+    CHECK(arrival_confirms(Promptness::usual, -milliseconds(1)));
+    CHECK_FALSE(arrival_confirms(Promptness::usual, microseconds(400)));
+    for (const Promptness other :
+         {Promptness::not_recorded, Promptness::unknown, Promptness::early, Promptness::late})
+        CHECK_FALSE(arrival_confirms(other, seconds(1)));
+}
