@@ -31,6 +31,8 @@ set(configuration_name versavis)
 set(state_directory versavis)
 foreach(pair
         versavisd.service.in:systemd/system/versavisd.service
+        versavis-metrics.service.in:systemd/system/versavis-metrics.service
+        versavis-metrics.timer:systemd/system/versavis-metrics.timer
         60-versavis.rules:udev/rules.d/60-versavis.rules
         versavis.sysusers:sysusers.d/versavis.conf
         versavis.tmpfiles:tmpfiles.d/versavis.conf)

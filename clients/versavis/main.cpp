@@ -17,6 +17,7 @@
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
 #include "commands/list.hpp"
+#include "commands/monitor_commands.hpp"
 #include "commands/process_command.hpp"
 #include "commands/record_command.hpp"
 #include "commands/snapshot.hpp"
@@ -110,6 +111,8 @@ int main(int argc, char** argv) {
     status->add_flag("--json", json,
                      "Print the status document as JSON (docs/contracts/status.md)");
 
+    client::MonitorCommands monitor(app);
+
     auto* list = app.add_subcommand("list", "List the streams that can be read");
     list->add_flag("--json", json, "Print a JSON array");
 
@@ -171,6 +174,7 @@ int main(int argc, char** argv) {
     if (*status)
         return watch ? watch_status(instance, {json, verbose})
                      : show_status(instance, {json, verbose});
+    if (monitor.chosen()) return monitor.run(instance);
     if (*list) {
         const auto text = client::list_streams(instance, json);
         if (!text) return fail(text.error());
