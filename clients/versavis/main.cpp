@@ -14,6 +14,7 @@
 #include "commands/board_commands.hpp"
 #include "commands/camera_commands.hpp"
 #include "commands/clock.hpp"
+#include "commands/doctor_command.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
 #include "commands/list.hpp"
@@ -113,6 +114,8 @@ int main(int argc, char** argv) {
 
     client::MonitorCommands monitor(app);
 
+    client::DoctorCommand doctor(app);
+
     auto* list = app.add_subcommand("list", "List the streams that can be read");
     list->add_flag("--json", json, "Print a JSON array");
 
@@ -174,6 +177,7 @@ int main(int argc, char** argv) {
     if (*status)
         return watch ? watch_status(instance, {json, verbose})
                      : show_status(instance, {json, verbose});
+    if (doctor.chosen()) return doctor.run(instance, VERSAVIS_VERSION);
     if (monitor.chosen()) return monitor.run(instance);
     if (*list) {
         const auto text = client::list_streams(instance, json);

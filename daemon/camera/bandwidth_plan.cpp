@@ -48,6 +48,7 @@ BandwidthShare BandwidthPlan::share(const std::string& camera) const {
     const auto own = needs_.find(camera);
     if (own == needs_.end()) return {};
     BandwidthShare share;
+    share.link = own->second.link;
     share.needed_mbps = needed_mbps(own->second);
     share.link_mbps = own->second.link_mbps * usable_part;
     std::size_t sharers = 0;

@@ -22,6 +22,7 @@ struct BandwidthNeed {
 };
 
 struct BandwidthShare {
+    std::string link;             ///< as of the need; empty: nothing is known of it
     double needed_mbps = 0;       ///< of this camera, with all headers
     double link_needed_mbps = 0;  ///< of all cameras on its link
     double link_mbps = 0;

@@ -165,6 +165,7 @@ json camera_json(const CameraStatus& status) {
             {"gain", camera.sensor.gain},
             {"gain_feature", camera.gain_feature},
             {"temperature_c", camera.sensor.temperature_c},
+            {"link", camera.bandwidth.link},
             {"needed_mbps", camera.bandwidth.needed_mbps},
             {"link_needed_mbps", camera.bandwidth.link_needed_mbps},
             {"link_mbps", camera.bandwidth.link_mbps},

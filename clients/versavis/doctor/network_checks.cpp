@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "doctor/network_checks.hpp"
+
+#include <fmt/format.h>
+#include <linux/ethtool.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <set>
+#include <sstream>
+
+#include "posix/file_descriptor.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// Of packets that carry GigE Vision well; those of 1500 bytes cost six times as many interrupts.
+constexpr std::int64_t jumbo_mtu = 9000;
+
+/// What the service asks for; it gets it with CAP_NET_ADMIN, else as far as rmem_max allows.
+constexpr std::int64_t receive_buffer = 32 << 20;
+constexpr unsigned cap_net_admin = 12;
+
+/// Below this, one camera of 1 Mpixel does not reach 20 Hz.
+constexpr std::int64_t slowest_link_mbps = 1000;
+
+constexpr std::array loss_counters{"rx_dropped", "rx_missed_errors", "rx_fifo_errors",
+                                   "rx_crc_errors", "rx_over_errors"};
+
+std::string statistics(const std::string& interface, const char* counter) {
+    return "/sys/class/net/" + interface + "/statistics/" + counter;
+}
+
+std::set<std::string> links(const Subject& subject) {
+    std::set<std::string> names;
+    for (const LinkedCamera& camera : subject.cameras)
+        if (camera.interface != "lo") names.insert(camera.interface);
+    return names;
+}
+
+/// Column `name` of the two lines that /proc/net/snmp has for a protocol.
+std::int64_t snmp_counter(const std::string& text, const std::string& protocol,
+                          const std::string& name) {
+    std::istringstream lines(text);
+    std::string titles;
+    for (std::string line; std::getline(lines, line);) {
+        if (line.rfind(protocol + ": ", 0) != 0) continue;
+        if (titles.empty()) {
+            titles = line;
+            continue;
+        }
+        std::istringstream title_words(titles);
+        std::istringstream values(line);
+        std::string title;
+        std::string value;
+        while (title_words >> title && values >> value)
+            if (title == name) return std::strtoll(value.c_str(), nullptr, 10);
+    }
+    return 0;
+}
+
+std::uint32_t largest_packet(const Subject& subject, const std::string& interface) {
+    std::uint32_t largest = 0;
+    for (const LinkedCamera& camera : subject.cameras)
+        if (camera.interface == interface) largest = std::max(largest, camera.packet_size);
+    return largest;
+}
+
+Findings check_mtu(const Subject& subject, const std::string& interface) {
+    const auto mtu = subject.files.number("/sys/class/net/" + interface + "/mtu");
+    if (!mtu) return {};
+    Finding finding{"mtu", interface, fmt::format("{} bytes", *mtu)};
+    finding.cure = fmt::format("sudo ip link set dev {} mtu {}, and the same in the switch",
+                               interface, jumbo_mtu);
+    const std::uint32_t packet = largest_packet(subject, interface);
+    if (packet > *mtu) {
+        finding.verdict = Verdict::bad;
+        finding.reason =
+            fmt::format("a camera sends packets of {} bytes, which do not pass", packet);
+    } else if (*mtu < jumbo_mtu) {
+        finding.verdict = Verdict::warning;
+        finding.reason = fmt::format("packets of {} bytes would be {:.1f} times fewer", jumbo_mtu,
+                                     static_cast<double>(jumbo_mtu) / static_cast<double>(*mtu));
+    } else {
+        finding.cure.clear();
+    }
+    return {finding};
+}
+
+Findings check_speed(const Subject& subject, const std::string& interface) {
+    const auto speed = subject.files.number("/sys/class/net/" + interface + "/speed");
+    const auto carrier = subject.files.number("/sys/class/net/" + interface + "/carrier");
+    if (carrier == 0)
+        return {{"link_speed", interface, "no carrier", Verdict::bad,
+                 "nothing is connected, or it has no power", "check cable and switch"}};
+    if (!speed || *speed <= 0) return {};  // a virtual one does not say
+    Finding finding{"link_speed", interface, fmt::format("{} Mbit/s", *speed)};
+    if (*speed < slowest_link_mbps) {
+        finding.verdict = Verdict::bad;
+        finding.reason = "cameras need 1 Gbit/s: a wire of the cable may be broken";
+        finding.cure = fmt::format("replace the cable; then: ethtool {} | grep Speed", interface);
+    }
+    return {finding};
+}
+
+std::int64_t of(const LossCounters& counters, const std::string& interface) {
+    const auto found = counters.interfaces.find(interface);
+    return found == counters.interfaces.end() ? 0 : found->second;
+}
+
+Finding lossy(Finding finding, std::int64_t before, std::int64_t after, std::string reason,
+              std::string cure) {
+    finding.value = fmt::format("{} lost since boot, {} of them now", after, after - before);
+    if (after == before) return finding;
+    finding.verdict = Verdict::bad;
+    finding.reason = std::move(reason);
+    finding.cure = std::move(cure);
+    return finding;
+}
+
+/// Frames of one camera, by the service.
+Findings check_frames(const nlohmann::json& status) {
+    Findings findings;
+    for (const auto& camera : status.value("cameras", nlohmann::json::array())) {
+        const double received = camera.value("frames_received", 0.0);
+        const double incomplete = camera.value("frames_incomplete", 0.0);
+        if (received + incomplete == 0) continue;
+        const double share = incomplete / (received + incomplete);
+        Finding finding{"frame_loss", camera.value("name", ""),
+                        fmt::format("{} of {} frames incomplete ({:.3f} %)", incomplete,
+                                    received + incomplete, share * 100)};
+        if (share > 0.001) {
+            finding.verdict = Verdict::warning;
+            finding.reason = "packets are lost between camera and service";
+            finding.cure = "see mtu, link_loss, receive_buffers and rx_ring; else cable and switch";
+        }
+        findings.push_back(finding);
+    }
+    return findings;
+}
+
+bool has_capability(const HostFiles& files, int pid, unsigned capability) {
+    const auto text = files.text(fmt::format("/proc/{}/status", pid));
+    const std::size_t at = text ? text->find("CapEff:") : std::string::npos;
+    if (at == std::string::npos) return false;
+    return ((std::strtoull(text->c_str() + at + 7, nullptr, 16) >> capability) & 1U) != 0;
+}
+
+Findings check_receive_buffer(const Subject& subject) {
+    const char* path = "/proc/sys/net/core/rmem_max";
+    const auto limit = subject.files.number(path);
+    if (!limit) return {};
+    Finding finding{"rmem_max", "", fmt::format("{} KiB", *limit >> 10)};
+    if (*limit >= receive_buffer) return {finding};
+    if (subject.pid() == 0) {
+        finding.verdict = Verdict::unknown;
+        finding.reason =
+            "the service is not running; with CAP_NET_ADMIN, as its unit grants, this does not "
+            "matter";
+        return {finding};
+    }
+    if (has_capability(subject.files, subject.pid(), cap_net_admin)) {
+        finding.value += ", and the service has CAP_NET_ADMIN";
+        return {finding};
+    }
+    finding.verdict = Verdict::bad;
+    finding.reason = fmt::format(
+        "the service asks for receive buffers of {} KiB and has no CAP_NET_ADMIN: bursts of frames "
+        "are lost",
+        receive_buffer >> 10);
+    finding.cure = fmt::format(
+        "echo net.core.rmem_max={} | sudo tee /etc/sysctl.d/90-versavis.conf; sudo sysctl "
+        "--system; "
+        "then restart the service",
+        receive_buffer);
+    finding.fix = Fix{path, std::to_string(receive_buffer)};
+    return {finding};
+}
+
+/// One question to a driver; false: it does not answer it.
+template <class Question>
+bool ask(const FileDescriptor& socket, const std::string& interface, Question& question) {
+    ifreq request{};
+    interface.copy(request.ifr_name, sizeof request.ifr_name - 1);
+    request.ifr_data = reinterpret_cast<char*>(&question);
+    return ::ioctl(socket.get(), SIOCETHTOOL, &request) == 0;
+}
+
+}  // namespace
+
+LossCounters read_losses(const Subject& subject) {
+    LossCounters counters;
+    for (const std::string& interface : links(subject))
+        for (const char* counter : loss_counters)
+            counters.interfaces[interface] +=
+                subject.files.number(statistics(interface, counter)).value_or(0);
+    counters.receive_buffers =
+        snmp_counter(subject.files.text("/proc/net/snmp").value_or(""), "Udp", "RcvbufErrors");
+    return counters;
+}
+
+InterfaceSettings read_interface_settings(const std::string& interface) {
+    InterfaceSettings settings;
+    const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    ethtool_coalesce moderation{};
+    moderation.cmd = ETHTOOL_GCOALESCE;
+    if (ask(socket, interface, moderation)) {
+        settings.moderation_us = moderation.rx_coalesce_usecs;
+        settings.adaptive_moderation = moderation.use_adaptive_rx_coalesce != 0;
+    }
+    ethtool_ringparam ring{};
+    ring.cmd = ETHTOOL_GRINGPARAM;
+    if (ask(socket, interface, ring) && ring.rx_max_pending != 0) {
+        settings.ring = ring.rx_pending;
+        settings.longest_ring = ring.rx_max_pending;
+    }
+    ethtool_value flags{};
+    flags.cmd = ETHTOOL_GFLAGS;
+    if (ask(socket, interface, flags)) settings.large_receive = (flags.data & ETH_FLAG_LRO) != 0;
+    return settings;
+}
+
+Findings check_interface_settings(const std::string& interface, const InterfaceSettings& settings,
+                                  bool losses) {
+    Findings findings;
+    if (settings.ring) {
+        Finding finding{"rx_ring", interface,
+                        fmt::format("{} of {} packets", *settings.ring, *settings.longest_ring)};
+        if (losses && *settings.ring < *settings.longest_ring) {
+            finding.verdict = Verdict::bad;
+            finding.reason = "packets are lost on this link, and the interface could hold more";
+            finding.cure =
+                fmt::format("sudo ethtool -G {} rx {}", interface, *settings.longest_ring);
+        }
+        findings.push_back(finding);
+    }
+    if (settings.moderation_us) {
+        const bool adaptive = settings.adaptive_moderation.value_or(false);
+        Finding finding{
+            "moderation", interface,
+            fmt::format("{} us{}", *settings.moderation_us, adaptive ? ", adaptive" : "")};
+        if (*settings.moderation_us == 0 && !adaptive) {
+            finding.verdict = Verdict::warning;
+            finding.reason = "each packet interrupts the host";
+            finding.cure = fmt::format("sudo ethtool -C {} rx-usecs 50", interface);
+        }
+        findings.push_back(finding);
+    }
+    if (settings.large_receive) {
+        Finding finding{"offload", interface, *settings.large_receive ? "LRO is on" : "LRO is off"};
+        if (*settings.large_receive) {
+            finding.verdict = Verdict::warning;
+            finding.reason = "the interface merges packets, which receivers of single ones miss";
+            finding.cure = fmt::format("sudo ethtool -K {} lro off", interface);
+        }
+        findings.push_back(finding);
+    }
+    return findings;
+}
+
+Findings check_network(const Subject& subject, const LossCounters& before,
+                       const LossCounters& after) {
+    Findings findings;
+    const auto add = [&findings](Findings more) {
+        findings.insert(findings.end(), more.begin(), more.end());
+    };
+    for (const std::string& interface : links(subject)) {
+        add(check_mtu(subject, interface));
+        add(check_speed(subject, interface));
+        const bool losses = of(after, interface) != of(before, interface);
+        add({lossy({"link_loss", interface, ""}, of(before, interface), of(after, interface),
+                   "the interface drops packets",
+                   fmt::format("ip -s -s link show {} says where; see rx_ring", interface))});
+        add(check_interface_settings(interface, read_interface_settings(interface), losses));
+    }
+    if (!subject.cameras.empty()) {
+        add(check_receive_buffer(subject));
+        add({lossy({"receive_buffers", "UDP", ""}, before.receive_buffers, after.receive_buffers,
+                   "a program does not read its packets in time",
+                   "lower the load of the host; see rmem_max and governor")});
+    }
+    if (subject.status) add(check_frames(*subject.status));
+    return findings;
+}
+
+}  // namespace versavis::client

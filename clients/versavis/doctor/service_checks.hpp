@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The service: whether it lives and what it says is wrong, its release and its board's, and who
+// else wants its devices.
+#pragma once
+
+#include "doctor/finding.hpp"
+#include "doctor/subject.hpp"
+
+namespace versavis::client {
+
+Findings check_service(const Subject& subject);
+
+/// Whether the synchronisation is right, and by which figures of the service.
+Conclusion conclude(const Subject& subject);
+
+}  // namespace versavis::client
