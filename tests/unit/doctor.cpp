@@ -74,7 +74,8 @@ struct LinkedHost : MadeHost {
         put("/sys/class/net/eth7/mtu", "9000");
         put("/sys/class/net/eth7/speed", "1000");
         put("/sys/class/net/eth7/carrier", "1");
-        put("/sys/class/net/eth7/statistics/rx_dropped", "3");
+        put("/sys/class/net/eth7/statistics/rx_crc_errors", "3");
+        put("/sys/class/net/eth7/statistics/rx_dropped", "12");  // nobody wanted them
         put("/proc/sys/net/core/rmem_max", "33554432");
         set_overflows(5);
     }
@@ -141,7 +142,7 @@ TEST_CASE("doctor: a small rmem_max matters without CAP_NET_ADMIN, and --fix rai
     const std::string path = "/proc/sys/net/core/rmem_max";
     host.put(path, "212992");
     CHECK(get(host.check(), "rmem_max").verdict == Verdict::unknown);
-    host.subject.status = {{"pid", 4711}};
+    host.subject.status = json::parse(R"({"pid": 4711})");
     host.put("/proc/4711/status", "Name: versavisd\nCapEff:\t0000000000001000");
     CHECK(get(host.check(), "rmem_max").verdict == Verdict::good);
     host.put("/proc/4711/status", "Name: versavisd\nCapEff:\t0000000000000000");
@@ -269,7 +270,7 @@ TEST_CASE("doctor: governor") {
 
 TEST_CASE("doctor: real-time priority of the service") {
     MadeHost host;
-    host.subject.status = {{"pid", 4711}};
+    host.subject.status = json::parse(R"({"pid": 4711})");
     const std::string stat = "/proc/4711/task/4712/stat";
     const std::string fields_4_to_39 =
         "1 1 1 0 -1 0 0 0 0 0 1 1 0 0 20 0 5 0 100 1000 100 1 1 1 1 1 1 0 0 0 0 0 0 0 -1 3";

@@ -23,7 +23,7 @@ struct Family {
     Type type;
     Part part;
     std::string_view key;
-    double scale;
+    double divisor;  ///< of the key's value, to the base unit
     std::string_view help;
 };
 
@@ -42,15 +42,15 @@ constexpr Family families[] = {
      "Output edges that left late."},
     {"versavis_board_connections", "", Type::counter, Part::board, "connections", 1,
      "Times the board was connected."},
-    {"versavis_board_loop_max_seconds", "seconds", Type::gauge, Part::board, "loop_max_ns", 1e-9,
+    {"versavis_board_loop_max_seconds", "seconds", Type::gauge, Part::board, "loop_max_ns", 1e9,
      "Longest delay from due to done on the board in the last second."},
-    {"versavis_clock_sigma_seconds", "seconds", Type::gauge, Part::clock, "sigma_ns", 1e-9,
+    {"versavis_clock_sigma_seconds", "seconds", Type::gauge, Part::clock, "sigma_ns", 1e9,
      "One standard deviation of a stamp made now."},
-    {"versavis_clock_bound_seconds", "seconds", Type::gauge, Part::clock, "bound_ns", 1e-9,
+    {"versavis_clock_bound_seconds", "seconds", Type::gauge, Part::clock, "bound_ns", 1e9,
      "Limit of the error of a stamp made now, however unequal the link's directions are."},
-    {"versavis_clock_round_trip_seconds", "seconds", Type::gauge, Part::clock, "round_trip_ns",
-     1e-9, "Last round trip of a clock exchange."},
-    {"versavis_clock_skew_ratio", "ratio", Type::gauge, Part::clock, "skew_ppm", 1e-6,
+    {"versavis_clock_round_trip_seconds", "seconds", Type::gauge, Part::clock, "round_trip_ns", 1e9,
+     "Last round trip of a clock exchange."},
+    {"versavis_clock_skew_ratio", "ratio", Type::gauge, Part::clock, "skew_ppm", 1e6,
      "Host clock against board clock, less 1."},
     {"versavis_clock_exchanges", "", Type::counter, Part::clock, "exchanges", 1,
      "Clock exchanges used."},
@@ -61,7 +61,7 @@ constexpr Family families[] = {
     {"versavis_clock_host_synchronised", "", Type::gauge, Part::clock, "host_synchronised", 1,
      "1 if the kernel says that the host's clock is synchronised."},
     {"versavis_clock_host_max_error_seconds", "seconds", Type::gauge, Part::clock,
-     "host_max_error_ns", 1e-9, "Largest distance of the host's clock from UTC by the kernel."},
+     "host_max_error_ns", 1e9, "Largest distance of the host's clock from UTC by the kernel."},
     {"versavis_camera_configured_hertz", "hertz", Type::gauge, Part::camera, "configured_hz", 1,
      "Rate of the camera as configured."},
     {"versavis_camera_delivered_hertz", "hertz", Type::gauge, Part::camera, "delivered_hz", 1,
@@ -260,9 +260,9 @@ void add_service(Exposition& out, const json& status, HostTime now) {
                 {"board", board.value("serial", "")}});
     const double made_ns = status.value("host_time_ns", 0.0);
     out.begin(uptime);
-    out.add((made_ns - status.value("started_ns", 0.0)) * 1e-9, {});
+    out.add((made_ns - status.value("started_ns", 0.0)) / 1e9, {});
     out.begin(status_age);
-    out.add((static_cast<double>(now.ns) - made_ns) * 1e-9, {});
+    out.add((static_cast<double>(now.ns) - made_ns) / 1e9, {});
     out.begin(healthy);
     for_each_device(status, [&](const json& device, const std::string& name) {
         out.add(device.value("health", "") == "ok" ? 1 : 0, {{"device", name}});
@@ -292,7 +292,7 @@ std::string openmetrics_text(const std::string& instance, const std::optional<js
         out.begin(family);
         for_each(*status, family.part, [&](const json& object, const Labels& labels) {
             const auto value = number(object, family.key);
-            if (value) out.add(*value * family.scale, labels);
+            if (value) out.add(*value / family.divisor, labels);
         });
     }
     return out.finish();
