@@ -98,16 +98,16 @@ Findings check_master(const std::vector<PtpAnswer>& answers,
 }
 
 Findings check_utc_offset(const std::vector<PtpAnswer>& answers) {
-    const std::string offset = value(answers, "TIME_PROPERTIES_DATA_SET", "currentUtcOffset");
-    if (offset.empty()) return {};
+    const auto offset = number_in(value(answers, "TIME_PROPERTIES_DATA_SET", "currentUtcOffset"));
+    if (!offset) return {};
     const bool valid = value(answers, "TIME_PROPERTIES_DATA_SET", "currentUtcOffsetValid") == "1";
     Finding finding{"ptp_utc_offset", "",
-                    fmt::format("{} s, {}", offset, valid ? "valid" : "not stated as valid")};
-    if (std::atoi(offset.c_str()) == tai_minus_utc_s) return {finding};
+                    fmt::format("{} s, {}", *offset, valid ? "valid" : "not stated as valid")};
+    if (*offset == tai_minus_utc_s) return {finding};
     finding.verdict = valid ? Verdict::bad : Verdict::warning;
     finding.reason = fmt::format(
         "PTP counts TAI, which is {} s ahead of UTC: clocks that use this offset are off by {} s",
-        tai_minus_utc_s, tai_minus_utc_s - std::atoi(offset.c_str()));
+        tai_minus_utc_s, tai_minus_utc_s - *offset);
     finding.cure = fmt::format("set utc_offset {} in the master's ptp4l.conf", tai_minus_utc_s);
     return {finding};
 }

@@ -24,7 +24,6 @@ constexpr std::uint64_t least_disk_mib = 16;
 
 /// The thread that stamps what the board sends asks for it.
 constexpr int realtime_priority = 20;
-constexpr unsigned cap_sys_nice = 23;
 
 /// Fields of /proc/PID/stat as proc(5) numbers them.
 constexpr int field_priority = 40;
@@ -42,9 +41,10 @@ int highest_priority(const HostFiles& files, int pid) {
         std::string field;
         int priority = 0;
         for (int number = 3; fields >> field && number <= field_policy; ++number) {
-            if (number == field_priority) priority = std::atoi(field.c_str());
-            const int policy = number == field_policy ? std::atoi(field.c_str()) : SCHED_OTHER;
-            if (policy == SCHED_FIFO || policy == SCHED_RR) highest = std::max(highest, priority);
+            const std::int64_t value = number_in(field).value_or(0);
+            if (number == field_priority) priority = static_cast<int>(value);
+            if (number == field_policy && (value == SCHED_FIFO || value == SCHED_RR))
+                highest = std::max(highest, priority);
         }
     }
     return highest;
@@ -69,7 +69,8 @@ Findings check_realtime(const Subject& subject) {
     const auto limit = limit_of(subject.files, subject.pid(), "Max realtime priority");
     Finding finding{"realtime", "",
                     fmt::format("no thread has priority; limit {}", limit.value_or("unknown"))};
-    if (limit && *limit != "unlimited" && std::atoi(limit->c_str()) < realtime_priority) {
+    const auto allowed = limit ? number_in(*limit) : std::nullopt;  // none: unlimited
+    if (allowed && *allowed < realtime_priority) {
         finding.verdict = Verdict::warning;
         finding.reason = "load of the host delays the stamps of the board's messages: sigma grows";
         finding.cure = fmt::format(

@@ -9,6 +9,12 @@
 
 namespace versavis::client {
 
+std::optional<std::int64_t> number_in(const std::string& text) {
+    std::int64_t value = 0;
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
+    return read.ec == std::errc{} ? std::optional(value) : std::nullopt;
+}
+
 std::filesystem::path HostFiles::path(const std::string& absolute) const {
     return root_ / std::filesystem::path(absolute).relative_path();
 }
@@ -23,11 +29,7 @@ std::optional<std::string> HostFiles::text(const std::string& absolute) const {
 
 std::optional<std::int64_t> HostFiles::number(const std::string& absolute) const {
     const auto found = text(absolute);
-    std::int64_t value = 0;
-    if (!found || found->empty() ||
-        std::from_chars(found->data(), found->data() + found->size(), value).ec != std::errc{})
-        return std::nullopt;
-    return value;
+    return found ? number_in(*found) : std::nullopt;
 }
 
 std::vector<std::string> HostFiles::list(const std::string& absolute) const {

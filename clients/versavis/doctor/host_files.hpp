@@ -11,6 +11,9 @@
 
 namespace versavis::client {
 
+/// The number that a text begins with; none: it begins with something else.
+std::optional<std::int64_t> number_in(const std::string& text);
+
 class HostFiles {
  public:
     explicit HostFiles(std::filesystem::path root = "/") : root_(std::move(root)) {}

@@ -49,8 +49,9 @@ bool is_camera(const HostFiles& files, const std::string& device) {
     const std::string path = devices_folder + device;
     for (const std::string& entry : files.list(path)) {
         if (entry.rfind(device + ":", 0) != 0) continue;
-        if (files.text(path + "/" + entry + "/bInterfaceClass") == "ef" &&
-            files.text(path + "/" + entry + "/bInterfaceSubClass") == "05")
+        const std::string interface = fmt::format("{}/{}", path, entry);
+        if (files.text(interface + "/bInterfaceClass") == "ef" &&
+            files.text(interface + "/bInterfaceSubClass") == "05")
             return true;
     }
     return false;
