@@ -102,7 +102,8 @@ TEST_CASE("models: cameras of four makers deliver proved frames as soon as the r
         INFO(models[i].name);
         if (models[i].exposure[0] != '\0')
             CHECK(status["cameras"][i]["exposure_ns"].get<double>() == Approx(6e6).margin(1e4));
-        CHECK(frames_to_lock(stack, "cam" + std::to_string(i)) <= usual);
+        // Their delays differ, so one may need one frame more; another start takes ten.
+        CHECK(frames_to_lock(stack, "cam" + std::to_string(i)) <= usual + 1);
     }
     judge_all(stack);
 }

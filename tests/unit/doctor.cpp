@@ -466,6 +466,7 @@ TEST_CASE("doctor: the conclusion is right only with proof, and says which") {
     CHECK(with("/clock/sigma_ns", nullptr).state == State::unknown);
     CHECK(with("/clock/state", "holdover").state == State::unknown);
     CHECK(with("/cameras/0/pairing", "searching").state == State::unknown);
+    CHECK(with("/cameras/0/state", "stopped").state == State::unknown);
     CHECK(with("/cameras/0/trigger", "free").state == State::unknown);
     CHECK(with("/cameras/0/frames_published", 0).state == State::unknown);
     CHECK(with("/cameras", json::array()).state == State::unknown);

@@ -183,6 +183,10 @@ Proof proof_of(const json& status) {
     Proof proof;
     for (const json& camera : status.value("cameras", json::array())) {
         const std::string name = camera.value("name", "");
+        if (camera.value("state", "") == "stopped") {
+            if (proof.missing.empty()) proof.missing = name + " is stopped by request";
+            continue;
+        }
         if (camera.value("trigger", "") != "board") {
             if (proof.missing.empty()) proof.missing = name + " is not triggered by the board";
             continue;

@@ -73,12 +73,12 @@ std::vector<UsbNode> find_devices(const HostFiles& files) {
     return found;
 }
 
-/// Every member of a group of its own, or everybody, may use it.
-bool open_to_group(const struct stat& node) {
+/// The group that the udev rule names, or everybody, may use it.
+bool open_to_group(const struct stat& node, const std::string& wanted) {
     if ((node.st_mode & S_IROTH) != 0 && (node.st_mode & S_IWOTH) != 0) return true;
-    const group* versavis = ::getgrnam("versavis");
-    return versavis != nullptr && versavis->gr_gid == node.st_gid &&
-           (node.st_mode & S_IRGRP) != 0 && (node.st_mode & S_IWGRP) != 0;
+    const group* owner = ::getgrnam(wanted.c_str());
+    return owner != nullptr && owner->gr_gid == node.st_gid && (node.st_mode & S_IRGRP) != 0 &&
+           (node.st_mode & S_IWGRP) != 0;
 }
 
 Findings check_permission(const HostFiles& files, const UsbNode& usb) {
@@ -92,9 +92,10 @@ Findings check_permission(const HostFiles& files, const UsbNode& usb) {
     Finding finding{"usb_permission", usb.label(),
                     fmt::format("{} is {:o}, group {}", path, node.st_mode & 07777U,
                                 owner != nullptr ? owner->gr_name : "?")};
-    if (open_to_group(node)) return {finding};
+    const bool flashed = usb.kind == Kind::boot_loader;
+    if (open_to_group(node, flashed ? "versavis-admin" : "versavis")) return {finding};
     finding.verdict = Verdict::bad;
-    finding.reason = "the service may not open it: the udev rule was not applied";
+    finding.reason = "it is closed to its group: the udev rule was not applied";
     finding.cure =
         "sudo udevadm control --reload && sudo udevadm trigger --subsystem-match=usb --action=add";
     return {finding};
