@@ -36,21 +36,32 @@ configure_file(cmake/versavis.pc.in versavis.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/versavis.pc
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# Manual pages, where there is scdoc.
+# Manual pages, where there is scdoc, and completion for shells: both of what the programs say.
 find_program(scdoc scdoc)
 find_program(python python3)
+set(programs versavisd versavis_tool)
+if(TARGET versavis-rig)
+    list(APPEND programs versavis-rig)
+endif()
+if(python)
+    set(completion ${CMAKE_BINARY_DIR}/completion)
+    add_custom_command(OUTPUT ${completion}/.made
+        COMMAND ${python} -B ${CMAKE_CURRENT_SOURCE_DIR}/docs/man/completion
+            ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${completion}
+        COMMAND ${CMAKE_COMMAND} -E touch ${completion}/.made
+        DEPENDS docs/man/completion docs/man/program_help.py ${programs} VERBATIM)
+    add_custom_target(completion ALL DEPENDS ${completion}/.made)
+    install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}
+        PATTERN .made EXCLUDE)
+endif()
 if(scdoc AND python)
     set(man_pages ${CMAKE_BINARY_DIR}/man)
     file(GLOB man_sources CONFIGURE_DEPENDS docs/man/*.scd)
-    set(programs versavisd versavis_tool)
-    if(TARGET versavis-rig)
-        list(APPEND programs versavis-rig)
-    endif()
     add_custom_command(OUTPUT ${man_pages}/.made
-        COMMAND ${python} ${CMAKE_CURRENT_SOURCE_DIR}/docs/man/man_pages
+        COMMAND ${python} -B ${CMAKE_CURRENT_SOURCE_DIR}/docs/man/man_pages
             ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${man_pages} ${CMAKE_INSTALL_FULL_DOCDIR}
         COMMAND ${CMAKE_COMMAND} -E touch ${man_pages}/.made
-        DEPENDS docs/man/man_pages ${man_sources} ${programs} VERBATIM)
+        DEPENDS docs/man/man_pages docs/man/program_help.py ${man_sources} ${programs} VERBATIM)
     add_custom_target(man ALL DEPENDS ${man_pages}/.made)
     install(DIRECTORY ${man_pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}
         FILES_MATCHING PATTERN *.[158])
