@@ -14,6 +14,7 @@
 #include "commands/board_commands.hpp"
 #include "commands/camera_commands.hpp"
 #include "commands/clock.hpp"
+#include "commands/discover_commands.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
 #include "commands/list.hpp"
@@ -97,6 +98,8 @@ int main(int argc, char** argv) {
         app.add_option("--instance", instance, "Instance of the service")->capture_default_str();
     app.fallthrough();
     bool json = false;
+
+    client::DiscoverCommands discover(app);
 
     bool watch = false;
     auto* status = app.add_subcommand(
@@ -187,6 +190,7 @@ int main(int argc, char** argv) {
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
+    if (discover.chosen()) return discover.run(instance);
     if (recorder.chosen()) return recorder.run(instance);
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
     if (evaluate.chosen()) return evaluate.run();

@@ -123,3 +123,40 @@ TEST_CASE("usb: two entries for one camera beside a device that never answers en
     CHECK(stack.service().terminate() == 0);
     CHECK(host_now() - asked < seconds(2));
 }
+
+TEST_CASE("usb: discover lists board and cameras, and disturbs no service that uses them") {
+    StackSettings settings{"u3vlist", 34, 1, 20, "", "", "", 320, 240, "usb"};
+    settings.devices = {"RIGCAM-cam0"};
+    Stack stack(settings);
+    UsbRig rig(stack);
+    rig.add_mute(stack);
+    const auto discover = [&] {
+        std::string said;
+        CHECK(stack.tool({"discover", "--json"}, &said) == 0);
+        return nlohmann::json::parse(said);
+    };
+    for (int i = 0; i < 2; ++i) {  // the first leaves all as it was
+        const auto devices = discover();
+        REQUIRE(devices["boards"].size() == 1);
+        CHECK(devices["boards"][0]["serial"] == stack.scenario().board.serial);
+        CHECK(devices["boards"][0]["state"] == "running");
+        CHECK(devices["boards"][0]["used_by"].is_null());
+        REQUIRE(devices["cameras"].size() == 2);
+        const auto& camera = devices["cameras"][1];
+        CHECK(devices["cameras"][0]["serial"] == "MUTE");
+        CHECK(camera["protocol"] == "USB3 Vision");
+        CHECK(camera["device"] == "RIGCAM-cam0");
+        CHECK(camera["port"] == "usb:1-2");
+        CHECK(camera["preset"] == "generic");
+        CHECK(camera["access"] == "free");
+    }
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    const auto devices = discover();
+    CHECK(devices["boards"][0]["used_by"]["instance"] == "u3vlist");
+    CHECK(devices["cameras"][1]["access"] == "busy");
+    CHECK(devices["cameras"][1]["used_by"]["name"] == "cam0");
+    CHECK(devices["cameras"][0]["access"] == "free");
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["cameras"][0]["connections"] == 1);
+}
