@@ -132,7 +132,7 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows,
     return out;
 }
 
-std::string or_dash(std::string text) { return text.empty() ? "-" : text; }
+std::string or_dash(const std::string& text) { return text.empty() ? "-" : text; }
 
 std::string boards_text(const json& boards) {
     if (boards.empty())

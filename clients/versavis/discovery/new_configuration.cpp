@@ -203,7 +203,7 @@ Expected<NewImu> choose_imu(const std::string& text) {
 
 std::string choose_board(const json& boards) {
     for (const json& board : boards)
-        if (const std::string serial = text(board, "serial"); !serial.empty() && boards.size() > 1)
+        if (std::string serial = text(board, "serial"); !serial.empty() && boards.size() > 1)
             return serial;
     return "";
 }
