@@ -44,7 +44,7 @@ TEST_CASE("new_configuration: all cameras that can be used are chosen, and get n
     found.push_back(camera("13", "10.0.0.4", "busy"));
     found.push_back(camera("14", "10.0.0.5", "busy"));
     found.back()["used_by"] = {{"instance", "default"}};
-    const auto chosen = choose_cameras(found, {});
+    const auto chosen = choose_cameras(found, {}, "default");
     REQUIRE(chosen);
     REQUIRE(chosen->size() == 3);
     CHECK((*chosen)[0].name == "cam0");
@@ -55,7 +55,7 @@ TEST_CASE("new_configuration: all cameras that can be used are chosen, and get n
 
 TEST_CASE("new_configuration: cameras are chosen by any of their names, in that order") {
     for (const char* word : {"12", "10.0.0.3", "AA:BB:CC:DD:EE:12", "LEFT12"}) {
-        const auto chosen = choose_cameras(two, {std::string(word) + "=right", "11"});
+        const auto chosen = choose_cameras(two, {std::string(word) + "=right", "11"}, "default");
         REQUIRE(chosen);
         CHECK((*chosen)[0].device == "10.0.0.3");
         CHECK((*chosen)[0].name == "right");
@@ -64,26 +64,28 @@ TEST_CASE("new_configuration: cameras are chosen by any of their names, in that 
 }
 
 TEST_CASE("new_configuration: a name that was given is not given again") {
-    const auto chosen = choose_cameras(two, {"12", "11=cam0"});
+    const auto chosen = choose_cameras(two, {"12", "11=cam0"}, "default");
     REQUIRE(chosen);
     CHECK((*chosen)[0].name == "cam1");
 }
 
 TEST_CASE("new_configuration: a choice that is none is refused, and the error says what there is") {
-    CHECK_THAT(choose_cameras(two, {"13"}).error().message(),
+    CHECK_THAT(choose_cameras(two, {"13"}, "default").error().message(),
                Contains("13: no camera") && Contains("11 at 10.0.0.2, 12 at 10.0.0.3"));
-    CHECK_THAT(choose_cameras(two, {"11", "10.0.0.2"}).error().message(), Contains("twice"));
+    CHECK_THAT(choose_cameras(two, {"11", "10.0.0.2"}, "default").error().message(),
+               Contains("twice"));
     json many = json::array();
     for (int i = 1; i < 6; ++i)
         many.push_back(camera("1" + std::to_string(i), "10.0.0." + std::to_string(i)));
-    CHECK_THAT(choose_cameras(many, {}).error().message(),
+    CHECK_THAT(choose_cameras(many, {}, "default").error().message(),
                Contains("5 are too many") && Contains("--camera"));
-    CHECK(choose_cameras(many, {"11", "12", "13", "14"}));
+    CHECK(choose_cameras(many, {"11", "12", "13", "14"}, "default"));
     CHECK_THAT(choose_imu("bmi088x").error().message(), Contains("icm42688p"));
 }
 
 TEST_CASE("new_configuration: what stands in the way of a chosen camera is in the file") {
-    const auto chosen = choose_cameras(json{camera("13", "10.0.0.4", "unreachable")}, {"13"});
+    const auto chosen =
+        choose_cameras(json{camera("13", "10.0.0.4", "unreachable")}, {"13"}, "default");
     REQUIRE(chosen);
     NewConfiguration configuration;
     configuration.cameras = *chosen;
@@ -102,7 +104,7 @@ TEST_CASE(
             json found = two;
             found.push_back(camera("13", "10.0.0.4"));
             found.push_back(camera("14", "10.0.0.5"));
-            configuration.cameras = *choose_cameras(found, {});
+            configuration.cameras = *choose_cameras(found, {}, "default");
             INFO(model << " " << rate_hz);
             const auto read = loaded(configuration);
             CHECK(read.imus.at(0).model->name == model);
@@ -120,19 +122,19 @@ TEST_CASE("new_configuration: instance, link and board are written where they ar
     CHECK_THAT(to_toml(configuration, keys()), !Contains("instance =") && !Contains("link ="));
     configuration.instance = "second";
     configuration.link = "unix:/run/board";
-    configuration.board_serial = choose_board({{{"serial", "A"}}, {{"serial", "B"}}});
+    configuration.board_serial = choose_board({{{"serial", "A"}}, {{"serial", "B"}}}, "second");
     const auto read = loaded(configuration);
     CHECK(read.instance == "second");
     CHECK(read.board.link == "unix:/run/board");
     CHECK(read.board.serial == "A");
-    CHECK(choose_board({{{"serial", "A"}}}).empty());
+    CHECK(choose_board({{{"serial", "A"}}}, "second").empty());
 }
 
 TEST_CASE("new_configuration: whatever a camera calls itself stays in its comment") {
     json odd = camera("13", "10.0.0.4");
     odd["vendor"] = "A\n[board]\nlink = 1\x7f";
     NewConfiguration configuration;
-    configuration.cameras = *choose_cameras(json{odd}, {});
+    configuration.cameras = *choose_cameras(json{odd}, {}, "default");
     configuration.cameras[0].device = "a \"quoted\" \\ name";
     const auto read = loaded(configuration);
     CHECK(read.board.link == "usb");
@@ -142,7 +144,7 @@ TEST_CASE("new_configuration: whatever a camera calls itself stays in its commen
 TEST_CASE("new_configuration: each key is in the service's table, and has its meaning above it") {
     NewConfiguration configuration;
     configuration.instance = "second";
-    configuration.cameras = *choose_cameras(two, {});
+    configuration.cameras = *choose_cameras(two, {}, "default");
     configuration.imu = *choose_imu("bmi088");
     const std::string text = to_toml(configuration, keys());
     CHECK_THAT(text,
@@ -156,4 +158,18 @@ TEST_CASE("new_configuration: each key is in the service's table, and has its me
         CHECK(line.size() <= 100);
         if (!features && line.find(" = ") != std::string::npos) CHECK(before.rfind("# ", 0) == 0);
     }
+}
+
+TEST_CASE("new_configuration: what another service uses is left to it") {
+    const json used = {{"instance", "other"}};
+    json found = two;
+    found[0]["access"] = "busy";
+    found[0]["used_by"] = used;
+    CHECK(choose_cameras(found, {}, "default")->front().device == "10.0.0.3");
+    CHECK(choose_cameras(found, {}, "other")->front().device == "10.0.0.2");
+    CHECK(choose_cameras(found, {"11"}, "default")->front().problem ==
+          "the service 'other' uses it");
+    const json boards = {{{"serial", "A"}, {"used_by", used}}, {{"serial", "B"}}};
+    CHECK(choose_board(boards, "default") == "B");
+    CHECK(choose_board(boards, "other") == "A");
 }

@@ -165,17 +165,20 @@ std::vector<std::string> DiscoverCommands::all_addresses() const {
     return all;
 }
 
-Expected<NewConfiguration> DiscoverCommands::choose(const json& devices) const {
+Expected<NewConfiguration> DiscoverCommands::choose(const json& devices,
+                                                    const std::string& instance) const {
     NewConfiguration configuration;
+    configuration.instance = instance;
     configuration.link = link_;
-    configuration.board_serial = serial_.empty() ? choose_board(devices["boards"]) : serial_;
+    configuration.board_serial =
+        serial_.empty() ? choose_board(devices["boards"], instance) : serial_;
     if (rate_hz_ > 0) configuration.rate_hz = rate_hz_;
     if (!imu_.empty()) {
         const auto imu = choose_imu(imu_);
         if (!imu) return Unexpected(imu.error());
         configuration.imu = *imu;
     }
-    auto cameras = choose_cameras(devices["cameras"], cameras_);
+    auto cameras = choose_cameras(devices["cameras"], cameras_, instance);
     if (!cameras) return Unexpected(cameras.error());
     configuration.cameras = std::move(*cameras);
     return configuration;
@@ -194,9 +197,8 @@ int DiscoverCommands::init(const std::string& instance) {
     if (asks) fmt::print(stderr, "{}\n", devices_text(*devices));
     json chosen_from = *devices;
     if (asks && cameras_.empty()) chosen_from["cameras"] = json::array();
-    auto configuration = choose(chosen_from);
+    auto configuration = choose(chosen_from, instance);
     if (!configuration) return fail(configuration.error(), EX_UNAVAILABLE);
-    configuration->instance = instance;
     if (asks && !ask(*devices, *configuration))
         return fail({"init", "stopped", "nothing was written"}, EX_NOINPUT);
     if (configuration->cameras.empty() && !configuration->imu)
@@ -213,8 +215,9 @@ bool DiscoverCommands::ask(const json& devices, NewConfiguration& configuration)
     std::vector<NewCamera>& cameras = configuration.cameras;
     for (const json& found : devices["cameras"]) {
         if (!cameras_.empty() || cameras.size() == most_cameras) break;
-        NewCamera camera = new_camera(found);
-        const auto use = yes(fmt::format("Use {}?", camera.description), usable(found));
+        NewCamera camera = new_camera(found, configuration.instance);
+        const auto use =
+            yes(fmt::format("Use {}?", camera.description), usable(found, configuration.instance));
         if (!use) return false;
         if (!*use) continue;
         const auto name = answer("Name of its stream?", fmt::format("cam{}", cameras.size()));

@@ -30,7 +30,8 @@ class DiscoverCommands {
     int discover() const;
     int init(const std::string& instance);
     std::vector<std::string> all_addresses() const;
-    Expected<NewConfiguration> choose(const nlohmann::json& devices) const;
+    Expected<NewConfiguration> choose(const nlohmann::json& devices,
+                                      const std::string& instance) const;
     /// False: the user gave up.
     bool ask(const nlohmann::json& devices, NewConfiguration& configuration);
     bool ask_imu(NewConfiguration& configuration) const;

@@ -135,12 +135,13 @@ std::string imu_text(const NewImu& imu, const json& keys) {
 
 }  // namespace
 
-bool usable(const json& camera) {
-    return !text(camera, "device").empty() &&
-           (text(camera, "access") == "free" || camera.value("used_by", json()).is_object());
+bool usable(const json& camera, const std::string& instance) {
+    const json used = camera.value("used_by", json());
+    const bool ours = used.is_object() && text(used, "instance") == instance;
+    return !text(camera, "device").empty() && (text(camera, "access") == "free" || ours);
 }
 
-NewCamera new_camera(const json& camera) {
+NewCamera new_camera(const json& camera, const std::string& instance) {
     NewCamera made;
     made.device = text(camera, "device");
     if (made.device.empty()) made.device = text(camera, "serial");
@@ -148,8 +149,11 @@ NewCamera new_camera(const json& camera) {
         fmt::format("{} {}, serial number {}, {} at {}; preset {}", text(camera, "vendor"),
                     text(camera, "model"), text(camera, "serial"), text(camera, "protocol"),
                     place_of(camera), text(camera, "preset"));
-    if (!usable(camera))
-        made.problem = fmt::format("{}; {}", text(camera, "problem"), text(camera, "cure"));
+    if (usable(camera, instance)) return made;
+    const json used = camera.value("used_by", json());
+    made.problem = used.is_object()
+                       ? fmt::format("the service '{}' uses it", text(used, "instance"))
+                       : fmt::format("{}; {}", text(camera, "problem"), text(camera, "cure"));
     return made;
 }
 
@@ -169,18 +173,19 @@ void name_cameras(std::vector<NewCamera>& cameras) {
 }
 
 Expected<std::vector<NewCamera>> choose_cameras(const json& found,
-                                                const std::vector<std::string>& wanted) {
+                                                const std::vector<std::string>& wanted,
+                                                const std::string& instance) {
     std::vector<NewCamera> chosen;
     if (wanted.empty())
         for (const json& camera : found)
-            if (usable(camera)) chosen.push_back(new_camera(camera));
+            if (usable(camera, instance)) chosen.push_back(new_camera(camera, instance));
     for (const std::string& word : wanted) {
         const auto [which, name] = split(word);
         const auto camera =
             std::find_if(found.begin(), found.end(),
                          [&, &id = which](const json& each) { return goes_by(each, id); });
         if (camera == found.end()) return Unexpected(not_found(found, which));
-        NewCamera made = new_camera(*camera);
+        NewCamera made = new_camera(*camera, instance);
         const bool twice = std::any_of(chosen.begin(), chosen.end(), [&](const NewCamera& other) {
             return other.device == made.device;
         });
@@ -201,10 +206,13 @@ Expected<NewImu> choose_imu(const std::string& text) {
     return NewImu{name.empty() ? "imu0" : name, model};
 }
 
-std::string choose_board(const json& boards) {
-    for (const json& board : boards)
-        if (std::string serial = text(board, "serial"); !serial.empty() && boards.size() > 1)
-            return serial;
+std::string choose_board(const json& boards, const std::string& instance) {
+    if (boards.size() < 2) return "";
+    for (const json& board : boards) {
+        const json used = board.value("used_by", json());
+        const bool free = !used.is_object() || text(used, "instance") == instance;
+        if (std::string serial = text(board, "serial"); free && !serial.empty()) return serial;
+    }
     return "";
 }
 

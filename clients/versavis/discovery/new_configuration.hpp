@@ -36,11 +36,11 @@ struct NewConfiguration {
 /// Outputs of the board, each for one camera.
 inline constexpr std::size_t most_cameras = 4;
 
-/// As find_devices() has it, without a name.
-NewCamera new_camera(const nlohmann::json& camera);
+/// As find_devices() has it, without a name; for the service `instance`, as all below.
+NewCamera new_camera(const nlohmann::json& camera, const std::string& instance);
 
-/// Nothing stands in the way of this camera, or the service uses it already.
-bool usable(const nlohmann::json& camera);
+/// Nothing stands in the way of this camera, or that service uses it already.
+bool usable(const nlohmann::json& camera, const std::string& instance);
 
 /// Names cameras that have none "cam0", "cam1", ..., as far as those are free.
 void name_cameras(std::vector<NewCamera>& cameras);
@@ -49,13 +49,14 @@ void name_cameras(std::vector<NewCamera>& cameras);
 /// followed by "=NAME" or not; without any, all that are usable. Error: one is not there, or is
 /// wanted twice, or there are too many.
 Expected<std::vector<NewCamera>> choose_cameras(const nlohmann::json& found,
-                                                const std::vector<std::string>& wanted);
+                                                const std::vector<std::string>& wanted,
+                                                const std::string& instance);
 
 /// "MODEL" or "MODEL=NAME". Error: no such model.
 Expected<NewImu> choose_imu(const std::string& text);
 
-/// The serial number of the board, if there is a choice.
-std::string choose_board(const nlohmann::json& boards);
+/// If there are several, the serial number of the first that no other service uses.
+std::string choose_board(const nlohmann::json& boards, const std::string& instance);
 
 /// `keys`: as `versavisd --keys --json` prints them.
 std::string to_toml(const NewConfiguration& configuration, const nlohmann::json& keys);
