@@ -74,13 +74,16 @@ void join_board(json& boards, const json& status) {
     const json board = status.value("board", json::object());
     const std::string port = text(board, "port");
     if (port.empty() || text(board, "state") == "absent") return;
-    auto known = std::find_if(boards.begin(), boards.end(),
-                              [&](const json& other) { return text(other, "port") == port; });
+    const std::string serial = text(board, "serial");
+    auto known = std::find_if(boards.begin(), boards.end(), [&](const json& other) {
+        return text(other, "port") == port &&
+               (text(other, "serial").empty() || text(other, "serial") == serial);
+    });
     if (known == boards.end()) {
         boards.push_back({{"port", port}, {"problem", ""}, {"cure", ""}});
         known = std::prev(boards.end());
     }
-    (*known)["serial"] = text(board, "serial");
+    (*known)["serial"] = serial;
     (*known)["state"] = text(board, "state");
     (*known)["firmware"] = text(board, "firmware");
     (*known)["used_by"] = user(status, "");
