@@ -39,16 +39,43 @@ Camera::Hooks CameraGroup::hooks(const CameraConfiguration& configuration, Camer
             board_.start_cameras(master->pipeline->board_mask(), pairing::Start::steady);
         events_.add({EventKind::camera_lost, EventReason::none, index, name});
     };
-    hooks.exposure = [this, &pipeline, output = configuration.output,
-                      delay = configuration.auto_exposure.delay_frames](Duration exposure) {
+    hooks.exposure = [this, &pipeline](Duration exposure, unsigned delay_frames) {
         if (pipeline.triggered())
-            board_.announce_exposure(output, pipeline.newest_trigger() + 1 + delay, exposure);
+            board_.announce_exposure(pipeline.output(),
+                                     pipeline.newest_trigger() + 1 + delay_frames, exposure);
     };
     return hooks;
 }
 
 void CameraGroup::start() {
     for (const Unit& unit : units_) unit.camera->start();
+}
+
+void CameraGroup::reconfigure(const std::vector<CameraConfiguration>& configurations) {
+    for (Unit& unit : units_) {
+        const auto next = std::find_if(
+            configurations.begin(), configurations.end(),
+            [&](const CameraConfiguration& it) { return it.name == unit.configuration.name; });
+        if (next == configurations.end() || *next == unit.configuration) continue;
+        CameraConfiguration with_old_features = *next;
+        with_old_features.features = unit.configuration.features;
+        if (!(with_old_features == unit.configuration)) unit.pipeline->reconfigure(*next);
+        unit.configuration = *next;
+        unit.camera->change({*next, unit.enabled});
+    }
+}
+
+void CameraGroup::ask(const std::string& camera, CameraWish wish) {
+    for (Unit& unit : units_) {
+        if (unit.configuration.name != camera) continue;
+        unit.enabled = wish != CameraWish::stop;
+        unit.camera->change({unit.configuration, unit.enabled, wish == CameraWish::restart});
+    }
+}
+
+ChangeReport CameraGroup::changes(const std::string& camera) const {
+    const Unit* unit = find(camera);
+    return unit != nullptr ? unit->camera->changes() : ChangeReport{};
 }
 
 bool CameraGroup::stop(HostTime deadline) {
@@ -101,18 +128,18 @@ void CameraGroup::triggers_skipped(unsigned output, std::uint64_t count) {
 void CameraGroup::name_source(JournalEntry& entry) const {
     const Unit* unit = at_output(entry.source);
     entry.source = unit != nullptr ? static_cast<std::uint32_t>(unit - units_.data()) : 0U;
-    if (unit != nullptr) entry.source_name = unit->configuration.name;
+    if (unit != nullptr) entry.source_name = unit->pipeline->name();
 }
 
 const CameraGroup::Unit* CameraGroup::find(const std::string& name) const {
     for (const Unit& unit : units_)
-        if (unit.configuration.name == name) return &unit;
+        if (unit.pipeline->name() == name) return &unit;
     return nullptr;
 }
 
 const CameraGroup::Unit* CameraGroup::at_output(unsigned output) const {
     for (const Unit& unit : units_)
-        if (unit.pipeline->triggered() && unit.configuration.output == output) return &unit;
+        if (unit.pipeline->triggered() && unit.pipeline->output() == output) return &unit;
     return nullptr;
 }
 

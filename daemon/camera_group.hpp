@@ -10,12 +10,14 @@
 
 #include "board/board_link.hpp"
 #include "camera/camera.hpp"
+#include "control/control.hpp"
 #include "health/status.hpp"
 #include "pipeline/camera_pipeline.hpp"
 
 namespace versavis::daemon {
 
-/// All cameras are added before the first is started; after that it is thread-safe.
+/// All cameras are added before the first is started; after that it is thread-safe, but for what is
+/// of the main thread.
 class CameraGroup {
  public:
     CameraGroup(const ring::Place& rings, std::vector<CameraPreset> presets,
@@ -24,6 +26,14 @@ class CameraGroup {
 
     void add(const CameraConfiguration& configuration);
     void start();
+
+    /// Pairs and stamps by these values from now on, and asks the cameras that they concern to take
+    /// them; they are of the same cameras. Of the main thread.
+    void reconfigure(const std::vector<CameraConfiguration>& configurations);
+
+    /// Of a camera that is there. Of the main thread.
+    void ask(const std::string& camera, CameraWish wish);
+    ChangeReport changes(const std::string& camera) const;
 
     /// Waits for the end of all. False: some device still keeps the service waiting, whose camera
     /// and all that it uses must be left as they are until the process ends.
@@ -48,12 +58,14 @@ class CameraGroup {
     void name_source(JournalEntry& entry) const;
 
     bool any_triggered() const;
+    const std::vector<CameraPreset>& presets() const { return environment_.presets; }
     std::vector<CameraStatus> status() const;
     std::vector<StreamStatus> streams() const;
 
  private:
     struct Unit {
-        CameraConfiguration configuration;
+        CameraConfiguration configuration;  ///< of the main thread
+        bool enabled = true;                ///< the same
         std::unique_ptr<CameraPipeline> pipeline;
         std::unique_ptr<Camera> camera;
     };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // versavisd: the service.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <signal.h>
 #include <sysexits.h>
 #include <systemd/sd-daemon.h>
@@ -18,12 +19,14 @@
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
+#include "control/control.hpp"
 #include "health/health_log.hpp"
 #include "posix/file.hpp"
 #include "service.hpp"
 #include "settings/configuration.hpp"
 #include "settings/key_report.hpp"
 #include "settings/problem_report.hpp"
+#include "versavis/ring_path.hpp"
 
 namespace {
 
@@ -41,18 +44,49 @@ sigset_t block_signals() {
     return signals;
 }
 
+void log_problems(const TomlProblems& problems) {
+    for (const TomlProblem& problem : problems)
+        log(LogLevel::error, "configuration", "{}", problem.message());
+}
+
+/// Who may control the service, beside its own user (systemd/versavis.sysusers).
+constexpr auto admin_group = "versavis-admin";
+
+/// In the log: a service manager that reloads does not ask for more.
+void reload(Control& control) {
+    sd_notify(0, "RELOADING=1");
+    const auto done = control.reload();
+    sd_notify(0, "READY=1");
+    if (!done) {
+        log_problems(done.error());
+        return log(LogLevel::error, "configuration", "not reloaded: the old one stays in force");
+    }
+    log(LogLevel::info, "configuration", "reloaded: {}",
+        done->changed.empty() ? "nothing changed" : fmt::to_string(fmt::join(done->changed, ", ")));
+    if (!done->need_restart.empty())
+        log(LogLevel::warning, "configuration", "changed, but in force only after a restart: {}",
+            fmt::join(done->need_restart, ", "));
+}
+
+/// Without a socket the service serves as well.
+ControlSocket make_socket(const std::string& instance) {
+    auto socket = ControlSocket::create(control_path(instance), admin_group);
+    if (socket) return std::move(*socket);
+    log(LogLevel::error, "service", "cannot be controlled: {}", socket.error().message());
+    return {};
+}
+
 /// Ticks until a signal asks to stop; returns it.
-int serve(Service& service, const sigset_t& signals) {
+int serve(Service& service, Control& control, const sigset_t& signals) {
     const timespec interval{0, Service::tick_interval.ns};
     HealthLog health_log;
     std::string status;
     for (;;) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
-        if (signal == SIGHUP)
-            log(LogLevel::warning, "service",
-                "SIGHUP does not reload the configuration: restart the service");
+        if (signal == SIGHUP) reload(control);
         service.tick();
+        control.tick(service.health(), host_now());
         report_suppressed_library_lines(host_now());
         sd_notify(0, "WATCHDOG=1");
         const Summary& health = service.health();
@@ -62,11 +96,6 @@ int serve(Service& service, const sigset_t& signals) {
         status = health.text;
         sd_notifyf(0, "STATUS=%s", status.c_str());
     }
-}
-
-void log_problems(const TomlProblems& problems) {
-    for (const TomlProblem& problem : problems)
-        log(LogLevel::error, "configuration", "{}", problem.message());
 }
 
 bool serves(const Configuration& configuration) {
@@ -91,6 +120,16 @@ int check(const std::string& path, bool as_json) {
     return problems.empty() ? EX_OK : EX_CONFIG;
 }
 
+/// One that is handled; the watchdog is served meanwhile.
+int wait_for_signal(const sigset_t& signals) {
+    const timespec interval{1, 0};
+    for (;;) {
+        const int signal = sigtimedwait(&signals, nullptr, &interval);
+        if (signal > 0) return signal;
+        sd_notify(0, "WATCHDOG=1");
+    }
+}
+
 /// For so long, or until a signal asks to stop: then true.
 bool stopped_within(Duration length, const sigset_t& signals) {
     const timespec interval{1, 0};
@@ -103,13 +142,13 @@ bool stopped_within(Duration length, const sigset_t& signals) {
 }
 
 /// As after an installation: systemd need not start it again until there is something to serve.
-int wait_for_configuration(const std::string& path, const sigset_t& signals) {
-    const std::string text = fmt::format("{}: {}, then restart the service", path, serves_nothing);
+/// True: it is to be read again.
+bool wait_for_configuration(const std::string& path, const sigset_t& signals) {
+    const std::string text =
+        fmt::format("{}: {}, then reload or restart the service", path, serves_nothing);
     log(LogLevel::warning, "service", "{}", text);
     sd_notifyf(0, "READY=1\nSTATUS=%s", text.c_str());
-    while (!stopped_within(seconds(60), signals)) {
-    }
-    return EX_OK;
+    return wait_for_signal(signals) == SIGHUP;
 }
 
 Expected<std::unique_ptr<Service>> make_service(const Configuration& configuration) {
@@ -137,13 +176,17 @@ Expected<std::unique_ptr<Service>> make_or_wait(const Configuration& configurati
 
 int run(const std::string& path) {
     const sigset_t signals = block_signals();
-    auto configuration = load_configuration(path);
-    if (!configuration) {
-        log_problems(configuration.error());
+    auto document = ConfigurationDocument::load(path);
+    while (document && !serves(document->configuration)) {
+        if (!wait_for_configuration(path, signals)) return EX_OK;
+        document = ConfigurationDocument::load(path);
+    }
+    if (!document) {
+        log_problems(document.error());
         return EX_CONFIG;
     }
+    const Configuration* configuration = &document->configuration;
     set_log_level(configuration->log_level);
-    if (!serves(*configuration)) return wait_for_configuration(path, signals);
     route_library_log();
     auto service = make_or_wait(*configuration, signals);
     if (!service) {
@@ -152,10 +195,11 @@ int run(const std::string& path) {
     }
     if (!*service) return EX_OK;
     (*service)->start();
+    Control control(make_socket(configuration->instance), *document, **service);
     sd_notify(0, "READY=1");
     log(LogLevel::info, "service", "serving instance '{}' with {} camera(s) and {} IMU(s)",
         configuration->instance, configuration->cameras.size(), configuration->imus.size());
-    const int signal = serve(**service, signals);
+    const int signal = serve(**service, control, signals);
     sd_notify(0, "STOPPING=1");
     log(LogLevel::info, "service", "stopping on {}", signal == SIGINT ? "SIGINT" : "SIGTERM");
     if ((*service)->stop()) return EX_OK;

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "base/log.hpp"
@@ -44,6 +45,12 @@ std::vector<std::string> ring_names(const Configuration& configuration) {
         names.push_back(camera.name + evidence_suffix);
     }
     return names;
+}
+
+/// With the latencies that the board must know.
+Configuration for_board(Configuration configuration, const std::vector<CameraPreset>& presets) {
+    for (CameraConfiguration& camera : configuration.cameras) use_named_preset(presets, camera);
+    return configuration;
 }
 
 ring::Place place_of(const ring::OwnedDirectory& directory, const Configuration& configuration) {
@@ -103,11 +110,10 @@ Expected<> Service::make_cameras() {
     auto presets = load_presets(preset_directory(configuration_));
     if (!presets) return Unexpected(presets.error());
     BoardListener& self = *this;
-    Configuration for_board = configuration_;
-    for (CameraConfiguration& camera : for_board.cameras) use_named_preset(*presets, camera);
-    board_ = std::make_unique<BoardLink>([this] { return open_byte_stream(configuration_.board); },
-                                         for_board, configuration_.clock.exchange_rate_hz,
-                                         translator_, *clock_recorder_, self);
+    board_ = std::make_unique<BoardLink>(
+        [board = configuration_.board] { return open_byte_stream(board); },
+        for_board(configuration_, *presets), configuration_.clock.exchange_rate_hz, translator_,
+        *clock_recorder_, self);
     cameras_ = std::make_unique<CameraGroup>(
         place_of(directory_, configuration_), std::move(*presets),
         state_directory(configuration_.state_directory), translator_, *events_, *board_);
@@ -119,6 +125,28 @@ void Service::start() {
     if (board_needed()) board_->start();
     cameras_->start();
 }
+
+void Service::reconfigure(const Configuration& configuration) {
+    set_log_level(configuration.log_level);
+    changed_ = host_now();
+    const Configuration before = for_board(configuration_, cameras_->presets());
+    const Configuration after = for_board(configuration, cameras_->presets());
+    const wire::Configuration old_board = board_configuration(before);
+    const wire::Configuration new_board = board_configuration(after);
+    if (std::memcmp(&old_board, &new_board, sizeof new_board) != 0) {
+        alignment_.reconfigure(new_board);
+        board_->reconfigure(after);
+    }
+    configuration_ = configuration;
+    cameras_->reconfigure(configuration.cameras);
+}
+
+void Service::ask(const std::string& camera, CameraWish wish) {
+    changed_ = host_now();
+    cameras_->ask(camera, wish);
+}
+
+ChangeReport Service::changes(const std::string& camera) const { return cameras_->changes(camera); }
 
 bool Service::stop() {
     const bool ended = cameras_->stop(host_now() + stop_patience);
@@ -251,6 +279,7 @@ Status Service::collect_status(HostTime now) {
     status.release = VERSAVIS_VERSION;
     status.configuration = std::filesystem::absolute(configuration_.entry.place.path).string();
     status.started = started_;
+    status.changed = changed_;
     status.now = now;
     status.board_needed = board_needed();
     status.board = board_->report();

@@ -11,6 +11,7 @@
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
 #include "camera_group.hpp"
+#include "control/control.hpp"
 #include "engine/ring/directory.hpp"
 #include "health/clock_step_detector.hpp"
 #include "health/status_publisher.hpp"
@@ -22,7 +23,7 @@
 
 namespace versavis::daemon {
 
-class Service final : private BoardListener {
+class Service final : public Controlled, private BoardListener {
  public:
     /// Errors: the instance is served by another process, the rings cannot be made, the output
     /// clock is not set.
@@ -39,6 +40,14 @@ class Service final : private BoardListener {
 
     /// Bounded waits and heartbeats; call it every 50 ms or so.
     void tick();
+
+    /// Takes effect at once: what only cameras need is theirs alone; what the board has stops its
+    /// cameras until it is configured anew.
+    void reconfigure(const Configuration& configuration) override;
+    void ask(const std::string& camera, CameraWish wish) override;
+    ChangeReport changes(const std::string& camera) const override;
+
+    const std::filesystem::path& directory() const { return directory_.path(); }
 
     /// As of the last status document.
     const Summary& health() const { return status_.summary(); }
@@ -84,6 +93,7 @@ class Service final : private BoardListener {
     std::unique_ptr<CameraGroup> cameras_;
     std::atomic<bool> unkept_{false};  ///< the board could not store its configuration
     HostTime started_;
+    HostTime changed_;  ///< by request
 };
 
 }  // namespace versavis::daemon

@@ -14,6 +14,7 @@
 #include "commands/board_commands.hpp"
 #include "commands/camera_commands.hpp"
 #include "commands/clock.hpp"
+#include "commands/control_commands.hpp"
 #include "commands/discover_commands.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
@@ -144,6 +145,8 @@ int main(int argc, char** argv) {
 
     client::CameraCommands camera(app);
 
+    client::ControlCommands control(app);
+
     client::ProcessCommand process(app, [] { return stop_requested != 0; });
 
     client::FileCommands files(app, [] { return stop_requested != 0; });
@@ -190,6 +193,7 @@ int main(int argc, char** argv) {
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
+    if (control.chosen()) return control.run(instance);
     if (discover.chosen()) return discover.run(instance);
     if (recorder.chosen()) return recorder.run(instance);
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");

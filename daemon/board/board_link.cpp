@@ -93,6 +93,28 @@ void BoardLink::stop() {
     if (thread_.joinable()) thread_.join();
 }
 
+void BoardLink::reconfigure(const Configuration& configuration) {
+    {
+        const std::lock_guard lock(command_mutex_);
+        next_file_ = configuration;
+        takes_commands_ = false;
+        commands_.clear();
+        accepting_ = false;
+        greet_anew_ = true;
+    }
+    wake_.signal();
+}
+
+void BoardLink::adopt_configuration() {
+    const std::lock_guard lock(command_mutex_);
+    greet_anew_ = false;
+    if (!next_file_) return;
+    file_ = *std::exchange(next_file_, std::nullopt);
+    const std::uint32_t id = configuration_.id;
+    configuration_ = board_configuration(file_);
+    configuration_.id = id;
+}
+
 bool BoardLink::pause(Duration duration) const {
     const HostTime end = host_now() + duration;
     while (!stop_ && host_now() < end) {
@@ -167,6 +189,7 @@ Expected<> BoardLink::serve() {
 /// One conversation, from hello to its end.
 Expected<> BoardLink::converse() {
     if (!explained()) set_state(BoardState::handshake, "");
+    adopt_configuration();
     if (auto done = handshake(); !done) return done;
     if (auto done = configure(); !done) return done;
     if (auto done = synchronise(); !done) return done;
@@ -188,6 +211,8 @@ Expected<> BoardLink::converse() {
                                       std::max(clock_.next_request() - host_now(), shortest_wait)));
             !done)
             return done;
+        anew_ = greet_anew_;
+        if (anew_) return failure("board", "its configuration changes");
         anew_ = host_now() - last_packet_ > silence_limit;
         if (anew_) return failure("board", "went silent", "check cable and power");
     }

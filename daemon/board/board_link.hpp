@@ -82,6 +82,10 @@ class BoardLink {
     void start();
     void stop();
 
+    /// The board is greeted anew with another configuration, which stops its cameras until
+    /// board_connected(). From any thread.
+    void reconfigure(const Configuration& configuration);
+
     /// Starts or stops triggering the cameras of the mask, if the board is there. From any thread.
     void start_cameras(std::uint8_t mask, pairing::Start how);
     void stop_cameras(std::uint8_t mask);
@@ -103,6 +107,7 @@ class BoardLink {
     Expected<> serve();
     Expected<> converse();
     Expected<> handshake();
+    void adopt_configuration();
     Expected<> configure();
     Expected<> synchronise();
     Expected<> read(Duration timeout);
@@ -134,6 +139,8 @@ class BoardLink {
     std::mutex command_mutex_;
     std::vector<Command> commands_;  ///< to be sent by the link's thread, so that no other waits
     bool takes_commands_ = false;
+    std::optional<Configuration> next_file_;  ///< to be adopted; under the same lock
+    std::atomic<bool> greet_anew_{false};     ///< because of it
 
     // Of the link's thread.
     std::unique_ptr<ByteStream> stream_;

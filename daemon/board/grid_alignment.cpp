@@ -44,6 +44,12 @@ void GridAlignment::begin() {
     errors_.clear();
 }
 
+void GridAlignment::reconfigure(const wire::Configuration& board) {
+    const std::lock_guard lock(mutex_);
+    board_ = board;
+    errors_.clear();
+}
+
 std::optional<wire::AlignGrid> GridAlignment::message(HostTime now, clock::Translator& translator) {
     const std::lock_guard lock(mutex_);
     if (!wanted_ || now < next_) return std::nullopt;
@@ -77,12 +83,12 @@ void GridAlignment::exposure(const wire::Exposure& record, OutputTime middle, Ho
     const bool own = (record.flags & wire::exposure_measured) != 0 &&
                      (record.flags & wire::exposure_from_master) == 0;
     if (!wanted_ || !own || record.camera >= wire::camera_count) return;
+    const std::lock_guard lock(mutex_);
     const wire::CameraConfiguration& camera = board_.cameras[record.camera];
     if (camera.rate_uhz == 0) return;
     const auto since_first = static_cast<std::int64_t>(static_cast<__int128>(record.tick) *
                                                        1'000'000'000'000'000 / camera.rate_uhz);
     const std::int64_t first_tick = middle.ns - camera.phase_ns - since_first;
-    const std::lock_guard lock(mutex_);
     errors_.push_back({now, {past_nearest_second_ns(first_tick)}});
     if (errors_.size() > errors_kept) errors_.pop_front();
 }

@@ -27,6 +27,9 @@ class GridAlignment {
     /// A new connection: the board is to be updated at once.
     void begin();
 
+    /// The board has this configuration from now on.
+    void reconfigure(const wire::Configuration& board);
+
     /// What to send to the board now. None: it was updated within the last second, or the clock is
     /// not known well enough.
     std::optional<wire::AlignGrid> message(HostTime now, clock::Translator& translator);

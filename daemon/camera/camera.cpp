@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <gio/gio.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
@@ -69,6 +71,21 @@ constexpr Duration time_of_free_silence = seconds(5);
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
 
+using Features = std::vector<std::pair<std::string, std::string>>;
+
+/// Those of `after` that are new or have another value; none: one of `before` is gone.
+std::optional<Features> differing_features(const Features& before, const Features& after) {
+    Features differing;
+    for (const auto& feature : after)
+        if (std::find(before.begin(), before.end(), feature) == before.end())
+            differing.push_back(feature);
+    for (const auto& [name, value] : before)
+        if (std::none_of(after.begin(), after.end(),
+                         [wanted = &name](const auto& it) { return it.first == *wanted; }))
+            return std::nullopt;
+    return differing;
+}
+
 void on_control_lost(ArvDevice* /*device*/, Flag* lost) { **lost = true; }
 void forget(gpointer flag, GClosure* /*closure*/) { delete static_cast<Flag*>(flag); }
 
@@ -108,6 +125,20 @@ void Camera::stop() {
     if (thread_.joinable()) thread_.join();
 }
 
+void Camera::change(CameraChange change) {
+    const std::lock_guard lock(mutex_);
+    // A start anew that nobody saw yet is still to come.
+    change.restart = change.restart || (change_ && change_->restart);
+    change_ = std::move(change);
+    ++changes_.asked;
+    wake_.notify_all();
+}
+
+ChangeReport Camera::changes() const {
+    const std::lock_guard lock(mutex_);
+    return changes_;
+}
+
 bool Camera::ended_by(HostTime deadline) {
     std::unique_lock lock(mutex_);
     const Duration left = deadline - host_now();
@@ -145,11 +176,15 @@ void Camera::set_state(CameraState state, const std::string& hint) {
     report_.hint = hint;
 }
 
-/// Waits, unless the camera is to stop. False: it is.
+/// Under the lock: the session is to end, at once or to begin anew. What may be possible while it
+/// streams is left to watch().
+bool Camera::asked_to_end() const { return stop_ || (change_ && !streaming_); }
+
+/// Waits, unless the session is to end. False: it is.
 bool Camera::pause(Duration duration) {
     std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, std::chrono::nanoseconds(duration.ns), [this] { return stop_; });
-    return !stop_;
+    wake_.wait_for(lock, std::chrono::nanoseconds(duration.ns), [this] { return asked_to_end(); });
+    return !asked_to_end();
 }
 
 void Camera::set_setting_up_since(HostTime since) {
@@ -159,19 +194,111 @@ void Camera::set_setting_up_since(HostTime since) {
 
 void Camera::run() {
     set_state(CameraState::opening, "");
-    for (;;) {
+    while (adopt_change()) {
         auto ended = session();
         set_setting_up_since({});
         environment_.bandwidth.leave(configuration_.name);
-        if (ended || !pause({})) break;
+        if (ended || !pause({})) continue;
+        if (refuse_change(ended.error())) continue;
         explain(ended.error());
         note_held();
         set_state(ended.error().state, ended.error().error.message());
-        if (!wait_to_retry(ended.error().state)) break;
+        wait_to_retry(ended.error().state);
     }
     const std::lock_guard lock(mutex_);
     ended_ = true;
     wake_.notify_all();
+}
+
+/// Before a session: takes what was asked for, and waits as long as the camera is to be left alone.
+/// False: it is to stop.
+bool Camera::adopt_change() {
+    std::unique_lock lock(mutex_);
+    while (!stop_ && (change_ || !enabled_)) {
+        if (!change_) {
+            wake_.wait(lock, [this] { return stop_ || change_; });
+            continue;
+        }
+        before_change_ = std::exchange(configuration_, change_->configuration);
+        enabled_ = change_->enabled;
+        adopted_ = changes_.asked;
+        change_.reset();
+        retry_.restart();
+        exposure_.reset();
+        meter_.reset();
+        lock.unlock();
+        set_state(enabled_ ? CameraState::opening : CameraState::stopped, "");
+        if (!enabled_) settle_change("");
+        lock.lock();
+    }
+    return !stop_;
+}
+
+/// What was adopted is in force, or was refused for that reason.
+void Camera::settle_change(const std::string& refused) {
+    if (!before_change_) return;
+    before_change_.reset();
+    const std::lock_guard lock(mutex_);
+    changes_.done = adopted_;
+    changes_.refused = refused;
+}
+
+/// A session has failed. True: because of the change, which is taken back.
+bool Camera::refuse_change(const CameraProblem& problem) {
+    if (!before_change_ || problem.state != CameraState::misconfigured) {
+        settle_change("");  // whatever it is, it is not the change
+        return false;
+    }
+    const std::string refused = problem.error.message();
+    log(LogLevel::warning, configuration_.name, "not changed: {}", refused);
+    configuration_ = *before_change_;
+    settle_change(refused);
+    return true;
+}
+
+/// Sets an exposure or a gain while frames come. Error: the camera refuses it.
+Expected<> Camera::set_live(AravisNodeMap& nodes, const std::string& feature,
+                            const std::string& value) {
+    if (feature != exposure_feature_) return nodes.set(feature, value);
+    const Duration wanted{std::llround(std::strtod(value.c_str(), nullptr) * 1e3)};
+    hooks_.exposure(wanted, configuration_.auto_exposure.delay_frames);
+    pipeline_.set_camera_exposure(wanted, host_now());
+    const auto done = nodes.set(feature, value);
+    pipeline_.set_camera_exposure(fixed_exposure(nodes, feature), host_now());
+    return done;
+}
+
+/// What was asked for, if it is no more than another exposure or gain. False: the camera must begin
+/// anew.
+bool Camera::change_live(AravisNodeMap& nodes) {
+    std::unique_lock lock(mutex_);
+    if (!change_) return true;
+    const CameraChange change = *change_;
+    const std::uint64_t number = changes_.asked;
+    lock.unlock();
+    CameraConfiguration next = change.configuration;
+    next.features = configuration_.features;
+    if (!change.enabled || change.restart || !(next == configuration_)) return false;
+    const auto differing =
+        differing_features(configuration_.features, change.configuration.features);
+    const auto live = [&](const auto& feature) {
+        return (feature.first == exposure_feature_ && exposure_ == nullptr) ||
+               feature.first == sensor_features_.gain;
+    };
+    if (!differing || !std::all_of(differing->begin(), differing->end(), live)) return false;
+    std::string refused;
+    for (const auto& [feature, value] : *differing)
+        if (const auto done = set_live(nodes, feature, value); !done)
+            refused = done.error().message();
+    for (auto& [feature, value] : watched_)
+        if (feature == exposure_feature_) value = nodes.read(feature);
+    if (refused.empty()) configuration_.features = change.configuration.features;
+    if (!refused.empty()) log(LogLevel::warning, configuration_.name, "not changed: {}", refused);
+    lock.lock();
+    if (changes_.asked == number) change_.reset();
+    changes_.done = number;
+    changes_.refused = refused;
+    return true;
 }
 
 /// Control that is held need not be held by a program that runs, and a camera that was there a
@@ -196,21 +323,17 @@ void Camera::note_held() {
     report_.held = held_since_.ns != 0;
 }
 
-/// Waits; not as long when the camera was gone and is back. False: it is to stop.
-bool Camera::wait_to_retry(CameraState why) {
+/// Waits; not as long when the camera was gone and is back, or something is asked of it.
+void Camera::wait_to_retry(CameraState why) {
     const bool held = held_since_.ns != 0;
     const HostTime until = host_now() + (held ? Retry::soon : retry_.after(why));
     for (bool gone = false; host_now() < until;) {
-        if (!pause(std::min(until - host_now(), presence_interval))) return false;
+        if (!pause(std::min(until - host_now(), presence_interval))) return;
         if (!device_ || until - host_now() < presence_interval) continue;
         const bool there = answers(doubt_patience);
-        if (there && gone) {
-            retry_.restart();
-            return true;
-        }
+        if (there && gone) return retry_.restart();
         gone = !there;
     }
-    return pause({});
 }
 
 bool Camera::answers(Duration patience) const {
@@ -219,7 +342,7 @@ bool Camera::answers(Duration patience) const {
         .has_value();
 }
 
-/// From opening the camera to its loss. A value: it was asked to stop.
+/// From opening the camera to its loss. A value: it was asked to end.
 CameraResult<> Camera::session() {
     const CameraOpening opening{environment_.descriptions, environment_.claims,
                                 environment_.aravis};
@@ -310,6 +433,7 @@ CameraResult<> Camera::stream(ArvCamera* camera, AravisNodeMap& nodes, const Cam
     }
     set_state(CameraState::streaming, "");
     streaming_ = true;
+    settle_change("");
     hooks_.streaming();
     auto ended = watch(camera, nodes, **frames, control_lost);
     lose();
@@ -406,6 +530,7 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSourc
         if (control_lost)
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});
+        if (!change_live(nodes)) return {};
         if (auto good = examine(frames, health); !good) return good;
         if (exposure_) control_exposure(nodes);
         if (host_now() >= next_reading_ && pipeline_.wants_exposure_readings())
@@ -555,7 +680,7 @@ void Camera::control_exposure(AravisNodeMap& nodes) {
     const auto seen = meter_->newest(exposure_holds_);
     const auto wanted = seen ? exposure_->update(*seen) : std::nullopt;
     if (!wanted) return;
-    hooks_.exposure(*wanted);
+    hooks_.exposure(*wanted, configuration_.auto_exposure.delay_frames);
     pipeline_.set_camera_exposure(*wanted, host_now());
     const std::string exposure_us = fmt::format("{}", static_cast<double>(wanted->ns) * 1e-3);
     if (const auto done = nodes.set(exposure_feature_, exposure_us); !done) {

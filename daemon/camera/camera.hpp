@@ -60,6 +60,20 @@ struct CameraReport {
     SensorState sensor;  ///< as its registers say
 };
 
+/// How far requests of Camera::change() are.
+struct ChangeReport {
+    std::uint64_t asked = 0;
+    std::uint64_t done = 0;  ///< carried out or refused
+    std::string refused;     ///< why the last of them was; empty: it was not
+};
+
+/// What a camera is asked for while the service runs; it has all of it at its next start.
+struct CameraChange {
+    CameraConfiguration configuration;
+    bool enabled = true;   ///< false: it is let go, and left alone
+    bool restart = false;  ///< even if nothing else requires it
+};
+
 /// What all cameras share.
 struct CameraContext {
     CameraContext(ring::Place place, std::vector<CameraPreset> known_presets,
@@ -84,8 +98,8 @@ class Camera {
     struct Hooks {
         std::function<void()> streaming;  ///< it can be triggered
         std::function<void()> lost;
-        std::function<void(Duration)>
-            exposure;  ///< will be set next: the board must know before it holds
+        /// Will be set next, and hold after so many frames: the board must know before.
+        std::function<void(Duration, unsigned delay_frames)> exposure;
     };
 
     Camera(const CameraConfiguration& configuration, CameraContext& environment,
@@ -100,6 +114,11 @@ class Camera {
 
     /// After request_stop(). False: its device still keeps it waiting.
     bool ended_by(HostTime deadline);
+    /// Takes effect in the camera's own time: exposure and gain while it streams, all else with a
+    /// new session. The last request counts.
+    void change(CameraChange change);
+    ChangeReport changes() const;
+
     bool streaming() const { return streaming_; }
     CameraReport report() const;
 
@@ -107,6 +126,12 @@ class Camera {
     struct Health;  // of a camera that streams
 
     void run();
+    bool adopt_change();
+    void settle_change(const std::string& refused);
+    bool refuse_change(const CameraProblem& problem);
+    bool asked_to_end() const;
+    bool change_live(AravisNodeMap& nodes);
+    Expected<> set_live(AravisNodeMap& nodes, const std::string& feature, const std::string& value);
     CameraResult<> session();
     CameraResult<> set_up_and_stream(ArvCamera* camera, const std::atomic<bool>& control_lost);
     CameraResult<> stream(ArvCamera* camera, AravisNodeMap& nodes, const CameraSetup& setup,
@@ -118,7 +143,7 @@ class Camera {
     CameraResult<> examine(FrameSource& frames, Health& health);
     void note_held();
     void explain(CameraProblem& ended);
-    bool wait_to_retry(CameraState why);
+    void wait_to_retry(CameraState why);
     bool answers(Duration patience) const;
     bool restarted(Health& health) const;
     void plan_bandwidth(ArvCamera* camera, AravisNodeMap& nodes, std::uint64_t payload);
@@ -144,10 +169,15 @@ class Camera {
     std::condition_variable wake_;
     bool stop_ = false;
     bool ended_ = false;
+    std::optional<CameraChange> change_;  ///< asked for, and not carried out yet
+    ChangeReport changes_;
     CameraReport report_;
     HostTime setting_up_since_;  ///< 0: it is not being set up
 
     // Of the control thread.
+    bool enabled_ = true;
+    std::optional<CameraConfiguration> before_change_;  ///< until it is known whether that holds
+    std::uint64_t adopted_ = 0;                         ///< number of that change
     std::unique_ptr<FrameMeter> meter_;
     std::unique_ptr<AutoExposure> exposure_;
     std::string exposure_feature_;

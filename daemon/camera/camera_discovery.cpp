@@ -166,6 +166,7 @@ const char* to_string(CameraState state) {
         case CameraState::opening: return "opening";
         case CameraState::streaming: return "streaming";
         case CameraState::silent: return "silent";
+        case CameraState::stopped: return "stopped";
         case CameraState::failed: return "failed";
     }
     return "unknown";

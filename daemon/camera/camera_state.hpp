@@ -13,8 +13,9 @@ enum class CameraState {
     misconfigured,  ///< it lacks or refuses something of its configuration
     opening,
     streaming,
-    silent,  ///< it was there, and does not answer or send any more
-    failed,  ///< anything else
+    silent,   ///< it was there, and does not answer or send any more
+    stopped,  ///< by request
+    failed,   ///< anything else
 };
 const char* to_string(CameraState state);
 

@@ -830,6 +830,11 @@ Diagnosis diagnose_clock(const Status& status) {
 
 Diagnosis diagnose(const CameraStatus& status, const Status& all) {
     const CameraView camera{status, all};
+    if (camera.in(CameraState::stopped))
+        return conclude(
+            Fault::none,
+            fmt::format("stopped by request: 'versavis start {}' starts it", status.name), true,
+            {});
     const Rule* rule =
         std::find_if(std::begin(camera_rules), std::end(camera_rules),
                      [&](const Rule& candidate) { return candidate.applies(camera); });
@@ -838,13 +843,16 @@ Diagnosis diagnose(const CameraStatus& status, const Status& all) {
         return conclude(Fault::none, own.empty() ? clock_hint(camera) : own, true, {});
     }
     const Duration patience = start_patience + camera.period() * start_periods;
-    return conclude(rule->fault, rule->hint(camera), status.delivery.ever,
-                    all.now - all.started < patience);
+    const bool asked = rule->fault == Fault::starting && all.now - all.changed < patience;
+    return conclude(rule->fault, rule->hint(camera), status.delivery.ever && !asked,
+                    asked || all.now - all.started < patience);
 }
 
 Diagnosis diagnose(const ImuStatus& imu, const Status& all) {
     const auto because = [&](Fault fault, const std::string& hint) {
-        return conclude(fault, hint, imu.delivery.ever, young(all.started, all.now));
+        const bool asked = fault == Fault::starting && young(all.changed, all.now);
+        return conclude(fault, hint, imu.delivery.ever && !asked,
+                        asked || young(all.started, all.now));
     };
     const ImuReport& report = imu.report;
     const Fault cause = all.board_diagnosis.fault;

@@ -218,6 +218,9 @@ Health health(const Status& status) {
 Summary summary(const Status& status) {
     const Health worst = health(status);
     Summary summary{worst, false, "", to_string(worst)};
+    for (const CameraStatus& camera : status.cameras)
+        summary.cameras.push_back({camera.name, to_string(camera.camera.state),
+                                   camera.diagnosis.health, camera.diagnosis.hint});
     if (worst == Health::ok) return summary;
     std::string others;
     for (const auto& [name, diagnosis] : diagnoses(status)) {

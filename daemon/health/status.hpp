@@ -47,6 +47,7 @@ struct Status {
     std::string release;        ///< of the service
     std::string configuration;  ///< its file
     HostTime started;
+    HostTime changed;  ///< somebody asked for a change, which makes devices start anew
     HostTime now;
     bool board_needed = true;
     BoardReport board;
@@ -66,12 +67,21 @@ bool firmware_outdated(const Status& status);
 /// That of the device that is worst off.
 Health health(const Status& status);
 
-/// The health in one line.
+/// How a device is, in short.
+struct DeviceSummary {
+    std::string name;
+    std::string state;
+    Health health = Health::starting;
+    std::string hint;  ///< empty: all is well
+};
+
+/// The health in one line, and that of each camera.
 struct Summary {
     Health health = Health::starting;
     bool dead = false;  ///< a device that is degraded delivers nothing at all
     std::string cause;  ///< the first device in the order of cause, and its fault
     std::string text = to_string(health);  ///< the same with its hint, and who else is as badly off
+    std::vector<DeviceSummary> cameras{};
 };
 Summary summary(const Status& status);
 

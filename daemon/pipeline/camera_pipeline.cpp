@@ -59,11 +59,14 @@ clock::Stamp moved(clock::Stamp stamp, Duration by) {
 
 CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::uint32_t index,
                                clock::Translator& translator, EventJournal& events)
-    : configuration_(configuration),
+    : name_(configuration.name),
+      triggered_(configuration.trigger == TriggerSource::board),
+      output_(configuration.output),
       index_(index),
       translator_(translator),
       events_(events),
       stream_(translator.add_stream()),
+      configuration_(configuration),
       frames_(configuration),
       evidence_(translator),
       record_limits_(record_limits_of(configuration)),
@@ -75,6 +78,27 @@ CameraPipeline::CameraPipeline(const CameraConfiguration& configuration, std::ui
       triggers_(configuration),
       limits_(limits_of(configuration)),
       pairing_(limits_, *this) {}
+
+/// Line delays are the camera's, and stay until it is set up anew.
+void CameraPipeline::reconfigure(const CameraConfiguration& configuration) {
+    const std::lock_guard lock(mutex_);
+    const LineDelays lines = completion_.line_delays();
+    configuration_ = configuration;
+    record_limits_ = record_limits_of(configuration);
+    completion_ = ExposureCompletion(configuration);
+    check_ = ExposureCheck(configuration);
+    completion_.set_line_delays(lines);
+    check_.set_line_delays(lines);
+    answers_ = AnswerWatch(period_of(configuration));
+    triggers_.expect(configuration);
+    const pairing::Limits before = std::exchange(limits_, limits_of(configuration));
+    limits_.camera_clock = before.camera_clock && configuration.camera_clock;
+    limits_.stamped = before.stamped;
+    feed(record_limits_);
+    forget_records();
+    pairing_.set_limits(limits_);
+    feed(limits_);
+}
 
 /// All that pairing and the filter of records get goes through here, so that the recording is
 /// complete.
@@ -119,7 +143,7 @@ Expected<> CameraPipeline::prepare(const ring::Place& place, std::uint64_t paylo
     // Rings are made, and end, outside the lock that all threads wait for: that takes long. Only
     // the camera's thread does so, and what the ring before still waits for is published first.
     if (triggered() && !evidence_.recording()) {
-        auto ring = EvidenceRecorder::make_ring(place, configuration_.name);
+        auto ring = EvidenceRecorder::make_ring(place, name_);
         if (!ring) return Unexpected(ring.error());
         const std::lock_guard lock(mutex_);
         evidence_.use(std::move(*ring));
@@ -259,7 +283,7 @@ void CameraPipeline::follow_clock(std::uint32_t life) {
 void CameraPipeline::adopt_step(const wire::Exposure& record, const Implausibility& doubt) {
     restart_pairing();
     delays_.forget();
-    events_.add({EventKind::stream_stepped, doubt.reason, index_, configuration_.name, doubt.said,
+    events_.add({EventKind::stream_stepped, doubt.reason, index_, name_, doubt.said,
                  BoardTime{record.trigger_ns}, doubt.expected});
 }
 
@@ -267,13 +291,8 @@ void CameraPipeline::count_rejected(const wire::Exposure& record, const Implausi
     ++report_.records_doubted;
     const bool by_length = doubt.reason == EventReason::implausible_length;
     report_.doubted_exposure = {by_length ? record.end_ns - record.start_ns : 0};
-    events_.add({EventKind::message_doubted,
-                 doubt.reason,
-                 index_,
-                 configuration_.name,
-                 doubt.said,
-                 {},
-                 doubt.expected});
+    events_.add(
+        {EventKind::message_doubted, doubt.reason, index_, name_, doubt.said, {}, doubt.expected});
     // Two accounts of one exposure: neither is believed.
     if (filter_.disputes_newest(record)) middles_.erase(record.trigger);
 }
@@ -407,7 +426,7 @@ void CameraPipeline::slipped(const pairing::Arrival& at) {
 
 void CameraPipeline::journal(EventKind kind, EventReason reason, std::int64_t value,
                              std::optional<BoardTime> at) {
-    events_.add({kind, reason, index_, configuration_.name, value, at});
+    events_.add({kind, reason, index_, name_, value, at});
 }
 
 void CameraPipeline::reset() {
@@ -423,7 +442,7 @@ std::optional<pairing::Start> CameraPipeline::advance(HostTime now) {
         lines.swap(deferred_log_);
         return advance_locked(now);
     }();
-    for (const auto& [level, text] : lines) log(level, configuration_.name, "{}", text);
+    for (const auto& [level, text] : lines) log(level, name_, "{}", text);
     return wanted;
 }
 

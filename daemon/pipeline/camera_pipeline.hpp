@@ -78,6 +78,10 @@ class CameraPipeline final : private pairing::Outcome {
     Expected<> prepare(const ring::Place& place, std::uint64_t payload_size, bool has_clock,
                        pairing::Instant stamp_instant = pairing::Instant::unknown);
 
+    /// The same camera is to be paired and stamped by other values. Nothing that came before is
+    /// used any more.
+    void reconfigure(const CameraConfiguration& configuration);
+
     std::optional<std::uint32_t> acquire();
     std::byte* slot_data(std::uint32_t slot);
     void abandon(std::uint32_t slot, EventReason reason, std::uint64_t block_id);
@@ -120,10 +124,10 @@ class CameraPipeline final : private pairing::Outcome {
     pairing::Start first_start();
     void start_requested(pairing::Start start, HostTime now);
 
-    bool triggered() const { return configuration_.trigger == TriggerSource::board; }
-    std::uint8_t board_mask() const {
-        return static_cast<std::uint8_t>(1U << configuration_.output);
-    }
+    const std::string& name() const { return name_; }
+    bool triggered() const { return triggered_; }
+    unsigned output() const { return output_; }  ///< of the board
+    std::uint8_t board_mask() const { return static_cast<std::uint8_t>(1U << output_); }
 
     /// Number of the newest trigger that the board recorded.
     std::uint64_t newest_trigger();
@@ -169,13 +173,17 @@ class CameraPipeline final : private pairing::Outcome {
     void journal(EventKind kind, EventReason reason, std::int64_t value,
                  std::optional<BoardTime> at = {});
 
-    CameraConfiguration configuration_;
-    std::uint32_t index_;
+    // These do not change while the service runs.
+    const std::string name_;
+    const bool triggered_;
+    const unsigned output_;
+    const std::uint32_t index_;
     clock::Translator& translator_;
     EventJournal& events_;
     std::size_t stream_;  ///< of the translator's witnesses
 
     std::mutex mutex_;
+    CameraConfiguration configuration_;
     FramePublisher frames_;
     EvidenceRecorder evidence_;
     pairing::RecordLimits record_limits_;

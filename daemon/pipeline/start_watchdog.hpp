@@ -11,8 +11,11 @@ namespace versavis::daemon {
 /// Not thread-safe.
 class StartWatchdog {
  public:
-    explicit StartWatchdog(const CameraConfiguration& configuration)
-        : patience_(start_patience + period_of(configuration) * patient_periods) {}
+    explicit StartWatchdog(const CameraConfiguration& configuration) { expect(configuration); }
+
+    void expect(const CameraConfiguration& configuration) {
+        patience_ = start_patience + period_of(configuration) * patient_periods;
+    }
 
     void asked(HostTime now) { last_ = now; }
     void recorded(std::uint64_t trigger, HostTime now) {

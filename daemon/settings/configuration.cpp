@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "configuration_check.hpp"
+#include "configuration_file.hpp"
 #include "engine/toml/table_reader.hpp"
 #include "keys.hpp"
 
@@ -165,9 +166,14 @@ void read_parts(TomlFile& file, TableReader& top, const char* name, std::vector<
 Expected<Configuration, TomlProblems> load_configuration(const std::string& path) {
     const auto root = parse_toml(path);
     if (!root) return Unexpected(TomlProblems{root.error()});
+    return read_configuration(*root, path);
+}
+
+Expected<Configuration, TomlProblems> read_configuration(const toml::table& root,
+                                                         const std::string& path) {
     TomlFile file{path, "docs/user/configuration.md"};
     Configuration configuration;
-    TableReader top(file, *root);
+    TableReader top(file, root);
     read_keys(top, configuration);
     read_part(top, "board", configuration.board);
     read_part(top, "clock", configuration.clock);

@@ -63,6 +63,8 @@ struct AutoExposureConfiguration {
     double max_us = 0;          ///< from max_exposure_us, if not given
     double largest_step = 1.5;  ///< factor from one exposure to the next
     unsigned delay_frames = 1;  ///< frames between setting an exposure and the first that has it
+
+    bool operator==(const AutoExposureConfiguration&) const = default;
 };
 
 struct CameraConfiguration {
@@ -110,6 +112,8 @@ struct CameraConfiguration {
     bool camera_clock = true;    ///< its time stamps are evidence; false: they are worthless
     bool check_exposure = true;  ///< the camera's exposure time against the measured one
     std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
+
+    bool operator==(const CameraConfiguration&) const = default;
 };
 
 /// A time in microseconds, as the file has it.

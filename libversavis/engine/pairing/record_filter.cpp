@@ -288,6 +288,10 @@ bool RecordHistory::disputes_newest(const wire::Exposure& record) const {
 RecordFilter::RecordFilter(const RecordLimits& limits)
     : limits_(limits), filter_(RecordHistory(limits), records_to_confirm) {}
 
+void RecordFilter::set_limits(const RecordLimits& limits) {
+    if (!(limits == limits_)) *this = RecordFilter(limits);
+}
+
 RecordVerdict RecordFilter::judge(const ReceivedRecord& received) {
     verdict_ = {};
     verdict_.doubt = contradicts_itself(received.record, limits_);

@@ -24,6 +24,8 @@ struct RecordLimits {
     bool wired = true;                         ///< its exposure line
     bool slave = false;                        ///< triggered by another camera's exposure line
     bool fixed_grid = false;                   ///< its grid points follow no clock but the board's
+
+    bool operator==(const RecordLimits&) const = default;
 };
 
 /// A record as it came, and what was known then beside its own fields.
@@ -148,6 +150,9 @@ struct RecordVerdict {
 class RecordFilter {
  public:
     explicit RecordFilter(const RecordLimits& limits);
+
+    /// Others than before: it begins anew.
+    void set_limits(const RecordLimits& limits);
 
     RecordVerdict judge(const ReceivedRecord& received);
 

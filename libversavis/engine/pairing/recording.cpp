@@ -196,6 +196,8 @@ void apply(Pairing& pairing, const Evidence& evidence) {
 void apply(RecordFilter& filter, const Evidence& evidence) {
     if (const auto* received = std::get_if<ReceivedRecord>(&evidence))
         filter.judge(*received);
+    else if (const auto* limits = std::get_if<RecordLimits>(&evidence))
+        filter.set_limits(*limits);
     else if (const auto* skipped = std::get_if<TriggersSkipped>(&evidence))
         filter.triggers_skipped(skipped->count);
     else if (const auto* reset = std::get_if<Reset>(&evidence); reset && reset->records_too)

@@ -55,6 +55,9 @@ struct TomlEntry {
     /// "file:line:column: 'key' of [[table]]"; the key alone when the file has no such table.
     std::string reference(const std::string& key) const;
     TomlProblem problem(const std::string& key, std::string what, std::string cure) const;
+
+    /// Values are the same wherever they are in a file.
+    friend bool operator==(const TomlEntry& /*a*/, const TomlEntry& /*b*/) { return true; }
 };
 
 /// The unit that ends the name of a key: "us" of "pulse_us"; empty: none.

@@ -22,4 +22,9 @@ VERSAVIS_API bool is_stream_name(const std::string& name);
 VERSAVIS_API std::filesystem::path stream_path(const std::string& instance,
                                                const std::string& stream);
 
+/// The socket that the service is controlled by (docs/contracts/control.md).
+inline std::filesystem::path control_path(const std::string& instance) {
+    return instance_directory(instance) / ".control";
+}
+
 }  // namespace versavis

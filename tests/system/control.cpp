@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A service that runs is changed: no stamp is wrong meanwhile, and what is not meant goes on.
+#include <signal.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+
+#include "../support/judged.hpp"
+#include "../support/stack.hpp"
+
+using namespace versavis;
+using namespace versavis::test;
+
+namespace {
+
+std::string tool_output(const Stack& stack, const std::vector<std::string>& arguments, int code) {
+    std::string output;
+    INFO(arguments.front());
+    CHECK(stack.tool(arguments, &output) == code);
+    return output;
+}
+
+nlohmann::json delivering(Stack& stack, unsigned camera, double rate_hz) {
+    return stack.wait_for_status([&](const auto& status) {
+        return healthy(status) && status["cameras"][camera]["configured_hz"] == rate_hz;
+    });
+}
+
+void judge(Stack& stack, const char* when) {
+    const rig::Verdict verdict = judged(stack, 3);
+    INFO(when << ":\n" << rig::to_table(verdict));
+    CHECK(verdict.ok);
+}
+
+constexpr int refused = 65;
+
+}  // namespace
+
+TEST_CASE("control: exposure changes while frames come, rates with a pause, and nothing is wrong") {
+    Stack stack({"control", 95, 2, 20, "exposure_us = 4000", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+
+    tool_output(stack, {"set", "cam0", "ExposureTime=2000"}, 0);
+    auto status = stack.wait_for_status([](const auto& s) {
+        return healthy(s) &&
+               std::abs(s["cameras"][0]["exposure_ns"].template get<double>() - 2e6) < 1e4;
+    });
+    CHECK(status["cameras"][0]["connections"] == 1);  // it was not opened anew
+    judge(stack, "after another exposure");
+
+    using Catch::Contains;
+    CHECK_THAT(tool_output(stack, {"set", "cam0", "ExposureTime=1e12"}, refused),
+               Contains("ExposureTime") && Contains("allowed"));
+    CHECK_THAT(tool_output(stack, {"set", "cam0", "NoSuchFeature=1"}, refused),
+               Contains("NoSuchFeature"));
+    CHECK_THAT(tool_output(stack, {"set", "cam0", "output=3"}, refused), Contains("restart"));
+    status = stack.wait_for_status(healthy);
+    CHECK(std::abs(status["cameras"][0]["exposure_ns"].get<double>() - 2e6) < 1e4);
+
+    tool_output(stack, {"set", "cam0", "rate_hz=30"}, 0);
+    status = delivering(stack, 0, 30);
+    CHECK(status["board"]["connections"] == 2);
+    CHECK(status["cameras"][1]["connections"] == 1);  // only its triggers paused
+    judge(stack, "after another rate");
+}
+
+TEST_CASE("control: a camera stops and starts, and the file is read again") {
+    Stack stack({"startstop", 96, 2, 20, "exposure_us = 4000", "", ""});
+    stack.start_rig();
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    tool_output(stack, {"stop", "cam1"}, 0);
+    auto status = stack.wait_for_status(
+        [](const auto& s) { return healthy(s) && s["cameras"][1]["state"] == "stopped"; });
+    CHECK_THAT(status["cameras"][1]["hint"].get<std::string>(),
+               Catch::Contains("versavis start cam1"));
+    const auto received = status["cameras"][1]["frames_received"];
+    const std::uint64_t before = status["cameras"][0]["frames_published"];
+    status = stack.wait_for_status([&](const auto& s) {
+        return s["cameras"][0]["frames_published"].template get<std::uint64_t>() > before + 20;
+    });
+    CHECK(status["cameras"][1]["frames_received"] == received);
+
+    // What the file says of it holds when it starts.
+    std::ifstream file(stack.configuration_path());
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    std::string next = text;
+    for (std::size_t at = 0; (at = next.find("rate_hz = 20", at)) != std::string::npos;)
+        next.replace(at, 12, "rate_hz = 25");
+    std::ofstream(stack.configuration_path()) << next << "[memory]\nsealed = true\n";
+    const std::string output = tool_output(stack, {"reload"}, 0);
+    CHECK_THAT(output, Catch::Contains("camera.cam1.rate_hz") && Catch::Contains("memory.sealed"));
+    tool_output(stack, {"start", "cam1"}, 0);
+    delivering(stack, 1, 25);
+    judge(stack, "after the start");
+
+    std::ofstream(stack.configuration_path()) << text << "[memory\n";
+    stack.service().signal(SIGHUP);
+    CHECK(stack.service().wait_for_output("not reloaded", seconds(10)));
+    CHECK(healthy(stack.wait_for_status(healthy)));
+    CHECK(stack.service().terminate() == 0);
+}
