@@ -15,6 +15,7 @@
 #include "base/library_log.hpp"
 #include "base/log.hpp"
 #include "base/memory_lock.hpp"
+#include "camera/camera_list.hpp"
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
@@ -250,6 +251,24 @@ int check_wiring(const std::string& path, bool as_json) {
     return report->right() ? EX_OK : EXIT_FAILURE;
 }
 
+const std::vector<ListedCamera> no_cameras;
+
+int show_cameras(const std::vector<std::string>& addresses, bool as_json) {
+    route_library_log();
+    const auto presets = load_presets(default_preset_directory());
+    if (!presets) {
+        fmt::print(stderr, "{}\n", presets.error().message());
+        return EX_UNAVAILABLE;
+    }
+    const auto cameras = list_cameras(addresses, *presets);
+    if (!cameras) {
+        fmt::print(stderr, "{}\n", cameras.error().message());
+        return EX_USAGE;
+    }
+    fmt::print("{}", as_json ? to_json(*cameras) + "\n" : to_text(*cameras));
+    return EX_OK;
+}
+
 /// Sets up one camera or all, and reports. The exit code says whether all of them are ready.
 int probe(const ProbeOptions& options) {
     Configuration configuration;
@@ -262,8 +281,12 @@ int probe(const ProbeOptions& options) {
         configuration = std::move(*read);
     }
     const auto presets = preset_directory(configuration);
-    const auto devices =
-        options.device == "all" ? list_cameras() : std::vector<std::string>{options.device};
+    std::vector<std::string> devices{options.device};
+    if (options.device == "all") {
+        devices.clear();
+        for (const ListedCamera& camera : list_cameras({}, {}).value_or(no_cameras))
+            if (!camera.device.empty()) devices.push_back(camera.device);
+    }
     if (devices.empty()) {
         fmt::print(stderr, "no camera answers; check cables and power, or name an address\n");
         return EX_UNAVAILABLE;
@@ -308,12 +331,25 @@ int main(int argc, char** argv) {
                      "Verify the wiring of all cameras with test pulses, and exit")
             ->excludes(check_config)
             ->excludes(keys);
+    bool list = false;
+    CLI::Option* list_option = app.add_flag("--list-cameras", list,
+                                            "List the cameras that can be seen, without changing "
+                                            "any, and exit")
+                                   ->excludes(check_config)
+                                   ->excludes(keys)
+                                   ->excludes(check_wires);
+    std::vector<std::string> addresses;
+    app.add_option("--address", addresses,
+                   "Also ask this address, which no broadcast reaches; may be repeated")
+        ->needs(list_option)
+        ->allow_extra_args(false);
     ProbeOptions probe_options;
     app.add_option("--probe-camera", probe_options.device,
                    "Set up one camera (address, serial number or name) or 'all', report, and exit")
         ->excludes(check_config)
         ->excludes(keys)
-        ->excludes(check_wires);
+        ->excludes(check_wires)
+        ->excludes(list_option);
     app.add_option(
         "--bundle", probe_options.bundle,
         "Also write the GenICam description, feature values and a draft preset to this file");
@@ -326,14 +362,17 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? EX_OK : EX_USAGE;
     }
     if (!description.empty()) return run_description_probe(description == "zip");
-    if (as_json && !check_only && !list_keys && !check_cables && probe_options.device.empty())
-        return app.exit(CLI::RequiresError(
-                   "--json", "--check-config, --keys, --check-cameras or --probe-camera")),
+    if (as_json && !check_only && !list_keys && !check_cables && !list &&
+        probe_options.device.empty())
+        return app.exit(CLI::RequiresError("--json",
+                                           "--check-config, --keys, --check-cameras, "
+                                           "--list-cameras or --probe-camera")),
                EX_USAGE;
     if (list_keys) {
         fmt::print("{}", as_json ? to_json(describe_keys()) + "\n" : to_text(describe_keys()));
         return EX_OK;
     }
+    if (list) return show_cameras(addresses, as_json);
     if (check_cables) return check_wiring(path, as_json);
     if (!probe_options.device.empty()) {
         probe_options.json = as_json;

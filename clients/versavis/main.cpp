@@ -15,6 +15,7 @@
 #include "commands/camera_commands.hpp"
 #include "commands/clock.hpp"
 #include "commands/control_commands.hpp"
+#include "commands/discover_commands.hpp"
 #include "commands/doctor_command.hpp"
 #include "commands/evaluate_commands.hpp"
 #include "commands/file_commands.hpp"
@@ -100,6 +101,8 @@ int main(int argc, char** argv) {
         app.add_option("--instance", instance, "Instance of the service")->capture_default_str();
     app.fallthrough();
     bool json = false;
+
+    client::DiscoverCommands discover(app);
 
     bool watch = false;
     auto* status = app.add_subcommand(
@@ -199,6 +202,7 @@ int main(int argc, char** argv) {
     if (board.chosen()) return board.run(instance);
     if (camera.chosen()) return camera.run();
     if (control.chosen()) return control.run(instance);
+    if (discover.chosen()) return discover.run(instance);
     if (recorder.chosen()) return recorder.run(instance);
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
     if (evaluate.chosen()) return evaluate.run();

@@ -71,6 +71,9 @@ constexpr Duration time_of_free_silence = seconds(5);
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
 
+/// More than any camera takes.
+constexpr double longest_exposure_us = 1e9;
+
 using Features = std::vector<std::pair<std::string, std::string>>;
 
 /// Those of `after` that are new or have another value; none: one of `before` is gone.
@@ -260,11 +263,15 @@ bool Camera::refuse_change(const CameraProblem& problem) {
 Expected<> Camera::set_live(AravisNodeMap& nodes, const std::string& feature,
                             const std::string& value) {
     if (feature != exposure_feature_) return nodes.set(feature, value);
-    const Duration wanted{std::llround(std::strtod(value.c_str(), nullptr) * 1e3)};
-    hooks_.exposure(wanted, configuration_.auto_exposure.delay_frames);
+    const unsigned delay_frames = configuration_.auto_exposure.delay_frames;
+    const double us = std::clamp(std::strtod(value.c_str(), nullptr), 0.0, longest_exposure_us);
+    const Duration wanted{std::llround(us * 1e3)};
+    hooks_.exposure(wanted, delay_frames);
     pipeline_.set_camera_exposure(wanted, host_now());
-    const auto done = nodes.set(feature, value);
-    pipeline_.set_camera_exposure(fixed_exposure(nodes, feature), host_now());
+    auto done = nodes.set(feature, value);
+    const Duration actual = fixed_exposure(nodes, feature);  // rounded, or still as it was
+    if (actual != wanted) hooks_.exposure(actual, delay_frames);
+    pipeline_.set_camera_exposure(actual, host_now());
     return done;
 }
 

@@ -39,8 +39,8 @@ CameraProblem absent(const std::string& device) {
              "camera's"}};
     return {CameraState::absent,
             {device, "no camera answers to this name",
-             "check cable, power and name ('arv-tool-0.8' lists cameras by address, serial number "
-             "and name)"}};
+             "check cable, power and name ('versavis discover' lists cameras by address, serial "
+             "number and name)"}};
 }
 
 CameraResult<> check_claim(const std::string& camera, const std::string& device,

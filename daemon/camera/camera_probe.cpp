@@ -106,19 +106,6 @@ ProbeReport probe_camera(const CameraConfiguration& configuration,
     return report;
 }
 
-std::vector<std::string> list_cameras() {
-    arv_update_device_list();
-    std::vector<std::string> devices;
-    for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
-        const std::string protocol = arv_get_device_protocol(i);
-        if (protocol == "GigEVision")
-            devices.emplace_back(arv_get_device_address(i));
-        else if (protocol == "USB3Vision")
-            devices.emplace_back(arv_get_device_id(i));
-    }
-    return devices;
-}
-
 std::string to_text(const ProbeReport& report) {
     std::string text = fmt::format("{}: {} {} (serial number {})\n  preset {}\n", report.device,
                                    report.setup.vendor, report.setup.model, report.setup.serial,

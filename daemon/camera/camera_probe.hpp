@@ -27,9 +27,6 @@ struct ProbeReport {
 ProbeReport probe_camera(const CameraConfiguration& configuration,
                          const std::filesystem::path& preset_directory, bool features);
 
-/// Devices that a broadcast and a look through USB find, by what they are opened with.
-std::vector<std::string> list_cameras();
-
 /// For a terminal.
 std::string to_text(const ProbeReport& report);
 

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <memory>
 
 namespace versavis::daemon {
@@ -37,27 +38,18 @@ constexpr Duration answer_time = milliseconds(200);
 /// Between looks at `cancelled`.
 constexpr Duration look_interval = milliseconds(20);
 
-struct Interface {
-    in_addr address{};
-    in_addr mask{};
-};
-
-std::vector<Interface> own_interfaces() {
-    std::vector<Interface> found;
+std::vector<OwnInterface> own_interfaces() {
+    std::vector<OwnInterface> found;
     ifaddrs* all = nullptr;
     if (getifaddrs(&all) != 0) return found;
     const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(all, &freeifaddrs);
     for (const ifaddrs* entry = all; entry != nullptr; entry = entry->ifa_next)
         if (entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET &&
             entry->ifa_netmask != nullptr && (entry->ifa_flags & IFF_UP) != 0)
-            found.push_back({reinterpret_cast<const sockaddr_in*>(entry->ifa_addr)->sin_addr,
+            found.push_back({entry->ifa_name,
+                             reinterpret_cast<const sockaddr_in*>(entry->ifa_addr)->sin_addr,
                              reinterpret_cast<const sockaddr_in*>(entry->ifa_netmask)->sin_addr});
     return found;
-}
-
-bool contains(const Interface& interface, in_addr address) {
-    return (interface.address.s_addr & interface.mask.s_addr) ==
-           (address.s_addr & interface.mask.s_addr);
 }
 
 sockaddr_in endpoint(in_addr address, std::uint16_t at) {
@@ -152,18 +144,43 @@ CameraTime camera_time(std::uint64_t ticks, std::uint64_t ticks_per_second) {
 bool in_own_network(in_addr address) {
     const auto interfaces = own_interfaces();
     return std::any_of(interfaces.begin(), interfaces.end(),
-                       [&](const Interface& own) { return contains(own, address); });
+                       [&](const OwnInterface& own) { return own.contains(address); });
+}
+
+std::string OwnInterface::text() const {
+    const unsigned prefix = static_cast<unsigned>(std::popcount(mask.s_addr));
+    return fmt::format("{} ({}/{})", name, to_text(address), prefix);
+}
+
+std::optional<OwnInterface> own_interface(in_addr address) {
+    for (const OwnInterface& own : own_interfaces())
+        if (own.address.s_addr == address.s_addr) return own;
+    return std::nullopt;
 }
 
 DeviceSearch::DeviceSearch(std::string name)
     : name_(std::move(name)), address_(parse_address(name_)) {
     // A camera beyond a router answers to one of them; what is in an own network, to that one.
     const bool near = address_ && in_own_network(*address_);
-    for (const Interface& own : own_interfaces()) {
-        if (near && !contains(own, *address_)) continue;
-        if (auto socket = open_socket(own.address))
-            sockets_.push_back({std::move(socket), own.address});
+    for (const OwnInterface& own : own_interfaces()) {
+        if (near && !own.contains(*address_)) continue;
+        auto socket = open_socket(own.address);
+        if (!socket) continue;
+        sockets_.push_back({std::move(socket), own.address});
+        if (!address_) add_broadcast_receiver(sockets_.back());
     }
+}
+
+/// A camera of another subnet may answer by broadcast, which a socket with an address of its own
+/// does not get.
+void DeviceSearch::add_broadcast_receiver(const Socket& socket) {
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    ::getsockname(socket.descriptor.get(), reinterpret_cast<sockaddr*>(&own), &size);
+    FileDescriptor receiver(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+    own.sin_addr = {INADDR_BROADCAST};
+    if (::bind(receiver.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0)
+        receivers_.push_back({std::move(receiver), socket.interface});
 }
 
 void DeviceSearch::ask() const {
@@ -187,15 +204,19 @@ std::optional<NetworkDevice> DeviceSearch::receive(const Socket& socket) const {
         half_at(packet + 2) != discovery + 1)
         return std::nullopt;
     NetworkDevice device = describe(packet + header_size, socket.interface);
-    if (!address_) return goes_by(device, name_) ? std::optional(device) : std::nullopt;
+    if (!address_)
+        return name_.empty() || goes_by(device, name_) ? std::optional(device) : std::nullopt;
     if (from.sin_addr.s_addr != address_->s_addr) return std::nullopt;
     device.address = *address_;
     return device;
 }
 
-std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancelled& cancelled) {
+void DeviceSearch::look(Duration patience, const Cancelled& cancelled,
+                        const std::function<bool(const NetworkDevice&)>& enough) {
     std::vector<pollfd> polled;
-    for (const Socket& socket : sockets_) polled.push_back({socket.descriptor.get(), POLLIN, 0});
+    for (const auto* sockets : {&sockets_, &receivers_})
+        for (const Socket& socket : *sockets)
+            polled.push_back({socket.descriptor.get(), POLLIN, 0});
     const HostTime deadline = host_now() + patience;
     // All that a broadcast reaches answers at once: it is not repeated as often.
     Duration interval = address_ ? ask_interval : ask_interval * 10;
@@ -206,10 +227,33 @@ std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancell
             asked = host_now();
         }
         if (!readable(polled, std::min(deadline, asked + interval), cancelled)) continue;
-        for (const Socket& socket : sockets_)
-            if (auto device = receive(socket)) return device;
+        for (const auto* sockets : {&sockets_, &receivers_})
+            for (const Socket& socket : *sockets)
+                if (const auto device = receive(socket); device && enough(*device)) return;
     }
-    return std::nullopt;
+}
+
+std::optional<NetworkDevice> DeviceSearch::wait(Duration patience, const Cancelled& cancelled) {
+    std::optional<NetworkDevice> found;
+    look(patience, cancelled, [&](const NetworkDevice& device) {
+        found = device;
+        return true;
+    });
+    return found;
+}
+
+std::vector<NetworkDevice> DeviceSearch::collect(Duration patience) {
+    std::vector<NetworkDevice> found;
+    look(
+        patience, [] { return false; },
+        [&](const NetworkDevice& device) {
+            const auto same = [&](const NetworkDevice& other) {
+                return other.mac == device.mac && other.interface.s_addr == device.interface.s_addr;
+            };
+            if (std::none_of(found.begin(), found.end(), same)) found.push_back(device);
+            return false;
+        });
+    return found;
 }
 
 GvcpClient::GvcpClient(in_addr interface, in_addr address)

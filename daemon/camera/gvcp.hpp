@@ -41,7 +41,22 @@ CameraTime camera_time(std::uint64_t ticks, std::uint64_t ticks_per_second);
 /// Does this host have an interface in the network of the address?
 bool in_own_network(in_addr address);
 
-/// Looks for one device by address, MAC, serial number, name, or "vendor-serial".
+struct OwnInterface {
+    std::string name;
+    in_addr address{};
+    in_addr mask{};
+
+    bool contains(in_addr other) const {
+        return (address.s_addr & mask.s_addr) == (other.s_addr & mask.s_addr);
+    }
+    std::string text() const;  ///< as "eth0 (192.168.1.1/24)"
+};
+
+/// The interface with this address of this host.
+std::optional<OwnInterface> own_interface(in_addr address);
+
+/// Looks for one device by address, MAC, serial number, name, or "vendor-serial"; without a name,
+/// for all.
 class DeviceSearch {
  public:
     explicit DeviceSearch(std::string name);
@@ -49,17 +64,25 @@ class DeviceSearch {
     /// Asks, again and again, for at most `patience`.
     std::optional<NetworkDevice> wait(Duration patience, const Cancelled& cancelled);
 
+    /// The same for all that answer within `patience`; a device once for each interface.
+    std::vector<NetworkDevice> collect(Duration patience);
+
  private:
     struct Socket {
         FileDescriptor descriptor;
         in_addr interface {};
     };
+    /// Until `enough` says so of a device that is looked for.
+    void look(Duration patience, const Cancelled& cancelled,
+              const std::function<bool(const NetworkDevice&)>& enough);
     void ask() const;
+    void add_broadcast_receiver(const Socket& socket);
     std::optional<NetworkDevice> receive(const Socket& socket) const;
 
     std::string name_;
     std::optional<in_addr> address_;
     std::vector<Socket> sockets_;
+    std::vector<Socket> receivers_;  ///< of what is answered by broadcast
 };
 
 /// Memory of one device. Not thread-safe.

@@ -43,8 +43,6 @@ constexpr std::uint16_t read_memory = 0x0800;
 constexpr std::uint16_t pending = 0x0805;
 constexpr std::size_t usb_packet = 1024;  ///< of SuperSpeed: a buffer holds a number of them
 
-constexpr device::UsbClass control_class{0xEF, 5, 0};  ///< of USB3 Vision
-
 /// More bootstrap registers.
 constexpr std::uint64_t abrm_manifest = 0x1D0;
 constexpr std::uint64_t sbrm_largest_command = 0x14;
@@ -75,7 +73,7 @@ std::uint64_t number_in(const Bytes& bytes, std::size_t at, std::size_t size) {
 /// None: nothing that can be opened has the name.
 std::optional<device::UsbHandle> open_named(const device::UsbBus& bus, const UsbName& name) {
     for (const device::UsbDevice& candidate : bus.devices()) {
-        if (candidate.function(control_class).interface < 0) continue;
+        if (candidate.function(u3v_control).interface < 0) continue;
         auto handle = candidate.open();
         if (handle && handle->serial().value_or("") == name.serial &&
             handle->product() == name.model && handle->manufacturer() == name.vendor)
@@ -225,7 +223,7 @@ CameraResult<Description> read_usb_description(const std::string& device, const 
     if (!handle)
         return problem(CameraState::failed, {device, "it was found but cannot be opened",
                                              "check the udev rule, or unplug it and plug it in"});
-    const device::UsbFunction control = handle->device().function(control_class);
+    const device::UsbFunction control = handle->device().function(u3v_control);
     const auto claimed = handle->claim(control.interface);
     if (!claimed && claimed.error().fault == device::UsbFault::busy)
         return problem(CameraState::busy,

@@ -8,6 +8,7 @@
 
 #include "camera/camera_state.hpp"
 #include "camera/description.hpp"
+#include "device/usb_bus.hpp"
 
 namespace versavis::daemon {
 
@@ -22,6 +23,9 @@ struct UsbName {
 /// opened or does not answer, or its registers make no sense.
 CameraResult<Description> read_usb_description(const std::string& device, const UsbName& name,
                                                const Cancelled& cancelled);
+
+/// The control interface of USB3 Vision, by which such cameras are found.
+inline constexpr device::UsbClass u3v_control{0xEF, 5, 0};
 
 /// Where bootstrap registers lie: GenCP's, and within those of USB3 Vision and of its stream.
 inline constexpr std::uint64_t abrm_sbrm = 0x1D8;

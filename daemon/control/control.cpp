@@ -53,7 +53,7 @@ struct Control::Method {
     void (Control::*call)(Client, const VarlinkCall&);
 };
 
-const Control::Method Control::methods_[] = {
+const Control::Method Control::methods[] = {
     {"org.varlink.service.GetInfo", &Control::get_info},
     {"org.varlink.service.GetInterfaceDescription", &Control::describe_interface},
     {"org.versavis.service.GetState", &Control::get_state},
@@ -77,9 +77,9 @@ void Control::call(Client client, const std::string& message) {
                     {{"parameter", parsed.error().what}});
     if (parsed->oneway) oneway_.insert(client);
     const Method* method =
-        std::find_if(std::begin(methods_), std::end(methods_),
+        std::find_if(std::begin(methods), std::end(methods),
                      [&](const Method& known) { return known.name == parsed->method; });
-    if (method == std::end(methods_))
+    if (method == std::end(methods))
         return fail(client, "org.varlink.service.MethodNotFound", {{"method", parsed->method}});
     (this->*method->call)(client, *parsed);
 }

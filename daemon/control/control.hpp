@@ -82,7 +82,7 @@ class Control {
     bool answered(Waiting& waiting, HostTime now);
     void inform_subscribers(const Summary& health);
 
-    static const Method methods_[];
+    static const Method methods[];
 
     ControlSocket socket_;
     ConfigurationDocument document_;

@@ -165,7 +165,7 @@ void check_devices(const Configuration& configuration, Findings& findings) {
         if (camera.device.empty())
             findings.add(
                 camera.entry, "device", "'device' is missing",
-                "set the camera's IP address, serial number or name; arv-tool-0.8 lists them");
+                "set the camera's IP address, serial number or name; versavis discover lists them");
         if (is_broken_address(camera.device))
             findings.add(camera.entry, "device",
                          fmt::format("'{}' is not an IP address", clipped(camera.device)),

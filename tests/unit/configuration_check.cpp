@@ -237,10 +237,10 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
     check_rows("[[camera]]\nname = 'a'\n",
                {{"",
                  "1:1: 'device' is missing; set the camera's IP address, serial number or name; "
-                 "arv-tool-0.8 lists them"},
+                 "versavis discover lists them"},
                 {"device = ''\n",
                  "3:10: 'device' is missing; set the camera's IP address, serial number or name; "
-                 "arv-tool-0.8 lists them"},
+                 "versavis discover lists them"},
                 {"device = '192.168.1.300'\n", "3:10: '192.168.1.300'" + no_address},
                 {"device = '192.168.1'\n", "3:10: '192.168.1'" + no_address},
                 {"device = '1.2.3.4.5'\n", "3:10: '1.2.3.4.5'" + no_address},

@@ -123,3 +123,51 @@ TEST_CASE("usb: two entries for one camera beside a device that never answers en
     CHECK(stack.service().terminate() == 0);
     CHECK(host_now() - asked < seconds(2));
 }
+
+namespace {
+
+/// The one of this serial number: services of other tests are seen, too.
+nlohmann::json of_serial(const nlohmann::json& devices, const std::string& serial) {
+    for (const auto& device : devices)
+        if (device["serial"] == serial) return device;
+    return nlohmann::json::object();
+}
+
+}  // namespace
+
+TEST_CASE("usb: discover lists board and cameras, and disturbs no service that uses them") {
+    StackSettings settings{
+        "u3vlist", 34,  1,   20,   "serial = \"LISTED\"", "[board]\nserial = \"LISTEDB\"\n",
+        "",        320, 240, "usb"};
+    settings.devices = {"LISTED"};
+    Stack stack(settings);
+    UsbRig rig(stack);
+    rig.add_mute(stack);
+    const auto discover = [&] {
+        std::string said;
+        CHECK(stack.tool({"discover", "--json"}, &said) == 0);
+        return nlohmann::json::parse(said);
+    };
+    for (int i = 0; i < 2; ++i) {  // the first leaves all as it was
+        const auto devices = discover();
+        const auto board = of_serial(devices["boards"], "LISTEDB");
+        CHECK(board["state"] == "running");
+        CHECK(board["used_by"].is_null());
+        const auto camera = of_serial(devices["cameras"], "LISTED");
+        CHECK(camera["protocol"] == "USB3 Vision");
+        CHECK(camera["device"] == "LISTED");
+        CHECK(camera["port"] == "usb:1-2");
+        CHECK(camera["preset"] == "generic");
+        CHECK(camera["access"] == "free");
+        CHECK(of_serial(devices["cameras"], "MUTE")["access"] == "free");
+    }
+    stack.start_service();
+    stack.wait_for_status(healthy);
+    const auto devices = discover();
+    CHECK(of_serial(devices["boards"], "LISTEDB")["used_by"]["instance"] == "u3vlist");
+    const auto camera = of_serial(devices["cameras"], "LISTED");
+    CHECK(camera["access"] == "busy");
+    CHECK(camera["used_by"]["name"] == "cam0");
+    const auto status = stack.wait_for_status(healthy);
+    CHECK(status["cameras"][0]["connections"] == 1);
+}

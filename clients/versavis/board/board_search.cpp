@@ -48,6 +48,8 @@ Expected<std::vector<FoundBoard>> list_boards(const device::UsbBus& bus) {
     for (const device::UsbDevice& device : bus.find(wire::usb_vendor, wire::usb_product)) {
         const auto handle = device.open();
         boards.push_back({device, false, false, handle ? handle->serial().value_or("") : ""});
+        if (!handle)
+            boards.back().problem = handle.error().as_error("", "cannot be opened").message();
     }
     for (const device::UsbDevice& device :
          bus.find(wire::boot_loader_vendor, wire::boot_loader_rp2040))

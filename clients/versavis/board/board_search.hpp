@@ -22,6 +22,7 @@ struct FoundBoard {
     bool in_boot_loader = false;
     bool is_pico_2 = false;  ///< whose chip the firmware is not for; in its boot loader
     std::string serial;  ///< empty: in its boot loader, which does not know it, or not to be opened
+    std::string problem{};  ///< why it cannot be opened; empty: it can
 
     std::string text() const;
 };

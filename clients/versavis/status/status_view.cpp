@@ -9,6 +9,8 @@
 #include <initializer_list>
 #include <string_view>
 
+#include "base/wrapped_line.hpp"
+
 namespace versavis::client {
 
 namespace {
@@ -22,20 +24,8 @@ std::uint64_t count(const json& object, const char* key) {
 
 /// What follows the names of devices, and continues them.
 constexpr std::size_t indent = 9;
-constexpr std::size_t columns = 80;
 
-/// In lines that fit a terminal.
-std::string wrapped(std::string line) {
-    std::size_t begin = 0;
-    while (line.size() - begin > columns) {
-        std::size_t blank = line.rfind(' ', begin + columns);
-        if (blank <= begin + indent) blank = line.find(' ', begin + columns);
-        if (blank == std::string::npos) break;
-        line.replace(blank, 1, "\n" + std::string(indent, ' '));
-        begin = blank + 1;
-    }
-    return line + "\n";
-}
+std::string wrapped(std::string line) { return client::wrapped(std::move(line), indent); }
 
 /// In a line of its own, after its word.
 std::string hint(const json& part) {
