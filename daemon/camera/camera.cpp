@@ -254,7 +254,10 @@ bool Camera::refuse_change(const CameraProblem& problem) {
     }
     const std::string refused = problem.error.message();
     log(LogLevel::warning, configuration_.name, "not changed: {}", refused);
-    configuration_ = *before_change_;
+    {
+        const std::lock_guard lock(mutex_);
+        configuration_ = *before_change_;
+    }
     settle_change(refused);
     return true;
 }

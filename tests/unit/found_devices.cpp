@@ -46,8 +46,8 @@ json status() {
 
 TEST_CASE("found_devices: what a service uses is said to be in use by it, and nothing in the way") {
     const json devices = join_devices(
-        {found_board()}, {camera("22", "busy"), camera("23", "busy"), camera("24", "free")},
-        {status()});
+        json::array({found_board()}),
+        {camera("22", "busy"), camera("23", "busy"), camera("24", "free")}, {status()});
     CHECK(devices["services"] == json{{{"instance", "default"}, {"pid", 4711}, {"health", "ok"}}});
     CHECK(devices["boards"][0]["used_by"]["instance"] == "default");
     CHECK(devices["boards"][0]["firmware"] == "versavis 0.2.0");
@@ -60,26 +60,27 @@ TEST_CASE("found_devices: what a service uses is said to be in use by it, and no
 }
 
 TEST_CASE("found_devices: a camera of a status that it is free of is not in use") {
-    const json devices = join_devices(json::array(), {camera("22", "free")}, {status()});
+    const json devices =
+        join_devices(json::array(), json::array({camera("22", "free")}), {status()});
     CHECK(devices["cameras"][0]["used_by"].is_null());
 }
 
 TEST_CASE("found_devices: a board that only a service sees is listed, an absent one is not") {
     json with = status();
     with["board"]["port"] = "unix:/run/board";
-    const json devices = join_devices({found_board()}, json::array(), {with});
+    const json devices = join_devices(json::array({found_board()}), json::array(), {with});
     REQUIRE(devices["boards"].size() == 2);
     CHECK(devices["boards"][0]["used_by"].is_null());
     CHECK(devices["boards"][1]["port"] == "unix:/run/board");
     with["board"]["state"] = "absent";
-    CHECK(join_devices({found_board()}, json::array(), {with})["boards"].size() == 1);
+    CHECK(join_devices(json::array({found_board()}), json::array(), {with})["boards"].size() == 1);
 }
 
 TEST_CASE("found_devices: there is something, or nothing") {
     const auto none = json::array();
     CHECK_FALSE(anything_found(join_devices(none, none, {})));
-    CHECK(anything_found(join_devices({found_board()}, none, {})));
-    CHECK(anything_found(join_devices(none, {camera("22", "denied")}, {})));
+    CHECK(anything_found(join_devices(json::array({found_board()}), none, {})));
+    CHECK(anything_found(join_devices(none, json::array({camera("22", "denied")}), {})));
 }
 
 TEST_CASE("found_devices: the table fits a terminal, and says what stands in the way") {
@@ -88,8 +89,8 @@ TEST_CASE("found_devices: the table fits a terminal, and says what stands in the
     far["cure"] =
         "add an address in the camera's subnet to this host, 'sudo ip addr add "
         "192.168.100.1/24 dev eth0', or give it one with its maker's tool";
-    const std::string text =
-        devices_text(join_devices({found_board()}, {camera("22", "busy"), far}, {status()}));
+    const std::string text = devices_text(
+        join_devices(json::array({found_board()}), {camera("22", "busy"), far}, {status()}));
     CHECK_THAT(text, Contains("E66164084373532B  usb:1-2  versavis 0.2.0  running, used by"));
     CHECK_THAT(text, Contains("in use\n    used by service 'default' as cam0\n"));
     CHECK_THAT(text, Contains("unreachable\n    its address") && Contains("ip addr add"));

@@ -85,7 +85,7 @@ TEST_CASE("new_configuration: a choice that is none is refused, and the error sa
 
 TEST_CASE("new_configuration: what stands in the way of a chosen camera is in the file") {
     const auto chosen =
-        choose_cameras(json{camera("13", "10.0.0.4", "unreachable")}, {"13"}, "default");
+        choose_cameras(json::array({camera("13", "10.0.0.4", "unreachable")}), {"13"}, "default");
     REQUIRE(chosen);
     NewConfiguration configuration;
     configuration.cameras = *chosen;
@@ -134,7 +134,7 @@ TEST_CASE("new_configuration: whatever a camera calls itself stays in its commen
     json odd = camera("13", "10.0.0.4");
     odd["vendor"] = "A\n[board]\nlink = 1\x7f";
     NewConfiguration configuration;
-    configuration.cameras = *choose_cameras(json{odd}, {}, "default");
+    configuration.cameras = *choose_cameras(json::array({odd}), {}, "default");
     configuration.cameras[0].device = "a \"quoted\" \\ name";
     const auto read = loaded(configuration);
     CHECK(read.board.link == "usb");
