@@ -106,7 +106,9 @@ void HealthWatch::examine(Status& status) {
 }
 
 void HealthWatch::measure(CameraStatus& camera, const Status& status) {
-    auto& device = cameras_.try_emplace(camera.name, camera.configuration.rate_hz).first->second;
+    const double rate_hz = camera.configuration.rate_hz;
+    auto& device = cameras_.try_emplace(camera.name, rate_hz).first->second;
+    if (device.rate_hz != rate_hz) device = Device<PipelineReport>(rate_hz);  // while it runs
     const std::uint64_t starts =
         camera.camera.connections + (camera.triggered() ? status.board.connections : 0);
     if (camera.camera.state == CameraState::streaming && starts != device.starts) {

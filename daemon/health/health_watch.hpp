@@ -21,8 +21,9 @@ class HealthWatch {
  private:
     template <class Report>
     struct Device {
-        explicit Device(double rate_hz) : delivery(rate_hz) {}
+        explicit Device(double configured_hz) : rate_hz(configured_hz), delivery(configured_hz) {}
 
+        double rate_hz;
         Delivery delivery;
         std::uint64_t starts = 0;
         std::deque<std::pair<HostTime, Report>> reports;  ///< oldest first

@@ -64,6 +64,9 @@ TEST_CASE("control: exposure changes while frames come, rates with a pause, and 
     CHECK(status["board"]["connections"] == 2);
     CHECK(status["cameras"][1]["connections"] == 1);  // only its triggers paused
     judge(stack, "after another rate");
+    // It is judged by the new rate, also where that is lower.
+    tool_output(stack, {"set", "cam0", "rate_hz=12"}, 0);
+    delivering(stack, 0, 12);
 }
 
 TEST_CASE("control: a camera stops and starts, and the file is read again") {
