@@ -167,6 +167,7 @@ void Service::board_restarted() {
 /// Before any camera starts: then its first exposure lies on the grid already.
 void Service::board_synchronised() {
     asymmetry_.use(board_->report().port);
+    ticks_.grid_began(host_now());
     alignment_.begin();
     align_grid(host_now());
 }
@@ -186,7 +187,9 @@ void Service::align_grid(HostTime now) {
 }
 
 void Service::exposure(const wire::Exposure& record, HostTime received) {
-    const auto stamp = cameras_->add(record, received);
+    wire::Exposure numbered = record;
+    numbered.tick = ticks_.number(record.tick);
+    const auto stamp = cameras_->add(numbered, received);
     if (stamp) alignment_.exposure(record, stamp->output, received);
 }
 
@@ -213,7 +216,11 @@ void Service::board_event(const wire::Event& event, HostTime received) {
         entry->expected = doubt->expected;
     }
     const EventSource source = source_of(event.kind);
-    if (const auto count = skipped_triggers(event)) cameras_->triggers_skipped(event.source, count);
+    if (const auto count = skipped_triggers(event)) {
+        cameras_->triggers_skipped(event.source, count);
+        entry->value =
+            static_cast<std::int64_t>(ticks_.number(static_cast<std::uint64_t>(event.value)));
+    }
     if (event.kind == wire::BoardEventKind::stored) unkept_ = event.value == 0;
     if (const auto line = remark(event)) log(line->level, "board", "{}", line->text);
     if (source == EventSource::camera) cameras_->name_source(*entry);

@@ -10,6 +10,7 @@
 #include "board/asymmetry_keeper.hpp"
 #include "board/board_link.hpp"
 #include "board/grid_alignment.hpp"
+#include "board/tick_numbers.hpp"
 #include "camera_group.hpp"
 #include "control/control.hpp"
 #include "engine/ring/directory.hpp"
@@ -85,6 +86,7 @@ class Service final : public Controlled, private BoardListener {
     bool host_disciplined_ = true;
     AsymmetryKeeper asymmetry_;
     GridAlignment alignment_;
+    TickNumbers ticks_;  ///< of the link's thread
     std::unique_ptr<EventJournal> events_;
     EventValidator event_witness_{translator_};
     std::unique_ptr<ClockRecorder> clock_recorder_;

@@ -20,6 +20,7 @@
 #include "../../firmware/native/native_board.hpp"
 #include "engine/clock/output_clock.hpp"
 #include "posix/thread.hpp"
+#include "sample_mark.hpp"
 
 namespace versavis::rig {
 
@@ -27,7 +28,7 @@ namespace {
 
 constexpr Duration longest_wait = milliseconds(20);  // a reset or a stop is noticed after this time
 
-devices::Inertial felt(const Motion& motion, HostTime at) {
+devices::Inertial felt(const Motion& motion, HostTime at, std::uint32_t serial) {
     constexpr double degrees = 180 / 3.14159265358979;
     constexpr double standard_gravity = 9.80665;
     const Eigen::Vector3d rate = motion.rate_rad_s(at) * degrees;
@@ -35,7 +36,7 @@ devices::Inertial felt(const Motion& motion, HostTime at) {
     devices::Inertial felt;
     felt.gyro_deg_s = {rate.x(), rate.y(), rate.z()};
     felt.accel_g = {force.x(), force.y(), force.z()};
-    felt.magnetic_gauss = {0.2, 0, 0.4};
+    felt.magnetic_gauss = SampleMark::field_gauss(serial);
     felt.temperature_c = 36;
     return felt;
 }
@@ -105,8 +106,8 @@ BoardHost::BoardHost(const World& world, std::string socket_path,
       imu_name_(world.scenario.imu),
       socket_path_(std::move(socket_path)),
       imu_(devices::AdisModel::adis16448b,
-           [&motion = world.surroundings.motion](firmware::Nanoseconds at) {
-               return felt(motion, HostTime{at});
+           [this, &motion = world.surroundings.motion](firmware::Nanoseconds at) {
+               return felt(motion, HostTime{at}, imu_serial_);
            }),
       leds_(world.surroundings.leds.get()),
       truth_(world.truth),
@@ -133,7 +134,6 @@ void BoardHost::boot(firmware::Identity identity, const ClockErrors& clock, Host
                                                 static_cast<std::uint64_t>(host_now().ns));
     serial_.copy(identity.serial, sizeof identity.serial - 1);
     pins_ = 0;
-    imu_samples_ = 0;
     next_utc_s_ = 0;
     signalled_ = host_now();
     std::fill(std::begin(pulses_), std::end(pulses_), 0);
@@ -171,12 +171,13 @@ void BoardHost::imu_transfer(firmware::Nanoseconds at, const firmware::ImuTransf
         return;
     }
     if (suffers(FaultKind::imu_noisy)) imu_.corrupt(1);
-    imu_.transfer(instant.ns, transfer, received);
     // Register accesses have gaps, and come word by word where the chip makes them.
     const bool sample = transfer.word_gap_ns == 0 && transfer.size > 2;
+    if (sample) ++imu_serial_;
+    imu_.transfer(instant.ns, transfer, received);
     if (sample)
-        truth_.add(TrueImuSample{imu_name_, life_, imu_samples_++,
-                                 HostTime{imu_.motion_shown(instant.ns)}});
+        truth_.add(
+            TrueImuSample{imu_name_, life_, imu_serial_, HostTime{imu_.motion_shown(instant.ns)}});
 }
 
 void BoardHost::outputs_changed(firmware::Nanoseconds at, std::uint32_t pins) {

@@ -83,9 +83,9 @@ class BoardHost {
     std::uint64_t life_ = 0;
     std::uint32_t pins_ = 0;
     std::uint64_t pulses_[firmware::camera_count] = {};
-    std::uint64_t imu_samples_ = 0;
-    HostTime signalled_{};         ///< until here edges of the data-ready line are scheduled
-    std::int64_t next_utc_s_ = 0;  ///< the second that the receiver marks next; 0: the coming one
+    std::uint32_t imu_serial_ = 0;  ///< of the newest sample that was read
+    HostTime signalled_{};          ///< until here edges of the data-ready line are scheduled
+    std::int64_t next_utc_s_ = 0;   ///< the second that the receiver marks next; 0: the coming one
     using Parcels = std::deque<std::pair<HostTime, std::vector<std::uint8_t>>>;
     Parcels late_;    ///< on its way to the host
     Parcels coming_;  ///< on its way from there

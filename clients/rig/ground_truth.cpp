@@ -51,8 +51,8 @@ void GroundTruth::add(const TrueDeparture& d) {
 }
 
 void GroundTruth::add(const TrueImuSample& s) {
-    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"number":{},"at_ns":{}}})",
-                      s.imu, s.board_life, s.number, s.at.ns));
+    write(fmt::format(R"({{"type":"imu","imu":"{}","board_life":{},"serial":{},"at_ns":{}}})",
+                      s.imu, s.board_life, s.serial, s.at.ns));
 }
 
 void GroundTruth::add(const Motion& motion) {

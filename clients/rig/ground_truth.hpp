@@ -43,7 +43,7 @@ struct TrueDeparture {
 struct TrueImuSample {
     std::string imu;
     std::uint64_t board_life = 0;
-    std::uint64_t number = 0;
+    std::uint32_t serial = 0;  ///< shown by the magnetometer
     HostTime at;
 };
 

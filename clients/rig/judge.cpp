@@ -13,6 +13,7 @@
 #include <set>
 
 #include "engine/clock/output_clock.hpp"
+#include "sample_mark.hpp"
 #include "scene.hpp"
 #include "versavis/stream.hpp"
 
@@ -31,8 +32,8 @@ constexpr std::int64_t in_flight_ns = 1'000'000'000;
 
 /// One published stamp, converted back to host time, and the exposure or sample it claims to be of.
 struct Published {
-    std::uint64_t key;      ///< frames: serial from the pixels; IMU: sample number
-    std::uint64_t trigger;  ///< frames only
+    std::uint64_t serial;  ///< from the pixels, or from the magnetic field
+    std::uint64_t number;  ///< of the trigger or of the sample
     std::int64_t host_ns;
     std::uint32_t sigma_ns;
 };
@@ -115,8 +116,9 @@ class Recorder {
     }
 
     void take(const ImuSample& item) {
-        recordings_[imu_name_].items.push_back(
-            {item.data.number, 0, to_host_ns(item.time), item.data.sigma_ns});
+        recordings_[imu_name_].items.push_back({SampleMark::serial_in(item.data.magnetic),
+                                                item.data.number, to_host_ns(item.time),
+                                                item.data.sigma_ns});
     }
 
     std::string instance_;
@@ -135,7 +137,7 @@ struct TrueFrame {
 
 struct Truth {
     std::map<std::string, std::map<std::uint64_t, TrueFrame>> frames;  ///< by camera and serial
-    std::multimap<std::uint64_t, std::int64_t> imu;  ///< by number, over all boots of the board
+    std::map<std::uint64_t, std::int64_t> imu;                         ///< by serial
 };
 
 Expected<Truth> load_truth(const std::string& path) {
@@ -152,7 +154,7 @@ Expected<Truth> load_truth(const std::string& path) {
             truth.frames[record["camera"]][record["serial"]] = {
                 record["trigger"], start + (end - start) / 2, record["sent"]};
         } else if (record["type"] == "imu") {
-            truth.imu.emplace(record["number"].get<std::uint64_t>(),
+            truth.imu.emplace(record["serial"].get<std::uint64_t>(),
                               record["at_ns"].get<std::int64_t>());
         }
     }
@@ -203,9 +205,9 @@ StreamVerdict judge_frames(const Recording& recording,
     std::vector<double> errors;
     std::set<std::uint64_t> seen;
     for (const Published& item : recording.items) {
-        const auto found = truth.find(item.key);
-        const bool paired = found != truth.end() && found->second.trigger == item.trigger &&
-                            seen.insert(item.key).second;
+        const auto found = truth.find(item.serial);
+        const bool paired = found != truth.end() && found->second.trigger == item.number &&
+                            seen.insert(item.serial).second;
         const double error =
             paired ? std::abs(static_cast<double>(item.host_ns - found->second.middle_ns)) : 0;
         if (!paired || !honest(item, error))
@@ -228,19 +230,19 @@ StreamVerdict judge_imu(const Recording& recording, const Truth& truth, const In
     count(recording, interval, verdict);
     std::vector<double> errors;
     for (const Published& item : recording.items) {
-        double best = 1e18;
-        const auto [begin, end] = truth.imu.equal_range(item.key);
-        for (auto it = begin; it != end; ++it)
-            best = std::min(best, std::abs(static_cast<double>(item.host_ns - it->second)));
-        if (honest(item, best))
-            errors.push_back(best);
+        const auto found = truth.imu.find(item.serial);
+        const double error = found == truth.imu.end()
+                                 ? 1e18
+                                 : std::abs(static_cast<double>(item.host_ns - found->second));
+        if (honest(item, error))
+            errors.push_back(error);
         else
             ++verdict.wrong_pairs;
     }
     summarise(errors, verdict);
     for (std::size_t i = 1; i < recording.items.size(); ++i)
-        if (recording.items[i].key > recording.items[i - 1].key)
-            verdict.lost += recording.items[i].key - recording.items[i - 1].key - 1;
+        if (recording.items[i].number > recording.items[i - 1].number)
+            verdict.lost += recording.items[i].number - recording.items[i - 1].number - 1;
     verdict.lost -= std::min(verdict.lost, recording.missed);
     return verdict;
 }

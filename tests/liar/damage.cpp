@@ -33,7 +33,7 @@ std::int64_t camera_of(const Packet& packet) {
     return packet.type == Type::exposure ? get(packet, exposure::camera) : 0;
 }
 
-/// The number in a sample's magnetic field must outlive damage to its other bits.
+/// The serial number in a sample's magnetic field must outlive damage to its other bits.
 bool is_mark(Type type, std::size_t byte) {
     return type == Type::imu_sample && byte >= imu_sample::magnetic_x.offset &&
            byte < imu_sample::magnetic_y.offset + imu_sample::magnetic_y.size;
@@ -243,8 +243,8 @@ std::vector<Packet> Liar::pass(Packet packet, HostTime now) {
     return out;
 }
 
-/// Notes what is true, before any lie, and writes it where readers find it.
-void Liar::observe(Packet& packet) {
+/// Notes what is true, before any lie.
+void Liar::observe(const Packet& packet) {
     const std::uint64_t seen = ++seen_[packet.type];
     present_ = {static_cast<std::uint64_t>(camera_of(packet)), seen};
     if (packet.type == Type::exposure) {
@@ -252,9 +252,7 @@ void Liar::observe(Packet& packet) {
         ticks_[{static_cast<unsigned>(present_.camera), present_.number}] =
             static_cast<std::uint64_t>(get(packet, exposure::tick));
     } else if (packet.type == Type::imu_sample) {
-        present_.number = static_cast<std::uint64_t>(get(packet, imu_sample::number));
-        set(packet, imu_sample::magnetic_x, static_cast<std::int64_t>(present_.number));
-        set(packet, imu_sample::magnetic_y, static_cast<std::int64_t>(present_.number >> 16U));
+        present_.number = serial_in(packet);
     }
 }
 
@@ -456,11 +454,11 @@ std::int64_t Liar::other_number(std::int64_t number) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(number) + by);
 }
 
-std::uint32_t true_number(float magnetic_x, float magnetic_y, double lsb) {
-    const auto word = [&](float magnetic) {
-        return static_cast<std::uint16_t>(std::lround(magnetic / lsb));
+std::uint64_t serial_in(const Packet& sample) {
+    const auto word = [&](const Field& field) {
+        return static_cast<std::uint16_t>(get(sample, field));
     };
-    return word(magnetic_x) | static_cast<std::uint32_t>(word(magnetic_y)) << 16U;
+    return word(imu_sample::magnetic_x) | std::uint64_t{word(imu_sample::magnetic_y)} << 16U;
 }
 
 }  // namespace versavis::liar

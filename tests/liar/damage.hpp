@@ -103,7 +103,7 @@ class Liar {
         unsigned rest;  ///< messages after it without another such lie: one for ever is the truth
     };
 
-    void observe(Packet& packet);
+    void observe(const Packet& packet);
     bool continue_lies(Packet& packet, HostTime now);
     std::vector<Packet> lie(const Kind& kind, const Victim& victim, Packet packet, HostTime now);
     bool alter(const Kind& kind, const Victim& victim, Packet& packet, HostTime now);
@@ -148,8 +148,7 @@ class Liar {
     std::vector<Damage> damages_;
 };
 
-/// The true number of a sample, which the liar writes into its magnetic field: no part of the
-/// service looks at it, and readers get it as it came. `lsb` is that of the IMU's model.
-std::uint32_t true_number(float magnetic_x, float magnetic_y, double lsb);
+/// The serial number of a sample, which the rig shows in its magnetic field: no lie changes it.
+std::uint64_t serial_in(const Packet& sample);
 
 }  // namespace versavis::liar

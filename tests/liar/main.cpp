@@ -128,6 +128,7 @@ class Run {
                                            fmt::to_string(settings.falsify_truth_us)};
         for (const auto& camera : stack_.scenario().cameras)
             arguments.insert(arguments.end(), {"--camera", camera.name});
+        if (!settings.data_ready) arguments.emplace_back("--no-data-ready");
         if (!settings.log.empty())
             arguments.insert(arguments.end(), {"--log", settings.log + ".judge"});
         judge_ = std::make_unique<JudgeProcess>(arguments);

@@ -7,6 +7,7 @@
 
 #include "../support/judged.hpp"
 #include "../support/stack.hpp"
+#include "versavis/set_reader.hpp"
 
 using namespace versavis;
 using namespace versavis::test;
@@ -30,6 +31,17 @@ void judge(Stack& stack, const char* when) {
     const rig::Verdict verdict = judged(stack, 3);
     INFO(when << ":\n" << rig::to_table(verdict));
     CHECK(verdict.ok);
+}
+
+/// A set that came after the service was last changed; none: there is none in time.
+std::optional<FrameSet> new_set(SetReader& sets) {
+    const HostTime begin = host_now();
+    while (host_now() < begin + seconds(10)) {
+        auto made = sets.next(seconds(1));
+        if (made && made->frames.front() && made->frames.front()->data.host_time > begin)
+            return std::move(*made);
+    }
+    return std::nullopt;
 }
 
 constexpr int refused = 65;
@@ -74,6 +86,11 @@ TEST_CASE("control: a camera stops and starts, and the file is read again") {
     stack.start_rig();
     stack.start_service();
     stack.wait_for_status(healthy);
+    SetOptions options;
+    options.instance = stack.instance();
+    options.partial = true;
+    auto sets = SetReader::open({"cam0", "cam1"}, options);
+    REQUIRE(sets);
     tool_output(stack, {"stop", "cam1"}, 0);
     auto status = stack.wait_for_status(
         [](const auto& s) { return healthy(s) && s["cameras"][1]["state"] == "stopped"; });
@@ -93,8 +110,17 @@ TEST_CASE("control: a camera stops and starts, and the file is read again") {
     for (std::size_t at = 0; (at = next.find("rate_hz = 20", at)) != std::string::npos;)
         next.replace(at, 12, "rate_hz = 25");
     std::ofstream(stack.configuration_path()) << next << "[memory]\nsealed = true\n";
+    const auto before_reload = new_set(*sets);
+    REQUIRE(before_reload);
+    const std::uint64_t left_out = sets->report().left_out;
     const std::string output = tool_output(stack, {"reload"}, 0);
     CHECK_THAT(output, Catch::Contains("camera.cam1.rate_hz") && Catch::Contains("memory.sealed"));
+    stack.wait_for_status([](const auto& s) { return s["board"]["connections"] == 2; });
+    const auto after_reload = new_set(*sets);
+    REQUIRE(after_reload);
+    CHECK(after_reload->tick > before_reload->tick);
+    CHECK(after_reload->epoch == before_reload->epoch);
+    CHECK(sets->report().left_out == left_out);  // although the board counts its ticks anew
     tool_output(stack, {"start", "cam1"}, 0);
     delivering(stack, 1, 25);
     judge(stack, "after the start");
