@@ -34,6 +34,7 @@ foreach(pair
         versavis-metrics.service.in:systemd/system/versavis-metrics.service
         versavis-metrics.timer:systemd/system/versavis-metrics.timer
         60-versavis.rules:udev/rules.d/60-versavis.rules
+        versavis.sysctl:sysctl.d/60-versavis.conf
         versavis.sysusers:sysusers.d/versavis.conf
         versavis.tmpfiles:tmpfiles.d/versavis.conf)
     string(REPLACE ":" ";" pair "${pair}")
@@ -49,6 +50,10 @@ set(configuration_name %i)
 set(state_directory versavis/%i)
 place(versavisd.service.in "${system_directory}/systemd/system/versavisd@.service")
 list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${system_directory}/systemd/system/versavisd@.service")
+
+# AppArmor looks nowhere else; where there is none, nobody reads it.
+place(versavisd.apparmor.in "${sysconfdir}/apparmor.d/versavisd")
+list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${sysconfdir}/apparmor.d/versavisd")
 
 # The user's own is neither overwritten nor, as the manifest does not name it, uninstalled.
 set(configuration "${sysconfdir}/versavis/versavis.toml")

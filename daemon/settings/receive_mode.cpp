@@ -27,7 +27,8 @@ Expected<ReceiveMode> choose_receive_mode(const CameraConfiguration& camera, boo
                                           bool plain_images) {
     if (camera.receive == ReceiveMode::packet && !allowed)
         return failure("receive", "\"packet\" needs CAP_NET_RAW, which the service does not have",
-                       "grant it, as the systemd unit does, or set receive = \"auto\"");
+                       "grant it by packet-socket.conf (docs/user/operations.md), or set receive = "
+                       "\"auto\"");
     const bool packet =
         plain_images &&
         (camera.receive == ReceiveMode::packet ||

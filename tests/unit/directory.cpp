@@ -24,11 +24,13 @@
 using namespace versavis;
 using namespace versavis::ring;
 
-TEST_CASE("directory: one owner at a time, readable for its group only") {
+TEST_CASE("directory: one owner at a time, readable for its group, whatever the umask") {
     test::TemporaryDirectory parent("/dev/shm");
     const auto path = parent.path() / "instance";
     {
+        const mode_t mask = ::umask(0077);
         auto first = OwnedDirectory::claim(path);
+        ::umask(mask);
         REQUIRE(first);
         struct stat info {};
         REQUIRE(stat(path.c_str(), &info) == 0);

@@ -141,7 +141,7 @@ TEST_CASE("doctor: a small rmem_max matters without CAP_NET_ADMIN, and --fix rai
     LinkedHost host;
     const std::string path = "/proc/sys/net/core/rmem_max";
     host.put(path, "212992");
-    CHECK(get(host.check(), "rmem_max").verdict == Verdict::unknown);
+    CHECK(get(host.check(), "rmem_max").verdict == Verdict::bad);
     host.subject.status = json::parse(R"({"pid": 4711})");
     host.put("/proc/4711/status", "Name: versavisd\nCapEff:\t0000000000001000");
     CHECK(get(host.check(), "rmem_max").verdict == Verdict::good);
@@ -153,6 +153,24 @@ TEST_CASE("doctor: a small rmem_max matters without CAP_NET_ADMIN, and --fix rai
     CHECK(get(findings, "rmem_max").fixed);
     CHECK(host.get(path) == "33554432");
     CHECK(get(host.check(), "rmem_max").verdict == Verdict::good);
+}
+
+TEST_CASE("doctor: packet sockets are offered with their price, where none may be opened") {
+    LinkedHost host;
+    const auto with = [&](const char* receive, const char* capabilities) {
+        host.subject.status = json{{"pid", 4711}, {"cameras", {{{"receive", receive}}}}};
+        host.put("/proc/4711/status", std::string("CapEff:\t") + capabilities);
+        return host.check();
+    };
+    CHECK(find(host.check(), "packet_socket") == nullptr);
+    CHECK(find(with("", "0"), "packet_socket") == nullptr);  // USB3 Vision
+    CHECK(get(with("packet", "2000"), "packet_socket").verdict == Verdict::good);
+    CHECK(get(with("socket", "2000"), "packet_socket").verdict == Verdict::good);
+    const Finding offered = get(with("socket", "0"), "packet_socket");
+    CHECK(offered.verdict == Verdict::unknown);
+    CHECK(offered.value == "used for 0 of 1 cameras");
+    CHECK_THAT(offered.reason, Contains("a third of the processor") && Contains("1.9 to 2.2"));
+    CHECK_THAT(offered.cure, Contains("versavisd.service.d/packet-socket.conf"));
 }
 
 TEST_CASE("doctor: a fix that is refused says why") {

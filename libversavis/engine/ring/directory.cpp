@@ -88,7 +88,9 @@ Expected<OwnedDirectory> OwnedDirectory::claim(const std::filesystem::path& path
     std::error_code error;
     const auto parent = path.parent_path();
     if (std::filesystem::create_directories(parent, error)) ::chmod(parent.c_str(), 0755);
-    if (!error && ::mkdir(path.c_str(), 0750) != 0 && errno != EEXIST)
+    if (!error && ::mkdir(path.c_str(), 0750) == 0)
+        ::chmod(path.c_str(), 0750);  // whatever umask says
+    else if (!error && errno != EEXIST)
         error = {errno, std::generic_category()};
     if (error)
         return failure(path.string(), fmt::format("cannot be created: {}", error.message()),
