@@ -169,7 +169,15 @@ ReceivedRecord received_record(const json& line) {
     return received;
 }
 
+/// A number that is not whole may be too large for the integer that it would become.
+void check_numbers(const json& line) {
+    for (const auto& [key, value] : line.items())
+        if (value.is_number_float() && key != "grid_slew_ppm")
+            throw std::invalid_argument(fmt::format("'{}' must be an integer", key));
+}
+
 Evidence read(const json& line) {
+    check_numbers(line);
     const std::string kind = line.at("evidence");
     if (kind == "begin") return limits(line);
     if (kind == "exposure") return exposure(line);

@@ -90,7 +90,7 @@ std::optional<clock::Asymmetry> asymmetry_of(const Recording& recording) {
         return std::nullopt;
     const json offset = clock.value("asymmetry_ns", json());
     const json sigma = clock.value("asymmetry_sigma_ns", json());
-    if (!offset.is_number() || !sigma.is_number()) return std::nullopt;
+    if (!offset.is_number_integer() || !sigma.is_number_integer()) return std::nullopt;
     return clock::Asymmetry{{offset.get<std::int64_t>()}, {sigma.get<std::int64_t>()}};
 }
 
