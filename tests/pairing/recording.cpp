@@ -203,6 +203,8 @@ TEST_CASE("recording: what no service can have recorded is refused with its name
         CHECK(field(with(Limits{}, [&](auto& l) { l.earliest_arrival = early; })) ==
               "earliest_arrival_ns");
     CHECK(field(with(Limits{}, [](auto& l) { l.frames_held = 60'001; })) == "frames_held");
+    for (const auto instant : {Instant::arrival, static_cast<Instant>(50'050'000)})
+        CHECK(field(with(Limits{}, [&](auto& l) { l.stamped = instant; })) == "stamp_instant");
     for (const double slew : {-1.0, 1e7, std::nan("")})
         CHECK(field(with(RecordLimits{}, [&](auto& l) { l.grid_slew_ppm = slew; })) ==
               "grid_slew_ppm");

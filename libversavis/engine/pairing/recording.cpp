@@ -82,6 +82,7 @@ const char* impossible(const Limits& limits) {
     if (!is_length(limits.latest_arrival)) return "latest_arrival_ns";
     if (!is_length(limits.exposure_wait)) return "exposure_wait_ns";
     if (!is_length(limits.pattern_duration)) return "pattern_duration_ns";
+    if (limits.stamped > Instant::end) return "stamp_instant";  // the camera's clock shows no other
     return limits.frames_held > most_frames_held ? "frames_held" : nullptr;
 }
 
