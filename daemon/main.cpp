@@ -315,7 +315,7 @@ int main(int argc, char** argv) {
     std::string path = default_configuration;
     bool check_only = false;
     bool as_json = false;
-    app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
+    app.add_option("-c,--config", path, "Configuration file (man versavis.toml)")
         ->capture_default_str();
     CLI::Option* check_config = app.add_flag(
         "--check-config", check_only, "Check the configuration file, report every error, and exit");
