@@ -12,6 +12,7 @@
 
 #include "configuration_check.hpp"
 #include "configuration_file.hpp"
+#include "engine/toml/service_file.hpp"
 #include "engine/toml/table_reader.hpp"
 #include "keys.hpp"
 
@@ -185,8 +186,8 @@ void read_parts(TomlFile& file, TableReader& top, const char* name, std::vector<
 }  // namespace
 
 Expected<Configuration, TomlProblems> load_configuration(const std::string& path) {
-    const auto root = parse_toml(path);
-    if (!root) return Unexpected(TomlProblems{root.error()});
+    auto root = parse_service_file(path);
+    if (!root) return Unexpected(std::move(root.error()));
     return read_configuration(*root, path);
 }
 
