@@ -25,6 +25,7 @@
 #include "commands/record_command.hpp"
 #include "commands/snapshot.hpp"
 #include "commands/tail.hpp"
+#include "commands/wiring_command.hpp"
 #include "pairing/pair_replay.hpp"
 #include "posix/file.hpp"
 #include "status/status_document.hpp"
@@ -103,6 +104,8 @@ int main(int argc, char** argv) {
     bool json = false;
 
     client::DiscoverCommands discover(app);
+
+    client::WiringCommand wiring(app);
 
     bool watch = false;
     auto* status = app.add_subcommand(
@@ -183,6 +186,7 @@ int main(int argc, char** argv) {
     if (*status)
         return watch ? watch_status(instance, {json, verbose})
                      : show_status(instance, {json, verbose});
+    if (wiring.chosen()) return wiring.run(instance);
     if (doctor.chosen()) return doctor.run(instance, VERSAVIS_VERSION);
     if (monitor.chosen()) return monitor.run(instance);
     if (*list) {

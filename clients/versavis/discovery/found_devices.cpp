@@ -2,6 +2,7 @@
 #include "discovery/found_devices.hpp"
 
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -169,6 +170,14 @@ std::string cameras_text(const json& cameras) {
 }
 
 }  // namespace
+
+bool goes_by(const json& camera, const std::string& name) {
+    for (const char* key : {"serial", "address", "mac", "user_name", "device"})
+        if (const std::string own = text(camera, key);
+            !own.empty() && strcasecmp(own.c_str(), name.c_str()) == 0)
+            return true;
+    return false;
+}
 
 std::string place_of(const json& camera) {
     const std::string address = text(camera, "address");

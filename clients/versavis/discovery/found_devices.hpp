@@ -25,6 +25,9 @@ bool anything_found(const nlohmann::json& devices);
 /// For a terminal.
 std::string devices_text(const nlohmann::json& devices);
 
+/// A configuration may call the camera so.
+bool goes_by(const nlohmann::json& camera, const std::string& name);
+
 /// Where a camera is, in a few words.
 std::string place_of(const nlohmann::json& camera);
 

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <strings.h>
 
 #include <algorithm>
 #include <utility>
@@ -41,14 +40,6 @@ std::pair<std::string, std::string> split(const std::string& word) {
     const std::size_t at = word.find('=');
     if (at == std::string::npos) return {word, ""};
     return {word.substr(0, at), word.substr(at + 1)};
-}
-
-bool goes_by(const json& camera, const std::string& name) {
-    for (const char* key : {"serial", "address", "mac", "user_name", "device"})
-        if (const std::string own = text(camera, key);
-            !own.empty() && strcasecmp(own.c_str(), name.c_str()) == 0)
-            return true;
-    return false;
 }
 
 Error not_found(const json& found, const std::string& name) {

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "commands/wiring_command.hpp"
+
+#include <fmt/format.h>
+#include <sysexits.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <optional>
+
+#include "discovery/found_devices.hpp"
+#include "posix/file.hpp"
+#include "status/status_document.hpp"
+#include "wiring/wiring_drawing.hpp"
+#include "wiring/wiring_text.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr auto installed_configuration = VERSAVIS_SYSCONFDIR "/versavis/versavis.toml";
+
+int fail(const Error& error, int code) {
+    fmt::print(stderr, "versavis: {}\n", error.message());
+    return code;
+}
+
+/// What the service set a camera up by; without one, what is connected.
+class Presets {
+ public:
+    explicit Presets(const std::optional<json>& status) : status_(status) {}
+
+    std::string of(const std::string& name, const std::string& device) {
+        if (status_)
+            for (const json& camera : status_->value("cameras", json::array()))
+                if (camera.value("name", "") == name && !camera.value("preset", "").empty())
+                    return camera.value("preset", "");
+        if (!devices_) {
+            fmt::print(stderr, "Looking for cameras ...\n");
+            const auto found = find_devices({});
+            devices_ = found ? found->value("cameras", json::array()) : json::array();
+        }
+        for (const json& camera : *devices_)
+            if (goes_by(camera, device)) return camera.value("preset", "");
+        return "";
+    }
+
+ private:
+    const std::optional<json>& status_;
+    std::optional<json> devices_;
+};
+
+bool are_circuits(const std::vector<std::string>& names) {
+    return !names.empty() && std::all_of(names.begin(), names.end(), [](const auto& name) {
+        return circuits().camera(name) != nullptr || circuits().imu(name) != nullptr;
+    });
+}
+
+}  // namespace
+
+WiringCommand::WiringCommand(CLI::App& app)
+    : command_(app.add_subcommand(
+          "wiring",
+          "Show how to connect the cameras and IMUs of the configuration to the board, pin by pin, "
+          "with levels and warnings. The circuits follow the manufacturers' figures and are not "
+          "tried on hardware (docs/user/wiring.md)")) {
+    command_->add_option("name", names_,
+                         "Only these cameras and IMUs; or circuits by name, without a "
+                         "configuration");
+    command_->add_option("--config", configuration_,
+                         "Configuration file of the service (default: the one that it has read)");
+    command_->add_option("--svg", svg_, "Also write a drawing to this file");
+    command_->add_flag("--list", list_, "List the circuits that are known");
+    command_->add_flag("--json", json_, "Print one JSON object");
+    command_->add_option("--pictures", pictures_)->group("");  // of the documents
+}
+
+Expected<WiredParts> WiringCommand::parts(const std::string& instance) const {
+    if (configuration_.empty() && are_circuits(names_)) return named_wiring(names_);
+    std::optional<json> status;
+    if (auto read = read_status(instance)) status = std::move(*read);
+    std::string path = configuration_;
+    if (path.empty() && status) path = status->value("configuration", "");
+    if (path.empty()) path = installed_configuration;
+    Presets presets(status);
+    auto all = configured_wiring(
+        path, [&](const auto& name, const auto& device) { return presets.of(name, device); });
+    if (!all) return all;
+    if (all->cameras.empty() && all->imus.empty())
+        return failure(path, "has no camera or IMU at the board",
+                       "write one with 'versavis init', or name a circuit: 'versavis wiring "
+                       "--list'");
+    return only(std::move(*all), names_);
+}
+
+/// Those of docs/user/wiring.md.
+Expected<> WiringCommand::write_pictures(const std::string& directory) const {
+    const auto write = [&](const std::string& name, const std::vector<Sheet>& sheets) {
+        return write_whole_file(fmt::format("{}/wiring-{}.svg", directory, name), to_svg(sheets));
+    };
+    for (const CameraCircuit& circuit : circuits().cameras)
+        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
+            return done;
+    for (const ImuCircuit& circuit : circuits().imus)
+        if (auto done = write(circuit.name, drawings(*named_wiring({circuit.name}))); !done)
+            return done;
+    if (auto done = write("driven", {driven_outputs_drawing()}); !done) return done;
+    return write("inverted", {inverted_trigger_drawing()});
+}
+
+int WiringCommand::run(const std::string& instance) const {
+    if (!pictures_.empty()) {
+        const auto written = write_pictures(pictures_);
+        return written ? EX_OK : fail(written.error(), EX_CANTCREAT);
+    }
+    if (list_) {
+        fmt::print("{}", circuits_text());
+        return EX_OK;
+    }
+    const auto wired = parts(instance);
+    if (!wired) return fail(wired.error(), EX_NOINPUT);
+    if (!svg_.empty()) {
+        if (auto written = write_whole_file(svg_, to_svg(drawings(*wired))); !written)
+            return fail(written.error(), EX_CANTCREAT);
+    }
+    fmt::print("{}", json_ ? wiring_json(*wired).dump() + "\n" : wiring_text(*wired));
+    const bool all = std::all_of(wired->cameras.begin(), wired->cameras.end(),
+                                 [](const auto& camera) { return camera.circuit != nullptr; });
+    return all ? EX_OK : EXIT_FAILURE;
+}
+
+}  // namespace versavis::client

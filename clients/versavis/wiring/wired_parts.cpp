@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "wiring/wired_parts.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "engine/toml/table_reader.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+constexpr auto manual =
+    "its circuits are in docs/user/wiring.md; by the kind of its lines, choose "
+    "'versavis wiring flir' (direct) or 'versavis wiring flir-opto' (opto)";
+
+/// Where the configuration names no line, the preset's first circuit has it.
+bool agrees(const std::string& wanted, const std::string& line, bool first) {
+    return wanted.empty() ? first : wanted == line;
+}
+
+std::string lines_of(const CameraCircuit& circuit) {
+    return fmt::format("{} with {}", circuit.trigger.line, circuit.exposure.line);
+}
+
+void choose_circuit(WiredCamera& camera, const std::string& preset, const std::string& trigger_line,
+                    const std::string& strobe_line) {
+    std::vector<std::string> others;
+    for (const CameraCircuit& circuit : circuits().cameras) {
+        if (circuit.preset != preset) continue;
+        const bool first = others.empty();
+        if (agrees(trigger_line, circuit.trigger.line, first) &&
+            agrees(strobe_line, circuit.exposure.line, first)) {
+            camera.circuit = &circuit;
+            return;
+        }
+        others.push_back(lines_of(circuit));
+    }
+    if (preset.empty())
+        camera.problem = fmt::format(
+            "which camera it is, is not known: connect it, or set its 'preset'; {}", manual);
+    else if (others.empty())
+        camera.problem =
+            fmt::format("no circuit of preset '{}' is known: see its manual; {}", preset, manual);
+    else
+        camera.problem = fmt::format(
+            "no circuit for these lines is known, only for {}: set 'trigger_line' and "
+            "'strobe_line' so, or see the camera's manual",
+            fmt::join(others, ", "));
+}
+
+std::string text(const toml::table& table, const char* key, const char* usual = "") {
+    return table[key].value_or(std::string(usual));
+}
+
+WiredCamera configured_camera(const toml::table& table, const PresetOf& preset_of) {
+    WiredCamera camera;
+    camera.name = text(table, "name");
+    camera.output = table["output"].value_or(0U);
+    camera.inverted = table["trigger_inverted"].value_or(false);
+    camera.exposure_line = text(table, "strobe") != "none";
+    std::string preset = text(table, "preset", "auto");
+    if (preset == "auto") preset = preset_of(camera.name, text(table, "device"));
+    choose_circuit(camera, preset, text(table, "trigger_line"), text(table, "strobe_line"));
+    return camera;
+}
+
+WiredImu configured_imu(const toml::table& table) {
+    WiredImu imu;
+    imu.name = text(table, "name", "imu0");
+    imu.data_ready = table["data_ready"].value_or(false);
+    const std::string model = text(table, "model", "adis16448b");
+    const std::string bus = text(table, "bus", "spi");
+    for (const ImuCircuit& circuit : circuits().imus) {
+        const auto& models = circuit.models;
+        const bool fits = std::find(models.begin(), models.end(), model) != models.end() &&
+                          (circuit.bus == bus || circuit.bus == "uart");
+        if (fits) imu.circuit = &circuit;
+    }
+    if (imu.circuit == nullptr)
+        imu.problem =
+            fmt::format("no circuit of a '{}' on {} is known: check 'model' and 'bus'", model, bus);
+    return imu;
+}
+
+template <class Use>
+void each_table(const toml::table& file, const char* key, Use use) {
+    if (const auto* tables = file[key].as_array())
+        for (const auto& item : *tables)
+            if (const auto* table = item.as_table()) use(*table);
+}
+
+template <class Item>
+std::vector<std::string> names_of(const std::vector<Item>& items) {
+    std::vector<std::string> names;
+    for (const Item& item : items) names.push_back(item.name);
+    return names;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+}  // namespace
+
+Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& preset_of) {
+    const auto file = parse_toml(path);
+    if (!file) return Unexpected<>(file.error());
+    WiredParts parts;
+    each_table(*file, "camera", [&](const toml::table& table) {
+        if (text(table, "trigger", "board") == "board")
+            parts.cameras.push_back(configured_camera(table, preset_of));
+    });
+    each_table(*file, "imu",
+               [&](const toml::table& table) { parts.imus.push_back(configured_imu(table)); });
+    return parts;
+}
+
+Expected<WiredParts> named_wiring(const std::vector<std::string>& names) {
+    WiredParts parts;
+    for (const std::string& name : names) {
+        const CameraCircuit* camera = circuits().camera(name);
+        const ImuCircuit* imu = circuits().imu(name);
+        if (camera != nullptr) {
+            WiredCamera wired;
+            wired.circuit = camera;
+            parts.cameras.push_back(std::move(wired));
+        } else if (imu != nullptr) {
+            WiredImu wired;
+            wired.circuit = imu;
+            parts.imus.push_back(std::move(wired));
+        } else {
+            return failure(name, "there is no such circuit", "see 'versavis wiring --list'");
+        }
+    }
+    return parts;
+}
+
+Expected<WiredParts> only(WiredParts parts, const std::vector<std::string>& names) {
+    std::vector<std::string> known = names_of(parts.cameras);
+    for (std::string& imu : names_of(parts.imus)) known.push_back(std::move(imu));
+    for (const std::string& name : names)
+        if (!contains(known, name))
+            return failure(name, "is neither a circuit nor a part that the board serves",
+                           fmt::format("choose one of {}; circuits: 'versavis wiring --list'",
+                                       known.empty() ? "a configuration with parts"
+                                                     : fmt::format("{}", fmt::join(known, ", "))));
+    const auto unwanted = [&](const auto& part) {
+        return !names.empty() && !contains(names, part.name);
+    };
+    std::erase_if(parts.cameras, unwanted);
+    std::erase_if(parts.imus, unwanted);
+    return parts;
+}
+
+}  // namespace versavis::client

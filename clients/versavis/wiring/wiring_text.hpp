@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The wiring of cameras and IMUs pin by pin, for a terminal and as JSON.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "wiring/wired_parts.hpp"
+
+namespace versavis::client {
+
+std::string wiring_text(const WiredParts& parts);
+
+/// {"board", "cameras", "imus"}; docs/user/wiring.md has the members.
+nlohmann::json wiring_json(const WiredParts& parts);
+
+/// The circuits that are known, by name.
+std::string circuits_text();
+
+}  // namespace versavis::client
