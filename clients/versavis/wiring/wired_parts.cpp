@@ -6,14 +6,14 @@
 
 #include <algorithm>
 
-#include "engine/toml/table_reader.hpp"
+#include "engine/toml/service_file.hpp"
 
 namespace versavis::client {
 
 namespace {
 
 constexpr auto manual =
-    "its circuits are in docs/user/wiring.md; by the kind of its lines, choose "
+    "man versavis-wiring names the document of circuits; by the kind of its lines, choose "
     "'versavis wiring flir' (direct) or 'versavis wiring flir-opto' (opto)";
 
 /// Where the configuration names no line, the preset's first circuit has it.
@@ -106,8 +106,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }  // namespace
 
 Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& preset_of) {
-    const auto file = parse_toml(path);
-    if (!file) return Unexpected<>(file.error());
+    const auto file = parse_service_file(path);
+    if (!file) return Unexpected<>(file.error().front());
     WiredParts parts;
     each_table(*file, "camera", [&](const toml::table& table) {
         if (text(table, "trigger", "board") == "board")
