@@ -13,8 +13,8 @@ namespace versavis::client {
 namespace {
 
 constexpr auto manual =
-    "man versavis-wiring names the document of circuits; by the kind of its lines, choose "
-    "'versavis wiring flir' (direct) or 'versavis wiring flir-opto' (opto)";
+    "see the camera's manual and man versavis-wiring; as its lines are, choose 'versavis wiring "
+    "flir' (direct) or 'versavis wiring flir-opto' (opto)";
 
 /// Where the configuration names no line, the preset's first circuit has it.
 bool agrees(const std::string& wanted, const std::string& line, bool first) {
@@ -42,8 +42,7 @@ void choose_circuit(WiredCamera& camera, const std::string& preset, const std::s
         camera.problem = fmt::format(
             "which camera it is, is not known: connect it, or set its 'preset'; {}", manual);
     else if (others.empty())
-        camera.problem =
-            fmt::format("no circuit of preset '{}' is known: see its manual; {}", preset, manual);
+        camera.problem = fmt::format("no circuit of preset '{}' is known: {}", preset, manual);
     else
         camera.problem = fmt::format(
             "no circuit for these lines is known, only for {}: set 'trigger_line' and "
