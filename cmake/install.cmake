@@ -79,7 +79,8 @@ install(DIRECTORY clients/python/versavis DESTINATION ${VERSAVIS_PYTHON_DIR}
 install(FILES README.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN man EXCLUDE)
 install(DIRECTORY clients/examples/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
-install(FILES systemd/versavis-alerts.yml systemd/closed.conf systemd/packet-socket.conf
+install(FILES systemd/versavis-alerts.yml systemd/versavis-dashboard.json
+    systemd/closed.conf systemd/packet-socket.conf
     DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
 
 # Last, as it may need rights that the rest does not: what starts the service.

@@ -20,6 +20,7 @@
 #include "camera/description_check.hpp"
 #include "check/camera_check.hpp"
 #include "control/control.hpp"
+#include "engine/toml/service_file.hpp"
 #include "health/health_log.hpp"
 #include "posix/file.hpp"
 #include "service.hpp"
@@ -109,14 +110,19 @@ constexpr auto serves_nothing =
 int check(const std::string& path, bool as_json) {
     const auto configuration = load_configuration(path);
     const TomlProblems problems = configuration ? TomlProblems{} : configuration.error();
-    if (as_json)
-        fmt::print("{}\n", to_json(path, problems));
-    else if (problems.empty() && !serves(*configuration))
+    const std::vector<std::string> files =
+        service_files(path).value_or(std::vector<std::string>{path});
+    if (as_json) {
+        fmt::print("{}\n", to_json(files, problems));
+        return problems.empty() ? EX_OK : EX_CONFIG;
+    }
+    if (problems.empty() && !serves(*configuration))
         fmt::print("{}: ok, but {}\n", path, serves_nothing);
     else if (problems.empty())
         fmt::print("{}: ok\n", path);
     else
         log_problems(problems);
+    for (std::size_t i = 1; i < files.size(); ++i) fmt::print("with {}\n", files[i]);
     return problems.empty() ? EX_OK : EX_CONFIG;
 }
 
@@ -315,7 +321,7 @@ int main(int argc, char** argv) {
     std::string path = default_configuration;
     bool check_only = false;
     bool as_json = false;
-    app.add_option("-c,--config", path, "Configuration file (docs/user/configuration.md)")
+    app.add_option("-c,--config", path, "Configuration file (man versavis.toml)")
         ->capture_default_str();
     CLI::Option* check_config = app.add_flag(
         "--check-config", check_only, "Check the configuration file, report every error, and exit");

@@ -164,7 +164,7 @@ Fault read_fault(TableReader& reader) {
 Expected<Scenario> load_scenario(const std::string& path) {
     const auto root = parse_toml(path);
     if (!root) return Unexpected(root.error());
-    TomlFile file{path, "docs/user/rig.md"};
+    TomlFile file{path, "man versavis-rig"};
     Scenario scenario;
     TableReader top(file, *root);
     top.read("seed", scenario.seed, 0, INT64_MAX);

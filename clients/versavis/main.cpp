@@ -56,20 +56,49 @@ struct StatusOptions {
     bool verbose = false;
 };
 
+bool on_terminal() { return isatty(STDOUT_FILENO) != 0; }
+
+client::Colour colour() {
+    const char* refused = std::getenv("NO_COLOR");
+    const bool none = !on_terminal() || (refused != nullptr && *refused != '\0');
+    return none ? client::Colour::none : client::Colour::ansi;
+}
+
+struct StatusReport {
+    std::string text;
+    int code;
+};
+
+StatusReport report_status(const nlohmann::json& status, const StatusOptions& options) {
+    const auto detail = options.verbose ? client::Detail::full : client::Detail::summary;
+    return {options.json ? status.dump() + "\n" : client::status_text(status, detail, colour()),
+            exit_code(status.value("health", ""))};
+}
+
 int show_status(const std::string& instance, const StatusOptions& options) {
     const auto status = client::read_status(instance);
     if (!status) return fail(status.error());
-    const auto detail = options.verbose ? client::Detail::full : client::Detail::summary;
-    fmt::print("{}", options.json ? status->dump() + "\n" : client::status_text(*status, detail));
+    const StatusReport report = report_status(*status, options);
+    fmt::print("{}", report.text);
     std::fflush(stdout);
-    return exit_code(status->value("health", ""));
+    return report.code;
 }
 
 int watch_status(const std::string& instance, const StatusOptions& options) {
     int code = EX_OK;
     while (stop_requested == 0) {
-        if (isatty(STDOUT_FILENO) != 0 && !options.json) fmt::print("\x1b[H\x1b[J");
-        code = show_status(instance, options);
+        if (on_terminal() && !options.json) {
+            const auto status = client::read_status(instance);
+            const StatusReport report =
+                status
+                    ? report_status(*status, options)
+                    : StatusReport{"versavis: " + status.error().message() + "\n", EX_UNAVAILABLE};
+            fmt::print("{}", client::in_place(report.text));
+            std::fflush(stdout);
+            code = report.code;
+        } else {
+            code = show_status(instance, options);
+        }
         const timespec interval{1, 0};
         nanosleep(&interval, nullptr);  // a signal ends it early
     }

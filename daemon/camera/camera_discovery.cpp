@@ -40,7 +40,7 @@ CameraProblem absent(const std::string& device) {
     return {CameraState::absent,
             {device, "no camera answers to this name",
              "check cable, power and name ('versavis discover' lists cameras by address, serial "
-             "number and name)"}};
+             "number and name; host names are not looked up)"}};
 }
 
 CameraResult<> check_claim(const std::string& camera, const std::string& device,

@@ -6,13 +6,14 @@
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <poll.h>
-#include <strings.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <memory>
+
+#include "settings/device_name.hpp"
 
 namespace versavis::daemon {
 
@@ -105,7 +106,7 @@ NetworkDevice describe(const std::uint8_t* registers, in_addr interface) {
 bool goes_by(const NetworkDevice& device, const std::string& name) {
     for (const std::string& own :
          {device.mac, device.serial, device.user_name, device.vendor + "-" + device.serial})
-        if (!own.empty() && strcasecmp(own.c_str(), name.c_str()) == 0) return true;
+        if (!own.empty() && same_device(own, name)) return true;
     return false;
 }
 

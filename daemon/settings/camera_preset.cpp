@@ -89,7 +89,7 @@ std::vector<PresetStep> read_steps(TomlFile& file, const toml::table& table) {
 Expected<CameraPreset> load_preset(const std::filesystem::path& path) {
     const auto root = parse_toml(path.string());
     if (!root) return Unexpected(root.error());
-    TomlFile file{path.string(), "docs/user/cameras.md"};
+    TomlFile file{path.string(), "man versavis.toml"};
     CameraPreset preset;
     preset.name = path.stem().string();
     TableReader reader(file, *root);

@@ -2,14 +2,17 @@
 #include "configuration.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <sstream>
 #include <utility>
 
 #include "configuration_check.hpp"
 #include "configuration_file.hpp"
+#include "engine/toml/service_file.hpp"
 #include "engine/toml/table_reader.hpp"
 #include "keys.hpp"
 
@@ -23,13 +26,29 @@ constexpr double longest_wait_s = 0.12;
 /// Trigger pulses, where the period leaves room for them: half of what it may be.
 constexpr double usual_part_of_period = 0.25;
 
-/// The camera's own exposure, where the file sets it.
-void check_exposure_feature(TableReader& reader, std::string_view key, const toml::node& node,
-                            const CameraConfiguration& camera) {
-    const auto us = node.is_number() ? node.value<double>() : std::nullopt;
-    if ((key != "ExposureTime" && key != "ExposureTimeAbs") || !us) return;
-    if (const auto hidden = hidden_exposure(camera, key, *us))
-        reader.fail(key, hidden->what, hidden->cure);
+const std::string top_of_file = "the top of the file";
+
+/// The tables that have this key, as documents call them; empty: none has it.
+std::string tables_with(std::string_view key) {
+    std::vector<std::string> tables;
+    for (const KeyDescription& known : describe_keys())
+        if (known.key == key) tables.push_back(known.table.empty() ? top_of_file : known.table);
+    return fmt::format("{}", fmt::join(tables, " or "));
+}
+
+std::string move_to(const std::string& tables) {
+    return fmt::format("move it there, above the {} table",
+                       tables == top_of_file ? "first" : "next");
+}
+
+/// TOML takes each key as one of the table above it, whatever was meant.
+std::string cure_of_stray(std::string_view title, std::string_view key) {
+    const bool of_camera = title.find("camera") != std::string_view::npos;
+    if (of_camera && std::isupper(static_cast<unsigned char>(key.front())) != 0)
+        return "features of the camera go below [camera.features]";
+    const std::string tables = tables_with(key);
+    if (tables.empty()) return "";
+    return fmt::format("it belongs to {}: {}", tables, move_to(tables));
 }
 
 /// Features that the service sets, with the key that says what to.
@@ -45,6 +64,9 @@ void check_feature_name(TableReader& reader, const TableReader& camera_keys, std
     if (camera_keys.knows(key))
         return reader.fail(key, fmt::format("'{}' is a key of the camera, not a feature", key),
                            "move it above [camera.features]");
+    if (const std::string tables = tables_with(key); !tables.empty())
+        return reader.fail(key, fmt::format("'{}' belongs to {}, it is no feature", key, tables),
+                           move_to(tables));
     for (const auto& [feature, own] : own_features)
         if (key == feature && camera.trigger == TriggerSource::board)
             reader.fail(key, fmt::format("'{}' is set by the service, from '{}'", key, own),
@@ -55,7 +77,6 @@ void read_features(TableReader& reader, const TableReader& camera_keys,
                    CameraConfiguration& camera) {
     for (const auto& [key, node] : reader.contents()) {
         check_feature_name(reader, camera_keys, key.str(), camera);
-        check_exposure_feature(reader, key.str(), node, camera);
         std::ostringstream text;
         if (const auto* string = node.as_string())
             text << string->get();
@@ -67,6 +88,7 @@ void read_features(TableReader& reader, const TableReader& camera_keys,
                                     clipped(key.str())));
         camera.features.emplace_back(key.str(), text.str());
     }
+    camera.features_entry = reader.entry();
 }
 
 void read_tables_below(TableReader& reader, CameraConfiguration& camera) {
@@ -164,14 +186,14 @@ void read_parts(TomlFile& file, TableReader& top, const char* name, std::vector<
 }  // namespace
 
 Expected<Configuration, TomlProblems> load_configuration(const std::string& path) {
-    const auto root = parse_toml(path);
-    if (!root) return Unexpected(TomlProblems{root.error()});
+    auto root = parse_service_file(path);
+    if (!root) return Unexpected(std::move(root.error()));
     return read_configuration(*root, path);
 }
 
 Expected<Configuration, TomlProblems> read_configuration(const toml::table& root,
                                                          const std::string& path) {
-    TomlFile file{path, "docs/user/configuration.md"};
+    TomlFile file{path, "man versavis.toml", {}, cure_of_stray};
     Configuration configuration;
     TableReader top(file, root);
     read_keys(top, configuration);

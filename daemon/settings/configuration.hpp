@@ -112,6 +112,7 @@ struct CameraConfiguration {
     bool camera_clock = true;    ///< its time stamps are evidence; false: they are worthless
     bool check_exposure = true;  ///< the camera's exposure time against the measured one
     std::vector<std::pair<std::string, std::string>> features;  ///< set in this order
+    TomlEntry features_entry;
 
     bool operator==(const CameraConfiguration&) const = default;
 };
@@ -208,7 +209,7 @@ struct Configuration {
 };
 
 /// Errors: all that is wrong in the file, as far as it can be known without devices, in the order
-/// of its lines.
+/// of its lines; those of FILE.d follow (engine/toml/service_file.hpp).
 Expected<Configuration, TomlProblems> load_configuration(const std::string& path);
 
 /// The camera of this name, if the board triggers it; else null.

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "configuration_check.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <strings.h>
 #include <sys/un.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cstdlib>
 #include <tuple>
 
 #include "camera_preset.hpp"
+#include "device_name.hpp"
 #include "engine/pairing/pairing.hpp"
 #include "receive_mode.hpp"
 
@@ -35,7 +35,7 @@ class Findings {
         TomlProblem found = entry.problem(key, what, cure);
         found.range = range;
         const auto same_place = [&](const TomlProblem& known) {
-            return known.place.line == found.place.line &&
+            return known.place.path == found.place.path && known.place.line == found.place.line &&
                    known.place.column == found.place.column && known.key == found.key;
         };
         if (std::none_of(problems_.begin(), problems_.end(), same_place))
@@ -60,9 +60,10 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The entry in words, with its line.
-std::string at_line(const TomlEntry& entry) {
-    return fmt::format("{} on line {}", entry.title, entry.place.line);
+/// The entry in words, with its line, and with its file if a message about `seen_from` has another.
+std::string at_line(const TomlEntry& entry, const TomlEntry& seen_from) {
+    const std::string line = fmt::format("{} on line {}", entry.title, entry.place.line);
+    return entry.place.path == seen_from.place.path ? line : line + " of " + entry.place.path;
 }
 
 /// Reports each that agrees with one before it, with the first of them.
@@ -90,9 +91,11 @@ void check_instance(const Configuration& configuration, Findings& findings) {
                      "use at most 31 letters, digits, '_' and '-'");
 }
 
+const std::string unix_link = "unix:";
+
 void check_link(const Configuration& configuration, Findings& findings) {
     const BoardConfiguration& board = configuration.board;
-    const std::string prefix = "unix:";
+    const std::string& prefix = unix_link;
     const bool is_unix = board.link.rfind(prefix, 0) == 0;
     const std::size_t longest = sizeof(sockaddr_un::sun_path) - 1;
     if (board.link != "usb" && (!is_unix || board.link == prefix))
@@ -103,6 +106,24 @@ void check_link(const Configuration& configuration, Findings& findings) {
         findings.add(board.entry, "link",
                      fmt::format("a socket path can have at most {} characters", longest),
                      "use a shorter path");
+}
+
+/// What a shell would expand.
+bool has_shell_marks(const std::string& path) {
+    return path.front() == '~' || path.find('$') != std::string::npos;
+}
+
+void check_paths(const Configuration& configuration, Findings& findings) {
+    const auto check = [&](const TomlEntry& entry, const char* key, const std::string& path) {
+        if (!path.empty() && has_shell_marks(path))
+            findings.add(entry, key, "'~' and '$' have no meaning in a path here",
+                         "write the whole path");
+    };
+    check(configuration.entry, "preset_directory", configuration.preset_directory);
+    check(configuration.entry, "state_directory", configuration.state_directory);
+    const std::string& link = configuration.board.link;
+    if (link.rfind(unix_link, 0) == 0)
+        check(configuration.board.entry, "link", link.substr(unix_link.size()));
 }
 
 void check_pps(const Configuration& configuration, Findings& findings) {
@@ -147,17 +168,9 @@ void check_names(const Configuration& configuration, Findings& findings) {
         [&](const NamedEntry& first, const NamedEntry& second) {
             findings.add(second.entry, "name",
                          fmt::format("the name '{}' is already used by {}", second.name,
-                                     at_line(first.entry)),
+                                     at_line(first.entry, second.entry)),
                          "choose another name");
         });
-}
-
-/// Digits and dots in three groups or more are meant as an IP address.
-bool is_broken_address(const std::string& device) {
-    const bool numeric = device.find_first_not_of("0123456789.") == std::string::npos;
-    in_addr address{};
-    return numeric && std::count(device.begin(), device.end(), '.') >= 2 &&
-           ::inet_pton(AF_INET, device.c_str(), &address) != 1;
 }
 
 void check_devices(const Configuration& configuration, Findings& findings) {
@@ -166,20 +179,19 @@ void check_devices(const Configuration& configuration, Findings& findings) {
             findings.add(
                 camera.entry, "device", "'device' is missing",
                 "set the camera's IP address, serial number or name; versavis discover lists them");
-        if (is_broken_address(camera.device))
+        else if (const auto fault = device_fault(camera.device))
             findings.add(camera.entry, "device",
-                         fmt::format("'{}' is not an IP address", clipped(camera.device)),
-                         "an IP address is four numbers from 0 to 255, such as 192.168.1.20");
+                         fmt::format("'{}' {}", clipped(camera.device), fault->what), fault->cure);
     }
     find_repeated(
         configuration.cameras,
         [](const CameraConfiguration& a, const CameraConfiguration& b) {
-            return !a.device.empty() && ::strcasecmp(a.device.c_str(), b.device.c_str()) == 0;
+            return !a.device.empty() && same_device(a.device, b.device);
         },
         [&](const CameraConfiguration& first, const CameraConfiguration& second) {
             findings.add(second.entry, "device",
                          fmt::format("the device '{}' is already used by {}",
-                                     clipped(second.device), at_line(first.entry)),
+                                     clipped(second.device), at_line(first.entry, second.entry)),
                          "set another device, or remove one of the two tables");
         });
 }
@@ -212,11 +224,11 @@ void check_outputs(const Configuration& configuration, Findings& findings) {
             return triggered(a) && triggered(b) && a.output == b.output;
         },
         [&](const CameraConfiguration& first, const CameraConfiguration& second) {
-            findings.add(
-                second.entry, "output",
-                fmt::format("output {} is already used by {}", second.output, at_line(first.entry)),
-                free.empty() ? "the board triggers at most four cameras: remove one"
-                             : fmt::format("free outputs: {}", fmt::join(free, ", ")));
+            findings.add(second.entry, "output",
+                         fmt::format("output {} is already used by {}", second.output,
+                                     at_line(first.entry, second.entry)),
+                         free.empty() ? "the board triggers at most four cameras: remove one"
+                                      : fmt::format("free outputs: {}", fmt::join(free, ", ")));
         });
 }
 
@@ -309,14 +321,22 @@ void check_line_delays(const Configuration& configuration, Findings& findings) {
     }
 }
 
-/// What would last too short for the board to see.
+/// Refuses an exposure that the board would take for a disturbance of its line.
+void check_seen(const CameraConfiguration& camera, const TomlEntry& entry, const std::string& key,
+                double us, Findings& findings) {
+    const bool watched = camera.trigger == TriggerSource::board && camera.strobe != Strobe::none;
+    if (!entry.has(key) || !watched || us >= camera.glitch_us) return;
+    findings.add(entry, key,
+                 fmt::format("'{}' is {:.10g} us, but must be at least {:.10g} us ('glitch_us'): "
+                             "the board ignores shorter pulses on the exposure line",
+                             key, us, camera.glitch_us),
+                 "lower 'glitch_us', or expose longer", TomlRange{camera.glitch_us, std::nullopt});
+}
+
 void check_glitch(const Configuration& configuration, Findings& findings) {
     for (const CameraConfiguration& camera : configuration.cameras) {
         const auto seen = [&](const TomlEntry& entry, const char* key, double us) {
-            if (!entry.has(key)) return;
-            if (const auto hidden = hidden_exposure(camera, key, us))
-                findings.add(entry, key, hidden->what, hidden->cure,
-                             TomlRange{camera.glitch_us, std::nullopt});
+            check_seen(camera, entry, key, us, findings);
         };
         seen(camera.entry, "exposure_us", camera.exposure_us);
         seen(camera.entry, "max_exposure_us", camera.max_exposure_us);
@@ -326,6 +346,42 @@ void check_glitch(const Configuration& configuration, Findings& findings) {
         seen(camera.auto_exposure.entry, "min_us", camera.auto_exposure.min_us);
         seen(camera.auto_exposure.entry, "max_us", camera.auto_exposure.max_us);
     }
+}
+
+/// The camera's own exposure, in microseconds; none: the feature is another one.
+std::optional<double> exposure_of(const std::string& feature, const std::string& value) {
+    if (feature != "ExposureTime" && feature != "ExposureTimeAbs") return std::nullopt;
+    char* end = nullptr;
+    const double us = std::strtod(value.c_str(), &end);
+    return end == value.c_str() || *end != '\0' ? std::nullopt : std::optional(us);
+}
+
+/// Refuses one that the camera cannot end before its next trigger, or that the board gives up.
+void check_exposure_feature(const CameraConfiguration& camera, const std::string& feature,
+                            double us, Findings& findings) {
+    const auto limit = [&](double most, const char* reason, const char* cure) {
+        if (us > most)
+            findings.add(camera.features_entry, feature,
+                         fmt::format("'{}' is {:.10g} us, but must be at most {:.10g} us ({})",
+                                     feature, us, most, reason),
+                         cure, TomlRange{std::nullopt, most});
+    };
+    const double period = 1e6 / camera.rate_hz;
+    const char* slower = "lower it, or 'rate_hz'";
+    if (camera.trigger == TriggerSource::free_run) return limit(period, "the period", slower);
+    limit(period - camera.latency_us - camera.gap_us, "the period less 'latency_us' and 'gap_us'",
+          slower);
+    limit(camera.max_exposure_us, "'max_exposure_us'", "lower it, or raise 'max_exposure_us'");
+}
+
+void check_exposure_features(const Configuration& configuration, Findings& findings) {
+    for (const CameraConfiguration& camera : configuration.cameras)
+        for (const auto& [feature, value] : camera.features)
+            if (const auto us = exposure_of(feature, value)) {
+                check_seen(camera, camera.features_entry, feature, *us, findings);
+                if (!camera.exposure_by_pulse)
+                    check_exposure_feature(camera, feature, *us, findings);
+            }
 }
 
 void check_auto_exposure(const Configuration& configuration, Findings& findings) {
@@ -438,7 +494,8 @@ void check_imus(const Configuration& configuration, Findings& findings) {
             findings.add(
                 second.entry, "model",
                 fmt::format("the board has one IMU port on {}, already used by {}",
-                            second.port() == 0 ? "SPI or I2C" : "the UART", at_line(first.entry)),
+                            second.port() == 0 ? "SPI or I2C" : "the UART",
+                            at_line(first.entry, second.entry)),
                 "remove one of the two tables; a vn100 is on the UART, all others are on SPI or "
                 "I2C");
         });
@@ -517,7 +574,8 @@ void check_test_rate(const Configuration& configuration, Findings& findings) {
     if (const CameraConfiguration* camera = find_camera_at(configuration, output))
         findings.add(
             ports.entry, "test_output",
-            fmt::format("output {} is already used by {}", output, at_line(camera->entry)),
+            fmt::format("output {} is already used by {}", output,
+                        at_line(camera->entry, ports.entry)),
             fmt::format("free outputs: {}", fmt::join(free_test_outputs(configuration), ", ")));
 }
 
@@ -546,24 +604,19 @@ void check_pulse_outputs(const Configuration& configuration, Findings& findings)
 }
 
 constexpr void (*rules[])(const Configuration&, Findings&){
-    check_instance,    check_link,          check_pps,           check_names,
-    check_devices,     check_outputs,       check_masters,       check_camera_times,
-    check_line_delays, check_glitch,        check_auto_exposure, check_presets,
-    check_imus,        check_illumination,  check_inputs,        check_uart_and_imu_output,
-    check_test_rate,   check_pulse_outputs, check_history,       check_receive};
+    check_instance,    check_link,
+    check_pps,         check_names,
+    check_devices,     check_outputs,
+    check_masters,     check_camera_times,
+    check_line_delays, check_exposure_features,
+    check_glitch,      check_auto_exposure,
+    check_paths,       check_presets,
+    check_imus,        check_illumination,
+    check_inputs,      check_uart_and_imu_output,
+    check_test_rate,   check_pulse_outputs,
+    check_history,     check_receive};
 
 }  // namespace
-
-std::optional<HiddenExposure> hidden_exposure(const CameraConfiguration& camera,
-                                              std::string_view key, double us) {
-    const bool watched = camera.trigger == TriggerSource::board && camera.strobe != Strobe::none;
-    if (!watched || us >= camera.glitch_us) return std::nullopt;
-    return HiddenExposure{
-        fmt::format("'{}' is {:.10g} us, but must be at least {:.10g} us ('glitch_us'): the board "
-                    "ignores shorter pulses on the exposure line",
-                    key, us, camera.glitch_us),
-        "lower 'glitch_us', or expose longer"};
-}
 
 double longest_arrival_ms(const CameraConfiguration& camera) {
     const double kept =
@@ -575,7 +628,8 @@ void add_problems(const Configuration& configuration, TomlProblems& problems) {
     Findings findings(problems);
     for (const auto rule : rules) rule(configuration, findings);
     std::stable_sort(problems.begin(), problems.end(), [](const auto& a, const auto& b) {
-        return std::tie(a.place.line, a.place.column) < std::tie(b.place.line, b.place.column);
+        return std::tie(a.place.path, a.place.line, a.place.column) <
+               std::tie(b.place.path, b.place.line, b.place.column);
     });
 }
 

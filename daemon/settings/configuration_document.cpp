@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "configuration_file.hpp"
+#include "engine/toml/service_file.hpp"
 #include "engine/toml/table_reader.hpp"
 #include "keys.hpp"
 
@@ -149,8 +150,8 @@ std::vector<KeyChange> changes(const toml::table& before, const toml::table& aft
 }
 
 Expected<ConfigurationDocument, TomlProblems> ConfigurationDocument::load(const std::string& path) {
-    auto root = parse_toml(path);
-    if (!root) return Unexpected(TomlProblems{root.error()});
+    auto root = parse_service_file(path);
+    if (!root) return Unexpected(std::move(root.error()));
     auto configuration = read_configuration(*root, path);
     if (!configuration) return Unexpected(std::move(configuration.error()));
     return ConfigurationDocument{std::move(*root), std::move(*configuration)};

@@ -151,10 +151,10 @@ Value<Part> numbers(std::vector<double> Part::*member, std::size_t count, const 
 }
 
 template <class Part, class Choice>
-Value<Part> choice(Choice Part::*member,
-                   const std::vector<std::pair<std::string, Choice>>& choices) {
+Value<Part> choice(Choice Part::*member, const std::vector<std::pair<std::string, Choice>>& choices,
+                   const char* difference = "") {
     const auto read = [=](TableReader& reader, const char* key, Part& part) {
-        reader.choose<Choice>(key, part.*member, choices);
+        reader.choose<Choice>(key, part.*member, choices, difference);
     };
     std::vector<std::string> names;
     std::string usual;
@@ -429,7 +429,8 @@ const Keys<ImuConfiguration>& keys<ImuConfiguration>() {
     static const Keys<Imu> all{
         {"name", plain(&Imu::name, "a name, unique"), "name of its stream"},
         {"model",
-         choice(&Imu::model, models)
+         choice(&Imu::model, models,
+                "The part's label says ADIS16448BMLZ or ADIS16448AMLZ; only the B sends a checksum")
              .within("adis164.., icm42688p, bmi088, vn100")
              .on_board(Field::imu_kind),
          "the part"},

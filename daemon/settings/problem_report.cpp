@@ -7,10 +7,10 @@ namespace versavis::daemon {
 
 using nlohmann::json;
 
-std::string to_json(const std::string& path, const TomlProblems& problems) {
+std::string to_json(const std::vector<std::string>& files, const TomlProblems& problems) {
     json list = json::array();
     for (const TomlProblem& problem : problems) {
-        json entry{{"what", problem.what}, {"cure", problem.cure}};
+        json entry{{"file", problem.place.path}, {"what", problem.what}, {"cure", problem.cure}};
         if (problem.place.line != 0) {
             entry["line"] = problem.place.line;
             entry["column"] = problem.place.column;
@@ -23,8 +23,8 @@ std::string to_json(const std::string& path, const TomlProblems& problems) {
         list.push_back(std::move(entry));
     }
     // A name in the file system may hold any bytes.
-    return json{{"file", path}, {"problems", list}}.dump(2, ' ', false,
-                                                         json::error_handler_t::replace);
+    return json{{"file", files.front()}, {"files", files}, {"problems", list}}.dump(
+        2, ' ', false, json::error_handler_t::replace);
 }
 
 }  // namespace versavis::daemon

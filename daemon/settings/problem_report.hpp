@@ -3,13 +3,15 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "engine/toml/problem.hpp"
 
 namespace versavis::daemon {
 
-/// {"file", "problems": [{"line", "column", "table", "key", "unit", "minimum", "maximum", "what",
-/// "cure"}]}; a problem has those of its members that mean something.
-std::string to_json(const std::string& path, const TomlProblems& problems);
+/// {"file", "files", "problems": [{"file", "line", "column", "table", "key", "unit", "minimum",
+/// "maximum", "what", "cure"}]}; a problem has those of its members that mean something. The first
+/// of the files is the one that was named.
+std::string to_json(const std::vector<std::string>& files, const TomlProblems& problems);
 
 }  // namespace versavis::daemon

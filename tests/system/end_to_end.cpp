@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "../support/judged.hpp"
@@ -533,8 +534,14 @@ TEST_CASE("end to end: a bad configuration ends with 78 and its place, a good on
               stack.log_path("bad.json"), &output) == 78);
     CHECK(nlohmann::json::parse(output)["problems"][0]["line"] == 15);
     Stack good({"config2", 21, 1, 20, "", "", ""});
-    CHECK(run({program("versavisd"), "--check-config", "--config", good.configuration_path()},
-              good.log_path("ok.log"), &output) == 0);
+    const std::vector<std::string> check{program("versavisd"), "--check-config", "--config",
+                                         good.configuration_path()};
+    CHECK(run(check, good.log_path("ok.log"), &output) == 0);
+    const std::string folder = good.configuration_path() + ".d";
+    std::filesystem::create_directory(folder);
+    std::ofstream(folder + "/10.toml") << "log_level = \"debug\"\n";
+    CHECK(run(check, good.log_path("two.log"), &output) == 0);
+    CHECK_THAT(output, Catch::Contains(": ok\nwith " + folder + "/10.toml\n"));
     CHECK(run({program("versavisd"), "--keys", "--json"}, good.log_path("keys"), &output) == 0);
     CHECK(nlohmann::json::parse(output)[0]["key"] == "instance");
     CHECK(run({program("versavisd"), "--json"}, good.log_path("usage.log"), &output) == 64);

@@ -88,17 +88,17 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
           "2:18: a step needs 'set' and 'to'; give a list of names for each"},
          {"[[trigger]]\nset = ['A']\n", "1:1: 'steps' is missing or empty; give a list of them"},
          {"[[trigger]]\nselect = ['A']\n",
-          "2:10: 'select' needs a selector and its value; see docs/user/cameras.md"},
+          "2:10: 'select' needs a selector and its value; see man versavis.toml"},
          {"stamp_instant = 'dawn'\n",
           "1:17: 'stamp_instant' must be one of start, middle, end, but is 'dawn'; see "
-          "docs/user/cameras.md"},
+          "man versavis.toml"},
          {"[[line]]\nkind = 'direct'\n",
-          "1:1: a [[line]] needs a 'name'; see docs/user/cameras.md"},
+          "1:1: a [[line]] needs a 'name'; see man versavis.toml"},
          {"[[line]]\nname = 'Line1'\nkind = 'opt'\n",
           "3:8: 'kind' must be one of opto, direct, but is 'opt'; did you mean \"opto\"?"}});
     const std::string two_numbers =
         "4:20: 'output_rising_us' must be a list of 2 numbers from 0 to 1000; see "
-        "docs/user/cameras.md";
+        "man versavis.toml";
     test::check_messages(
         [&](const std::string& keys) {
             return error("[[line]]\nname = 'Line1'\nkind = 'opto'\n" + keys);

@@ -272,7 +272,7 @@ TEST_CASE("configuration: features are kept in text, in their own types") {
 }
 
 TEST_CASE("configuration: errors name line, column, key, value, range, unit and cure") {
-    const std::string see_manual = "; see docs/user/configuration.md";
+    const std::string see_manual = "; see man versavis.toml";
     test::check_messages(
         errors_after(cam0_section),
         {{"rate_hzz = 20\n", "4:1: unknown key 'rate_hzz'; did you mean 'rate_hz'?"},
@@ -322,18 +322,38 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
           "5:8: feature 'Gain' must be a string, a number, true or false" + see_manual},
          {"[camera.auto_exposure]\npercentile = 101\nlargest_step = 1\n",
           "5:14: 'percentile' must be a number from 0 to 100, but is 101; see "
-          "docs/user/configuration.md\n"
+          "man versavis.toml\n"
           "6:16: 'largest_step' must be a number from 1.01 to 10, but is 1" +
               see_manual},
          {"[ports]\npps = 'on'\n",
-          "5:1: unknown key 'pps'; remove it; the keys are in docs/user/configuration.md"},
+          "5:1: unknown key 'pps'; it belongs to [clock]: move it there, above the next table"},
+         {"rated_hz_max = 1\n",
+          "4:1: unknown key 'rated_hz_max'; remove it; the keys are in man versavis.toml"},
+         {"Gain = 1\n",
+          "4:1: unknown key 'Gain'; features of the camera go below [camera.features]"},
+         {"[camera.auto_exposure]\nGain = 1\n",
+          "5:1: unknown key 'Gain'; features of the camera go below [camera.features]"},
+         {"[camera.auto_exposure]\nrate_hz = 1\n",
+          "5:1: unknown key 'rate_hz'; it belongs to [[camera]] or [[imu]]: move it there, above "
+          "the "
+          "next table"},
+         {"[clock]\nlog_level = 'debug'\n",
+          "5:1: unknown key 'log_level'; it belongs to the top of the file: move it there, above "
+          "the first table"},
+         {"[camera.features]\ndata_ready = true\n",
+          "5:14: 'data_ready' belongs to [[imu]], it is no feature; move it there, above the next "
+          "table"},
+         {"strobe = 'active'\n",
+          "4:10: 'strobe' must be one of active_high, active_low, none, but is 'active'; did you "
+          "mean \"active_high\" or \"active_low\"?"},
          {"[ports]\ntest_rate_hz = 10001\n",
           "5:16: 'test_rate_hz' must be a number from 0 to 10000 Hz, but is 10001" + see_manual},
          {"[ports]\ntest_rate = 10\n",
           "5:1: unknown key 'test_rate'; did you mean 'test_rate_hz'?"},
          {"[ports]\ntest_output = 'trigger4'\n",
           "5:15: 'test_output' must be one of test, sync, trigger0, trigger1, trigger2, trigger3, "
-          "but is 'trigger4'; did you mean \"trigger0\"?"},
+          "but is 'trigger4'" +
+              see_manual},
          {"[clock]\npps = 'on'\n",
           "5:7: 'pps' must be one of off, host, nmea, but is 'on'" + see_manual},
          {"[clock]\nmax_slew_ppm = 0\n",
@@ -347,7 +367,13 @@ TEST_CASE("configuration: errors name line, column, key, value, range, unit and 
          {"[[board]]\n", "4:1: 'board' must be a table: [board], but is a list" + see_manual}});
     test::check_messages(
         errors_after("[[imu]]\n"),
-        {{"bus = 'usb'\n", "2:7: 'bus' must be one of spi, i2c, but is 'usb'" + see_manual},
+        {{"model = 'adis16448'\n",
+          "2:9: 'model' must be one of adis16448b, adis16448a, adis16445, adis16460, adis16470, "
+          "icm42688p, bmi088, vn100, but is 'adis16448'; did you mean \"adis16448b\" or "
+          "\"adis16448a\"? The part's label says ADIS16448BMLZ or ADIS16448AMLZ; only the B sends "
+          "a "
+          "checksum"},
+         {"bus = 'usb'\n", "2:7: 'bus' must be one of spi, i2c, but is 'usb'" + see_manual},
          {"busses = 'spi'\n", "2:1: unknown key 'busses'; did you mean 'bus'?"},
          {"i2c_adress = 0x69\n", "2:1: unknown key 'i2c_adress'; did you mean 'i2c_address'?"},
          {"i2c_address = '0x68'\n",
@@ -391,7 +417,7 @@ TEST_CASE("configuration: windows line ends and a byte order mark change nothing
         text.insert(at, "\r");
     CHECK(errors_of(text) ==
           "4:11: 'rate_hz' must be a number from 0.1 to 1000 Hz, but is 2000; see "
-          "docs/user/configuration.md");
+          "man versavis.toml");
 }
 
 TEST_CASE("configuration: every key of the manual is known, and its example loads") {

@@ -133,6 +133,19 @@ TEST_CASE("configuration_check: the times of a camera fit its period, its limit 
          {"exposure_us = 1\ntrigger = 'free'\n", accepted},
          {"pulse_us = 3\n", accepted},
          {"[camera.features]\nExposureTime = 5\nGain = 1\n", accepted},
+         // What the camera itself is set to.
+         {"rate_hz = 100\nlatency_us = 50\n[camera.features]\nExposureTime = 9951\n",
+          "8:16: 'ExposureTime' is 9951 us, but must be at most 9950 us (the period less "
+          "'latency_us' and 'gap_us'); lower it, or 'rate_hz'"},
+         {"rate_hz = 100\nlatency_us = 50\n[camera.features]\nExposureTime = 9950\n", accepted},
+         {"max_exposure_us = 20000\n[camera.features]\nExposureTimeAbs = 20001.5\n",
+          "7:19: 'ExposureTimeAbs' is 20001.5 us, but must be at most 20000 us "
+          "('max_exposure_us'); lower it, or raise 'max_exposure_us'"},
+         {"trigger = 'free'\n[camera.features]\nExposureTime = 50001\n",
+          "7:16: 'ExposureTime' is 50001 us, but must be at most 50000 us (the period); lower it, "
+          "or 'rate_hz'"},
+         {"exposure = 'pulse'\n[camera.features]\nExposureTime = 60000\n", accepted},
+         {"[camera.features]\nExposureTime = 'long'\n", accepted},
          // How long a frame can be waited for.
          {"latest_arrival_ms = 49351\n",
           "5:21: 'latest_arrival_ms' is 49351 ms, but must be at most 49350 ms (exposures are "
@@ -171,6 +184,15 @@ TEST_CASE("configuration_check: a preset exists and does what the keys ask for")
           "'preset_directory' in the configuration"}});
 }
 
+TEST_CASE("configuration_check: no shell expands a path") {
+    const std::string whole = "'~' and '$' have no meaning in a path here; write the whole path";
+    check_rows("", {{"state_directory = '~/state'\n", "1:19: " + whole},
+                    {"state_directory = '$HOME/state'\n", "1:19: " + whole},
+                    {"preset_directory = '~versavis'\n" + cam0, "1:20: " + whole},
+                    {"[board]\nlink = 'unix:~/socket'\n", "2:8: " + whole},
+                    {"state_directory = '/var/a~b'\n", accepted}});
+}
+
 TEST_CASE("configuration_check: limits of auto exposure agree with each other") {
     check_rows(
         camera_section("a", 0),
@@ -195,6 +217,10 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
         {{"[[camera]]\nname = 'cam1'\ndevice = 'OF cam0'\noutput = 1\n",
           "7:10: the device 'OF cam0' is already used by [[camera]] \"cam0\" on line 1; set "
           "another device, or remove one of the two tables"},
+         {"[[camera]]\nname = 'm'\ndevice = '00-11-22-33-44-5A'\noutput = 1\n"
+          "[[camera]]\nname = 'n'\ndevice = '0011.2233.445a'\noutput = 2\n",
+          "11:10: the device '0011.2233.445a' is already used by [[camera]] \"m\" on line 5; set "
+          "another device, or remove one of the two tables"},
          {camera_section("cam1", 0),
           "8:10: output 0 is already used by [[camera]] \"cam0\" on line 1; free outputs: 1, 2, 3"},
          {camera_section("cam1", 0, "trigger = 'free'\n"), accepted},
@@ -212,7 +238,7 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
          // What is wrong already is not reported again in other words.
          {camera_section("cam1", 4),
           "8:10: 'output' must be a whole number from 0 to 3, but is 4; see "
-          "docs/user/configuration.md"}});
+          "man versavis.toml"}});
     check_rows(
         "",
         {{camera_section("clock", 0),
@@ -231,9 +257,10 @@ TEST_CASE("configuration_check: names, devices and outputs are valid and not use
           "1:12: 'a/b' is not a valid name; use at most 31 letters, digits, '_' and '-'"},
          {"camera = 1\n",
           "1:10: 'camera' must be an array of tables: [[camera]], but is 1; see "
-          "docs/user/configuration.md"}});
+          "man versavis.toml"}});
     const std::string no_address =
-        " is not an IP address; an IP address is four numbers from 0 to 255, such as 192.168.1.20";
+        " is not an IP address; an IP address is four numbers from 0 to 255 without leading zeros, "
+        "such as 192.168.1.20";
     check_rows("[[camera]]\nname = 'a'\n",
                {{"",
                  "1:1: 'device' is missing; set the camera's IP address, serial number or name; "

@@ -7,6 +7,7 @@
 #include <sys/un.h>
 
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -226,6 +227,28 @@ TEST_CASE("control: the file is read again, whole or not at all") {
                Catch::Contains("versavis.toml:6:1") && Catch::Contains("rate_hz"));
     CHECK(bench.service.configuration.cameras[0].max_temperature_c == 50);
     CHECK(bench.service.progress.asked == 1);
+}
+
+TEST_CASE("control: the folder of the file is read again, too, and a request goes before it") {
+    ControlBench bench;
+    ControlClientEnd client(bench.path);
+    std::filesystem::create_directory(bench.file + ".d");
+    const auto reloaded = [&](const std::string& text) {
+        std::ofstream(bench.file + ".d/10.toml") << "[[camera]]\nname = \"cam0\"\n" << text;
+        client.call(own + "Reload");
+        return bench.answer(client);
+    };
+    CHECK(reloaded("max_temperature_c = 50\n")["parameters"]["changed"] ==
+          json{"camera.cam0.max_temperature_c"});
+    CHECK(bench.service.configuration.cameras[0].max_temperature_c == 50);
+    client.call(own + "SetCamera", {{"camera", "cam0"}, {"values", {{"max_temperature_c", 60}}}});
+    bench.step();
+    CHECK(bench.service.configuration.cameras[0].max_temperature_c == 60);
+    bench.service.progress.done = bench.service.progress.asked;
+    CHECK(bench.answer(client)["parameters"]["changed"] == json{"camera.cam0.max_temperature_c"});
+    CHECK_THAT(reloaded("rate = 3\n")["parameters"]["problems"][0].get<std::string>(),
+               Catch::Contains("versavis.toml.d/10.toml:3:1: unknown key 'rate'"));
+    CHECK(bench.service.configuration.cameras[0].max_temperature_c == 60);
 }
 
 TEST_CASE("control: subscribers get the state, and each change of it once") {

@@ -101,17 +101,31 @@ TEST_CASE("status_metrics: without a service there is only versavis_up") {
           "status.\nversavis_up{service=\"a\\\"b\\\\\"} 0\n# EOF\n");
 }
 
-TEST_CASE("status_metrics: alerts name only metrics that exist, and the manual names all") {
+TEST_CASE(
+    "status_metrics: alerts and dashboard name only metrics that exist, the manual names all") {
     const std::vector<std::string> names = metric_names();
-    const std::string alerts = read_source("systemd/versavis-alerts.yml");
-    const std::regex name("versavis_[a-z_]+");
-    int used = 0;
-    for (std::sregex_iterator at(alerts.begin(), alerts.end(), name), end; at != end;
-         ++at, ++used) {
-        INFO(at->str());
-        CHECK(std::count(names.begin(), names.end(), at->str()) == 1);
+    for (const char* file : {"systemd/versavis-alerts.yml", "systemd/versavis-dashboard.json"}) {
+        const std::string text = read_source(file);
+        const std::regex name("versavis_[a-z_]+");
+        int used = 0;
+        for (std::sregex_iterator at(text.begin(), text.end(), name), end; at != end;
+             ++at, ++used) {
+            INFO(file << ": " << at->str());
+            CHECK(std::count(names.begin(), names.end(), at->str()) == 1);
+        }
+        CHECK(used > 5);
     }
-    CHECK(used > 5);
+    // No two panels of the dashboard lie on each other.
+    std::set<std::pair<int, int>> taken;
+    const auto dashboard = nlohmann::json::parse(read_source("systemd/versavis-dashboard.json"));
+    for (const auto& panel : dashboard["panels"]) {
+        const auto& at = panel["gridPos"];
+        for (int x = at["x"]; x < at["x"].get<int>() + at["w"].get<int>(); ++x)
+            for (int y = at["y"]; y < at["y"].get<int>() + at["h"].get<int>(); ++y) {
+                INFO(panel["title"]);
+                CHECK((x < 24 && taken.emplace(x, y).second));
+            }
+    }
     const std::string manual = read_source("docs/user/monitoring.md");
     for (const std::string& metric : names) CHECK_THAT(manual, Contains("`" + metric + "`"));
 }

@@ -36,7 +36,8 @@ TEST_CASE("status_view: keys of the clock that are not known yet are shown by th
 
 namespace {
 
-/// Two cameras and an IMU, all of which have been through trouble, and have a hint as long as any.
+/// Four cameras and an IMU, all of which have been through trouble, and have the same hint, as long
+/// as any.
 json troubled() {
     json status = json::parse(R"({"instance": "default", "health": "degraded",
         "started_ns": 0, "host_time_ns": 432000000000000,
@@ -55,15 +56,16 @@ json troubled() {
         "triggers_without_frame": 4711, "slips": 89, "line": "Line2", "line_delay_start_ns": 36000,
         "line_delay_end_ns": 18000, "line_delay_sigma_ns": 7000, "line_delay_source": "preset",
         "edge_difference_ns": -18100})");
-    for (const char* name : {"cam0", "cam1"}) {
+    for (const char* name : {"cam0", "cam1", "cam2", "cam3"}) {
         status["cameras"].push_back(camera);
         status["cameras"].back()["name"] = name;
     }
     const std::string longest =
         "takes every 2nd trigger: exposure (3 ms) and readout need more than 50 ms, and at most "
         "100 ms: lower 'rate_hz' to 10, shorten ExposureTime, or set TriggerOverlap to ReadOut";
-    for (json* device : {&status["board"], &status["clock"], &status["cameras"][0],
-                         &status["cameras"][1], &status["imus"][0]}) {
+    std::vector<json*> devices{&status["board"], &status["clock"], &status["imus"][0]};
+    for (json& each : status["cameras"]) devices.push_back(&each);
+    for (json* device : devices) {
         (*device)["fault"] = "rate_too_high";
         (*device)["hint"] = longest;
     }
@@ -82,7 +84,7 @@ std::vector<std::string> lines(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("status_view: the state of two cameras and an IMU fits a terminal, whatever is wrong") {
+TEST_CASE("status_view: the state of four cameras and an IMU fits a terminal") {
     for (const Detail detail : {Detail::summary, Detail::full})
         for (const std::string& line : lines(status_text(troubled(), detail))) {
             INFO(line);
@@ -107,7 +109,7 @@ TEST_CASE(
     "status_view: a summary has the counters that say something, all else is for the curious") {
     json status = troubled();
     for (const char* key : {"frames_incomplete", "slips"}) status["cameras"][0][key] = 0;
-    status["cameras"].erase(1);
+    status["cameras"] = json::array({status["cameras"][0]});
     const std::string summary = status_text(status, Detail::summary);
     CHECK_THAT(summary, Contains("trigger 4567") && !Contains("incomplete") && !Contains("slips") &&
                             !Contains("Line2") && !Contains("stream  ") && !Contains("it has") &&
@@ -116,4 +118,31 @@ TEST_CASE(
     CHECK_THAT(full, Contains("incomplete 0") && Contains("slips 0") && Contains("Line2: start") &&
                          Contains("stream   cam0-evidence") && Contains("it has camera0") &&
                          Contains("filter delay 3662.0 us"));
+}
+
+TEST_CASE("status_view: one hint of several devices is said once") {
+    const std::string text = status_text(troubled(), Detail::summary);
+    CHECK(text.find("takes every 2nd") == text.rfind("takes every 2nd"));
+    CHECK_THAT(text, Contains("rate_too_high: as board\n"));
+}
+
+TEST_CASE("status_view: colours are those of the states, and change nothing else") {
+    json status = troubled();
+    status["health"] = "ok";
+    status["cameras"][0]["fault"] = status["cameras"][0]["hint"] = "";
+    status["cameras"][1]["fault"] = "starting";
+    status["cameras"][2]["fault"] = "";
+    std::string text = status_text(status, Detail::summary, Colour::ansi);
+    CHECK_THAT(text, Contains("'default': \x1b[32mok\x1b[0m, up"));
+    CHECK_THAT(text, Contains("cam0     \x1b[32mstreaming\x1b[0m ") &&
+                         Contains("cam1     \x1b[33mstreaming\x1b[0m ") &&
+                         Contains("cam2     \x1b[33mstreaming\x1b[0m ") &&
+                         Contains("cam3     \x1b[31mstreaming\x1b[0m "));
+    for (std::size_t at = 0; (at = text.find('\x1b', at)) != std::string::npos;)
+        text.erase(at, text.find('m', at) + 1 - at);
+    CHECK(text == status_text(status, Detail::summary));
+}
+
+TEST_CASE("status_view: a watched state replaces the one before line by line") {
+    CHECK(in_place("a\nbc\n") == "\x1b[Ha\x1b[K\nbc\x1b[K\n\x1b[J");
 }

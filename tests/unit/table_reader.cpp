@@ -72,6 +72,85 @@ TEST_CASE("table_reader: what is not TOML is refused with its place") {
                        Catch::EndsWith("; the file must be TOML in UTF-8: https://toml.io"));
 }
 
+TEST_CASE("table_reader: characters that look like those of TOML are named") {
+    const auto named = [](const std::string& place, const std::string& name,
+                          const std::string& cure) {
+        return "t.toml:" + place + ": there is " + name + " here, which TOML does not know; " +
+               cure;
+    };
+    test::check_messages(
+        parse_error,
+        {{"a = “x”\n", named("1:5", "a curly quote", "type \" instead")},
+         {"b = 1\na = \"x”\n", named("2:7", "a curly quote", "type \" instead")},
+         {"a = ‘x’\n", named("1:5", "a curly quote", "type ' instead")},
+         {"a = –1\n", named("1:5", "a dash", "type - instead")},
+         {"a\u00A0= 1\n", named("1:2", "a no-break space", "type a plain space instead")},
+         {"a = { b = 'é”', c = “x” }\n", named("1:21", "a curly quote", "type \" instead")},
+         {"\u200Ba = 1\n", named("1:1", "an invisible space", "delete it, or type the line again")},
+         {"a = \"“x”\" # – it’s\n", accepted}});
+    // What is in a string or a comment is not why.
+    for (const char* text : {"a = = 1 # it’s\n", "a = \"“x”\" b\n", "a = 'it”s' = # “\n"})
+        CHECK_THAT(parse_error(text), Catch::EndsWith("; the file must be TOML in UTF-8: "
+                                                      "https://toml.io"));
+}
+
+TEST_CASE("table_reader: names that may have been meant are named, and only those") {
+    const auto cure_of = [](const std::string& text) {
+        const toml::table root = toml::parse("kind = \"" + text + "\"\n");
+        TomlFile file{"t.toml", "manual"};
+        TableReader reader(file, root);
+        int kind = 0;
+        reader.choose<int>("kind", kind,
+                           {{"off", 0},
+                            {"none", 1},
+                            {"end", 2},
+                            {"active_low", 3},
+                            {"active_high", 4},
+                            {"part16a", 5},
+                            {"part16b", 6},
+                            {"part17", 7},
+                            {"board", 8},
+                            {"lock", 9},
+                            {"line1", 10},
+                            {"line2", 11},
+                            {"line3", 12},
+                            {"line4", 13}},
+                           "They differ.");
+        return file.problems.front().cure;
+    };
+    const std::string nothing = "see manual";
+    test::check_messages(
+        cure_of, {{"on", nothing},
+                  {"high", "did you mean \"active_high\"?"},
+                  {"begin", nothing},
+                  {"active", "did you mean \"active_low\" or \"active_high\"? They differ."},
+                  {"part16", "did you mean \"part16a\" or \"part16b\"? They differ."},
+                  {"PART-16 B", "did you mean \"part16b\"?"},
+                  {"part18", nothing},
+                  {"baord", "did you mean \"board\"?"},
+                  {"bored", nothing},
+                  {"locked", "did you mean \"lock\"?"},
+                  {"line", nothing},
+                  {"line5", nothing},
+                  {"", nothing},
+                  {std::string(200, 'x'), nothing}});
+}
+
+TEST_CASE("table_reader: a key that is at home elsewhere gets the cure that is known for it") {
+    const toml::table root = toml::parse("[t]\nstray = 1\nhight = 2\nother = 3\n");
+    TomlFile file{"t.toml", "manual", {}, [](std::string_view title, std::string_view key) {
+                      return title == "[t]" && key != "other" ? "not here" : "";
+                  }};
+    TableReader reader(file, *root["t"].as_table(), "[t]");
+    int height = 1;
+    reader.read("height", height, 0, 9);
+    reader.finish();
+    REQUIRE(file.problems.size() == 3);
+    CHECK(file.problems[0].message() == "t.toml:3:1: unknown key 'hight'; did you mean 'height'?");
+    CHECK(file.problems[1].cure == "remove it; the keys are in manual");
+    CHECK(file.problems[2].message() == "t.toml:2:1: unknown key 'stray'; not here");
+}
+
 TEST_CASE("table_reader: problems are collected with place, table and key") {
     const toml::table root = toml::parse("[t]\nwidth_us = 3\nhight = 1\nkind = \"rond\"\n");
     TomlFile file{"t.toml", "manual"};

@@ -205,7 +205,7 @@ TEST_CASE("board: a self-test of a board without wires does not pass") {
     BoardBench bench;
     const LoopedBoard board(bench.testbed.get(), "LOOP0001", {});
     CHECK(bench.board({"selftest"}) == 1);
-    CHECK_THAT(bench.said, Contains("nothing was tested") && Contains("docs/user/board.md"));
+    CHECK_THAT(bench.said, Contains("nothing was tested") && Contains("man versavis-board"));
 }
 
 TEST_CASE("board: the bring-up sends in each step what its row in the manual says") {

@@ -295,7 +295,7 @@ std::string to_text(const SelfTest& test, bool json) {
     out += lines_text(test);
     const bool wired = std::any_of(test.lines.begin(), test.lines.end(),
                                    [](const TestedLine& line) { return !line.input.empty(); });
-    if (!wired) out += "nothing was tested: wire outputs to inputs (docs/user/board.md)\n";
+    if (!wired) out += "nothing was tested: wire outputs to inputs (man versavis-board)\n";
     return out;
 }
 

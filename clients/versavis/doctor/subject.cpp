@@ -7,7 +7,7 @@
 
 #include <memory>
 
-#include "engine/toml/table_reader.hpp"
+#include "engine/toml/service_file.hpp"
 #include "status/status_document.hpp"
 
 namespace versavis::client {
@@ -60,8 +60,8 @@ std::string interface_towards(const std::string& ipv4) {
 }
 
 Expected<ConfiguredParts> read_configured_parts(const std::string& path) {
-    const auto table = parse_toml(path);
-    if (!table) return Unexpected<>(table.error());
+    const auto table = parse_service_file(path);
+    if (!table) return Unexpected<>(table.error().front());
     ConfiguredParts parts;
     parts.path = path;
     parts.board_link = (*table)["board"]["link"].value_or(parts.board_link);

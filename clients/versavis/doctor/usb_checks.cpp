@@ -160,7 +160,7 @@ Findings check_rule(const HostFiles& files) {
     Finding finding{"udev_rule", "", "not installed", Verdict::bad};
     finding.reason =
         fmt::format("no folder of udev has {}: the service may not open the board", rule_file);
-    finding.cure = "install the package, or see docs/user/install.md";
+    finding.cure = "install VersaVIS again: package or cmake --install";
     return {finding};
 }
 

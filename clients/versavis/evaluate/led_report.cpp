@@ -373,7 +373,7 @@ Error nothing_read(const LedReport& report) {
                             most_led_steps * 1e6 / report.rate_hz)};
     if (hidden >= ambiguous)
         return {"", counts, "give the positions of the outermost LEDs: --board CAMERA=X1,Y1,X2,Y2"};
-    return {"", counts, "see docs/user/evaluate.md for the board that is expected"};
+    return {"", counts, "see man versavis-evaluate for the board that is expected"};
 }
 
 }  // namespace

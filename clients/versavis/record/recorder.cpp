@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "base/task_queue.hpp"
+#include "engine/toml/service_file.hpp"
 #include "record/item_writer.hpp"
 #include "record/png_encoder.hpp"
 #include "record/write_back.hpp"
@@ -320,10 +321,9 @@ void Recorder::keep_configuration(const nlohmann::json& status) {
     const std::string name = "configuration.toml";
     const bool known = std::any_of(attachments_.begin(), attachments_.end(),
                                    [&](const Content& one) { return one.name == name; });
-    std::ifstream file(text_at(status, "/configuration"), std::ios::binary);
-    if (known || !file) return;
-    attachments_.push_back(
-        {name, "application/toml", std::string(std::istreambuf_iterator<char>(file), {})});
+    if (known) return;
+    if (auto text = service_text(text_at(status, "/configuration")))
+        attachments_.push_back({name, "application/toml", std::move(*text)});
 }
 
 /// A name that is taken must not end the recording when its turn comes.

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <initializer_list>
+#include <map>
 #include <string_view>
 
 #include "base/wrapped_line.hpp"
@@ -25,15 +26,29 @@ std::uint64_t count(const json& object, const char* key) {
 /// What follows the names of devices, and continues them.
 constexpr std::size_t indent = 9;
 
+constexpr auto green = "\x1b[32m";
+constexpr auto yellow = "\x1b[33m";
+constexpr auto red = "\x1b[31m";
+constexpr auto plain = "\x1b[0m";
+
 std::string wrapped(std::string line) { return client::wrapped(std::move(line), indent); }
 
-/// In a line of its own, after its word.
-std::string hint(const json& part) {
-    const std::string fault = text(part, "fault");
-    if (text(part, "hint").empty()) return "";
-    return wrapped(fmt::format("{:{}}{}{}{}", "", indent, fault, fault.empty() ? "" : ": ",
-                               text(part, "hint")));
-}
+/// Hints in lines of their own, after their word; what was said of another part already is not said
+/// again.
+class Hints {
+ public:
+    std::string of(const json& part, const std::string& name) {
+        const std::string fault = text(part, "fault");
+        const std::string hint = text(part, "hint");
+        if (hint.empty()) return "";
+        const auto [said, is_new] = said_of_.emplace(hint, name);
+        return wrapped(fmt::format("{:{}}{}{}{}", "", indent, fault, fault.empty() ? "" : ": ",
+                                   is_new ? hint : "as " + said->second));
+    }
+
+ private:
+    std::map<std::string, std::string> said_of_;
+};
 
 /// What the board has, where it says so.
 std::string parts_line(const json& board) {
@@ -61,14 +76,15 @@ std::string listed(std::initializer_list<Counter> counters, Detail detail) {
     return out;
 }
 
-std::string board_lines(const json& board, Detail detail) {
+std::string board_lines(const json& board, Detail detail, Hints& hints) {
     const std::string line = fmt::format("board    {:<10} {} {}", text(board, "state"),
                                          text(board, "serial"), text(board, "firmware")) +
                              listed({{"lost packets", count(board, "lost_packets")},
                                      {"late outputs", count(board, "late_outputs")},
                                      {"IMU errors", count(board, "imu_errors")}},
                                     detail);
-    return wrapped(line) + hint(board) + (detail == Detail::full ? parts_line(board) : "");
+    return wrapped(line) + hints.of(board, "board") +
+           (detail == Detail::full ? parts_line(board) : "");
 }
 
 /// Of a time in ns, without the unit; what is not known is null, and no zero.
@@ -91,10 +107,10 @@ std::string clock_figures(const json& clock, Detail detail) {
     return figures;
 }
 
-std::string clock_lines(const json& clock, Detail detail) {
+std::string clock_lines(const json& clock, Detail detail, Hints& hints) {
     return wrapped(fmt::format("clock    {:<10} {}  {}", text(clock, "state"),
                                text(clock, "output"), clock_figures(clock, detail))) +
-           hint(clock);
+           hints.of(clock, "clock");
 }
 
 /// Name, state and model of a device, and how much of its rate it delivers.
@@ -104,14 +120,15 @@ std::string delivery(const json& device) {
                        device.value("delivered_hz", 0.0), device.value("configured_hz", 0.0));
 }
 
-std::string imu_lines(const json& imu, Detail detail) {
+std::string imu_lines(const json& imu, Detail detail, Hints& hints) {
     std::string line = delivery(imu);
     if (detail == Detail::full) line += fmt::format(", published {}", count(imu, "published"));
     line += listed({{"lost", count(imu, "lost")}, {"faulty", count(imu, "faulty")}}, detail);
     const std::string filter =
         wrapped(fmt::format("{:{}}filter delay {} us ({})", "", indent,
                             in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source")));
-    return wrapped(line) + hint(imu) + (detail == Detail::full ? filter : "");
+    return wrapped(line) + hints.of(imu, text(imu, "name")) +
+           (detail == Detail::full ? filter : "");
 }
 
 /// What is taken off the middle of its exposures, before it is known: nothing.
@@ -124,7 +141,7 @@ std::string delay_line(const json& camera) {
         text(camera, "line_delay_source"), in_us(camera, "edge_difference_ns")));
 }
 
-std::string camera_lines(const json& camera, Detail detail) {
+std::string camera_lines(const json& camera, Detail detail, Hints& hints) {
     std::string line = delivery(camera) + ", pairing " + text(camera, "pairing");
     if (detail == Detail::full)
         line += fmt::format(", published {}", count(camera, "frames_published"));
@@ -133,7 +150,22 @@ std::string camera_lines(const json& camera, Detail detail) {
                     {"triggers without frame", count(camera, "triggers_without_frame")},
                     {"slips", count(camera, "slips")}},
                    detail);
-    return wrapped(line) + hint(camera) + (detail == Detail::full ? delay_line(camera) : "");
+    return wrapped(line) + hints.of(camera, text(camera, "name")) +
+           (detail == Detail::full ? delay_line(camera) : "");
+}
+
+/// Green: it does what it should; red: it has a fault; yellow: it starts, or something is to be
+/// said of it.
+const char* colour_of(const json& part) {
+    const std::string fault = text(part, "fault");
+    if (fault.empty()) return text(part, "hint").empty() ? green : yellow;
+    return fault == "starting" ? yellow : red;
+}
+
+std::string coloured(std::string lines, std::size_t begin, std::size_t size, const char* colour) {
+    const std::size_t end = std::min(begin + size, lines.size());
+    lines.insert(end, plain);
+    return lines.insert(begin, colour);
 }
 
 struct ClockFact {
@@ -243,22 +275,47 @@ std::string clock_text(const json& status) {
     return out;
 }
 
-std::string status_text(const json& status, Detail detail) {
+std::string status_text(const json& status, Detail detail, Colour colour) {
     const double up_s =
         (status.value("host_time_ns", 0.0) - status.value("started_ns", 0.0)) * 1e-9;
-    std::string out = fmt::format("versavisd '{}': {}, up {:.0f} s\n", text(status, "instance"),
-                                  text(status, "health"), up_s);
-    if (status.contains("board")) out += board_lines(status["board"], detail);
-    if (status.contains("clock")) out += clock_lines(status["clock"], detail);
+    const std::string title = fmt::format("versavisd '{}': ", text(status, "instance"));
+    const std::string health = text(status, "health");
+    std::string out = fmt::format("{}{}, up {:.0f} s\n", title, health, up_s);
+    const auto paint = [&](std::string lines, std::size_t begin, std::size_t size,
+                           const char* with) {
+        return colour == Colour::ansi ? coloured(std::move(lines), begin, size, with) : lines;
+    };
+    out = paint(std::move(out), title.size(), health.size(),
+                health == "ok"         ? green
+                : health == "starting" ? yellow
+                                       : red);
+    Hints hints;
+    const auto add = [&](const json& part, std::string lines) {
+        out += paint(std::move(lines), indent, text(part, "state").size(), colour_of(part));
+    };
+    if (const auto board = status.find("board"); board != status.end())
+        add(*board, board_lines(*board, detail, hints));
+    if (const auto clock = status.find("clock"); clock != status.end())
+        add(*clock, clock_lines(*clock, detail, hints));
     for (const json& camera : status.value("cameras", json::array()))
-        out += camera_lines(camera, detail);
-    for (const json& imu : status.value("imus", json::array())) out += imu_lines(imu, detail);
+        add(camera, camera_lines(camera, detail, hints));
+    for (const json& imu : status.value("imus", json::array()))
+        add(imu, imu_lines(imu, detail, hints));
     if (detail == Detail::summary) return out;
     for (const json& stream : status.value("streams", json::array()))
         out +=
             fmt::format("stream   {:<10} {:<7} {:>10} items {:>8.1f} Hz\n", text(stream, "name"),
                         text(stream, "kind"), count(stream, "items"), stream.value("rate_hz", 0.0));
     return out;
+}
+
+std::string in_place(const std::string& text) {
+    std::string out = "\x1b[H";
+    for (const char c : text) {
+        if (c == '\n') out += "\x1b[K";  // the rest of what the line showed before
+        out += c;
+    }
+    return out + "\x1b[J";
 }
 
 }  // namespace versavis::client

@@ -12,7 +12,12 @@ enum class Detail {
     full,
 };
 
-std::string status_text(const nlohmann::json& status, Detail detail);
+enum class Colour { none, ansi };
+
+std::string status_text(const nlohmann::json& status, Detail detail, Colour colour = Colour::none);
+
+/// `text` in place of what a terminal shows, without a moment in which it shows nothing.
+std::string in_place(const std::string& text);
 
 /// The clock's part alone, one fact per line; keys that this version does not know are shown as
 /// they are.

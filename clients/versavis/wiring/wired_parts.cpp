@@ -6,15 +6,15 @@
 
 #include <algorithm>
 
-#include "engine/toml/table_reader.hpp"
+#include "engine/toml/service_file.hpp"
 
 namespace versavis::client {
 
 namespace {
 
 constexpr auto manual =
-    "its circuits are in docs/user/wiring.md; by the kind of its lines, choose "
-    "'versavis wiring flir' (direct) or 'versavis wiring flir-opto' (opto)";
+    "see the camera's manual and man versavis-wiring; as its lines are, choose 'versavis wiring "
+    "flir' (direct) or 'versavis wiring flir-opto' (opto)";
 
 /// Where the configuration names no line, the preset's first circuit has it.
 bool agrees(const std::string& wanted, const std::string& line, bool first) {
@@ -42,8 +42,7 @@ void choose_circuit(WiredCamera& camera, const std::string& preset, const std::s
         camera.problem = fmt::format(
             "which camera it is, is not known: connect it, or set its 'preset'; {}", manual);
     else if (others.empty())
-        camera.problem =
-            fmt::format("no circuit of preset '{}' is known: see its manual; {}", preset, manual);
+        camera.problem = fmt::format("no circuit of preset '{}' is known: {}", preset, manual);
     else
         camera.problem = fmt::format(
             "no circuit for these lines is known, only for {}: set 'trigger_line' and "
@@ -106,8 +105,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }  // namespace
 
 Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& preset_of) {
-    const auto file = parse_toml(path);
-    if (!file) return Unexpected<>(file.error());
+    const auto file = parse_service_file(path);
+    if (!file) return Unexpected<>(file.error().front());
     WiredParts parts;
     each_table(*file, "camera", [&](const toml::table& table) {
         if (text(table, "trigger", "board") == "board")

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Reads the keys of TOML tables with types, ranges and choices; problems are collected, and name
-// line, column and the nearest key.
+// line, column and the nearest keys.
 #pragma once
 
 #include <toml++/toml.h>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,9 +18,11 @@ namespace versavis {
 
 /// The file that is being read, and all that is wrong in it.
 struct TomlFile {
-    std::string path;
+    std::string path;    ///< of values that know of no other
     std::string manual;  ///< where the keys are documented
     TomlProblems problems{};
+    /// What to do about a key that the table of this title does not have, if it is known; else "".
+    std::function<std::string(std::string_view title, std::string_view key)> cure_of_stray{};
 
     /// The first of its problems, for who needs no more.
     Expected<> result() const;
@@ -62,13 +65,16 @@ class TableReader {
         if (find(key) != nullptr) read(key, value.emplace(), range...);
     }
 
-    /// One of the names given.
+    /// One of the names given. `difference`: a sentence on names that are easily confused, for who
+    /// may have meant several.
     template <class Enum>
     void choose(std::string_view key, Enum& value,
-                const std::vector<std::pair<std::string, Enum>>& choices) {
+                const std::vector<std::pair<std::string, Enum>>& choices,
+                std::string_view difference = {}) {
         std::vector<std::string> names;
         for (const auto& choice : choices) names.push_back(choice.first);
-        if (const auto chosen = find_choice(key, names)) value = choices[*chosen].second;
+        if (const auto chosen = find_choice(key, names, difference))
+            value = choices[*chosen].second;
     }
 
     /// The table below `key`, if there is one.
@@ -99,7 +105,8 @@ class TableReader {
     void read_integer(std::string_view key, std::int64_t& value, std::int64_t minimum,
                       std::int64_t maximum);
     std::optional<std::size_t> find_choice(std::string_view key,
-                                           const std::vector<std::string>& names);
+                                           const std::vector<std::string>& names,
+                                           std::string_view difference);
 
     TomlFile& file_;
     const toml::table& table_;
