@@ -92,8 +92,7 @@ TEST_CASE("camera_preset: errors of preset files name line and key") {
          {"stamp_instant = 'dawn'\n",
           "1:17: 'stamp_instant' must be one of start, middle, end, but is 'dawn'; see "
           "man versavis.toml"},
-         {"[[line]]\nkind = 'direct'\n",
-          "1:1: a [[line]] needs a 'name'; see man versavis.toml"},
+         {"[[line]]\nkind = 'direct'\n", "1:1: a [[line]] needs a 'name'; see man versavis.toml"},
          {"[[line]]\nname = 'Line1'\nkind = 'opt'\n",
           "3:8: 'kind' must be one of opto, direct, but is 'opt'; did you mean \"opto\"?"}});
     const std::string two_numbers =
