@@ -34,6 +34,7 @@ foreach(pair
         versavis-metrics.service.in:systemd/system/versavis-metrics.service
         versavis-metrics.timer:systemd/system/versavis-metrics.timer
         60-versavis.rules:udev/rules.d/60-versavis.rules
+        versavis.catalog:systemd/catalog/versavis.catalog
         versavis.sysctl:sysctl.d/60-versavis.conf
         versavis.sysusers:sysusers.d/versavis.conf
         versavis.tmpfiles:tmpfiles.d/versavis.conf)

@@ -92,7 +92,7 @@ int serve(Service& service, Control& control, const sigset_t& signals) {
         sd_notify(0, "WATCHDOG=1");
         const Summary& health = service.health();
         if (const auto level = health_log.see(health, host_now()))
-            log(*level, "service", "health: {}", health.text);
+            log_line(*level, "service", "health: " + health.text, to_string(health.fault));
         if (status == health.text) continue;
         status = health.text;
         sd_notifyf(0, "STATUS=%s", status.c_str());

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace versavis::daemon {
@@ -16,8 +17,14 @@ enum class LogLevel { error = 3, warning = 4, info = 6, debug = 7 };
 void set_log_level(LogLevel level);
 
 /// One line about `subject` (a camera's name, "board", "service"), also as journal field
-/// VERSAVIS_SUBJECT. Thread-safe.
-void log_line(LogLevel level, const std::string& subject, const std::string& text);
+/// VERSAVIS_SUBJECT. Of a fault also its word, in VERSAVIS_FAULT, and the id under which the
+/// journal's catalog explains it. Thread-safe.
+void log_line(LogLevel level, const std::string& subject, const std::string& text,
+              const std::string& fault = {});
+
+/// Of the journal's catalog (systemd/versavis.catalog): the same for the same word, in every
+/// release.
+std::string message_id(std::string_view fault);
 
 template <class... Arguments>
 void log(LogLevel level, const std::string& subject, fmt::format_string<Arguments...> format,

@@ -218,7 +218,9 @@ Health health(const Status& status) {
 
 Summary summary(const Status& status) {
     const Health worst = health(status);
-    Summary summary{worst, false, "", to_string(worst)};
+    Summary summary;
+    summary.health = worst;
+    summary.text = to_string(worst);
     for (const CameraStatus& camera : status.cameras)
         summary.cameras.push_back({camera.name, to_string(camera.camera.state),
                                    camera.diagnosis.health, camera.diagnosis.hint});
@@ -228,6 +230,7 @@ Summary summary(const Status& status) {
         if (diagnosis->health != worst) continue;
         if (summary.cause.empty()) {
             summary.cause = fmt::format("{}: {}", name, to_string(diagnosis->fault));
+            summary.fault = diagnosis->fault;
             summary.text += fmt::format(": {}: {}", name, diagnosis->hint);
         } else {
             others += (others.empty() ? "" : ", ") + name;

@@ -82,6 +82,7 @@ struct Summary {
     std::string cause;  ///< the first device in the order of cause, and its fault
     std::string text = to_string(health);  ///< the same with its hint, and who else is as badly off
     std::vector<DeviceSummary> cameras{};
+    Fault fault = Fault::none;  ///< of the cause
 };
 Summary summary(const Status& status);
 

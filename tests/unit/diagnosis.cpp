@@ -4,8 +4,8 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <set>
-#include <sstream>
 
+#include "base/log.hpp"
 #include "health/status.hpp"
 
 using namespace versavis;
@@ -601,15 +601,24 @@ TEST_CASE("diagnosis: of an IMU: nobody answers, another part does, it is silent
     check_fault(bench.imu(), Fault::too_slow, "100.0 of 200 Hz");
 }
 
-TEST_CASE("diagnosis: every fault has a word of its own, and a row in the manual") {
-    std::ifstream file(VERSAVIS_SOURCE_DIR "/docs/user/troubleshooting.md");
+namespace {
+
+std::string text_of(const char* name) {
+    std::ifstream file(std::string(VERSAVIS_SOURCE_DIR "/") + name);
     REQUIRE(file);
-    std::stringstream manual;
-    manual << file.rdbuf();
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+TEST_CASE("diagnosis: every fault has a word, a row in the manual, and an entry in the catalog") {
+    const std::string manual = text_of("docs/user/troubleshooting.md");
+    const std::string catalog = text_of("systemd/versavis.catalog");
     std::set<std::string> words;
     for (int i = 1; i <= static_cast<int>(last_fault); ++i) {
         const std::string word = to_string(static_cast<Fault>(i));
         CHECK(words.insert(word).second);
-        CHECK_THAT(manual.str(), Contains("| `" + word + "` |"));
+        CHECK_THAT(manual, Contains("| `" + word + "` |"));
+        CHECK_THAT(catalog, Contains("-- " + message_id(word) + "\n"));
     }
 }
