@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "discovery/found_devices.hpp"
+#include "discovery/service_program.hpp"
 #include "posix/file.hpp"
 #include "status/status_document.hpp"
 #include "wiring/wiring_drawing.hpp"
@@ -19,8 +20,6 @@ namespace versavis::client {
 namespace {
 
 using nlohmann::json;
-
-constexpr auto installed_configuration = VERSAVIS_SYSCONFDIR "/versavis/versavis.toml";
 
 int fail(const Error& error, int code) {
     fmt::print(stderr, "versavis: {}\n", error.message());
@@ -81,9 +80,12 @@ Expected<WiredParts> WiringCommand::parts(const std::string& instance) const {
     if (configuration_.empty() && are_circuits(names_)) return named_wiring(names_);
     std::optional<json> status;
     if (auto read = read_status(instance)) status = std::move(*read);
-    std::string path = configuration_;
-    if (path.empty() && status) path = status->value("configuration", "");
-    if (path.empty()) path = installed_configuration;
+    const std::string path = configuration_path(configuration_, status);
+    // Of a file with errors no wire is certain; the service says what is wrong with it.
+    const auto checked = run_versavisd({"--check-config", "--config", path});
+    if (!checked) return Unexpected(checked.error());
+    if (checked->exit_code != EX_OK)
+        return failure(path, "has errors, which stand above", "correct them, then ask again");
     Presets presets(status);
     auto all = configured_wiring(
         path, [&](const auto& name, const auto& device) { return presets.of(name, device); });
@@ -126,8 +128,9 @@ int WiringCommand::run(const std::string& instance) const {
             return fail(written.error(), EX_CANTCREAT);
     }
     fmt::print("{}", json_ ? wiring_json(*wired).dump() + "\n" : wiring_text(*wired));
-    const bool all = std::all_of(wired->cameras.begin(), wired->cameras.end(),
-                                 [](const auto& camera) { return camera.circuit != nullptr; });
+    const auto known = [](const auto& part) { return part.circuit != nullptr; };
+    const bool all = std::all_of(wired->cameras.begin(), wired->cameras.end(), known) &&
+                     std::all_of(wired->imus.begin(), wired->imus.end(), known);
     return all ? EX_OK : EXIT_FAILURE;
 }
 

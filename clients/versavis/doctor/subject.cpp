@@ -16,8 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr auto installed_configuration = VERSAVIS_SYSCONFDIR "/versavis/versavis.toml";
-
 std::uint32_t ipv4_of(const sockaddr* address) {
     return reinterpret_cast<const sockaddr_in*>(address)->sin_addr.s_addr;
 }
@@ -90,10 +88,7 @@ Subject examine(const std::string& instance, const std::string& configuration,
         subject.status = std::move(*status);
     else
         subject.silence = status.error();
-    std::string path = configuration;
-    if (path.empty() && subject.status) path = subject.status->value("configuration", "");
-    if (path.empty()) path = installed_configuration;
-    auto parts = read_configured_parts(path);
+    auto parts = read_configured_parts(configuration_path(configuration, subject.status));
     if (parts)
         subject.configuration = std::move(*parts);
     else

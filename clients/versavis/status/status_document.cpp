@@ -34,6 +34,13 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
     return document;
 }
 
+std::string configuration_path(const std::string& named,
+                               const std::optional<nlohmann::json>& status) {
+    if (!named.empty()) return named;
+    const std::string read = status ? status->value("configuration", "") : "";
+    return read.empty() ? VERSAVIS_SYSCONFDIR "/versavis/versavis.toml" : read;
+}
+
 Error explain(const Error& error, const std::string& instance, const std::string& stream) {
     const auto status = read_status(instance);
     if (!status) return error;

@@ -14,6 +14,10 @@ namespace versavis::client {
 /// its heart has not beaten for three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
 
+/// The file that is named, else the one that the service has read, else the installed one.
+std::string configuration_path(const std::string& named,
+                               const std::optional<nlohmann::json>& status);
+
 /// Why `stream` cannot be read: what the service says is wrong with the device of this name, if it
 /// says so, else `error`.
 Error explain(const Error& error, const std::string& instance, const std::string& stream);

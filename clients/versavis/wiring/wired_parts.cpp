@@ -13,8 +13,8 @@ namespace versavis::client {
 namespace {
 
 constexpr auto manual =
-    "see the camera's manual and man versavis-wiring; as its lines are, choose 'versavis wiring "
-    "flir' (direct) or 'versavis wiring flir-opto' (opto)";
+    "see the camera's manual; by the kind of its lines, 'versavis wiring flir' (without isolation) "
+    "or 'versavis wiring flir-opto' (opto-isolated) shows what they need";
 
 /// Where the configuration names no line, the preset's first circuit has it.
 bool agrees(const std::string& wanted, const std::string& line, bool first) {
@@ -39,8 +39,8 @@ void choose_circuit(WiredCamera& camera, const std::string& preset, const std::s
         others.push_back(lines_of(circuit));
     }
     if (preset.empty())
-        camera.problem = fmt::format(
-            "which camera it is, is not known: connect it, or set its 'preset'; {}", manual);
+        camera.problem =
+            fmt::format("its preset is not known: connect the camera, or set 'preset'; {}", manual);
     else if (others.empty())
         camera.problem = fmt::format("no circuit of preset '{}' is known: {}", preset, manual);
     else

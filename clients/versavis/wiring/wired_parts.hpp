@@ -36,7 +36,8 @@ struct WiredParts {
 /// The preset of a camera for which the configuration names none; empty: not known.
 using PresetOf = std::function<std::string(const std::string& name, const std::string& device)>;
 
-/// Those that the configuration file triggers by the board. Error: it cannot be read.
+/// Those that the configuration file, which has no errors, triggers by the board. Error: it cannot
+/// be read.
 Expected<WiredParts> configured_wiring(const std::string& path, const PresetOf& preset_of);
 
 /// Circuits by their own names, at the board's first output. Error: there is no such circuit.

@@ -14,7 +14,7 @@ using nlohmann::json;
 
 constexpr auto rules =
     "A pin of the board takes 0 to 3.3 V, and more destroys it. Each buffer needs 100 nF at its\n"
-    "supply; inputs of unused gates belong to ground. With power on, never plug or unplug.\n"
+    "supply. Tie the inputs of unused gates to ground. Never plug or unplug with the power on.\n"
     "When all is wired: versavis camera check\n";
 
 std::string row(const char* title, const std::string& text) {
