@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes the circuit as sheets of KiCad 6. Parts stand in framed groups; nets are joined by name."""
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from model import Board, Component, Part, Pin, stamp
+from sexpr import q, write
+
+Sexpr = list[Any]
+GRID = 2.54
+TITLES = {"imu_chip": "Optional IMU on the board", "uart": "IMU on the UART", "imu": "IMU on SPI "
+          "or I2C", "gnss": "PPS and NMEA in", "aux": "Auxiliary pulses", "sync": "Sync and test",
+          "pico": "Raspberry Pi Pico", "power": "7 to 24 V, USB, 1.8 V, clamp",
+          "camera_supply": "Fuses", "light": "Light, limited in time", "mechanics": "Holes"}
+SMALL = {"resistor", "capacitor", "diode", "zener", "led", "fuse", "inductor", "tvs"}
+
+
+@dataclasses.dataclass(frozen=True)
+class PinSpot:
+    """Where a wire meets the symbol; y grows upwards, as in KiCad's libraries."""
+    pin: Pin
+    x: float
+    y: float
+    side: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Symbol:
+    name: str
+    spots: tuple[PinSpot, ...]
+    width: float
+    height: float
+
+
+def ground(pin: Pin) -> bool:
+    return pin.name.startswith(("GND", "AGND", "RTN", "EP", "MP"))
+
+
+def sides(component: Component) -> tuple[list[Pin], list[Pin]]:
+    pins = [pin for pin in component.pins]
+    if component.name == "Raspberry Pi Pico":
+        return pins[:20], list(reversed(pins[20:]))
+    if component.family in ("connector", "jumper", "test_point"):
+        return [], pins
+    left = [p for p in pins if p.kind in ("power_in", "input") and not ground(p)]
+    if component.family == "t45":
+        left = [p for p in pins if p.name.startswith(("VCCA", "A", "DIR"))]
+    rest = [p for p in pins if p not in left and not ground(p)]
+    left += [p for p in pins if ground(p)]
+    return left, rest
+
+
+def symbol_of(component: Component) -> Symbol:
+    if component.symbol in SMALL:
+        return Symbol(component.name, tuple(PinSpot(pin, x, 0.0, side) for pin, x, side in zip(
+            component.pins, (-5.08, 5.08), ("left", "right"))), 10.16, 5.08)
+    left, right = sides(component)
+    rows = max(len(left), len(right), 1)
+    names = [max((len(p.name) for p in side), default=0) for side in (left, right)]
+    width = max(GRID * round((sum(names) * 1.1 + 6) / GRID), 4 * GRID)
+    if not left:
+        width = 3 * GRID
+    width = 2 * GRID * round(width / (2 * GRID))
+    top = GRID * (rows - 1) / 2
+    top = GRID * round(top / GRID)
+    spots = [PinSpot(pin, -width / 2 - GRID, top - GRID * i, "left") for i, pin in enumerate(left)]
+    spots += [PinSpot(pin, width / 2 + GRID, top - GRID * i, "right")
+              for i, pin in enumerate(right)]
+    return Symbol(component.name, tuple(spots), width, GRID * rows)
+
+
+def font(size: float = 1.27) -> Sexpr:
+    return ["effects", ["font", ["size", size, size]]]
+
+
+def hidden(size: float = 1.27) -> Sexpr:
+    return [*font(size), "hide"]
+
+
+def stroke(width: float = 0.254) -> Sexpr:
+    return ["stroke", ["width", width], ["type", "default"], ["color", 0, 0, 0, 0]]
+
+
+def polyline(points: list[tuple[float, float]], fill: str = "none") -> Sexpr:
+    return ["polyline", ["pts", *(["xy", x, y] for x, y in points)], stroke(),
+            ["fill", ["type", fill]]]
+
+
+def box(x: float, y: float, fill: str = "background") -> Sexpr:
+    return ["rectangle", ["start", -x, y], ["end", x, -y], stroke(), ["fill", ["type", fill]]]
+
+
+DIODE = [polyline([(-1.27, 1.27), (-1.27, -1.27)]),
+         polyline([(1.27, 1.27), (1.27, -1.27), (-1.27, 0), (1.27, 1.27)]),
+         polyline([(-2.54, 0), (2.54, 0)])]
+DRAWN: dict[str, list[Sexpr]] = {
+    "resistor": [box(2.54, 1.016, "none")], "fuse": [box(2.54, 0.762, "none"),
+                                                     polyline([(-2.54, 0), (2.54, 0)])],
+    "capacitor": [polyline([(-0.508, 2.032), (-0.508, -2.032)]),
+                  polyline([(0.508, 2.032), (0.508, -2.032)]),
+                  polyline([(-2.54, 0), (-0.508, 0)]), polyline([(0.508, 0), (2.54, 0)])],
+    "inductor": [["arc", ["start", x, 0.0], ["mid", x + 0.635, 0.635], ["end", x + 1.27, 0.0],
+                  stroke(), ["fill", ["type", "none"]]] for x in (-2.54, -1.27, 0.0, 1.27)],
+    "diode": DIODE, "zener": [*DIODE, polyline([(-1.27, 1.27), (-0.762, 1.27)])],
+    "led": [*DIODE, polyline([(-0.5, 1.8), (0.8, 3.0), (0.2, 3.0)])],
+    "tvs": [polyline([(0, 1.27), (0, -1.27)]),
+            polyline([(-2.54, 1.27), (0, 0), (-2.54, -1.27), (-2.54, 1.27)]),
+            polyline([(2.54, 1.27), (0, 0), (2.54, -1.27), (2.54, 1.27)])]}
+
+
+def library_symbol(component: Component) -> Sexpr:
+    symbol = symbol_of(component)
+    name = symbol_name(component)
+    small = component.symbol in SMALL
+    body = DRAWN[component.symbol] if small else [box(
+        symbol.width / 2, max(abs(s.y) for s in symbol.spots) + GRID if symbol.spots else GRID)]
+    pins = [["pin", kind_of(s.pin), "line",
+             ["at", s.x, s.y, 0 if s.side == "left" else 180], ["length", 2.54],
+             ["name", q("~" if small else s.pin.name), font()], ["number", q(s.pin.number),
+                                                               font(1.0)]]
+            for s in symbol.spots]
+    return ["symbol", q(f"versavis:{name}"),
+            *([["pin_numbers", "hide"], ["pin_names", "hide"]] if small else
+              [["pin_names", ["offset", 0.762]]]), ["in_bom", "yes"], ["on_board", "yes"],
+            ["property", q("Reference"), q("U"), ["id", 0], ["at", 0, 0, 0], font()],
+            ["property", q("Value"), q(component.name), ["id", 1], ["at", 0, 0, 0], font()],
+            ["property", q("Footprint"), q(f"versavis:{component.footprint}"), ["id", 2],
+             ["at", 0, 0, 0], hidden()],
+            ["property", q("Datasheet"), q(component.source), ["id", 3], ["at", 0, 0, 0], hidden()],
+            ["symbol", q(f"{name}_0_1"), *body], ["symbol", q(f"{name}_1_1"), *pins]]
+
+
+def symbol_name(component: Component) -> str:
+    return f"{component.name}_{component.footprint}".replace(" ", "_").replace("/", "_")
+
+
+def kind_of(pin: Pin) -> str:
+    return {"nc": "no_connect"}.get(pin.kind, pin.kind)
+
+
+GROUND = ["symbol", q("versavis:GND"), ["power"], ["pin_names", ["offset", 0]], ["in_bom", "yes"],
+          ["on_board", "yes"],
+          ["property", q("Reference"), q("#PWR"), ["id", 0], ["at", 0, -5, 0], hidden()],
+          ["property", q("Value"), q("GND"), ["id", 1], ["at", 0, -3.81, 0], font()],
+          ["property", q("Footprint"), q(""), ["id", 2], ["at", 0, 0, 0], hidden()],
+          ["property", q("Datasheet"), q(""), ["id", 3], ["at", 0, 0, 0], hidden()],
+          ["symbol", q("GND_0_1"), polyline([(0, 0), (0, -1.27), (1.27, -1.27), (0, -2.54),
+                                             (-1.27, -1.27), (0, -1.27)])],
+          ["symbol", q("GND_1_1"), ["pin", "power_in", "line", ["at", 0, 0, 270], ["length", 0],
+                                    "hide", ["name", q("GND"), font()], ["number", q("1"),
+                                                                         font()]]]]
+
+
+class Sheet:
+    """One sheet: parts flow down its columns, group by group."""
+
+    def __init__(self, board: Board, name: str, title: str, page: int):
+        self.board, self.name, self.title, self.page = board, name, title, page
+        self.rows: list[Sexpr] = []
+        self.parts = [part for part in board.parts.values() if part.sheet == name]
+        self.grounds = 0
+
+    @property
+    def path(self) -> str:
+        return f"/{stamp(self.board.name, 'sheet', self.name)}"
+
+    def draw(self) -> str:
+        self.flow()
+        used = {symbol_name(part.component): part.component for part in self.parts}
+        library = ["lib_symbols", *(library_symbol(used[name]) for name in sorted(used)), GROUND]
+        return write(["kicad_sch", ["version", "20211123"], ["generator", "versavis"],
+                      ["uuid", stamp(self.board.name, "page", self.name)], ["paper", q("A3")],
+                      title_block(self.board, self.title), library, *self.rows]) + "\n"
+
+    def flow(self) -> None:
+        groups = list(dict.fromkeys(part.group for part in self.parts))
+        x, y, deepest = 25.4, 30.48, 30.48
+        for group in groups:
+            parts = [part for part in self.parts if part.group == group]
+            width, height, spots = arrange(parts)
+            if x + width > 400 and x > 30:
+                x, y = 25.4, deepest + 15.24
+            self.frame(x, y, width, height, TITLES.get(group, group_title(group)))
+            for part, (px, py) in spots:
+                self.place(part, snap(x + px), snap(y + py))
+            deepest = max(deepest, y + height)
+            x = snap(x + width + 12.7)
+
+    def frame(self, x: float, y: float, width: float, height: float, title: str) -> None:
+        corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
+        for a, b in zip(corners, corners[1:]):
+            self.rows.append(["polyline", ["pts", ["xy", *a], ["xy", *b]],
+                              ["stroke", ["width", 0], ["type", "dash"], ["color", 0, 0, 0, 0]],
+                              ["uuid", stamp(self.name, "frame", *a, *b)]])
+        self.rows.append(["text", q(title), ["at", x + 1.27, y - 0.635, 0],
+                          ["effects", ["font", ["size", 2, 2]], ["justify", "left", "bottom"]],
+                          ["uuid", stamp(self.name, "title", title, x, y)]])
+
+    def place(self, part: Part, x: float, y: float) -> None:
+        symbol = symbol_of(part.component)
+        small = part.component.symbol in SMALL
+        top = max((abs(s.y) for s in symbol.spots), default=0.0)
+        up, down = (2.8, 3.0) if small else (top + 4.0, top + 4.2)
+        about = part.value if not part.label else f"{part.value}: {part.label}"
+        if "standard" not in part.fitted:
+            about += " (not fitted)" if part.fitted == {"none"} else \
+                f" (variant {', '.join(sorted(part.fitted))})"
+        self.rows.append([
+            "symbol", ["lib_id", q(f"versavis:{symbol_name(part.component)}")], ["at", x, y, 0],
+            ["unit", 1], ["in_bom", "yes"], ["on_board", "yes"],
+            ["uuid", stamp(self.board.name, "symbol", part.ref)],
+            ["property", q("Reference"), q(part.ref), ["id", 0], ["at", x, y - up, 0], font()],
+            ["property", q("Value"), q(about), ["id", 1], ["at", x, y + down, 0], font(1.0)],
+            ["property", q("Footprint"), q(f"versavis:{part.component.footprint}"), ["id", 2],
+             ["at", x, y, 0], hidden()],
+            ["property", q("Datasheet"), q(part.component.source), ["id", 3], ["at", x, y, 0],
+             hidden()],
+            ["property", q("MPN"), q(part.component.mpn), ["id", 4], ["at", x, y, 0], hidden()],
+            *(["pin", q(s.pin.number), ["uuid", stamp(part.ref, "pin", s.pin.number)]]
+              for s in symbol.spots)])
+        for spot in symbol.spots:
+            self.join(part, spot, x + spot.x, y - spot.y)
+
+    def join(self, part: Part, spot: PinSpot, x: float, y: float) -> None:
+        net = part.nets.get(spot.pin.number, "")
+        key = (part.ref, spot.pin.number)
+        if not net:
+            self.rows.append(["no_connect", ["at", x, y], ["uuid", stamp(*key, "open")]])
+            return
+        out = -GRID if spot.side == "left" else GRID
+        self.rows.append(["wire", ["pts", ["xy", x, y], ["xy", x + out, y]],
+                          ["stroke", ["width", 0], ["type", "default"], ["color", 0, 0, 0, 0]],
+                          ["uuid", stamp(*key, "wire")]])
+        if net == "GND":
+            self.ground(key, x + out, y, spot.side)
+            return
+        turn, justify = (180, "right") if spot.side == "left" else (0, "left")
+        self.rows.append(["global_label", q(net), ["shape", "passive"], ["at", x + out, y, turn],
+                          ["fields_autoplaced"],
+                          ["effects", ["font", ["size", 1.1, 1.1]], ["justify", justify]],
+                          ["uuid", stamp(*key, "label")]])
+
+    def ground(self, key: tuple[str, str], x: float, y: float, side: str) -> None:
+        self.grounds += 1
+        turn = 270 if side == "left" else 90
+        self.rows.append([
+            "symbol", ["lib_id", q("versavis:GND")], ["at", x, y, turn], ["unit", 1],
+            ["in_bom", "yes"], ["on_board", "yes"], ["uuid", stamp(*key, "ground")],
+            ["property", q("Reference"), q(self.power_name(self.grounds)), ["id", 0],
+             ["at", x, y, 0], hidden()],
+            ["property", q("Value"), q("GND"), ["id", 1],
+             ["at", x + (-4.4 if side == "left" else 4.4), y, 0], font(0.9)],
+            ["property", q("Footprint"), q(""), ["id", 2], ["at", x, y, 0], hidden()],
+            ["property", q("Datasheet"), q(""), ["id", 3], ["at", x, y, 0], hidden()],
+            ["pin", q("1"), ["uuid", stamp(*key, "ground pin")]]])
+
+    def power_name(self, number: int) -> str:
+        return f"#PWR{self.page:02}{number:03}"
+
+    def instances(self) -> list[Sexpr]:
+        rows = [["path", q(f"{self.path}/{stamp(self.board.name, 'symbol', part.ref)}"),
+                 ["reference", q(part.ref)], ["unit", 1], ["value", q(part.value)],
+                 ["footprint", q(f"versavis:{part.component.footprint}")]] for part in self.parts]
+        number = 0
+        for part in self.parts:
+            for spot in symbol_of(part.component).spots:
+                if part.nets.get(spot.pin.number) == "GND":
+                    number += 1
+                    rows.append(["path", q(f"{self.path}/"
+                                           f"{stamp(part.ref, spot.pin.number, 'ground')}"),
+                                 ["reference", q(self.power_name(number))], ["unit", 1],
+                                 ["value", q("GND")], ["footprint", q("")]])
+        return rows
+
+
+def snap(value: float) -> float:
+    return round(value / GRID) * GRID
+
+
+def group_title(group: str) -> str:
+    for start, title in (("camera", "Camera"), ("lidar", "LiDAR"), ("isolated", "Isolated channel")):
+        if group.startswith(start):
+            return f"{title} {group.removeprefix(start)}"
+    return group
+
+
+def reach(part: Part, side: str) -> float:
+    """Room that a symbol and the names on one side of it need."""
+    symbol = symbol_of(part.component)
+    names = [len(part.nets.get(s.pin.number, "")) for s in symbol.spots if s.side == side]
+    return symbol.width / 2 + 2 * GRID + max(names, default=0) * 1.1 + 4.0
+
+
+def tall(part: Part) -> float:
+    symbol = symbol_of(part.component)
+    return 10.16 if part.component.symbol in SMALL else symbol.height + 15.24
+
+
+def arrange(parts: list[Part]) -> tuple[float, float, list[tuple[Part, tuple[float, float]]]]:
+    """Chips and connectors in the first columns, two-pin parts in the others."""
+    spots: list[tuple[Part, tuple[float, float]]] = []
+    large = [part for part in parts if part.component.symbol not in SMALL]
+    small = [part for part in parts if part.component.symbol in SMALL]
+    limit = max(76.2, sum(map(tall, parts)) / max(1, round(sum(map(tall, parts)) / 95)) + 10)
+    x, deepest = 2.54, 10.16
+    for kind in (large, small):
+        column: list[Part] = []
+        for part in [*kind, None]:
+            if part is None or (column and sum(map(tall, column)) + tall(part) > limit):
+                if column:
+                    left = max(reach(each, "left") for each in column)
+                    y = 2.54
+                    for each in column:
+                        spots.append((each, (snap(x + left), snap(y + tall(each) / 2))))
+                        y += tall(each)
+                    deepest = max(deepest, y)
+                    x = snap(x + left + max(reach(each, "right") for each in column) + 2.54)
+                column = []
+            if part is not None:
+                column.append(part)
+    return snap(x + 1.27), snap(deepest + 2.54), spots
+
+
+def title_block(board: Board, title: str) -> Sexpr:
+    return ["title_block", ["title", q(f"{board.title}: {title}")], ["company", q("VersaVIS")],
+            ["comment", 1, q("CERN-OHL-P-2.0. Generated: change hardware/board, not this file.")]]
+
+
+def root(board: Board, sheets: list[Sheet]) -> str:
+    rows: list[Sexpr] = []
+    for i, sheet in enumerate(sheets):
+        x, y = 38.1 + 76.2 * (i % 3), 38.1 + 33.02 * (i // 3)
+        rows.append([
+            "sheet", ["at", x, y], ["size", 60.96, 20.32], ["fields_autoplaced"],
+            ["stroke", ["width", 0.1524], ["type", "solid"], ["color", 0, 0, 0, 0]],
+            ["fill", ["color", 0, 0, 0, 0.0]], ["uuid", sheet.path[1:]],
+            ["property", q("Sheet name"), q(sheet.title), ["id", 0], ["at", x, y - 0.7, 0],
+             ["effects", ["font", ["size", 1.27, 1.27]], ["justify", "left", "bottom"]]],
+            ["property", q("Sheet file"), q(f"{sheet.name}.kicad_sch"), ["id", 1],
+             ["at", x, y + 20.9, 0],
+             ["effects", ["font", ["size", 1.0, 1.0]], ["justify", "left", "top"]]]])
+    return write([
+        "kicad_sch", ["version", "20211123"], ["generator", "versavis"],
+        ["uuid", stamp(board.name, "root")], ["paper", q("A4")], title_block(board, "all sheets"),
+        ["lib_symbols"], *rows,
+        ["sheet_instances", ["path", q("/"), ["page", q("1")]],
+         *(["path", q(sheet.path), ["page", q(str(sheet.page))]] for sheet in sheets)],
+        ["symbol_instances", *(row for sheet in sheets for row in sheet.instances())]]) + "\n"
+
+
+def schematic(board: Board) -> dict[str, str]:
+    """Text by file name."""
+    sheets = [Sheet(board, name, title, i + 2) for i, (name, title) in enumerate(board.sheets)]
+    files = {f"{sheet.name}.kicad_sch": sheet.draw() for sheet in sheets}
+    return {f"{board.name}.kicad_sch": root(board, sheets), **files}
