@@ -6,5 +6,6 @@ from typing import Callable
 
 from carrier import carrier
 from model import Board
+from small import adis, leds
 
-BOARDS: dict[str, Callable[[], Board]] = {"carrier": carrier}
+BOARDS: dict[str, Callable[[], Board]] = {"carrier": carrier, "leds": leds, "adis": adis}

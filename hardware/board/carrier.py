@@ -420,4 +420,6 @@ def carrier() -> Board:
     for i in range(4):
         board.add(f"H{i + 1}", c.HOLE, "mechanics")
     board.planes = {"In1.Cu": "GND", "In2.Cu": "+3V3"}
+    board.texts = [(27.0, 35.5, 1.8, "VersaVIS carrier"), (27.0, 39.0, 1.0, "CERN-OHL-P-2.0"),
+                   (5.0, 37.7, 1.2, "USB")]
     return board

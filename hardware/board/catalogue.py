@@ -247,3 +247,26 @@ def pico() -> Component:
 
 
 PICO = pico()
+COUNTER = Component(
+    "74HC4024", "SOIC-14",
+    pins("1 CP in VCC, 2 MR in VCC, 3 Q6 out VCC, 4 Q5 out VCC, 5 Q4 out VCC, 6 Q3 out VCC, "
+         "7 GND pi, 8 NC nc, 9 Q2 out VCC, 10 NC nc, 11 Q1 out VCC, 12 Q0 out VCC, 13 NC nc, "
+         "14 VCC pi"),
+    "74HC4024D,653", "Nexperia", "Nexperia 74HC4024: counts at the falling edge, 5.2 mA",
+    ("MC74HC4024ADG",), 0.30, "hc", (("ma", 4), ("most_v", 6.0), ("supply_ma", 1.0)))
+DECODER = Component(
+    "74HC139", "SOIC-16",
+    pins("1 1E in VCC, 2 1A0 in VCC, 3 1A1 in VCC, 4 1Y0 out VCC, 5 1Y1 out VCC, 6 1Y2 out VCC, "
+         "7 1Y3 out VCC, 8 GND pi, 9 2Y3 out VCC, 10 2Y2 out VCC, 11 2Y1 out VCC, 12 2Y0 out VCC, "
+         "13 2A1 in VCC, 14 2A0 in VCC, 15 2E in VCC, 16 VCC pi"),
+    "74HC139D,653", "Nexperia", "Nexperia 74HC139: low at the chosen output, 5.2 mA",
+    ("SN74HC139DR",), 0.25, "hc", (("ma", 4), ("most_v", 6.0), ("supply_ma", 1.0)))
+INVERTER = Component(
+    "74LVC1G14", "SOT-23-5", pins("1 NC nc, 2 A in VCC, 3 GND pi, 4 Y out VCC, 5 VCC pi", True),
+    "SN74LVC1G14DBVR", "Texas Instruments", "TI SCES218", ("74LVC1G14GV,125 (Nexperia)",), 0.08,
+    "schmitt", (("ma", 24), ("most_v", 5.5), ("supply_ma", 0.1)))
+RIBBON = Component("ribbon 2x8", "RIBBON-2x8",
+                   pins(", ".join(f"{i} {i} pas" for i in range(1, 17))), "header 2x8, 2.00 mm",
+                   "any", "box header or pin header, 2.00 mm, 2x8: for a 16-pin ribbon cable of "
+                   "2.00 mm IDC, as Samtec TCSD", ("any header 2x8, 2.00 mm",), 0.80, "connector",
+                   (), "connector")

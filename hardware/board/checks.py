@@ -8,7 +8,10 @@ from typing import Iterator
 from carrier import LEVELS, firmware_pins
 from model import Board, Part, Pin
 
-OPEN = {("U2", "SHDN"), ("U1", "RUN"), ("U1", "VBUS"), ("U1", "GP18")}  # meant to be open
+# Meant to be open: by board.
+OPEN = {"carrier": {("U2", "SHDN"), ("U1", "RUN"), ("U1", "VBUS"), ("U1", "GP18")},
+        "leds": {("U2", "Q6"), *(("U3", f"2Y{i}") for i in range(4))},
+        "adis": {*(("J1", i) for i in ("7", "9")), *(("J2", i) for i in ("5", "15", "16"))}}
 DRIVERS = {"output", "power_out"}
 PICO_HIGH, PICO_LOW, PICO_MOST = 2.0, 0.8, 3.6
 PICO_GIVES = (2.62, 0.5)  # at 4 mA
@@ -51,7 +54,7 @@ def unconnected(board: Board) -> list[str]:
     faults = [f"{part.ref}: pin {pin.name} is open" for part in board.parts.values()
               for pin in part.component.pins
               if pin.kind != "nc" and pin.number not in part.nets
-              and (part.ref, pin.name) not in OPEN]
+              and (part.ref, pin.name) not in OPEN[board.name]]
     faults += [f"{part.ref}: pin {pin.number} must stay open" for part in board.parts.values()
                for pin in part.component.pins if pin.kind == "nc" and pin.number in part.nets]
     return faults + [f"{net} ends at one pin" for net in board.nets()
@@ -122,7 +125,7 @@ def thresholds(part: Part, pin: Pin, least: float, most: float) -> tuple[float, 
         return 0.7 * most, 0.3 * least
     if family in ("t45", "lvc", "imu") and least < 2.3:
         return 0.65 * most, 0.35 * least
-    if family in ("t45", "lvc") and least >= 4.0:
+    if family in ("t45", "lvc", "hc") and least >= 4.0:
         return 0.7 * most, 0.3 * least
     return (0.7 * most, 0.3 * least) if family == "imu" else (2.0, 0.8)
 
@@ -395,8 +398,8 @@ def decoupling(board: Board) -> list[str]:
     """Each supply pin of a chip has a capacitor to ground on its net."""
     faults = []
     for part in board.parts.values():
-        if part.component.family not in ("t45", "schmitt", "lvc", "isolator", "buck", "ldo", "imu",
-                                         "efuse"):
+        if part.component.family not in ("t45", "schmitt", "lvc", "hc", "isolator", "buck", "ldo",
+                                         "imu", "efuse"):
             continue
         for pin in part.component.pins:
             net = part.nets.get(pin.number, "")
@@ -415,3 +418,9 @@ CIRCUIT = (unconnected, drivers, level_faults, pico_alone, rests, protection, su
 
 def circuit_faults(board: Board) -> list[str]:
     return [fault for check in CIRCUIT for fault in dict.fromkeys(check(board))]
+
+
+def plain_faults(board: Board) -> list[str]:
+    """Of a board without a Pico."""
+    return [fault for check in (unconnected, drivers, level_faults, decoupling)
+            for fault in dict.fromkeys(check(board))]

@@ -75,6 +75,15 @@ def header(columns: int, rows: int, name: str = "", skip: tuple[str, ...] = ()) 
                      kind="thru")
 
 
+def ribbon(columns: int) -> Footprint:
+    """Two rows of 2 mm, numbered as a ribbon cable: 1 and 2 face each other."""
+    pads = tuple(Pad(str(2 * column + row + 1), 2.0 * column, -2.0 * row, 1.35, 1.35, 0.8,
+                     "rect" if column + row == 0 else "circle")
+                 for column in range(columns) for row in (0, 1))
+    body = (-1.0, -3.0, 2.0 * (columns - 1) + 1.0, 1.0)
+    return Footprint(f"RIBBON-2x{columns}", pads, grown(body, 0.25), body, 6.0, kind="thru")
+
+
 def level_header() -> Footprint:
     """A plus without its fourth arm: each choice needs the pin in the middle, so that never two
     jumpers fit."""
@@ -164,6 +173,10 @@ ALL = {footprint.name: footprint for footprint in (
              "Package_SO:SSOP-8_2.95x2.8mm_P0.65mm", 1.3, shape="rect", turn=-90),
     two_rows("SOIC-8", 4, 2.475, 1.27, 1.95, 0.6, centred(3.9, 4.9),
              "Package_SO:SOIC-8_3.9x4.9mm_P1.27mm", 1.75, turn=-90),
-    sot23(), htssop16(), lga14(), inductor(), micro_fit(), pico(), hole(), level_header(),
+    two_rows("SOIC-14", 7, 2.475, 1.27, 1.95, 0.6, centred(3.9, 8.7),
+             "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm", 1.75, turn=-90),
+    two_rows("SOIC-16", 8, 2.475, 1.27, 1.95, 0.6, centred(3.9, 9.9),
+             "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm", 1.75, turn=-90),
+    ribbon(8), sot23(), htssop16(), lga14(), inductor(), micro_fit(), pico(), hole(), level_header(),
     test_point(), *(gh(count) for count in (2, 3, 4, 5, 6, 8, 9, 10)),
     header(1, 2), header(2, 1), header(3, 1), header(2, 2), header(3, 2), header(8, 2))}

@@ -7,6 +7,7 @@ import numpy
 
 from model import Board, Box, Part, Place, box_at, gap, pad_at, pad_box
 from footprints import ALL, grown
+from small import adis_by_hand, leds_by_hand
 
 STEP = 0.25  # mm of the grid that small parts lie on
 REACH = 30.0  # mm that a part may be away from its pin
@@ -248,4 +249,4 @@ def place(board: Board, by_hand: dict[str, Place]) -> None:
         waiting = [part for part in waiting if part.ref not in board.places]
 
 
-HANDS = {"carrier": hand}
+HANDS = {"carrier": hand, "leds": leds_by_hand, "adis": adis_by_hand}

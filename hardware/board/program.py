@@ -53,9 +53,9 @@ def main(words: list[str], usage: str) -> int:
             return report(files(), "files", begin)
         case ["route", name] if name in BOARDS:
             return report(route(name), "route", begin)
-        case ["kicad"]:
+        case ["kicad"] | ["kicad", "--write"]:
             import with_kicad
-            return report(with_kicad.run(), "kicad", begin)
+            return report(with_kicad.run(words[1:] == ["--write"]), "kicad", begin)
         case ["spice"]:
             import spice
             return report(spice.run(), "spice", begin)
