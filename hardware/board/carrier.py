@@ -51,7 +51,8 @@ def supply(board: Board) -> None:
     disconnects above 30 V; meanwhile USB keeps the Pico alive."""
     board.sheet("power", "Supply: 7 to 24 V or USB")
     g = "power"
-    board.add("J1", c.MICRO_FIT, g, label="7-24V", _1="GND", _2="VIN")
+    board.add("J1", c.MICRO_FIT, g, marks=(("GND", -4.2, -1.5, 0), ("7-24V", 7.2, -2.5, 0)),
+              _1="GND", _2="VIN")
     board.add("D1", c.TVS, g, near="J1.2", _1="VIN", _2="GND")
     board.add("U2", c.EFUSE, g, IN="VIN", UVLO="UVLO", OVP="OVP", MODE="RTN", RTN="RTN", EP="RTN",
               GND="GND", IMON="IMON", ILIM="ILIM", dVdT="DVDT", FLT="FAULT", OUT="VPROT")
@@ -85,11 +86,11 @@ def supply(board: Board) -> None:
 
 def lights(board: Board) -> None:
     g = "power"
-    for ref, colour, ohm, high, low in (
-            ("D4", c.YELLOW, "10k", "VPROT", "GND"), ("D5", c.GREEN, "2k2", "+5V", "GND"),
-            ("D6", c.RED, "2k2", "+5V", "FAULT")):
+    for ref, colour, ohm, high, low, word in (
+            ("D4", c.YELLOW, "10k", "VPROT", "GND", "VIN"),
+            ("D5", c.GREEN, "2k2", "+5V", "GND", "5V"), ("D6", c.RED, "2k2", "+5V", "FAULT", "ERR")):
         node = f"LED_{ref}"
-        board.add(ref, colour, g, A=node, K=low)
+        board.add(ref, colour, g, marks=((word, 0.0, -1.25, 0),), A=node, K=low)
         board.add(f"R{int(ref[1:]) + 2}", resistor(ohm), g, near=f"{ref}.2", _1=high, _2=node)
 
 
@@ -209,7 +210,7 @@ def isolated(board: Board, n: int) -> None:
 def lidar(board: Board, n: int) -> None:
     """PPS and NMEA, each with its polarity; driven with 3.3 or 5 V."""
     if n == 0:
-        board.sheet("lidar", "LiDARs and pulses")
+        board.sheet("lidar", "LiDARs")
     g, b = f"lidar{n}", 600 + 20 * n
     level, pps, serial = f"LIDAR{n}_LEVEL", f"LIDAR{n}_PPS", f"LIDAR{n}_SERIAL"
     board.add(f"J{b}", gh(4), g, label=f"LIDAR{n}", _1=pps, _2="GND", _3=serial, _4="GND", MP="GND")
@@ -245,6 +246,7 @@ def slow_input(board: Board, ref: int, group: str, outside: str, node: str, conn
 
 def pulses(board: Board) -> None:
     """PPS, NMEA, aux and sync."""
+    board.sheet("pulses", "Pulses and NMEA")
     g = "gnss"
     board.add("J700", gh(4), g, label="GNSS", _1="5V_OUT", _2="PPS_IN", _3="NMEA_IN", _4="GND",
               MP="GND")

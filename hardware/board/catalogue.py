@@ -172,9 +172,8 @@ MOSFET = Component(
     "Vishay Si2308BDS: 60 V, 1.9 A, 0.19 Ohm at 4.5 V, gate threshold 1 to 3 V",
     ("DMN6140L-7 (Diodes)",), 0.20, "nmos", (("volts", 60.0), ("amps", 1.9)), "nmos")
 PTC500 = Component(
-    "PTC 0.5A 30V", "1812", TWO, "MF-MSMF050-2", "Bourns",
-    "Bourns MF-MSMF: hold 0.50 A, trip 1.00 A, 15 V; MF-MSMF030-2 for 30 V: hold 0.30 A",
-    (), 0.20, "fuse", (("amps", 0.5), ("volts", 15.0)), "fuse")
+    "PTC 0.5A 15V", "1812", TWO, "MF-MSMF050-2", "Bourns",
+    "Bourns MF-MSMF: hold 0.50 A, trip 1.00 A, 15 V", ("1812L050PR (Littelfuse)",), 0.20, "fuse", (("amps", 0.5), ("volts", 15.0)), "fuse")
 PTC300 = Component(
     "PTC 0.3A 30V", "1812", TWO, "MF-MSMF030-2", "Bourns",
     "Bourns MF-MSMF: hold 0.30 A, trip 0.60 A, 30 V", ("1812L035/30 (Littelfuse)",), 0.20, "fuse",

@@ -15,6 +15,7 @@ MARGIN = 0.3  # copper from the edge
 FRONT = ["F.Cu", "F.Paste", "F.Mask"]
 OFFSET = 20.0  # of the board on KiCad's sheet
 Sexpr = list[Any]
+POLAR = ("diode", "zener", "led")
 LAYERS = [(0, "F.Cu", "signal"), (1, "In1.Cu", "signal"), (2, "In2.Cu", "signal"),
           (31, "B.Cu", "signal"), (34, "B.Paste", "user"), (35, "F.Paste", "user"),
           (36, "B.SilkS", "user"), (37, "F.SilkS", "user"), (38, "B.Mask", "user"),
@@ -134,6 +135,10 @@ def footprint_sexpr(board: Board, part: Part, numbers: dict[str, int],
         rows.append(line("fp_line", "F.SilkS", 0.12, box, part.ref))
     rows += rectangle("fp_line", "F.Fab", 0.1, footprint.body, part.ref)
     rows += rectangle("fp_line", "F.CrtYd", 0.05, footprint.courtyard, part.ref)
+    if part.component.symbol in POLAR:  # a bar at the cathode
+        first = footprint.pads[0]
+        x, y = first.x - first.width / 2 - 0.15, first.height / 2
+        rows.append(line("fp_line", "F.SilkS", 0.12, (x, -y, x, y), part.ref, "cathode"))
     dot = pin_one(footprint)
     if dot:
         rows.append(["fp_circle", ["center", *dot], ["end", dot[0] + 0.1, dot[1]],

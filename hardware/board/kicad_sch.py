@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from typing import Any
 
 from model import Board, Component, Part, Pin, stamp
@@ -14,6 +15,19 @@ TITLES = {"imu_chip": "Optional IMU on the board", "uart": "IMU on the UART", "i
           "or I2C", "gnss": "PPS and NMEA in", "aux": "Auxiliary pulses", "sync": "Sync and test",
           "pico": "Raspberry Pi Pico", "power": "7 to 24 V, USB, 1.8 V, clamp",
           "camera_supply": "Fuses", "light": "Light, limited in time", "mechanics": "Holes"}
+NOTES = {
+    "power": "Input, clamp, eFuse (off below 6.5 V, above 30 V and when reversed; 2 A), 5 V "
+             "converter. USB feeds +5V through the diode on the Pico.",
+    "camera": "Trigger: Pico, rest resistor, 74LVC1T45, 47R, connector. Exposure: connector, 4k7, "
+              "clamp, Schmitt trigger, 74LVC1T45, Pico.",
+    "isolated": "Fitted for 24 V: then the 74LVC1T45 of the channel's exposure is not.",
+    "lidar": "Polarity by jumper (XOR), then 3.3 or 5 V by jumper.",
+    "gnss": "Inputs bear 24 V and RS-232; NMEA INV for RS-232.",
+    "light": "The capacitor ends each pulse after 8 to 17 ms, whatever the firmware does.",
+    "imu": "SPI and I2C share pins: one of the two connectors.",
+    "uart": "The jumper RX chooses between this connector and GNSS.",
+    "camera_supply": "The input's voltage, fused; never on a connector with signals."}
+PAPERS = (("A4", 297.0, 210.0), ("A3", 420.0, 297.0), ("A2", 594.0, 420.0))
 SMALL = {"resistor", "capacitor", "diode", "zener", "led", "fuse", "inductor", "tvs"}
 
 
@@ -104,7 +118,7 @@ DRAWN: dict[str, list[Sexpr]] = {
     "inductor": [["arc", ["start", x, 0.0], ["mid", x + 0.635, 0.635], ["end", x + 1.27, 0.0],
                   stroke(), ["fill", ["type", "none"]]] for x in (-2.54, -1.27, 0.0, 1.27)],
     "diode": DIODE, "zener": [*DIODE, polyline([(-1.27, 1.27), (-0.762, 1.27)])],
-    "led": [*DIODE, polyline([(-0.5, 1.8), (0.8, 3.0), (0.2, 3.0)])],
+    "led": [*DIODE, polyline([(2.0, -1.0), (3.0, -2.0), (2.4, -2.0)])],
     "tvs": [polyline([(0, 1.27), (0, -1.27)]),
             polyline([(-2.54, 1.27), (0, 0), (-2.54, -1.27), (-2.54, 1.27)]),
             polyline([(2.54, 1.27), (0, 0), (2.54, -1.27), (2.54, 1.27)])]}
@@ -161,6 +175,7 @@ class Sheet:
         self.rows: list[Sexpr] = []
         self.parts = [part for part in board.parts.values() if part.sheet == name]
         self.grounds = 0
+        self.paper = "A4"
 
     @property
     def path(self) -> str:
@@ -171,29 +186,36 @@ class Sheet:
         used = {symbol_name(part.component): part.component for part in self.parts}
         library = ["lib_symbols", *(library_symbol(used[name]) for name in sorted(used)), GROUND]
         return write(["kicad_sch", ["version", "20211123"], ["generator", "versavis"],
-                      ["uuid", stamp(self.board.name, "page", self.name)], ["paper", q("A3")],
+                      ["uuid", stamp(self.board.name, "page", self.name)], ["paper", q(self.paper)],
                       title_block(self.board, self.title), library, *self.rows]) + "\n"
 
     def flow(self) -> None:
+        """On the smallest paper that holds all groups and leaves its title block free."""
         groups = list(dict.fromkeys(part.group for part in self.parts))
-        x, y, deepest = 25.4, 30.48, 30.48
-        for group in groups:
-            parts = [part for part in self.parts if part.group == group]
-            width, height, spots = arrange(parts)
-            if x + width > 400 and x > 30:
-                x, y = 25.4, deepest + 15.24
-            self.frame(x, y, width, height, TITLES.get(group, group_title(group)))
-            for part, (px, py) in spots:
+        blocks = [(group, *arrange([part for part in self.parts if part.group == group]))
+                  for group in groups]
+        for self.paper, wide, high in PAPERS:
+            spots = flowed([(width, height) for _, width, height, _ in blocks], wide - 20)
+            if max(y + block[2] for (_, y), block in zip(spots, blocks)) < high - 48:
+                break
+        for (x, y), (group, width, height, parts) in zip(spots, blocks):
+            self.frame(x, y, width, height, group)
+            for part, (px, py) in parts:
                 self.place(part, snap(x + px), snap(y + py))
-            deepest = max(deepest, y + height)
-            x = snap(x + width + 12.7)
 
-    def frame(self, x: float, y: float, width: float, height: float, title: str) -> None:
+    def frame(self, x: float, y: float, width: float, height: float, group: str) -> None:
+        title = TITLES.get(group, group_title(group))
         corners = [(x, y), (x + width, y), (x + width, y + height), (x, y + height), (x, y)]
         for a, b in zip(corners, corners[1:]):
             self.rows.append(["polyline", ["pts", ["xy", *a], ["xy", *b]],
                               ["stroke", ["width", 0], ["type", "dash"], ["color", 0, 0, 0, 0]],
                               ["uuid", stamp(self.name, "frame", *a, *b)]])
+        note = NOTES.get(group, NOTES.get(group.rstrip("0123456789"), ""))
+        for i, words in enumerate(textwrap.wrap(note, max(30, int(width / 1.2)))):
+            self.rows.append(["text", q(words), ["at", x + 1.27, y + height + 2.2 * (i + 1), 0],
+                              ["effects", ["font", ["size", 1.27, 1.27]],
+                               ["justify", "left", "bottom"]],
+                              ["uuid", stamp(self.name, "note", group, i)]])
         self.rows.append(["text", q(title), ["at", x + 1.27, y - 0.635, 0],
                           ["effects", ["font", ["size", 2, 2]], ["justify", "left", "bottom"]],
                           ["uuid", stamp(self.name, "title", title, x, y)]])
@@ -251,7 +273,7 @@ class Sheet:
             ["property", q("Reference"), q(self.power_name(self.grounds)), ["id", 0],
              ["at", x, y, 0], hidden()],
             ["property", q("Value"), q("GND"), ["id", 1],
-             ["at", x + (-4.4 if side == "left" else 4.4), y, 0], font(0.9)],
+             ["at", x + (-4.4 if side == "left" else 4.4), y, 0], hidden()],
             ["property", q("Footprint"), q(""), ["id", 2], ["at", x, y, 0], hidden()],
             ["property", q("Datasheet"), q(""), ["id", 3], ["at", x, y, 0], hidden()],
             ["pin", q("1"), ["uuid", stamp(*key, "ground pin")]]])
@@ -273,6 +295,19 @@ class Sheet:
                                  ["reference", q(self.power_name(number))], ["unit", 1],
                                  ["value", q("GND")], ["footprint", q("")]])
         return rows
+
+
+def flowed(sizes: list[tuple[float, float]], right: float) -> list[tuple[float, float]]:
+    """Places of boxes side by side, in rows."""
+    x, y, deepest = 17.78, 22.86, 22.86
+    spots = []
+    for width, height in sizes:
+        if x + width > right and x > 20:
+            x, y = 17.78, snap(deepest + 12.7)
+        spots.append((x, y))
+        deepest = max(deepest, y + height)
+        x = snap(x + width + 7.62)
+    return spots
 
 
 def snap(value: float) -> float:
@@ -324,7 +359,7 @@ def arrange(parts: list[Part]) -> tuple[float, float, list[tuple[Part, tuple[flo
 
 
 def title_block(board: Board, title: str) -> Sexpr:
-    return ["title_block", ["title", q(f"{board.title}: {title}")], ["company", q("VersaVIS")],
+    return ["title_block", ["title", q(title)], ["company", q(board.title)],
             ["comment", 1, q("CERN-OHL-P-2.0. Generated: change hardware/board, not this file.")]]
 
 

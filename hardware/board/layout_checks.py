@@ -235,6 +235,17 @@ def within(box: Box, spot: Point) -> bool:
     return box[0] <= spot[0] <= box[2] and box[1] <= spot[1] <= box[3]
 
 
+def widths(board: Board, layout: Layout) -> list[str]:
+    """Tracks of supplies against their current, at 20 degrees of rise (IPC-2221, outer layer)."""
+    faults = set()
+    for _, net, width, x0, y0, x1, y1 in layout.tracks:
+        if net in board.rails and math.hypot(x1 - x0, y1 - y0) > 1.0:
+            bears = 0.048 * 20 ** 0.44 * (width * 39.37 * 1.378) ** 0.725
+            if bears * 1000 < board.rails[net].milliamps:
+                faults.add(f"{net} has a track of {width:g} mm, which bears {bears:.2f} A")
+    return sorted(faults)
+
+
 def isolation_gap(board: Board, layout: Layout) -> list[str]:
     """Copper of an isolated side is 2 mm from all other; below the isolator its own pads decide."""
     found = shapes(board, layout)
@@ -275,7 +286,7 @@ def silk(board: Board) -> list[str]:
 
 
 SIMPLE = (placed, courtyards, inside, near_capacitor, near_connector, silk)
-FULL = (lengths, clearances, connected, isolation_gap, holes)
+FULL = (lengths, widths, clearances, connected, isolation_gap, holes)
 
 
 def layout_faults(board: Board, layout: Layout) -> list[str]:

@@ -159,6 +159,8 @@ LAYOUT: tuple[tuple[Callable[..., list[str]], str, Callable[[Board, Layout], Non
      on_layout(lambda board: board.texts.append((19.0, 72.0, 1.0, "WORD")))),
     (layout_checks.lengths, "SW is",
      long_way),
+    (layout_checks.widths, "VPROT has a track of 0.2 mm",
+     track("VPROT", 10.0, 30.0, 13.0, 30.0)),
     (layout_checks.clearances, "mm apart near",
      track("VIN", 10.0, 30.0, 60.0, 45.0)),
     (layout_checks.connected, "is in 2 pieces",

@@ -57,10 +57,10 @@ def jumpers_at_the_top() -> dict[str, Place]:
 
 def signs(width: float, height: float) -> dict[str, Place]:
     """Lights and test points."""
-    return {"D4": Place(width - 3.0, 62.0, 0), "D5": Place(width - 3.0, 64.4, 0),
-            "D6": Place(width - 3.0, 59.6, 0), "D743": Place(46.5, 23.4, 0),
-            "TP1": Place(71.5, 33.5), "TP2": Place(71.5, 30.0), "TP3": Place(75.0, 30.0),
-            "TP4": Place(71.5, 26.5), "TP5": Place(75.0, 33.5)}
+    return {"D4": Place(width - 3.0, 64.0, 0), "D5": Place(width - 3.0, 60.5, 0),
+            "D6": Place(width - 3.0, 67.5, 0), "D743": Place(46.5, 23.4, 0),
+            "TP1": Place(71.5, 33.5), "TP2": Place(71.5, 30.0), "TP3": Place(76.0, 30.0),
+            "TP4": Place(71.5, 26.5), "TP5": Place(76.0, 33.5)}
 
 
 def islands(board: Board) -> dict[str, Box]:
@@ -95,7 +95,7 @@ class Placer:
     def room(part: Part) -> Box:
         """The courtyard; of chips, also room for tracks and vias, of connectors and jumpers for a label."""
         footprint = ALL[part.component.footprint]
-        if footprint.name.startswith("JST"):
+        if footprint.name.startswith("JST") or part.component.family == "led":
             box = footprint.courtyard
             return box[0], box[1] - 1.3, box[2], box[3]
         if part.component.family in ("jumper", "test_point"):
