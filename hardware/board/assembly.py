@@ -18,7 +18,7 @@ table{border-collapse:collapse;width:100%}td,th{padding:2px 6px;text-align:left;
 solid #ddd}tr.on{background:#ffe08a}tr.done{color:#999}
 .part{fill:#ddd;stroke:#555;stroke-width:.08}.pad{fill:#b8860b}.one{fill:#c0392b}
 .out{opacity:.25}.on .part{fill:#ff5d3a}.done .part{fill:#9bd59b}
-text{font-size:.9px;pointer-events:none}.word{fill:#555;font-size:1px}
+text{font-size:.9px;pointer-events:none}.small{font-size:.75px}.word{fill:#555;font-size:1px}
 </style></head><body><div id="list"><h3>TITLE</h3>
 <p>Variant <select id="variant"></select> Click a row to see its parts, or a part to see its row;
 tick a row when its parts are soldered (this browser remembers). The red pad is pin 1.</p>
@@ -58,7 +58,12 @@ def svg(board: Board) -> str:
         rows.append(f'<g id="p-{part.ref}">' + rect(box_at(footprint.body, place), "part"))
         rows += [rect(pad_box(pad, place), "pad one" if pad.number == "1" else "pad")
                  for pad in footprint.pads]
-        rows.append(f'<text x="{place.x:g}" y="{place.y + .3:g}" text-anchor="middle">{part.ref}'
+        x0, y0, x1, y1 = box_at(footprint.courtyard, place)
+        x, y, about = (x0 + x1) / 2, (y0 + y1) / 2, ""
+        if y1 - y0 > 1.3 * (x1 - x0):
+            about = f' transform="rotate(-90 {x:g} {y:g})"'
+        small = ' class="small"' if min(x1 - x0, y1 - y0) < 2 else ""
+        rows.append(f'<text x="{x:g}" y="{y + .3:g}" text-anchor="middle"{about}{small}>{part.ref}'
                     '</text></g>')
     for x, y, turn, _, text in labels(board):
         about = f' transform="rotate({-turn} {x:g} {y:g})"' if turn else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The carrier board for a Raspberry Pi Pico: each part, with its nets. The only description of it."""
+"""The carrier board for a Raspberry Pi Pico: each part, with its nets. Its only description."""
 from __future__ import annotations
 
 import pathlib
@@ -10,7 +10,7 @@ from catalogue import capacitor, gh, jumper, resistor
 from model import Board, Component, Mark, Rail
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-WIDTH, HEIGHT = 104.0, 78.0
+WIDTH, HEIGHT = 100.0, 83.0
 CAMERAS = 4
 ISOLATED = (2, 3)  # channels that can be populated for 24 V
 LEVELS = {"1.8 V": "+1V8", "3.3 V": "+3V3", "5 V": "+5V"}
@@ -22,7 +22,7 @@ SHARED = ("i2c_data", "i2c_clock")  # pins that SPI names
 
 def ends(first: str, last: str, turn: int) -> tuple[Mark, ...]:
     """Words beyond the first and the last pin of a row of three; turned as the board is read."""
-    return (first, -2.05, 0.0, turn), (last, 7.13, 0.0, turn)
+    return (first, -1.95, 0.0, turn), (last, 7.03, 0.0, turn)
 
 
 def firmware_pins() -> dict[str, int]:
@@ -88,7 +88,8 @@ def lights(board: Board) -> None:
     g = "power"
     for ref, colour, ohm, high, low, word in (
             ("D4", c.YELLOW, "10k", "VPROT", "GND", "VIN"),
-            ("D5", c.GREEN, "2k2", "+5V", "GND", "5V"), ("D6", c.RED, "2k2", "+5V", "FAULT", "ERR")):
+            ("D5", c.GREEN, "2k2", "+5V", "GND", "5V"),
+            ("D6", c.RED, "2k2", "+5V", "FAULT", "ERR")):
         node = f"LED_{ref}"
         board.add(ref, colour, g, marks=((word, 0.0, -1.25, 0),), A=node, K=low)
         board.add(f"R{int(ref[1:]) + 2}", resistor(ohm), g, near=f"{ref}.2", _1=high, _2=node)
@@ -98,7 +99,8 @@ def controller(board: Board) -> None:
     board.sheet("pico", "USB and Raspberry Pi Pico")
     nets = {f"GP{gpio}": name.upper() for name, gpio in firmware_pins().items()}
     del nets[f"GP{firmware_pins()['loop']}"]  # must stay open
-    board.add("U1", c.PICO, "pico", GND="GND", AGND="GND", VSYS="+5V", **{"3V3": "+3V3"}, **nets)
+    board.add("U1", c.PICO, "pico", GND="GND", AGND="GND", VSYS="+5V", 
+              named={"3V3": "+3V3", **nets})
     board.add("C12", c.C10U, "pico", near="U1.36", _1="+3V3", _2="GND")
     board.add("C13", c.C10U, "pico", near="U1.39", _1="+5V", _2="GND")
     for ref, net in (("TP1", "GND"), ("TP2", "+5V"), ("TP3", "+3V3"), ("TP4", "+1V8"),
@@ -216,13 +218,14 @@ def lidar(board: Board, n: int) -> None:
     board.add(f"J{b}", gh(4), g, label=f"LIDAR{n}", _1=pps, _2="GND", _3=serial, _4="GND", MP="GND")
     board.add(f"D{b}", c.ESD24, g, near=f"J{b}.2", IO1=pps, IO2=serial, GND="GND")
     board.add(f"JP{b}", jumper(3), g, marks=ends("3.3", "5V", 90), _1="+3V3", _2=level, _3="+5V")
-    board.add(f"JP{b + 1}", jumper(2, 2), g, label="INVERT", marks=INVERT_MARKS, _1=f"LIDAR{n}_PPS_INVERT", _2="+3V3",
+    board.add(f"JP{b + 1}", jumper(2, 2), g, label="INVERT", marks=INVERT_MARKS,
+              _1=f"LIDAR{n}_PPS_INVERT", _2="+3V3",
               _3=f"LIDAR{n}_SERIAL_INVERT", _4="+3V3")
     board.add(f"U{b}", c.T45_2, g, near=f"J{b}.2", VCCA="+3V3", GND="GND", DIR="+3V3", VCCB=level,
               A1=f"LIDAR{n}_PPS_3V3", B1=f"LIDAR{n}_PPS_5V", A2=f"LIDAR{n}_SERIAL_3V3",
               B2=f"LIDAR{n}_SERIAL_5V")
     board.add(f"U{b + 1}", c.XOR2, g, near=f"U{b}.2", VCC="+3V3", GND="GND",
-              **{"1A": "SYNC_OUTPUT", "1B": f"LIDAR{n}_PPS_INVERT", "1Y": f"LIDAR{n}_PPS_3V3",
+              named={"1A": "SYNC_OUTPUT", "1B": f"LIDAR{n}_PPS_INVERT", "1Y": f"LIDAR{n}_PPS_3V3",
                  "2A": "UART_TRANSMIT", "2B": f"LIDAR{n}_SERIAL_INVERT",
                  "2Y": f"LIDAR{n}_SERIAL_3V3"})
     board.add(f"R{b}", resistor("47R"), g, near=f"J{b}.1", _1=f"LIDAR{n}_PPS_5V", _2=pps)
@@ -241,7 +244,7 @@ def slow_input(board: Board, ref: int, group: str, outside: str, node: str, conn
     """4.7 k bears 24 V and RS-232, the clamp keeps the buffer within its limits."""
     board.add(f"R{ref}", resistor("4k7", "0805"), group, near=connector, _1=outside, _2=node)
     board.add(f"D{ref}", c.CLAMP, group, near=f"R{ref}.2", A="GND", K="VCLAMP", AK=node)
-    board.add(f"R{ref + 1}", resistor("47k"), group, near=f"D{ref}.3", _1=node, _2=idle)
+    board.add(f"R{ref + 1}", resistor("100k"), group, near=f"D{ref}.3", _1=node, _2=idle)
 
 
 def pulses(board: Board) -> None:
@@ -255,7 +258,7 @@ def pulses(board: Board) -> None:
     board.add("R700", resistor("49R9", "1206"), g, near="JP700.2", _1="PPS_50", _2="GND")
     slow_input(board, 702, g, "PPS_IN", "PPS_NODE", "J700.2")
     slow_input(board, 704, g, "NMEA_IN", "NMEA_NODE", "J700.3", "+3V3")
-    board.add("U700", c.SCHMITT2, g, near="D702.3", VCC="+3V3", GND="GND", **{
+    board.add("U700", c.SCHMITT2, g, near="D702.3", VCC="+3V3", GND="GND", named={
         "1A": "PPS_NODE", "1Y": "PPS", "2A": "NMEA_NODE", "2Y": "NMEA_CLEAN"})
     decouple(board, "C700", g, "U700.5", "+3V3")
     board.add("JP701", jumper(2), g, label="NMEA INV", _1="NMEA_INVERT", _2="+3V3")
@@ -274,7 +277,7 @@ def aux(board: Board) -> None:
     board.add("D720", c.ESD24, g, near="J720.2", IO1="AUX0_IN", IO2="AUX1_IN", GND="GND")
     slow_input(board, 722, g, "AUX0_IN", "AUX0_NODE", "J720.1")
     slow_input(board, 724, g, "AUX1_IN", "AUX1_NODE", "J720.3")
-    board.add("U720", c.SCHMITT2, g, near="D722.3", VCC="+3V3", GND="GND", **{
+    board.add("U720", c.SCHMITT2, g, near="D722.3", VCC="+3V3", GND="GND", named={
         "1A": "AUX0_NODE", "1Y": "AUX0", "2A": "AUX1_NODE", "2Y": "AUX1"})
     decouple(board, "C720", g, "U720.5", "+3V3")
 
@@ -316,7 +319,9 @@ def light(board: Board) -> None:
     board.add("U760", c.SCHMITT, g, near="Q760.1", A="LIGHT_TIMED", GND="GND", Y="LIGHT_LIMITED",
               VCC="+3V3")
     decouple(board, "C760", g, "U760.5", "+3V3")
-    board.add("C761", c.C100N, g, near="U760.2", _1="LIGHT", _2="LIGHT_TIMED")
+    # 1 k keeps the current small with which the capacitor empties into the Pico.
+    board.add("R765", resistor("1k"), g, near="U760.2", _1="LIGHT", _2="LIGHT_AC")
+    board.add("C761", c.C100N, g, near="U760.2", _1="LIGHT_AC", _2="LIGHT_TIMED")
     board.add("R760", resistor("100k"), g, near="U760.2", _1="LIGHT_TIMED", _2="GND")
     board.add("D761", c.SCHOTTKY, g, near="U760.2", K="LIGHT_TIMED", A="GND")
     board.add("R761", resistor("100R"), g, near="Q760.1", _1="LIGHT_DRIVER", _2="LIGHT_GATE")
@@ -326,7 +331,7 @@ def light(board: Board) -> None:
     decouple(board, "C762", g, "U761.1", "+3V3")
     decouple(board, "C763", g, "U761.6", "+5V")
     board.add("R763", resistor("100R"), g, near="U761.4", _1="LIGHT_DRIVER", _2="LIGHT_5V")
-    board.add("R764", resistor("4k7"), g, near="C761.1", _1="LIGHT", _2="GND")
+    board.add("R764", resistor("4k7"), g, near="R765.1", _1="LIGHT", _2="GND")
 
 
 def imus(board: Board) -> None:
@@ -336,7 +341,7 @@ def imus(board: Board) -> None:
            "ACCEL_READY")
     outside = {name: f"{name}_X" for name in spi}
     board.add("J800", gh(9), g, label="IMU SPI", _1="+3V3", _2="GND", MP="GND",
-              **{f"_{i + 3}": outside[name] for i, name in enumerate(spi)})
+              named={str(i + 3): outside[name] for i, name in enumerate(spi)})
     board.add("J801", gh(5), g, label="I2C", _1="+3V3", _2="GND", _3="SPI_TRANSMIT_X",
               _4="SPI_CLOCK_X", _5="IMU_READY0_X", MP="GND")
     board.add("D800", c.ESD5, g, near="J800.4", IO1=outside[spi[0]], GND="GND", IO2=outside[spi[1]],
@@ -369,7 +374,7 @@ def uart(board: Board) -> None:
     board.add("D821", c.ESD24, g, near="J820.3", IO1="UART_OUT", IO2="GND", GND="GND")
     slow_input(board, 822, g, "UART_IN", "UART_NODE", "J820.4", "+3V3")
     slow_input(board, 824, g, "READY1_IN", "READY1_NODE", "J820.5")
-    board.add("U820", c.SCHMITT2, g, near="D822.3", VCC="+3V3", GND="GND", **{
+    board.add("U820", c.SCHMITT2, g, near="D822.3", VCC="+3V3", GND="GND", named={
         "1A": "UART_NODE", "1Y": "UART_CLEAN", "2A": "READY1_NODE", "2Y": "IMU_READY1"})
     decouple(board, "C820", g, "U820.5", "+3V3")
     board.add("U821", c.SCHMITT, g, near="J820.3", A="UART_TRANSMIT", GND="GND", Y="UART_DRIVER",
@@ -377,7 +382,8 @@ def uart(board: Board) -> None:
     decouple(board, "C821", g, "U821.5", "+3V3")
     board.add("R826", resistor("100R"), g, near="U821.4", _1="UART_DRIVER", _2="UART_OUT")
     board.add("R827", resistor("4k7"), g, near="U821.2", _1="UART_TRANSMIT", _2="+3V3")
-    board.add("JP820", jumper(3), g, label="RX", marks=ends("IMU", "NMEA", 90), _1="UART_CLEAN", _2="UART_SELECTED",
+    board.add("JP820", jumper(3), g, label="RX", marks=ends("IMU", "NMEA", 90),
+              _1="UART_CLEAN", _2="UART_SELECTED",
               _3="NMEA_RECEIVED")
     board.add("R828", resistor("100R"), g, near="JP820.2", _1="UART_SELECTED", _2="UART_RECEIVE")
     board.add("R829", resistor("4k7"), g, near="JP820.2", _1="UART_RECEIVE", _2="+3V3")
@@ -409,19 +415,19 @@ def carrier() -> Board:
     supply(board)
     controller(board)
     imus(board)
+    light(board)
     for n in range(CAMERAS):
         camera(board, n)
     camera_supply(board)
     for n in ISOLATED:
         isolated(board, n)
+    pulses(board)
     for n in (0, 1):
         lidar(board, n)
-    pulses(board)
-    light(board)
     board.sheet("mechanics", "Holes")
     for i in range(4):
         board.add(f"H{i + 1}", c.HOLE, "mechanics")
     board.planes = {"In1.Cu": "GND", "In2.Cu": "+3V3"}
-    board.texts = [(27.0, 35.5, 1.8, "VersaVIS carrier"), (27.0, 39.0, 1.0, "CERN-OHL-P-2.0"),
-                   (5.0, 37.7, 1.2, "USB")]
+    board.texts = [(27.0, 40.5, 1.8, "VersaVIS carrier"), (27.0, 44.0, 1.0, "CERN-OHL-P-2.0"),
+                   (5.0, 42.7, 1.2, "USB")]
     return board

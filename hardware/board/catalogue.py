@@ -28,7 +28,7 @@ POLAR = pins("1 K pas, 2 A pas")
 def resistor(ohm: str, size: str = "0603") -> Component:
     code = {"0603": "RC0603FR-07", "0805": "RC0805FR-07", "1206": "RC1206FR-07"}[size]
     watts = {"0603": 0.1, "0805": 0.125, "1206": 0.25}[size]
-    return Component(ohm, size, TWO, code + (ohm.upper() if "k" in ohm or "M" in ohm else ohm) + "L",
+    return Component(ohm, size, TWO, f"{code}{ohm.upper()}L",
                      "Yageo", "Yageo RC_L series data sheet, 1 %",
                      ("any thick film, 1 %, same size and power",), 0.01, "resistor",
                      (("ohm", ohms(ohm)), ("watts", watts)), "resistor")
@@ -136,7 +136,8 @@ ESD32 = Component(
     ("SM36-02HTG (Littelfuse)",), 0.20, "esd", (("standoff", 32.0), ("farad", 30e-12)), "esd")
 ESD5 = Component(
     "SRV05-4", "SOT-23-6", pins("1 IO1 pas, 2 GND pas, 3 IO2 pas, 4 IO3 pas, 5 VP nc, 6 IO4 pas"),
-    "SRV05-4.TCT", "Semtech", "Semtech SRV05-4: four lines, 5 V stand-off, 3 pF, 15 kV; pin 5 open, "
+    "SRV05-4.TCT", "Semtech",
+    "Semtech SRV05-4: four lines, 5 V stand-off, 3 pF, 15 kV; pin 5 open, "
     "so that no line feeds the supply", ("TPD4E001DBVR (Texas Instruments)",), 0.15, "esd",
     (("standoff", 5.0), ("farad", 3e-12)))
 CLAMP = Component(
@@ -173,7 +174,8 @@ MOSFET = Component(
     ("DMN6140L-7 (Diodes)",), 0.20, "nmos", (("volts", 60.0), ("amps", 1.9)), "nmos")
 PTC500 = Component(
     "PTC 0.5A 15V", "1812", TWO, "MF-MSMF050-2", "Bourns",
-    "Bourns MF-MSMF: hold 0.50 A, trip 1.00 A, 15 V", ("1812L050PR (Littelfuse)",), 0.20, "fuse", (("amps", 0.5), ("volts", 15.0)), "fuse")
+    "Bourns MF-MSMF: hold 0.50 A, trip 1.00 A, 15 V", ("1812L050PR (Littelfuse)",),
+    0.20, "fuse", (("amps", 0.5), ("volts", 15.0)), "fuse")
 PTC300 = Component(
     "PTC 0.3A 30V", "1812", TWO, "MF-MSMF030-2", "Bourns",
     "Bourns MF-MSMF: hold 0.30 A, trip 0.60 A, 30 V", ("1812L035/30 (Littelfuse)",), 0.20, "fuse",
@@ -239,7 +241,7 @@ def pico() -> Component:
         else:
             rows.append(f"{number} {special.get(number, 'GND pi')}")
     return Component("Raspberry Pi Pico", "RASPBERRY-PI-PICO", pins(", ".join(rows)), "SC0915",
-                     "Raspberry Pi", "Raspberry Pi Pico data sheet; RP2040 data sheet: inputs 3.6 V, "
+                     "Raspberry Pi", "Raspberry Pi Pico and RP2040 data sheets: inputs 3.6 V, "
                      "high from 2.0 V, low to 0.8 V",
                      ("SC0917 (Pico H)", "SC0918 (Pico W)"), 4.00, "pico",
                      (("ma", 4), ("most_v", 3.6)))

@@ -198,8 +198,8 @@ def level_fault(board: Board, source: tuple[Part, Pin], sink: tuple[Part, Pin], 
 
 
 def pico_alone(board: Board) -> list[str]:
-    """Nothing feeds a Pico without supply: what drives its pins is supplied by the Pico's own 3.3 V,
-    and what comes from outside meets a part that blocks without supply, or 1 k."""
+    """Nothing feeds a Pico without supply: what drives its pins is supplied by the Pico's own
+    3.3 V, and what comes from outside meets a part that blocks without supply, or 1 k."""
     faults = []
     for pin in board.parts["U1"].component.pins:
         net = board.parts["U1"].nets.get(pin.number, "")
@@ -337,7 +337,8 @@ def isolation(board: Board) -> list[str]:
     for part in board.parts.values():
         sides = {side_of(net) for net in part.nets.values()}
         if len(sides) > 1 and part.component.family != "isolator":
-            faults.append(f"{part.ref} joins {' and '.join(sorted(s or 'the board' for s in sides))}")
+            names = sorted(side or "the board" for side in sides)
+            faults.append(f"{part.ref} joins {' and '.join(names)}")
     return faults
 
 

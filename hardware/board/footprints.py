@@ -177,6 +177,7 @@ ALL = {footprint.name: footprint for footprint in (
              "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm", 1.75, turn=-90),
     two_rows("SOIC-16", 8, 2.475, 1.27, 1.95, 0.6, centred(3.9, 9.9),
              "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm", 1.75, turn=-90),
-    ribbon(8), sot23(), htssop16(), lga14(), inductor(), micro_fit(), pico(), hole(), level_header(),
+    ribbon(8), sot23(), htssop16(), lga14(), inductor(), micro_fit(), pico(), hole(),
+    level_header(),
     test_point(), *(gh(count) for count in (2, 3, 4, 5, 6, 8, 9, 10)),
     header(1, 2), header(2, 1), header(3, 1), header(2, 2), header(3, 2), header(8, 2))}

@@ -8,6 +8,7 @@ import pathlib
 import assembly
 import kicad_pcb
 import kicad_sch
+import pinout
 import production
 import timing
 from boards import BOARDS
@@ -36,6 +37,7 @@ def files(board: Board, layout: Layout) -> dict[str, str]:
     if board.name == "carrier":
         found["timing.json"] = timing.text(board)
     found["production/board.wrl"] = production.vrml(board)
+    found["connectors.md"] = pinout.document(board)
     found["assembly.html"] = assembly.page(board, layout)
     return found
 

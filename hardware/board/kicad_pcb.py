@@ -233,7 +233,7 @@ def label_width(text: str, size: float) -> float:
 
 
 def text_spots(board: Board) -> dict[str, tuple[float, float, int]]:
-    """Where a reference fits beside its part; parts that are not here have it on the drawing only."""
+    """Where a reference fits beside its part; others have it on the drawing only."""
     blocked = [pad_box(pad, board.places[part.ref]) for part in board.parts.values()
                for pad in ALL[part.component.footprint].pads]
     blocked += [grown(box_at(ALL[part.component.footprint].body, board.places[part.ref]), 0.18)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the circuit as sheets of KiCad 6. Parts stand in framed groups; nets are joined by name."""
+"""Writes the circuit as sheets of KiCad 6. Parts stand in groups; names join the nets."""
 from __future__ import annotations
 
 import dataclasses
@@ -128,16 +128,17 @@ def library_symbol(component: Component) -> Sexpr:
     symbol = symbol_of(component)
     name = symbol_name(component)
     small = component.symbol in SMALL
-    body = DRAWN[component.symbol] if small else [box(
+    body: Sexpr = DRAWN[component.symbol] if small else [box(
         symbol.width / 2, max(abs(s.y) for s in symbol.spots) + GRID if symbol.spots else GRID)]
     pins = [["pin", kind_of(s.pin), "line",
              ["at", s.x, s.y, 0 if s.side == "left" else 180], ["length", 2.54],
              ["name", q("~" if small else s.pin.name), font()], ["number", q(s.pin.number),
                                                                font(1.0)]]
             for s in symbol.spots]
-    return ["symbol", q(f"versavis:{name}"),
-            *([["pin_numbers", "hide"], ["pin_names", "hide"]] if small else
-              [["pin_names", ["offset", 0.762]]]), ["in_bom", "yes"], ["on_board", "yes"],
+    hide: Sexpr = [["pin_numbers", "hide"], ["pin_names", "hide"]]
+    beside: Sexpr = [["pin_names", ["offset", 0.762]]]
+    return ["symbol", q(f"versavis:{name}"), *(hide if small else beside), ["in_bom", "yes"],
+            ["on_board", "yes"],
             ["property", q("Reference"), q("U"), ["id", 0], ["at", 0, 0, 0], font()],
             ["property", q("Value"), q(component.name), ["id", 1], ["at", 0, 0, 0], font()],
             ["property", q("Footprint"), q(f"versavis:{component.footprint}"), ["id", 2],
@@ -315,7 +316,8 @@ def snap(value: float) -> float:
 
 
 def group_title(group: str) -> str:
-    for start, title in (("camera", "Camera"), ("lidar", "LiDAR"), ("isolated", "Isolated channel")):
+    for start, title in (("camera", "Camera"), ("lidar", "LiDAR"),
+                         ("isolated", "Isolated channel")):
         if group.startswith(start):
             return f"{title} {group.removeprefix(start)}"
     return group

@@ -37,8 +37,8 @@ def load(path: pathlib.Path, board: Board) -> Layout:
     table = json.loads(path.read_text())
     board.islands = {name: to_box(box) for name, box in table["islands"].items()}
     board.places = {ref: Place(*at) for ref, at in table["places"].items()}
-    return Layout([tuple(track) for track in table["tracks"]],
-                  [tuple(via) for via in table["vias"]])
+    return Layout([(str(t[0]), str(t[1]), t[2], t[3], t[4], t[5], t[6]) for t in table["tracks"]],
+                  [(str(via[0]), via[1], via[2]) for via in table["vias"]])
 
 
 def to_box(numbers: list[float]) -> Box:

@@ -9,9 +9,12 @@ from typing import Callable
 import cables
 import catalogue as c
 import checks
+import documents
+import kept
 import layout_checks
+import reread
 from layout import Layout
-from model import Board, Place
+from model import Board, Component, Place
 
 Change = Callable[[Board], None]
 Check = Callable[[Board], list[str]]
@@ -26,7 +29,7 @@ def net(ref: str, pin: str, name: str) -> Change:
     return change
 
 
-def swap(ref: str, component: c.Component) -> Change:
+def swap(ref: str, component: Component) -> Change:
     def change(board: Board) -> None:
         board.parts[ref].component = component
     return change
@@ -144,9 +147,13 @@ def on_layout(change: Change) -> Callable[[Board, Layout], None]:
     return lambda board, layout: change(board)
 
 
+def lost(board: Board) -> None:
+    del board.places["R203"]
+
+
 LAYOUT: tuple[tuple[Callable[..., list[str]], str, Callable[[Board, Layout], None]], ...] = (
     (layout_checks.placed, "R203 has no place",
-     on_layout(lambda board: board.places.pop("R203") and None)),
+     on_layout(lost)),
     (layout_checks.courtyards, "overlap",
      on_layout(move("U201", 0.0, 3.0))),
     (layout_checks.inside, "less than 0.25 mm from the edge",
@@ -172,6 +179,20 @@ LAYOUT: tuple[tuple[Callable[..., list[str]], str, Callable[[Board, Layout], Non
 )
 
 
+def replaced(name: str, old: str, new: str) -> Callable[[dict[str, str]], None]:
+    def change(files: dict[str, str]) -> None:
+        assert old in files[name], old
+        files[name] = files[name].replace(old, new)
+    return change
+
+
+FILES: tuple[tuple[str, Callable[[dict[str, str]], None]], ...] = (
+    ("in the sheets at EXPOSURE1", replaced("camera0.kicad_sch", 'global_label "EXPOSURE0"',
+                                            'global_label "EXPOSURE1"')),
+    ("in the sheets at None", replaced("camera0.kicad_sch", "(wire", "(bus")),
+    ("in the board at ", replaced("carrier.kicad_pcb", '"CAM0_DRIVER")', '"CAM0_DRIVEN")')))
+
+
 def unnoticed(board: Board, layout: Layout) -> list[str]:
     """Mistakes that their check does not name, and checks that no mistake shows."""
     wrong = []
@@ -187,6 +208,13 @@ def unnoticed(board: Board, layout: Layout) -> list[str]:
                                (spoilt,)))
         if not any(sentence in fault for fault in found):
             wrong.append(f"{layout_check.__name__} does not find '{sentence}'")
+    for sentence, spoil_files in FILES:
+        files = kept.files(board, layout)
+        spoil_files(files)
+        if not any(sentence in fault for fault in reread.faults(board, files)):
+            wrong.append(f"reading the files again does not find '{sentence}'")
+    if len(documents.faults("nothing")) < 5:
+        wrong.append("a README without its numbers is not noticed")
     shown = {check for check, _, _ in CIRCUIT} | {check for check, _, _ in LAYOUT}
     return wrong + [f"no mistake shows {check.__name__}" for check in
                     (*checks.CIRCUIT, *layout_checks.SIMPLE, *layout_checks.FULL)
@@ -198,6 +226,14 @@ def cable(name: str, **changes: object) -> Callable[[cables.Table], None]:
         row = next(row for row in [*table["cameras"], *table["others"]] if row["name"] == name)
         row.update(changes)
     return change
+
+
+def supply_beside(table: cables.Table) -> None:
+    table["connectors"]["camera"]["pins"]["4"] = "supply"
+
+
+def first_camera_lost(table: cables.Table) -> None:
+    del table["cameras"][0]
 
 
 CABLES: tuple[tuple[str, Callable[[cables.Table], None]], ...] = (
@@ -218,9 +254,8 @@ CABLES: tuple[tuple[str, Callable[[cables.Table], None]], ...] = (
     ("livox: 5.25 V arrive, the input bears 3.6 V", cable("livox", level="5 V")),
     ("u-blox: gives 1.8 V, 2.2 V are high", cable("u-blox", gives_v=[1.8, 1.8])),
     ("vn100: serial is no pin of imu_uart", cable("vn100", wires={"serial": "RX"})),
-    ("camera: supply and a signal are on one connector", lambda table: table["connectors"][
-        "camera"]["pins"].update({"4": "supply"})),
-    ("flir of wiring.json has no cable", lambda table: table["cameras"].pop(0) and None),
+    ("camera: supply and a signal are on one connector", supply_beside),
+    ("flir of wiring.json has no cable", first_camera_lost),
 )
 
 

@@ -132,11 +132,12 @@ class Board:
 
     def add(self, ref: str, component: Component, group: str, *, value: str = "",
             fitted: tuple[str, ...] = (), near: str = "", label: str = "",
-            marks: tuple[Mark, ...] = (), **nets: str) -> Part:
-        """Pins by name; pins that share a name share the net. Names of Python: _1 for pin 1."""
+            marks: tuple[Mark, ...] = (), named: dict[str, str] | None = None,
+            **nets: str) -> Part:
+        """Pins by name; pins that share a name share the net. As keywords: _1 for pin 1."""
         if ref in self.parts:
             raise ValueError(f"{ref} exists twice")
-        wanted = {name.removeprefix("_"): net for name, net in nets.items()}
+        wanted = {name.removeprefix("_"): net for name, net in nets.items()} | (named or {})
         found: dict[str, str] = {}
         for pin in component.pins:
             net = wanted.get(pin.name, wanted.get(pin.number, ""))

@@ -3,6 +3,8 @@
 fit to the pin that they belong to."""
 from __future__ import annotations
 
+from typing import Any
+
 import numpy
 
 from model import Board, Box, Part, Place, box_at, gap, pad_at, pad_box
@@ -14,21 +16,21 @@ REACH = 30.0  # mm that a part may be away from its pin
 EDGE = 0.6  # mm between a courtyard and the edge
 NEAR = 2.5  # mm from a chip's pin to its capacitor
 MOAT = 2.2  # mm around an isolated area
-Grid = numpy.ndarray
+Grid = numpy.ndarray[Any, Any]
 
 
-ISOLATED_AT = ((2, 18.0), (3, 36.5))  # middle of each isolated area, at the right edge
+ISOLATED_AT = ((2, 20.5), (3, 39.0))  # middle of each isolated area, at the right edge
 ISLAND = (18.8, 7.6)  # its depth, and half of its height
 
 
 def hand(width: float, height: float) -> dict[str, Place]:
     top, bottom = 3.1, height - 3.1
     places = {
-        "U1": Place(26.0, 37.7, 90), "F6": Place(91.0, 4.4, 0),
-        "F1": Place(27.5, 53.1, 90), "F2": Place(31.6, 53.1, 90), "F3": Place(64.5, 52.5, 90),
-        "F4": Place(68.6, 52.5, 90), "J1": Place(width - 9.5, 51.5, 270),
-        "U2": Place(79.0, 47.5, 0), "U3": Place(66.5, 38.5, 90), "L1": Place(63.5, 30.5, 90),
-        "J800": Place(3.1, 58.4, 270), "U840": Place(9.0, height - 7.5, 0)}
+        "U1": Place(26.0, 42.7, 90), "F5": Place(67.0, 21, 90), "F6": Place(89.0, 4.4, 0),
+        "F1": Place(27.5, 58.1, 90), "F2": Place(31.6, 58.1, 90), "F3": Place(64.5, 57.5, 90),
+        "F4": Place(68.6, 57.5, 90), "J1": Place(width - 9.5, 56.5, 270),
+        "U2": Place(75.2, 53.5, 0), "U3": Place(66.5, 43.5, 90), "L1": Place(63.5, 35.5, 90),
+        "J800": Place(3.1, 63.4, 270), "U840": Place(9.0, height - 7.5, 0)}
     places |= {f"H{i + 1}": Place(x, y) for i, (x, y) in enumerate(
         (x, y) for y in (3.6, height - 3.6) for x in (3.6, width - 3.6))}
     places |= {ref: Place(x, bottom) for ref, x in (
@@ -45,22 +47,24 @@ def hand(width: float, height: float) -> dict[str, Place]:
         b = 1000 + 100 * n
         places[f"U{b}"] = Place(width - ISLAND[0] - 1.4, y)
         places[f"J{b}"] = Place(width - 3.1, y, 90)
+        places[f"C{b}"] = Place(width - ISLAND[0] - 3.8, y - 4.3, 90)
     return places | jumpers_at_the_top() | signs(width, height)
 
 
 def jumpers_at_the_top() -> dict[str, Place]:
-    return {"JP820": Place(10.6, 20.8), "C13": Place(4.6, 24.6), "C12": Place(11.4, 24.6), "JP700": Place(20.5, 23.2, 0), "JP701": Place(27.0, 23.2, 0),
-            "JP600": Place(51.0, 23.2, 0), "JP601": Place(61.0, 22.3, 0),
-            "JP620": Place(67.6, 23.2, 0), "JP621": Place(77.6, 22.3, 0),
-            "JP800": Place(9.5, 52.6, 0)}
+    return {"JP820": Place(10.6, 25.8), "C13": Place(4.6, 29.6), "C12": Place(11.4, 29.6),
+            "JP700": Place(20.5, 28.2, 0), "JP701": Place(27.0, 28.2, 0),
+            "JP600": Place(49.8, 28.2, 0), "JP601": Place(59.6, 27.3, 0),
+            "JP620": Place(66.0, 28.2, 0), "JP621": Place(75.8, 27.3, 0),
+            "JP800": Place(9.5, 57.6, 0)}
 
 
 def signs(width: float, height: float) -> dict[str, Place]:
     """Lights and test points."""
-    return {"D4": Place(width - 3.0, 64.0, 0), "D5": Place(width - 3.0, 60.5, 0),
-            "D6": Place(width - 3.0, 67.5, 0), "D743": Place(46.5, 23.4, 0),
-            "TP1": Place(71.5, 33.5), "TP2": Place(71.5, 30.0), "TP3": Place(76.0, 30.0),
-            "TP4": Place(71.5, 26.5), "TP5": Place(76.0, 33.5)}
+    return {"D4": Place(width - 3.0, 69, 0), "D5": Place(width - 3.0, 65.5, 0),
+            "D6": Place(width - 3.0, 72.5, 0), "D743": Place(43.0, 28.6, 0),
+            "TP1": Place(70.9, 38.5), "TP2": Place(70.9, 35), "TP3": Place(74.6, 35),
+            "TP4": Place(70.9, 31.5), "TP5": Place(74.6, 38.5)}
 
 
 def islands(board: Board) -> dict[str, Box]:
@@ -93,15 +97,16 @@ class Placer:
 
     @staticmethod
     def room(part: Part) -> Box:
-        """The courtyard; of chips, also room for tracks and vias, of connectors and jumpers for a label."""
+        """The courtyard; of chips, also room for tracks, of connectors and jumpers for a label."""
         footprint = ALL[part.component.footprint]
         if footprint.name.startswith("JST") or part.component.family == "led":
             box = footprint.courtyard
             return box[0], box[1] - 1.3, box[2], box[3]
         if part.component.family in ("jumper", "test_point"):
             return grown(footprint.body, 1.2)  # for its label
-        return grown(footprint.courtyard, 0.25 if 5 <= len(footprint.pads) <= 17 and
-                     part.component.family != "connector" else 0.0)
+        if not 5 <= len(footprint.pads) <= 17 or part.component.family == "connector":
+            return footprint.courtyard
+        return grown(footprint.courtyard, 0.5 if footprint.name == "SSOP-8" else 0.25)
 
     def home(self, part: Part) -> int:
         """The island that a part belongs to; 0 for the rest of the board."""
@@ -208,7 +213,7 @@ class Placer:
         top, bottom = top.clip(0, self.rows), bottom.clip(0, self.rows)
         count = (sums[bottom][:, right] - sums[top][:, right] - sums[bottom][:, left]
                  + sums[top][:, left])
-        return inside & (count == 0)
+        return numpy.asarray(inside & (count == 0))
 
     def cost(self, part: Part, turn: int, gx: Grid, gy: Grid, anchor: tuple[float, float]) -> Grid:
         cost = 0.0 * gx

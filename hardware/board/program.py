@@ -7,9 +7,11 @@ import time
 
 import cables
 import checks
+import documents
 import kept
 import layout_checks
 import mistakes
+import reread
 from boards import BOARDS
 
 
@@ -20,10 +22,12 @@ def check(quick: bool) -> list[str]:
         found = checks.circuit_faults(board) if name == "carrier" else checks.plain_faults(board)
         found += layout_checks.layout_faults(board, layout)
         found += kept.differences(board, layout)
+        found += reread.faults(board, kept.files(board, layout))
         if name == "carrier" and not quick:
             found += mistakes.unnoticed(board, layout)
         faults += [f"{name}: {fault}" for fault in found]
     faults += [f"cables.json: {fault}" for fault in cables.faults()]
+    faults += documents.faults()
     return faults if quick else faults + mistakes.unnoticed_cables()
 
 

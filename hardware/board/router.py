@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 import math
 import sys
-from typing import Iterator
+from typing import Any, Iterator
 
 import numpy
 
@@ -22,7 +22,7 @@ VIA_COST = 8.0
 Track = tuple[str, str, float, float, float, float, float]
 Via = tuple[str, float, float]
 Node = tuple[int, int, int]  # layer, row, column
-Grid = numpy.ndarray
+Grid = numpy.ndarray[Any, Any]
 POWER = {"VIN", "VPROT", "5V_BUCK", "+5V", "SW", "5V_OUT", "VLIGHT", "VCAM0", "VCAM1", "VCAM2",
          "VCAM3"}
 
@@ -39,6 +39,96 @@ def disc(radius: float) -> list[tuple[int, int]]:
     reach, limit = int(radius / PITCH) + 1, radius - 1e-6
     return [(dy, dx) for dy in range(-reach, reach + 1) for dx in range(-reach, reach + 1)
             if math.hypot(dx, dy) * PITCH < limit]
+
+
+class Window:
+    """A part of the board in which one way is searched (A*); nodes are numbers here."""
+
+    def __init__(self, box: tuple[int, int, int, int], cost: Grid, via_cost: Grid, plane: bool):
+        y0, y1, self.x0, x1 = box
+        self.y0, self.wide, self.tall = y0, x1 - self.x0 + 1, y1 - y0 + 1
+        self.x1, self.y1, self.plane = x1, y1, plane
+        self.size = self.wide * self.tall
+        self.costs = cost[:, y0:y1 + 1, self.x0:x1 + 1].ravel().tolist()
+        self.vias = via_cost[y0:y1 + 1, self.x0:x1 + 1].ravel().tolist()
+        self.targets: set[int] = set()
+        self.aim_box = (0, 0, 0, 0)
+        self.came: dict[int, int] = {}
+
+    def index(self, node: Node) -> int:
+        return node[0] * self.size + (node[1] - self.y0) * self.wide + node[2] - self.x0
+
+    def aim(self, goals: set[Node]) -> None:
+        self.targets = {self.index(n) for n in goals if self.y0 <= n[1] <= self.y1 and
+                        self.x0 <= n[2] <= self.x1}
+        rows = [n[1] - self.y0 for n in goals] or [0]
+        columns = [n[2] - self.x0 for n in goals] or [0]
+        self.aim_box = min(rows), max(rows), min(columns), max(columns)
+
+    def guess(self, i: int) -> float:
+        """Never more than what is left to go."""
+        if self.plane or i < 0:
+            return 0.0
+        low_y, high_y, low_x, high_x = self.aim_box
+        y, x = divmod(i % self.size, self.wide)
+        dy = low_y - y if y < low_y else y - high_y if y > high_y else 0
+        dx = low_x - x if x < low_x else x - high_x if x > high_x else 0
+        return dx + 0.414 * dy if dx > dy else dy + 0.414 * dx
+
+    def beside(self, i: int) -> Iterator[tuple[int, float]]:
+        """Nodes next to one on its layer, and what a step there costs."""
+        wide, costs, spot = self.wide, self.costs, i % self.size
+        x = spot % wide
+        for step, length in ((1, 1.0), (-1, 1.0), (wide, 1.0), (-wide, 1.0), (wide + 1, 1.414),
+                             (wide - 1, 1.414), (-wide + 1, 1.414), (-wide - 1, 1.414)):
+            if not 0 <= spot + step < self.size or abs((spot + step) % wide - x) > 1:
+                continue
+            price = costs[i + step]
+            if length > 1:  # the corners beside it count, too
+                row = wide if step > 1 else -wide
+                price = max(price, costs[i + row], costs[i + step - row])
+            yield i + step, length * price
+
+    def through(self, i: int) -> tuple[int, float]:
+        """The other end of a via; a negative number is the plane."""
+        price = self.vias[i % self.size]
+        if self.plane:
+            return -i - 1, price
+        j = i + self.size if i < self.size else i - self.size
+        return j, price + self.costs[j]
+
+    def find(self, sources: list[int]) -> tuple[int, bool]:
+        """Where the cheapest way ends, and whether with a via to the plane; -1: there is none."""
+        best = {i: 0.0 for i in sources}
+        heap = [(self.guess(i), i) for i in best]
+        heapq.heapify(heap)
+        done: set[int] = set()
+        while heap:
+            _, i = heapq.heappop(heap)
+            if i in done:
+                continue
+            done.add(i)
+            if i < 0:
+                return -i - 1, True
+            if i in self.targets:
+                return i, False
+            base = best[i]
+            for j, price in (*self.beside(i), self.through(i)):
+                if base + price < best.get(j, math.inf):
+                    best[j] = base + price
+                    if j >= 0:
+                        self.came[j] = i
+                    heapq.heappush(heap, (best[j] + self.guess(j), j))
+        return -1, False
+
+    def trace(self, i: int) -> list[Node]:
+        path = []
+        while True:
+            layer, spot = divmod(i, self.size)
+            path.append((layer, spot // self.wide + self.y0, spot % self.wide + self.x0))
+            if i not in self.came:
+                return path[::-1]
+            i = self.came[i]
 
 
 class Router:
@@ -257,87 +347,13 @@ class Router:
 
     def search_within(self, sources: list[Node], goals: set[Node], cost: Grid, via_cost: Grid,
                       plane: bool, margin: int) -> list[Node]:
-        y0, y1, x0, x1 = self.window(sources, goals, plane, margin)
-        wide, tall = x1 - x0 + 1, y1 - y0 + 1
-        size = wide * tall
-        costs = cost[:, y0:y1 + 1, x0:x1 + 1].ravel().tolist()
-        vias = via_cost[y0:y1 + 1, x0:x1 + 1].ravel().tolist()
-
-        def index(node: Node) -> int:
-            return node[0] * size + (node[1] - y0) * wide + node[2] - x0
-
-        targets = {index(n) for n in goals if y0 <= n[1] <= y1 and x0 <= n[2] <= x1}
-        rows, columns = [n[1] - y0 for n in goals] or [0], [n[2] - x0 for n in goals] or [0]
-        low_y, high_y, low_x, high_x = min(rows), max(rows), min(columns), max(columns)
-        steps = ((1, 1.0), (-1, 1.0), (wide, 1.0), (-wide, 1.0), (wide + 1, 1.414),
-                 (wide - 1, 1.414), (-wide + 1, 1.414), (-wide - 1, 1.414))
-
-        def guess(i: int) -> float:
-            if plane:
-                return 0.0
-            y, x = divmod(i % size, wide)
-            dy = low_y - y if y < low_y else y - high_y if y > high_y else 0
-            dx = low_x - x if x < low_x else x - high_x if x > high_x else 0
-            return dx + 0.414 * dy if dx > dy else dy + 0.414 * dx
-
-        best = {index(n): 0.0 for n in sources}
-        came: dict[int, int] = {}
-        heap = [(guess(i), i) for i in best]
-        heapq.heapify(heap)
-        done: set[int] = set()
-        finish, at_via = -1, False
-        while heap:
-            _, i = heapq.heappop(heap)
-            if i in done:
-                continue
-            done.add(i)
-            if i < 0:  # a via to the plane
-                finish, at_via = -i - 1, True
-                break
-            if i in targets:
-                finish = i
-                break
-            base = best[i]
-            spot = i % size
-            x = spot % wide
-            for step, length in steps:
-                j = i + step
-                if not 0 <= spot + step < size or abs((spot + step) % wide - x) > 1:
-                    continue
-                price = costs[j]
-                if length > 1:  # the corners beside it count, too
-                    row = wide if step > 1 else -wide
-                    price = max(price, costs[i + row], costs[i + step - row])
-                total = base + length * price
-                if total < best.get(j, math.inf):
-                    best[j] = total
-                    came[j] = i
-                    heapq.heappush(heap, (total + guess(j), j))
-            price = vias[spot]
-            if price < math.inf:
-                if plane:
-                    total = base + price
-                    if total < best.get(-i - 1, math.inf):
-                        best[-i - 1] = total
-                        heapq.heappush(heap, (total, -i - 1))
-                else:
-                    j = i + size if i < size else i - size
-                    total = base + price + costs[j]
-                    if total < best.get(j, math.inf):
-                        best[j] = total
-                        came[j] = i
-                        heapq.heappush(heap, (total + guess(j), j))
+        box = self.window(sources, goals, plane, margin)
+        window = Window(box, cost, via_cost, plane)
+        window.aim(goals)
+        finish, at_via = window.find([window.index(n) for n in sources])
         if finish < 0:
             return []
-        path = []
-        i = finish
-        while True:
-            layer, spot = divmod(i, size)
-            path.append((layer, spot // wide + y0, spot % wide + x0))
-            if i not in came:
-                break
-            i = came[i]
-        path.reverse()
+        path = window.trace(finish)
         if at_via:
             layer, y, x = path[-1]
             path.append((1 - layer, y, x))
@@ -407,12 +423,29 @@ class Router:
             if not todo:
                 return
             self.pressure = min(self.pressure * 1.4, 40)
-            for net in todo:
-                k = width_class(net)
-                for node in self.nodes_of(net):
-                    if self.used[k][node] > self.marks[net][k][node]:
-                        self.history[node] += 0.6 + 0.1 * turn
+            spots = self.remember(todo, turn)
+            if turn % 6 == 5:  # those around them may have to move, too
+                todo |= self.neighbours(spots)
         raise RuntimeError(f"{len(todo)} nets are still in conflict: {sorted(todo)}")
+
+    def remember(self, nets: set[str], turn: int) -> list[Node]:
+        """Makes the nodes dearer that they fight for, for good; and returns these."""
+        spots = []
+        for net in sorted(nets):
+            k = width_class(net)
+            for node in self.nodes_of(net):
+                if self.used[k][node] > self.marks[net][k][node]:
+                    self.history[node] += 0.6 + 0.1 * turn
+                    spots.append(node)
+        return spots
+
+    def neighbours(self, spots: list[Node]) -> set[str]:
+        """Nets that pass within 2.4 mm."""
+        squares = {(y // 12 + dy, x // 12 + dx) for _, y, x in spots for dy in (-1, 0, 1)
+                   for dx in (-1, 0, 1)}
+        planes = self.plane_nets()
+        return {net for net in self.paths if net not in planes and
+                any((y // 12, x // 12) in squares for _, y, x in self.nodes_of(net))}
 
     def tracks(self) -> list[Track]:
         found = list(self.leads)

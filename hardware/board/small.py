@@ -24,7 +24,7 @@ def leds() -> Board:
     board.add("U2", c.COUNTER, g, CP="CLOCK", MR="GND", GND="GND", VCC="+5V", Q0="BIT0", Q1="BIT1",
               Q2="BIT2", Q3="BIT3", Q4="BIT4", Q5="BIT5")
     board.add("U3", c.DECODER, g, GND="GND", VCC="+5V",
-              **{"1E": "GND", "1A0": "BIT0", "1A1": "BIT1", "1Y0": "STEP0", "1Y1": "STEP1",
+              named={"1E": "GND", "1A0": "BIT0", "1A1": "BIT1", "1Y0": "STEP0", "1Y1": "STEP1",
                  "1Y2": "STEP2", "1Y3": "STEP3", "2E": "+5V", "2A0": "GND", "2A1": "GND"})
     for ref, near in (("C1", "U1.5"), ("C2", "U2.14"), ("C3", "U3.16")):
         board.add(ref, c.C100N, g, near=near, _1="+5V", _2="GND")

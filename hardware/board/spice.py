@@ -193,7 +193,7 @@ def light_case(board: Board, threshold: float) -> Case:
     """The firmware hangs with the light on."""
     netlist = f"""
 V1 light 0 PULSE(0 3.3 1m 10n 10n 100m 300m)
-R1 light pin 50
+R1 light pin {50 + ohm(board, 'R765')}
 C1 pin timed {farad(board, 'C761')}
 R2 timed 0 {ohm(board, 'R760')}
 D1 0 timed schottky

@@ -14,8 +14,8 @@ import checks
 from model import Board
 
 # ns, least and most. 74LVC1T45: no table of delays was at hand; 420 Mbit/s to 5 V, 210 to 3.3 V and
-# 75 to 1.8 V (its data sheet) bound a bit, and so the delay. 74LVC1G17: the family's 5.5 V to 1.65 V
-# range, likewise bounded. ISO7721: 6 to 16 ns. Transistors of the isolated option: simulated.
+# 75 to 1.8 V (its data sheet) bound a bit, and so the delay; the 74LVC1G17 is bounded likewise.
+# ISO7721: 6 to 16 ns. Transistors of the isolated option: simulated.
 TRANSLATOR = {"5 V": (0.5, 5.0), "3.3 V": (0.5, 6.0), "1.8 V": (1.0, 14.0)}
 SCHMITT = {"5 V": (0.5, 5.0), "3.3 V": (0.5, 6.0), "1.8 V": (1.0, 14.0)}
 ISOLATOR = (6.0, 16.0)

@@ -25,7 +25,7 @@ DATED = re.compile(r"CreationDate|^G04 Created by|^; DRILL file|date |^; #@! TF.
 
 
 def pcbnew() -> Any:
-    import pcbnew as module  # pylint: disable=import-error
+    import pcbnew as module  # type: ignore  # pylint: disable=import-error
     return module
 
 
@@ -55,7 +55,8 @@ def moved_track(loaded: Any) -> None:
 
 
 def missing_via(loaded: Any) -> None:
-    via = [t for t in loaded.GetTracks() if t.GetClass() == "PCB_VIA" and t.GetNetname() != "GND"][3]
+    via = [t for t in loaded.GetTracks()
+           if t.GetClass() == "PCB_VIA" and t.GetNetname() != "GND"][3]
     loaded.Delete(via)
 
 
@@ -135,7 +136,8 @@ SIDES = {"front": ("F_Silkscreen", "F_Mask", "F_Cu"), "back": ("B_Silkscreen", "
 
 def picture(board: Board, work: pathlib.Path, side: str, target: pathlib.Path) -> None:
     """Of one side, as a pool would make it: silk screen, mask openings, copper."""
-    silk, mask, copper = (str(next((work / "gerbers").glob(f"*{name}.gbr"))) for name in SIDES[side])
+    silk, mask, copper = (str(next((work / "gerbers").glob(f"*{name}.gbr")))
+                          for name in SIDES[side])
     edge = str(next((work / "gerbers").glob("*Edge_Cuts.gbr")))
     drills = [str(path) for path in sorted((work / "gerbers").glob("*.drl"))]
     layers = [*((path, "#FFFFFFFF") for path in drills), (silk, "#F5F5F0FF"), (mask, "#D8B75AB0"),
