@@ -243,7 +243,8 @@ def text_spots(board: Board) -> dict[str, tuple[float, float, int]]:
     found = {}
     for part in board.parts.values():
         footprint, place = ALL[part.component.footprint], board.places[part.ref]
-        if footprint.kind not in ("smd", "thru") or part.ref == "U1":
+        named = part.component.family == "led" and part.marks
+        if footprint.kind not in ("smd", "thru") or part.ref == "U1" or named:
             continue
         spot = free_spot(board, part.ref, box_at(footprint.courtyard, place), blocked)
         if spot:
