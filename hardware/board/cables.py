@@ -9,8 +9,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import pathlib
+import re
 from typing import Any
 
+PRESETS = pathlib.Path(__file__).resolve().parents[2] / "daemon/settings/presets"
 HARDWARE = pathlib.Path(__file__).resolve().parents[1]
 Table = dict[str, Any]
 # The carrier's outputs: V at the rail at least and at most, ohm of the driver and of what follows
@@ -139,6 +141,20 @@ def pin_faults(row: Table, wiring: Table) -> list[str]:
     return faults
 
 
+def line_faults(row: Table) -> list[str]:
+    """Its lines are those that its preset uses; others have to be configured, and it says so."""
+    if "lines" not in row:
+        return []
+    text = (PRESETS / f"{row['preset']}.toml").read_text()
+    found = []
+    for key, what in (("trigger_lines", "trigger"), ("strobe_lines", "exposure")):
+        first = re.search(rf'^{key} = \["(\w+)"', text, re.M)
+        if first and first[1] != row["lines"][what] and not row.get("configure"):
+            found.append(f"preset '{row['preset']}' uses {first[1]} for the {what}, not "
+                         f"{row['lines'][what]}")
+    return found
+
+
 def shared_pins(table: Table) -> list[str]:
     """A pin that one camera uses for a signal and another one of the same plug for its supply may
     not be wired to both in one cable; the carrier has no such connector."""
@@ -179,7 +195,7 @@ def faults(table: Table | None = None) -> list[str]:
         into, output = camera_facts(row, wiring)
         found += [f"{row['name']}: {fault}" for fault in
                   [*trigger_faults(row, into), *exposure_faults(row, output),
-                   *pin_faults(row, wiring)]]
+                   *pin_faults(row, wiring), *line_faults(row)]]
     for row in table["others"]:
         wrong = lidar_faults(row) if row["at"] == "lidar" else other_faults(row, table)
         found += [f"{row['name']}: {fault}" for fault in wrong]

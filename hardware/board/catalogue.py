@@ -97,13 +97,14 @@ XOR = Component(
     "SN74LVC1G86DBVR", "Texas Instruments", "TI SCES222", ("74LVC1G86GV,125 (Nexperia)",), 0.10,
     "lvc", (("ma", 24), ("most_v", 5.5), ("supply_ma", 0.1)))
 ISOLATOR = Component(
-    "ISO7721", "SOIC-8",
+    "ISO7721F", "SOIC-8",
     pins("1 VCC1 pi, 2 OUTA out VCC1, 3 INB in VCC1, 4 GND1 pi, 5 GND2 pi, 6 OUTB out VCC2, "
          "7 INA in VCC2, 8 VCC2 pi"),
-    "ISO7721DR", "Texas Instruments",
-    "TI SLLSEP4: 11 ns typ., 16 at most, 2.25 to 5.5 V, 1.7 mA a channel; 3 kV, 4 mm",
-    ("ADuM1201ARZ (Analog Devices; 50 to 150 ns)", "ISO6721BDR"), 1.20, "isolator",
-    (("ma", 4), ("most_v", 5.5), ("supply_ma", 2.8)))
+    "ISO7721FDR", "Texas Instruments",
+    "TI SLLSEP4: 11 ns typ., 16 at most, 2.25 to 5.5 V, 1.7 mA a channel; 3 kV, 4 mm; F: outputs "
+    "are low while the other side has no supply (without F and the ADuM1201: high, which triggers)",
+    ("ISO6721FBDR",), 1.20, "isolator",
+    (("ma", 4), ("most_v", 5.5), ("supply_ma", 2.8), ("fails_low", 1)))
 EFUSE = Component(
     "TPS26600", "HTSSOP-16",
     pins("1 IN pi, 2 IN pi, 3 UVLO in, 4 NC nc, 5 OVP in, 6 MODE in, 7 SHDN in, 8 RTN pas, "

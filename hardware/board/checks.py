@@ -242,6 +242,9 @@ def rests(board: Board) -> list[str]:
                          for part, other in pins_on(board, net, variant))
             if not always and (not pulls or min(pulls) > WEAK_PULL):
                 faults.append(f"{variant}: nothing of {WEAK_PULL / 1000:g} k or less holds {net}")
+    faults += [f"{part.ref} drives high while its other side has no supply"
+               for part in board.parts.values() if part.component.family == "isolator" and
+               not dict(part.component.figures).get("fails_low")]
     return faults
 
 

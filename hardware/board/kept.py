@@ -10,6 +10,7 @@ import kicad_pcb
 import kicad_sch
 import pinout
 import production
+import sheet_svg
 import timing
 from boards import BOARDS
 from layout import Layout, load
@@ -31,6 +32,9 @@ def files(board: Board, layout: Layout) -> dict[str, str]:
     """Text by path below the board's folder."""
     found = {f"{board.name}.kicad_pro": kicad_pcb.project(board),
              f"{board.name}.kicad_pcb": kicad_pcb.pcb(board, layout), **kicad_sch.schematic(board)}
+    for name, text in list(found.items()):
+        if name.endswith(".kicad_sch") and name != f"{board.name}.kicad_sch":
+            found[f"sheets/{name.removesuffix('.kicad_sch')}.svg"] = sheet_svg.picture(text)
     for variant in board.variants:
         found[f"production/bom-{variant}.csv"] = production.bom(board, variant)
         found[f"production/placement-{variant}.csv"] = production.placement(board, variant)

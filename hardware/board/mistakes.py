@@ -82,6 +82,8 @@ CIRCUIT: tuple[tuple[Check, str, Change], ...] = (
      without("R201")),
     (checks.rests, "holds TRIGGER0",
      swap("R201", c.resistor("10k"))),
+    (checks.rests, "U1200 drives high",
+     swap("U1200", dataclasses.replace(c.ISOLATOR, figures=()))),
     (checks.protection, "CAM1_TRIGGER at J300 has no ESD part",
      net("D300", "1", "GND")),
     (checks.protection, "stands 5 V, CAM0_EXPOSURE may have 24 V",
@@ -249,6 +251,8 @@ CABLES: tuple[tuple[str, Callable[[cables.Table], None]], ...] = (
     ("daheng: its pull-up leaves", cable("daheng", input={
         "kind": "direct", "high_v": 1.9, "low_v": 0.1, "highest_v": 24,
         "pulls_up": {"v": 3.3, "ohm": 1000}})),
+    ("flir-oryx: preset 'flir-oryx' uses Line2 for the trigger, not Line5", cable(
+        "flir-oryx", lines={"trigger": "Line5", "exposure": "Line2"})),
     ("velodyne: 3.03 V arrive", cable("velodyne", level="3.3 V", pps={
         "high_v": 3.1, "needs_ma": 2, "highest_v": 15})),
     ("livox: 5.25 V arrive, the input bears 3.6 V", cable("livox", level="5 V")),
