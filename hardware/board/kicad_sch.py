@@ -226,10 +226,7 @@ class Sheet:
         small = part.component.symbol in SMALL
         top = max((abs(s.y) for s in symbol.spots), default=0.0)
         up, down = (2.8, 3.0) if small else (top + 4.0, top + 4.2)
-        about = part.value if not part.label else f"{part.value}: {part.label}"
-        if "standard" not in part.fitted:
-            about += " (not fitted)" if part.fitted == {"none"} else \
-                f" (variant {', '.join(sorted(part.fitted))})"
+        about = about_part(part)
         self.rows.append([
             "symbol", ["lib_id", q(f"versavis:{symbol_name(part.component)}")], ["at", x, y, 0],
             ["unit", 1], ["in_bom", "yes"], ["on_board", "yes"],
@@ -284,7 +281,7 @@ class Sheet:
 
     def instances(self) -> list[Sexpr]:
         rows = [["path", q(f"{self.path}/{stamp(self.board.name, 'symbol', part.ref)}"),
-                 ["reference", q(part.ref)], ["unit", 1], ["value", q(part.value)],
+                 ["reference", q(part.ref)], ["unit", 1], ["value", q(about_part(part))],
                  ["footprint", q(f"versavis:{part.component.footprint}")]] for part in self.parts]
         number = 0
         for part in self.parts:
@@ -296,6 +293,15 @@ class Sheet:
                                  ["reference", q(self.power_name(number))], ["unit", 1],
                                  ["value", q("GND")], ["footprint", q("")]])
         return rows
+
+
+def about_part(part: Part) -> str:
+    """Its value, with what it is called on the board, and when it is not fitted."""
+    about = part.value if not part.label else f"{part.value}: {part.label}"
+    if "standard" in part.fitted:
+        return about
+    return about + (" (not fitted)" if part.fitted == {"none"} else
+                    f" (variant {', '.join(sorted(part.fitted))})")
 
 
 def flowed(sizes: list[tuple[float, float]], right: float) -> list[tuple[float, float]]:
