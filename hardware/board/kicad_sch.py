@@ -130,7 +130,9 @@ def library_symbol(component: Component) -> Sexpr:
     small = component.symbol in SMALL
     body: Sexpr = DRAWN[component.symbol] if small else [box(
         symbol.width / 2, max(abs(s.y) for s in symbol.spots) + GRID if symbol.spots else GRID)]
-    pins = [["pin", kind_of(s.pin), "line",
+    doubled = {s.pin.number for i, s in enumerate(symbol.spots) if s.pin.kind == "power_out" and
+               any(o.pin.name == s.pin.name for o in symbol.spots[:i])}
+    pins = [["pin", "passive" if s.pin.number in doubled else kind_of(s.pin), "line",
              ["at", s.x, s.y, 0 if s.side == "left" else 180], ["length", 2.54],
              ["name", q("~" if small else s.pin.name), font()], ["number", q(s.pin.number),
                                                                font(1.0)]]
@@ -168,6 +170,29 @@ GROUND = ["symbol", q("versavis:GND"), ["power"], ["pin_names", ["offset", 0]], 
                                                                          font()]]]]
 
 
+FLAG = ["symbol", q("versavis:PWR_FLAG"), ["power"], ["pin_names", ["offset", 0]],
+        ["in_bom", "yes"], ["on_board", "yes"],
+        ["property", q("Reference"), q("#FLG"), ["id", 0], ["at", 0, 5, 0], hidden()],
+        ["property", q("Value"), q("PWR_FLAG"), ["id", 1], ["at", 0, 3.81, 0], hidden()],
+        ["property", q("Footprint"), q(""), ["id", 2], ["at", 0, 0, 0], hidden()],
+        ["property", q("Datasheet"), q(""), ["id", 3], ["at", 0, 0, 0], hidden()],
+        ["symbol", q("PWR_FLAG_0_1"), polyline([(0, 0), (0, 1.27), (-1.27, 1.9), (0, 2.54),
+                                                (1.27, 1.9), (0, 1.27)])],
+        ["symbol", q("PWR_FLAG_1_1"), ["pin", "power_out", "line", ["at", 0, 0, 90],
+                                       ["length", 0], "hide", ["name", q("pwr"), font()],
+                                       ["number", q("1"), font()]]]]
+
+
+def flagged(board: Board) -> list[str]:
+    """Nets that supply chips through connectors, jumpers or diodes: KiCad's ERC needs a word."""
+    found = []
+    for net in board.nets():
+        kinds = {pin.kind for _, pin in board.pins_of(net)}
+        if "power_in" in kinds and "power_out" not in kinds:
+            found.append(net)
+    return found
+
+
 class Sheet:
     """One sheet: parts flow down its columns, group by group."""
 
@@ -185,7 +210,8 @@ class Sheet:
     def draw(self) -> str:
         self.flow()
         used = {symbol_name(part.component): part.component for part in self.parts}
-        library = ["lib_symbols", *(library_symbol(used[name]) for name in sorted(used)), GROUND]
+        library = ["lib_symbols", *(library_symbol(used[name]) for name in sorted(used)), GROUND,
+                   FLAG]
         return write(["kicad_sch", ["version", "20211123"], ["generator", "versavis"],
                       ["uuid", stamp(self.board.name, "page", self.name)], ["paper", q(self.paper)],
                       title_block(self.board, self.title), library, *self.rows]) + "\n"
@@ -203,6 +229,20 @@ class Sheet:
             self.frame(x, y, width, height, group)
             for part, (px, py) in parts:
                 self.place(part, snap(x + px), snap(y + py))
+        if self.page == 2:
+            self.flags(max(y + block[2] for (_, y), block in zip(spots, blocks)) + 17.78)
+
+    def flags(self, y: float) -> None:
+        """In a row below the groups of the first sheet."""
+        x = 33.02
+        for i, net in enumerate(flagged(self.board)):
+            place = snap(x + 22.86 * (i % 7)), snap(y + 10.16 * (i // 7))
+            self.rows.append(["global_label", q(net), ["shape", "passive"], ["at", *place, 180],
+                              ["fields_autoplaced"],
+                              ["effects", ["font", ["size", 1.1, 1.1]], ["justify", "right"]],
+                              ["uuid", stamp(self.board.name, net, "flag label")]])
+            self.rows.append(power_symbol("PWR_FLAG", f"#FLG{i + 1:02}", place, 0,
+                                          stamp(self.board.name, net, "flag")))
 
     def frame(self, x: float, y: float, width: float, height: float, group: str) -> None:
         title = TITLES.get(group, group_title(group))
@@ -265,16 +305,8 @@ class Sheet:
     def ground(self, key: tuple[str, str], x: float, y: float, side: str) -> None:
         self.grounds += 1
         turn = 270 if side == "left" else 90
-        self.rows.append([
-            "symbol", ["lib_id", q("versavis:GND")], ["at", x, y, turn], ["unit", 1],
-            ["in_bom", "yes"], ["on_board", "yes"], ["uuid", stamp(*key, "ground")],
-            ["property", q("Reference"), q(self.power_name(self.grounds)), ["id", 0],
-             ["at", x, y, 0], hidden()],
-            ["property", q("Value"), q("GND"), ["id", 1],
-             ["at", x + (-4.4 if side == "left" else 4.4), y, 0], hidden()],
-            ["property", q("Footprint"), q(""), ["id", 2], ["at", x, y, 0], hidden()],
-            ["property", q("Datasheet"), q(""), ["id", 3], ["at", x, y, 0], hidden()],
-            ["pin", q("1"), ["uuid", stamp(*key, "ground pin")]]])
+        self.rows.append(power_symbol("GND", self.power_name(self.grounds), (x, y), turn,
+                                      stamp(*key, "ground")))
 
     def power_name(self, number: int) -> str:
         return f"#PWR{self.page:02}{number:03}"
@@ -292,7 +324,21 @@ class Sheet:
                                            f"{stamp(part.ref, spot.pin.number, 'ground')}"),
                                  ["reference", q(self.power_name(number))], ["unit", 1],
                                  ["value", q("GND")], ["footprint", q("")]])
+        if self.page == 2:
+            rows += [["path", q(f"{self.path}/{stamp(self.board.name, net, 'flag')}"),
+                      ["reference", q(f"#FLG{i + 1:02}")], ["unit", 1], ["value", q("PWR_FLAG")],
+                      ["footprint", q("")]] for i, net in enumerate(flagged(self.board))]
         return rows
+
+
+def power_symbol(name: str, ref: str, place: tuple[float, float], turn: int, identity: str
+                 ) -> Sexpr:
+    texts = (("Reference", ref), ("Value", name), ("Footprint", ""), ("Datasheet", ""))
+    return ["symbol", ["lib_id", q(f"versavis:{name}")], ["at", *place, turn], ["unit", 1],
+            ["in_bom", "yes"], ["on_board", "yes"], ["uuid", identity],
+            *(["property", q(key), q(value), ["id", i], ["at", *place, 0], hidden()]
+              for i, (key, value) in enumerate(texts)),
+            ["pin", q("1"), ["uuid", stamp(identity, "pin")]]]
 
 
 def about_part(part: Part) -> str:
