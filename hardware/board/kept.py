@@ -6,6 +6,7 @@ from __future__ import annotations
 import pathlib
 
 import assembly
+import kicad_lib
 import kicad_pcb
 import kicad_sch
 import pinout
@@ -31,7 +32,8 @@ def open_board(name: str) -> tuple[Board, Layout]:
 def files(board: Board, layout: Layout) -> dict[str, str]:
     """Text by path below the board's folder."""
     found = {f"{board.name}.kicad_pro": kicad_pcb.project(board),
-             f"{board.name}.kicad_pcb": kicad_pcb.pcb(board, layout), **kicad_sch.schematic(board)}
+             f"{board.name}.kicad_pcb": kicad_pcb.pcb(board, layout), **kicad_sch.schematic(board),
+             **kicad_lib.files(board)}
     for name, text in list(found.items()):
         if name.endswith(".kicad_sch") and name != f"{board.name}.kicad_sch":
             found[f"sheets/{name.removesuffix('.kicad_sch')}.svg"] = sheet_svg.picture(text)
