@@ -187,7 +187,7 @@ INDUCTOR = Component(
 IMU = Component(
     "ICM-42688-P", "LGA-14",
     pins("1 SDO out VDDIO, 2 RESV nc, 3 RESV nc, 4 INT1 out VDDIO, 5 VDDIO pi, 6 GND pi, "
-         "7 RESV nc, 8 VDD pi, 9 INT2 bi VDDIO, 10 RESV nc, 11 RESV nc, 12 CS in VDDIO, "
+         "7 RESV nc, 8 VDD pi, 9 INT2 pas, 10 RESV nc, 11 RESV nc, 12 CS in VDDIO, "
          "13 SCLK in VDDIO, 14 SDI in VDDIO"),
     "ICM-42688-P", "TDK InvenSense", "TDK DS-000347", (), 3.50, "imu",
     (("ma", 4), ("most_v", 3.6), ("supply_ma", 1.0)))

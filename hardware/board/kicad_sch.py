@@ -287,7 +287,8 @@ class Sheet:
         net = part.nets.get(spot.pin.number, "")
         key = (part.ref, spot.pin.number)
         if not net:
-            self.rows.append(["no_connect", ["at", x, y], ["uuid", stamp(*key, "open")]])
+            if spot.pin.kind != "nc":  # those say so themselves
+                self.rows.append(["no_connect", ["at", x, y], ["uuid", stamp(*key, "open")]])
             return
         out = -GRID if spot.side == "left" else GRID
         self.rows.append(["wire", ["pts", ["xy", x, y], ["xy", x + out, y]],
