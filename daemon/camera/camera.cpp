@@ -57,7 +57,7 @@ constexpr std::uint64_t few_frames = 3;
 constexpr Duration renumbering_memory = seconds(30);
 
 /// Between looks at a streaming camera.
-constexpr Duration step = milliseconds(20);
+constexpr Duration poll_interval = milliseconds(20);
 
 /// Between readings of what changes slowly.
 constexpr Duration housekeeping_interval = seconds(3);
@@ -535,8 +535,8 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSourc
     health.received = pipeline_.report().received;
     if (device_) health.client.emplace(device_->interface, device_->address);
     HostTime housekeeping = health.began;
-    while (pause(frames.needs_polling() ? Duration{} : step)) {
-        if (frames.needs_polling()) frames.poll(step);
+    while (pause(frames.needs_polling() ? Duration{} : poll_interval)) {
+        if (frames.needs_polling()) frames.poll(poll_interval);
         if (control_lost)
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});

@@ -79,7 +79,8 @@ std::size_t data_per_packet(std::size_t packet_size, bool extended) {
 }
 
 std::vector<std::uint8_t> resend_request(const PacketRange& range, std::uint16_t request) {
-    std::vector<std::uint8_t> packet{0x42, static_cast<std::uint8_t>(range.extended ? 0x10 : 0)};
+    std::vector<std::uint8_t> packet{gvcp_key,
+                                     static_cast<std::uint8_t>(range.extended ? 0x10 : 0)};
     put(packet, 0x0040, 2);
     put(packet, range.extended ? 20 : 12, 2);
     put(packet, request, 2);

@@ -15,7 +15,7 @@ namespace versavis::daemon {
 namespace {
 
 /// For one answer.
-constexpr Duration answer_patience = milliseconds(500);
+constexpr Duration command_patience = milliseconds(500);
 
 /// The same for a camera that says that its answer takes longer.
 constexpr Duration longest_patience = seconds(5);
@@ -24,7 +24,7 @@ constexpr Duration longest_patience = seconds(5);
 constexpr unsigned most_tries = 3;
 
 /// Between looks at whether it is cancelled.
-constexpr Duration look_interval = milliseconds(20);
+constexpr Duration read_interval = milliseconds(20);
 
 /// Aravis divides what it reads by the room in a packet: a header, and the longest text of GenCP.
 constexpr std::uint64_t smallest_packet = 12 + 8 + 64;
@@ -117,7 +117,7 @@ class ControlChannel {
             put(question, address, 8);
             put(question, 0, 2);
             put(question, size, 2);
-            if (!handle_.write(control_.endpoint_out, question, answer_patience))
+            if (!handle_.write(control_.endpoint_out, question, command_patience))
                 static_cast<void>(handle_.clear_halt(control_.endpoint_out));
             else if (auto answer = receive(size))
                 return answer;
@@ -128,10 +128,10 @@ class ControlChannel {
     /// What it holds, or none: it does not come, or it is a refusal.
     std::optional<Bytes> receive(std::uint64_t size) {
         const HostTime asked = host_now();
-        HostTime until = asked + answer_patience;
+        HostTime until = asked + command_patience;
         Bytes buffer((header_size + size + usb_packet - 1) / usb_packet * usb_packet);
         while (host_now() < until && !cancelled_()) {
-            const auto got = handle_.read(control_.endpoint_in, buffer, look_interval);
+            const auto got = handle_.read(control_.endpoint_in, buffer, read_interval);
             if (!got && got.error().fault == device::UsbFault::late) continue;
             if (!got && got.error().fault == device::UsbFault::stalled)
                 static_cast<void>(handle_.clear_halt(control_.endpoint_in));

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "base/fail.hpp"
 #include "discovery/found_devices.hpp"
 #include "discovery/service_program.hpp"
 #include "engine/imu/imu_model.hpp"
@@ -31,11 +32,6 @@ constexpr int exit_nothing = 1;
 constexpr double usual_rate_hz = 20;
 constexpr double slowest_hz = 0.1;
 constexpr double fastest_hz = 1000;
-
-int fail(const Error& error, int code) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return code;
-}
 
 /// A line of the user, `usual` for an empty one. None: the input has ended.
 std::optional<std::string> answer(const std::string& question, const std::string& usual) {

@@ -228,7 +228,7 @@ struct Solution {
 };
 
 /// Solves by own sizes of the unknowns; none where they are not determined at all.
-Matrix7 inverse(const Matrix7& information) {
+Matrix7 inverse_of(const Matrix7& information) {
     Vector7 size;
     for (int i = 0; i < 7; ++i) size[i] = 1 / std::sqrt(std::max(information(i, i), 1e-30));
     Matrix7 scaled = size.asDiagonal() * information * size.asDiagonal();
@@ -249,7 +249,7 @@ std::optional<Solution> follow(const Problem& problem, State state, double range
             information += weight * at.jacobians[i].transpose() * at.jacobians[i];
             right += weight * at.jacobians[i].transpose() * at.residuals[i];
         }
-        const Matrix7 spread = inverse(information);
+        const Matrix7 spread = inverse_of(information);
         // An offset that nothing shows would run away; the caller refuses it as it is.
         if (scale * std::sqrt(spread(offset_at, offset_at)) > 0.1 * range) break;
         const Vector7 change = -spread * right;
@@ -296,7 +296,7 @@ Matrix7 covariance(const Solution& solution) {
         }
     }
     lagged *= count / (count - 7);
-    const Matrix7 outer = inverse(bread);
+    const Matrix7 outer = inverse_of(bread);
     const Matrix7 by_plain = outer * plain * outer;
     const Matrix7 by_lagged = outer * lagged * outer;
     Matrix7 result = by_plain;
