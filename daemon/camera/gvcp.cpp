@@ -25,7 +25,7 @@ constexpr std::uint16_t discovery = 0x0002;
 constexpr std::uint16_t read_register_command = 0x0080;
 constexpr std::uint16_t read_memory = 0x0084;
 constexpr std::size_t discovery_size = 0xF8;
-constexpr std::size_t block = 512;  ///< the most that a device must deliver at once
+constexpr std::size_t read_size = 512;  ///< the most that a device must deliver at once
 
 /// Between the first two questions to one address, and then twice as long each time, because a slow
 /// camera answers all of them before anything else.
@@ -71,10 +71,6 @@ std::uint16_t half_at(const std::uint8_t* bytes) {
 
 std::uint32_t word_at(const std::uint8_t* bytes) {
     return std::uint32_t{half_at(bytes)} << 16U | half_at(bytes + 2);
-}
-
-void put(std::vector<std::uint8_t>& out, std::uint32_t value, unsigned bytes) {
-    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
 }
 
 /// A field of a device's own texts: up to its first zero, and printable.
@@ -276,7 +272,7 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
         ::send(socket_.get(), packet.data(), packet.size(), 0);
         const HostTime again = std::min(deadline, host_now() + repeat_after_);
         while (readable(polled, again, cancelled)) {
-            std::uint8_t answer[gvcp_header_size + block + 4];
+            std::uint8_t answer[gvcp_header_size + read_size + 4];
             const ssize_t size = ::recv(socket_.get(), answer, sizeof answer, 0);
             if (size < 0) break;  // nobody listens there: it may boot
             const bool ours = size >= static_cast<ssize_t>(gvcp_header_size) &&
@@ -302,7 +298,7 @@ Expected<std::vector<std::uint8_t>> GvcpClient::read(std::uint32_t address, std:
     std::vector<std::uint8_t> all;
     all.reserve(size);
     while (all.size() < size) {
-        const std::size_t left = std::min(block, (size - all.size() + 3) / 4 * 4);
+        const std::size_t left = std::min(read_size, (size - all.size() + 3) / 4 * 4);
         std::vector<std::uint8_t> body;
         put(body, address + static_cast<std::uint32_t>(all.size()), 4);
         put(body, static_cast<std::uint32_t>(left), 4);

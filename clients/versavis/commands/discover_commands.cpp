@@ -69,7 +69,7 @@ Expected<json> table_of_keys() {
 }
 
 /// What the service says of it before it is written.
-Expected<> check(const std::string& text) {
+Expected<> checked(const std::string& text) {
     // The child opens it by the same number.
     const FileDescriptor file(::memfd_create("versavis.toml", 0));
     const std::string path = fmt::format("/proc/self/fd/{}", file.get());
@@ -203,7 +203,7 @@ int DiscoverCommands::init(const std::string& instance) {
              "see 'versavis discover' for what stands in the way, or name an IMU with --imu"},
             EX_UNAVAILABLE);
     const std::string text = to_toml(*configuration, *keys);
-    if (const auto good = check(text); !good) return fail(good.error(), EX_CONFIG);
+    if (const auto good = checked(text); !good) return fail(good.error(), EX_CONFIG);
     return write(*configuration, text);
 }
 

@@ -29,7 +29,7 @@ constexpr std::size_t indent = 9;
 constexpr auto green = "\x1b[32m";
 constexpr auto yellow = "\x1b[33m";
 constexpr auto red = "\x1b[31m";
-constexpr auto plain = "\x1b[0m";
+constexpr auto no_colour = "\x1b[0m";
 
 std::string wrapped_part(std::string line) { return client::wrapped(std::move(line), indent); }
 
@@ -164,7 +164,7 @@ const char* colour_of(const json& part) {
 
 std::string coloured(std::string lines, std::size_t begin, std::size_t size, const char* colour) {
     const std::size_t end = std::min(begin + size, lines.size());
-    lines.insert(end, plain);
+    lines.insert(end, no_colour);
     return lines.insert(begin, colour);
 }
 
