@@ -134,7 +134,7 @@ void Service::report_hidden_clock() {
 
 void Service::start() {
     report_hidden_clock();
-    const auto kept = make_state_directory(state_directory(configuration_.state_directory));
+    const auto kept = make_state_directory(configuration_.state_directory);
     if (!kept) log(LogLevel::warning, "service", "{}", kept.error().message());
     if (board_needed()) board_->start();
     cameras_->start();

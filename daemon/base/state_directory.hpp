@@ -21,8 +21,10 @@ inline std::filesystem::path state_directory(const std::string& configured) {
     return by_systemd != nullptr ? by_systemd : "/var/lib/versavis";
 }
 
-/// Makes it. Error: nothing can be kept there.
-inline Expected<> make_state_directory(const std::filesystem::path& path) {
+/// Makes it, unless nobody has named one. Error: nothing can be kept there.
+inline Expected<> make_state_directory(const std::string& configured) {
+    if (configured.empty() && std::getenv("STATE_DIRECTORY") == nullptr) return {};
+    const std::filesystem::path path = state_directory(configured);
     std::error_code error;
     std::filesystem::create_directories(path, error);
     if (!error && ::access(path.c_str(), W_OK | X_OK) != 0)
