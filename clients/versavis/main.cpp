@@ -73,7 +73,7 @@ StatusReport report_status(const nlohmann::json& status, const StatusOptions& op
 
 int show_status(const std::string& instance, const StatusOptions& options) {
     const auto status = client::read_status(instance);
-    if (!status) return client::fail(status.error());
+    if (!status) return client::fail(client::explain_silence(status.error()));
     const StatusReport report = report_status(*status, options);
     fmt::print("{}", report.text);
     std::fflush(stdout);
@@ -88,7 +88,9 @@ int watch_status(const std::string& instance, const StatusOptions& options) {
             const StatusReport report =
                 status
                     ? report_status(*status, options)
-                    : StatusReport{"versavis: " + status.error().message() + "\n", EX_UNAVAILABLE};
+                    : StatusReport{
+                          "versavis: " + client::explain_silence(status.error()).message() + "\n",
+                          EX_UNAVAILABLE};
             fmt::print("{}", client::in_place(report.text));
             std::fflush(stdout);
             code = report.code;
