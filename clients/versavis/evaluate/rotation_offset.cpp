@@ -158,12 +158,13 @@ class Problem {
 /// How far the camera's turns are from the gyro's at this offset, with the rotation and the bias
 /// that fit best, and that rotation: W. Kabsch, A solution for the best rotation to relate two sets
 /// of vectors, 1976.
-struct Fit {
+struct OffsetFit {
     double misfit;
     Eigen::Quaterniond rotation;
 };
 
-Fit fit_rotation(const Problem& problem, const GyroTrack& track, double offset, double longest) {
+OffsetFit fit_rotation(const Problem& problem, const GyroTrack& track, double offset,
+                       double longest) {
     Eigen::Vector3d camera_sum = Eigen::Vector3d::Zero();
     Eigen::Vector3d gyro_sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
@@ -199,7 +200,7 @@ std::vector<State> starts(const Problem& problem, double range) {
                                                 track.orientation(turn.to))
                                         .norm());
     const auto steps = static_cast<int>(std::floor(range / scan_step_s));
-    std::vector<std::pair<Fit, double>> fits;
+    std::vector<std::pair<OffsetFit, double>> fits;
     for (int i = -steps; i <= steps; ++i)
         fits.emplace_back(fit_rotation(problem, track, i * scan_step_s, 2 * longest),
                           i * scan_step_s);
