@@ -15,6 +15,7 @@
 #include "base/library_log.hpp"
 #include "base/log.hpp"
 #include "base/memory_lock.hpp"
+#include "base/thread_watch.hpp"
 #include "camera/camera_list.hpp"
 #include "camera/camera_probe.hpp"
 #include "camera/description_check.hpp"
@@ -77,11 +78,23 @@ ControlSocket make_socket(const std::string& instance) {
     return {};
 }
 
+/// Asks for another time of grace, unless a thread is stuck: then the service manager is to restart
+/// the service.
+void feed_watchdog(std::string& reported) {
+    const std::string stuck = thread_watch().stuck(host_now()).value_or("");
+    if (stuck.empty()) sd_notify(0, "WATCHDOG=1");
+    if (stuck != reported && !stuck.empty())
+        log(LogLevel::error, "service", "thread '{}' is stuck: the watchdog is to restart all",
+            stuck);
+    reported = stuck;
+}
+
 /// Ticks until a signal asks to stop; returns it.
 int serve(Service& service, Control& control, const sigset_t& signals) {
     const timespec interval{0, Service::tick_interval.ns};
     HealthLog health_log;
     std::string status;
+    std::string stuck;
     for (;;) {
         const int signal = sigtimedwait(&signals, nullptr, &interval);
         if (signal == SIGINT || signal == SIGTERM) return signal;
@@ -89,7 +102,7 @@ int serve(Service& service, Control& control, const sigset_t& signals) {
         service.tick();
         control.tick(service.health(), host_now());
         report_suppressed_library_lines(host_now());
-        sd_notify(0, "WATCHDOG=1");
+        feed_watchdog(stuck);
         const Summary& health = service.health();
         if (const auto level = health_log.see(health, host_now()))
             log_line(*level, "service", "health: " + health.text, to_string(health.fault));
@@ -126,35 +139,20 @@ int check(const std::string& path, bool as_json) {
     return problems.empty() ? EX_OK : EX_CONFIG;
 }
 
-/// One that is handled; the watchdog is served meanwhile.
-int wait_for_signal(const sigset_t& signals) {
-    const timespec interval{1, 0};
-    for (;;) {
-        const int signal = sigtimedwait(&signals, nullptr, &interval);
-        if (signal > 0) return signal;
-        sd_notify(0, "WATCHDOG=1");
-    }
-}
-
-/// For so long, or until a signal asks to stop: then true.
-bool stopped_within(Duration length, const sigset_t& signals) {
+/// One that is handled, or 0 after so long; the watchdog is served meanwhile.
+int signal_within(Duration length, const sigset_t& signals) {
     const timespec interval{1, 0};
     for (const HostTime end = host_now() + length; host_now() < end;) {
         sd_notify(0, "WATCHDOG=1");
         const int signal = sigtimedwait(&signals, nullptr, &interval);
-        if (signal == SIGINT || signal == SIGTERM) return true;
+        if (signal > 0) return signal;
     }
-    return false;
+    return 0;
 }
 
-/// As after an installation: systemd need not start it again until there is something to serve.
-/// True: it is to be read again.
-bool wait_for_configuration(const std::string& path, const sigset_t& signals) {
-    const std::string text =
-        fmt::format("{}: {}, then reload or restart the service", path, serves_nothing);
-    log(LogLevel::warning, "service", "{}", text);
-    sd_notifyf(0, "READY=1\nSTATUS=%s", text.c_str());
-    return wait_for_signal(signals) == SIGHUP;
+/// As after an installation.
+Error serves_none(const std::string& path) {
+    return {path, std::string(serves_nothing) + ", then reload or restart the service", ""};
 }
 
 Expected<std::unique_ptr<Service>> make_service(const Configuration& configuration) {
@@ -163,30 +161,44 @@ Expected<std::unique_ptr<Service>> make_service(const Configuration& configurati
     return Service::create(configuration);
 }
 
+/// While nothing is served: a file with an error changes nothing here, either.
+void read_again(ConfigurationDocument& document, const std::string& path) {
+    sd_notify(0, "RELOADING=1");
+    auto next = ConfigurationDocument::load(path);
+    if (next)
+        document = std::move(*next);
+    else
+        log_problems(next.error());
+    set_log_level(document.configuration.log_level);
+}
+
 /// What is missing may come: a service manager need not start the program for each attempt. A
-/// terminal gets the error at once. None: stopped while it waited.
-Expected<std::unique_ptr<Service>> make_or_wait(const Configuration& configuration,
-                                                const sigset_t& signals) {
+/// terminal gets the error at once, unless a reload is all that is missing. None: stopped while it
+/// waited.
+Expected<std::unique_ptr<Service>> make_or_wait(ConfigurationDocument& document,
+                                                const std::string& path, const sigset_t& signals) {
     constexpr Duration retry = seconds(5);
+    const bool managed = std::getenv("NOTIFY_SOCKET") != nullptr;
     std::string reported;
     for (;;) {
-        auto service = make_service(configuration);
-        if (service || std::getenv("NOTIFY_SOCKET") == nullptr) return service;
+        const bool any = serves(document.configuration);
+        auto service = any ? make_service(document.configuration) : Unexpected(serves_none(path));
+        if (service || (any && !managed)) return service;
         const std::string text = service.error().message();
-        if (text != reported) log(LogLevel::error, "service", "{}; trying again every 5 s", text);
+        if (text != reported)
+            log(any ? LogLevel::error : LogLevel::warning, "service", "{}{}", text,
+                any ? "; trying again every 5 s" : "");
         reported = text;
         sd_notifyf(0, "READY=1\nSTATUS=waiting: %s", text.c_str());
-        if (stopped_within(retry, signals)) return std::unique_ptr<Service>{};
+        const int signal = signal_within(retry, signals);
+        if (signal == SIGINT || signal == SIGTERM) return std::unique_ptr<Service>{};
+        if (signal == SIGHUP) read_again(document, path);
     }
 }
 
 int run(const std::string& path) {
     const sigset_t signals = block_signals();
     auto document = ConfigurationDocument::load(path);
-    while (document && !serves(document->configuration)) {
-        if (!wait_for_configuration(path, signals)) return EX_OK;
-        document = ConfigurationDocument::load(path);
-    }
     if (!document) {
         log_problems(document.error());
         return EX_CONFIG;
@@ -194,7 +206,7 @@ int run(const std::string& path) {
     const Configuration* configuration = &document->configuration;
     set_log_level(configuration->log_level);
     route_library_log();
-    auto service = make_or_wait(*configuration, signals);
+    auto service = make_or_wait(*document, path, signals);
     if (!service) {
         log(LogLevel::error, "service", "{}", service.error().message());
         return EX_UNAVAILABLE;

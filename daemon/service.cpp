@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include "base/log.hpp"
@@ -121,7 +122,20 @@ Expected<> Service::make_cameras() {
     return {};
 }
 
+/// A sandbox may keep the kernel's state from this process.
+void Service::report_hidden_clock() {
+    const int error = translator_.report().kernel.error;
+    if (error == 0) return;
+    log(LogLevel::info, "clock",
+        "whether the host's clock is disciplined cannot be read: {}; a container or the drop-in "
+        "closed.conf may forbid it",
+        std::generic_category().message(error));
+}
+
 void Service::start() {
+    report_hidden_clock();
+    const auto kept = make_state_directory(configuration_.state_directory);
+    if (!kept) log(LogLevel::warning, "service", "{}", kept.error().message());
     if (board_needed()) board_->start();
     cameras_->start();
 }
@@ -277,7 +291,7 @@ void Service::report_discipline(const clock::KernelState& kernel) {
                   kernel.synchronised ? 0 : 1});
     log(kernel.synchronised ? LogLevel::info : LogLevel::warning, "clock",
         "the host's clock, which names the seconds of PPS pulses, is {}disciplined",
-        kernel.synchronised ? "" : "not ");
+        kernel.synchronised ? "" : (kernel.error == 0 ? "not " : "not known to be "));
 }
 
 Status Service::collect_status(HostTime now) {

@@ -66,6 +66,7 @@ class Service final : public Controlled, private BoardListener {
     void use_pps(const wire::Event& event);
     Status collect_status(HostTime now);
     void report_output_step(const OutputStep& step);
+    void report_hidden_clock();
     void report_discipline(const clock::KernelState& kernel);
 
     // On the link's thread.

@@ -12,7 +12,7 @@ namespace versavis::rig {
 
 namespace {
 
-std::string json(const std::vector<Tone>& tones) {
+std::string tones_json(const std::vector<Tone>& tones) {
     std::string list;
     for (const Tone& tone : tones)
         list += fmt::format("{}[{:.17g},{:.17g},{:.17g}]", list.empty() ? "" : ",", tone.hz,
@@ -56,11 +56,11 @@ void GroundTruth::add(const TrueImuSample& s) {
 }
 
 void GroundTruth::add(const Motion& motion) {
-    write(
-        fmt::format(R"({{"type":"motion","zero_ns":{},"angles":[{},{},{}],"position":[{},{},{}]}})",
-                    motion.zero().ns, json(motion.angles()[0]), json(motion.angles()[1]),
-                    json(motion.angles()[2]), json(motion.position()[0]),
-                    json(motion.position()[1]), json(motion.position()[2])));
+    write(fmt::format(
+        R"({{"type":"motion","zero_ns":{},"angles":[{},{},{}],"position":[{},{},{}]}})",
+        motion.zero().ns, tones_json(motion.angles()[0]), tones_json(motion.angles()[1]),
+        tones_json(motion.angles()[2]), tones_json(motion.position()[0]),
+        tones_json(motion.position()[1]), tones_json(motion.position()[2])));
 }
 
 void GroundTruth::write(const std::string& line) {

@@ -11,6 +11,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "base/fail.hpp"
 #include "commands/board_commands.hpp"
 #include "commands/camera_commands.hpp"
 #include "commands/clock.hpp"
@@ -37,11 +38,6 @@ namespace {
 using namespace versavis;
 
 volatile sig_atomic_t stop_requested = 0;
-
-int fail(const Error& error) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return EX_UNAVAILABLE;
-}
 
 /// At a start, scripts ask again instead of giving up.
 constexpr int exit_starting = 2;
@@ -77,7 +73,7 @@ StatusReport report_status(const nlohmann::json& status, const StatusOptions& op
 
 int show_status(const std::string& instance, const StatusOptions& options) {
     const auto status = client::read_status(instance);
-    if (!status) return fail(status.error());
+    if (!status) return client::fail(client::explain_silence(status.error()));
     const StatusReport report = report_status(*status, options);
     fmt::print("{}", report.text);
     std::fflush(stdout);
@@ -92,7 +88,9 @@ int watch_status(const std::string& instance, const StatusOptions& options) {
             const StatusReport report =
                 status
                     ? report_status(*status, options)
-                    : StatusReport{"versavis: " + status.error().message() + "\n", EX_UNAVAILABLE};
+                    : StatusReport{
+                          "versavis: " + client::explain_silence(status.error()).message() + "\n",
+                          EX_UNAVAILABLE};
             fmt::print("{}", client::in_place(report.text));
             std::fflush(stdout);
             code = report.code;
@@ -109,12 +107,12 @@ int replay_pairing(const std::string& recording, const std::string& decisions, b
     std::ifstream file;
     std::ostringstream out;
     if (recording != "-") file.open(recording);
-    if (!file) return fail({recording, "cannot be read", "check its name and permissions"});
+    if (!file) return client::fail({recording, "cannot be read", "check its name and permissions"});
     const auto summary = client::replay_pairing(recording == "-" ? std::cin : file,
                                                 decisions.empty() ? nullptr : &out);
-    if (!summary) return fail(summary.error());
+    if (!summary) return client::fail(summary.error());
     const auto written = decisions.empty() ? Expected<>() : write_whole_file(decisions, out.str());
-    if (!written) return fail(written.error());
+    if (!written) return client::fail(written.error());
     fmt::print("{}", client::to_text(*summary, json));
     return EX_OK;
 }
@@ -220,7 +218,7 @@ int main(int argc, char** argv) {
     if (monitor.chosen()) return monitor.run(instance);
     if (*list) {
         const auto text = client::list_streams(instance, json);
-        if (!text) return fail(text.error());
+        if (!text) return client::fail(text.error());
         fmt::print("{}", *text);
         return EX_OK;
     }
@@ -229,7 +227,7 @@ int main(int argc, char** argv) {
         tail.json = json;
         tail.stop = [] { return stop_requested != 0; };
         const auto done = client::tail(tail);
-        return done ? EX_OK : fail(done.error());
+        return done ? EX_OK : client::fail(done.error());
     }
     if (*replay) return replay_pairing(recording, decisions, json);
     if (board.chosen()) return board.run(instance);
@@ -243,7 +241,7 @@ int main(int argc, char** argv) {
     if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});
-    if (!written) return fail(written.error());
+    if (!written) return client::fail(written.error());
     fmt::print("{}\n", *written);
     return EX_OK;
 }

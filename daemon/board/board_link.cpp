@@ -3,6 +3,7 @@
 
 #include <fmt/ranges.h>
 
+#include "base/thread_watch.hpp"
 #include "engine/board/board_words.hpp"
 #include "engine/board/firmware_file.hpp"
 #include "posix/thread.hpp"
@@ -45,6 +46,9 @@ constexpr Duration largest_clock_surprise = milliseconds(500);
 constexpr int strangers_to_believe = 3;
 
 constexpr std::uint8_t all_cameras = 0xFF;
+
+/// In the kernel, which may be resetting a USB device; it is stuck if that takes longer.
+constexpr Duration longest_link_block = seconds(20);
 
 /// Why a board of another major version cannot be used, and what to do.
 std::string describe_mismatch(const wire::BoardHello& hello) {
@@ -142,6 +146,7 @@ BoardReport BoardLink::report() const {
 }
 
 void BoardLink::run() {
+    const auto watched = thread_watch().watch("link", longest_link_block);
     set_state(BoardState::absent, "searching");
     for (bool go_on = true; go_on;) {
         auto stream = open_();

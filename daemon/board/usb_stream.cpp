@@ -22,7 +22,7 @@ namespace {
 /// Reads that are always under way, so that the host controller never waits for the service.
 constexpr std::size_t transfer_count = 4;
 
-constexpr unsigned write_timeout_ms = device::transfer_timeout.ns / 1'000'000;
+constexpr unsigned usb_timeout_ms = device::transfer_timeout.ns / 1'000'000;
 
 struct TransferDeleter {
     void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
@@ -63,7 +63,7 @@ class UsbStream final : public ByteStream {
                 return usb_failure("cannot read", code);
             slot.pending = true;
         }
-        prepare(writing_, port_.data().endpoint_out, &UsbStream::write_completed, write_timeout_ms);
+        prepare(writing_, port_.data().endpoint_out, &UsbStream::write_completed, usb_timeout_ms);
         return {};
     }
 
@@ -92,7 +92,7 @@ class UsbStream final : public ByteStream {
             return usb_failure("the board does not accept data", code);
         writing_.pending = true;
         // libusb ends it at its time-out: twice that is only waited for when nobody reads.
-        written_.wait_for(lock, std::chrono::milliseconds(2 * write_timeout_ms),
+        written_.wait_for(lock, std::chrono::milliseconds(2 * usb_timeout_ms),
                           [this] { return !writing_.pending; });
         if (writing_.pending || transfer.status != LIBUSB_TRANSFER_COMPLETED ||
             transfer.actual_length != transfer.length)

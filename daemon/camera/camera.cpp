@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/thread_watch.hpp"
 #include "camera/aravis_stream.hpp"
 #include "camera/camera_discovery.hpp"
 #include "camera/camera_events.hpp"
@@ -57,7 +58,7 @@ constexpr std::uint64_t few_frames = 3;
 constexpr Duration renumbering_memory = seconds(30);
 
 /// Between looks at a streaming camera.
-constexpr Duration step = milliseconds(20);
+constexpr Duration poll_interval = milliseconds(20);
 
 /// Between readings of what changes slowly.
 constexpr Duration housekeeping_interval = seconds(3);
@@ -68,6 +69,13 @@ constexpr Duration time_of_silence = seconds(2);
 
 /// The same for a camera without triggers, whose rate nobody knows.
 constexpr Duration time_of_free_silence = seconds(5);
+
+/// For one answer: a camera may ask for 65 s with a pending acknowledge. A thread that does not run
+/// for longer is stuck.
+constexpr Duration longest_camera_block = seconds(90);
+
+/// Of a camera that is to be left alone: shorter than that.
+constexpr std::chrono::seconds camera_idle_step{5};
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
 
@@ -196,6 +204,8 @@ void Camera::set_setting_up_since(HostTime since) {
 }
 
 void Camera::run() {
+    const auto watched =
+        thread_watch().watch("camera " + configuration_.name, longest_camera_block);
     set_state(CameraState::opening, "");
     while (adopt_change()) {
         auto ended = session();
@@ -219,7 +229,7 @@ bool Camera::adopt_change() {
     std::unique_lock lock(mutex_);
     while (!stop_ && (change_ || !enabled_)) {
         if (!change_) {
-            wake_.wait(lock, [this] { return stop_ || change_; });
+            wake_.wait_for(lock, camera_idle_step, [this] { return stop_ || change_; });
             continue;
         }
         before_change_ = std::exchange(configuration_, change_->configuration);
@@ -535,8 +545,8 @@ CameraResult<> Camera::watch(ArvCamera* camera, AravisNodeMap& nodes, FrameSourc
     health.received = pipeline_.report().received;
     if (device_) health.client.emplace(device_->interface, device_->address);
     HostTime housekeeping = health.began;
-    while (pause(frames.needs_polling() ? Duration{} : step)) {
-        if (frames.needs_polling()) frames.poll(step);
+    while (pause(frames.needs_polling() ? Duration{} : poll_interval)) {
+        if (frames.needs_polling()) frames.poll(poll_interval);
         if (control_lost)
             return problem(CameraState::silent,
                            {configuration_.name, "the camera is gone", "check cable and power"});

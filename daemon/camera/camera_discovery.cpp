@@ -12,19 +12,10 @@ namespace versavis::daemon {
 
 namespace {
 
-/// Until a camera that is asked by its address is taken for absent: some answer after a third of a
-/// second.
-constexpr Duration address_patience = seconds(1);
-
 /// The same for one that is asked by broadcast, before USB is looked at, and after: cameras may
 /// wait a second with their answer.
 constexpr Duration first_broadcast_patience = milliseconds(100);
 constexpr Duration broadcast_patience = seconds(1);
-
-/// For one register.
-constexpr Duration answer_patience = milliseconds(500);
-
-constexpr std::chrono::milliseconds look_interval(20);
 
 std::string text(const char* value) { return value == nullptr ? "" : value; }
 
@@ -75,7 +66,7 @@ CameraResult<OpenCamera> open_on_network(const std::string& camera, const std::s
     GvcpClient client(found.interface, found.address);
     const auto held = problem(CameraState::busy,
                               {device, "is controlled by another program", "close that program"});
-    const auto privilege = client.read_register(gvcp_control_privilege, answer_patience);
+    const auto privilege = client.read_register(gvcp_control_privilege, register_patience);
     if (privilege && (*privilege & gvcp_controlled) != 0) return held;
     const auto description = read_description(client, cancelled);
     if (!description) return problem(CameraState::failed, description.error());
@@ -174,7 +165,7 @@ const char* to_string(CameraState state) {
 
 std::unique_lock<std::timed_mutex> lock(std::timed_mutex& mutex, const Cancelled& cancelled) {
     std::unique_lock turn(mutex, std::defer_lock);
-    while (!cancelled() && !turn.try_lock_for(look_interval)) {
+    while (!cancelled() && !turn.try_lock_for(std::chrono::nanoseconds(cancelled_interval.ns))) {
     }
     return turn;
 }

@@ -20,11 +20,7 @@ namespace {
 using nlohmann::json;
 
 /// Cameras may wait a second with their answer to a broadcast.
-constexpr Duration broadcast_patience = milliseconds(1200);
-constexpr Duration address_patience = seconds(1);
-
-/// For one register.
-constexpr Duration answer_patience = milliseconds(500);
+constexpr Duration list_broadcast_patience = milliseconds(1200);
 
 constexpr const char* gige = "GigE Vision";
 constexpr const char* usb3 = "USB3 Vision";
@@ -54,7 +50,7 @@ void judge_address(const NetworkDevice& found, const OwnInterface& own, ListedCa
 /// Asks, and takes no control.
 void judge_control(const NetworkDevice& found, ListedCamera& camera) {
     GvcpClient client(found.interface, found.address);
-    const auto privilege = client.read_register(gvcp_control_privilege, answer_patience);
+    const auto privilege = client.read_register(gvcp_control_privilege, register_patience);
     if (!privilege) {
         camera.access = Access::silent;
         camera.problem = "it answers when it is looked for, and to no question";
@@ -110,14 +106,15 @@ void add_aravis(std::vector<NetworkDevice>& all) {
             return mac != nullptr && same(other.mac, mac);
         });
         if (known || mac == nullptr) continue;
-        if (const auto device = DeviceSearch(mac).wait(broadcast_patience, [] { return false; }))
+        if (const auto device =
+                DeviceSearch(mac).wait(list_broadcast_patience, [] { return false; }))
             add(all, *device);
     }
 }
 
 std::vector<NetworkDevice> find_on_network(const std::vector<std::string>& addresses) {
     std::vector<NetworkDevice> all;
-    for (const NetworkDevice& device : DeviceSearch("").collect(broadcast_patience))
+    for (const NetworkDevice& device : DeviceSearch("").collect(list_broadcast_patience))
         add(all, device);
     add_aravis(all);
     for (const std::string& address : addresses)

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "base/lower_case.hpp"
 #include "camera/camera_discovery.hpp"
 
 namespace versavis::daemon {
@@ -48,12 +49,6 @@ std::string value_in(const ProbeReport& report, const std::string& feature) {
     const auto found = std::find_if(report.features.begin(), report.features.end(),
                                     [&](const auto& entry) { return entry.first == feature; });
     return found == report.features.end() ? "" : found->second;
-}
-
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
-    return text;
 }
 
 void set_up(ArvCamera* camera, const CameraConfiguration& configuration,
@@ -164,7 +159,8 @@ std::string draft_preset(const ProbeReport& report) {
         "strobe_lines = [\"\"]  # of LineSelector: where the exposure comes out\n",
         report.setup.vendor, report.setup.model, value_in(report, "TriggerSelector"),
         value_in(report, "TriggerSource"), value_in(report, "LineSelector"),
-        value_in(report, "LineMode"), value_in(report, "LineSource"), lower(report.setup.vendor));
+        value_in(report, "LineMode"), value_in(report, "LineSource"),
+        lower_case(report.setup.vendor));
 }
 
 }  // namespace versavis::daemon

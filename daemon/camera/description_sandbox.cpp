@@ -31,9 +31,6 @@ constexpr Duration probe_patience = seconds(60);
 /// Probes of one description that may use up their CPU time.
 constexpr unsigned slow_probes = 3;
 
-/// Between looks at `cancelled`.
-constexpr Duration look_interval = milliseconds(20);
-
 /// The most that a probe says.
 constexpr std::size_t longest_reason = 500;
 
@@ -56,7 +53,7 @@ class Probe {
             const bool sending = sent < bytes.size();
             pollfd polled{process_.socket(),
                           static_cast<short>(sending ? POLLIN | POLLOUT : POLLIN), 0};
-            const timespec pause{0, look_interval.ns};
+            const timespec pause{0, cancelled_interval.ns};
             if (::ppoll(&polled, 1, &pause, nullptr) <= 0) continue;
             if (sending && (polled.revents & POLLOUT) != 0) {
                 const ssize_t size = ::send(process_.socket(), bytes.data() + sent,

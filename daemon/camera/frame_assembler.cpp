@@ -15,7 +15,7 @@ constexpr std::uint8_t here = 0xFF;
 constexpr std::uint8_t most_asks = 3;
 
 /// What a camera takes to send a packet again.
-constexpr Duration answer_time = milliseconds(3);
+constexpr Duration resend_time = milliseconds(3);
 
 /// Silence within a frame after which its last packets are asked for.
 constexpr Duration silence = milliseconds(1);
@@ -145,7 +145,7 @@ std::uint32_t FrameAssembler::due_until(const Open& frame, bool followed) {
 
 /// Packets that did not come, and are not on the way again.
 void FrameAssembler::ask(Open& frame, std::uint32_t until, HostTime now) {
-    const bool again = now - frame.asked >= answer_time;
+    const bool again = now - frame.asked >= resend_time;
     const auto wanted = [&](std::uint32_t id) {
         return frame.packets[id] == 0 ||
                (again && frame.packets[id] < most_asks);  // which `here` is not
@@ -175,7 +175,7 @@ void FrameAssembler::ask_for_missing(Open& frame, bool followed, HostTime now) {
     const std::uint32_t rest = frame.last_id() - due;
     if (silent && frame.trailer == 0 && rest <= frame.budget) ask(frame, frame.last_id(), now);
     const auto gone = [&](std::uint8_t asks) { return asks == most_asks; };
-    const bool unanswered = now - std::max(frame.asked, frame.newest) >= answer_time;
+    const bool unanswered = now - std::max(frame.asked, frame.newest) >= resend_time;
     frame.done = now - frame.newest >= settings_.retention ||
                  (gaps && unanswered &&
                   std::any_of(frame.packets.begin(), frame.packets.begin() + due + 1, gone));
@@ -194,8 +194,8 @@ void FrameAssembler::advance(HostTime now) {
 std::optional<HostTime> FrameAssembler::deadline(HostTime now) const {
     std::optional<HostTime> first;
     for (const Open& frame : frames_)
-        for (const HostTime at : {frame.newest + silence, frame.asked + answer_time,
-                                  frame.newest + answer_time, frame.newest + settings_.retention})
+        for (const HostTime at : {frame.newest + silence, frame.asked + resend_time,
+                                  frame.newest + resend_time, frame.newest + settings_.retention})
             if (at > now && (!first || at < *first)) first = at;
     return first;
 }

@@ -19,15 +19,13 @@ namespace versavis::daemon {
 
 namespace {
 
-constexpr std::uint8_t key = 0x42;
 constexpr std::uint8_t acknowledge = 0x01;
 constexpr std::uint8_t acknowledge_by_broadcast = 0x11;
 constexpr std::uint16_t discovery = 0x0002;
 constexpr std::uint16_t read_register_command = 0x0080;
 constexpr std::uint16_t read_memory = 0x0084;
-constexpr std::size_t header_size = 8;
 constexpr std::size_t discovery_size = 0xF8;
-constexpr std::size_t block = 512;  ///< the most that a device must deliver at once
+constexpr std::size_t read_size = 512;  ///< the most that a device must deliver at once
 
 /// Between the first two questions to one address, and then twice as long each time, because a slow
 /// camera answers all of them before anything else.
@@ -35,9 +33,6 @@ constexpr Duration ask_interval = milliseconds(50);
 
 /// Until a question is asked again, of a camera that has not shown that it takes longer.
 constexpr Duration answer_time = milliseconds(200);
-
-/// Between looks at `cancelled`.
-constexpr Duration look_interval = milliseconds(20);
 
 std::vector<OwnInterface> own_interfaces() {
     std::vector<OwnInterface> found;
@@ -78,10 +73,6 @@ std::uint32_t word_at(const std::uint8_t* bytes) {
     return std::uint32_t{half_at(bytes)} << 16U | half_at(bytes + 2);
 }
 
-void put(std::vector<std::uint8_t>& out, std::uint32_t value, unsigned bytes) {
-    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
-}
-
 /// A field of a device's own texts: up to its first zero, and printable.
 std::string field(const std::uint8_t* bytes, std::size_t size) {
     std::string text(bytes, std::find(bytes, bytes + size, 0));
@@ -114,7 +105,7 @@ bool goes_by(const NetworkDevice& device, const std::string& name) {
 bool readable(std::vector<pollfd>& sockets, HostTime until, const Cancelled& cancelled) {
     for (Duration left = until - host_now(); left.ns > 0; left = until - host_now()) {
         if (cancelled()) return false;
-        const timespec pause{0, std::min(left, look_interval).ns};
+        const timespec pause{0, std::min(left, cancelled_interval).ns};
         if (::ppoll(sockets.data(), sockets.size(), &pause, nullptr) > 0) return true;
     }
     return false;
@@ -185,7 +176,7 @@ void DeviceSearch::add_broadcast_receiver(const Socket& socket) {
 }
 
 void DeviceSearch::ask() const {
-    std::vector<std::uint8_t> packet{key, address_ ? acknowledge : acknowledge_by_broadcast};
+    std::vector<std::uint8_t> packet{gvcp_key, address_ ? acknowledge : acknowledge_by_broadcast};
     put(packet, discovery, 2);
     put(packet, 0, 2);
     put(packet, 0xFFFF, 2);
@@ -196,15 +187,15 @@ void DeviceSearch::ask() const {
 }
 
 std::optional<NetworkDevice> DeviceSearch::receive(const Socket& socket) const {
-    std::uint8_t packet[header_size + 1024];
+    std::uint8_t packet[gvcp_header_size + 1024];
     sockaddr_in from{};
     socklen_t from_size = sizeof from;
     const ssize_t size = ::recvfrom(socket.descriptor.get(), packet, sizeof packet, 0,
                                     reinterpret_cast<sockaddr*>(&from), &from_size);
-    if (size < static_cast<ssize_t>(header_size + discovery_size) ||
+    if (size < static_cast<ssize_t>(gvcp_header_size + discovery_size) ||
         half_at(packet + 2) != discovery + 1)
         return std::nullopt;
-    NetworkDevice device = describe(packet + header_size, socket.interface);
+    NetworkDevice device = describe(packet + gvcp_header_size, socket.interface);
     if (!address_)
         return name_.empty() || goes_by(device, name_) ? std::optional(device) : std::nullopt;
     if (from.sin_addr.s_addr != address_->s_addr) return std::nullopt;
@@ -269,7 +260,7 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
                                                              Duration patience,
                                                              const Cancelled& cancelled) {
     id_ = static_cast<std::uint16_t>(id_ % 0xFFFFU + 1U);  // zero is none
-    std::vector<std::uint8_t> packet{key, acknowledge};
+    std::vector<std::uint8_t> packet{gvcp_key, acknowledge};
     put(packet, command, 2);
     put(packet, static_cast<std::uint32_t>(body.size()), 2);
     put(packet, id_, 2);
@@ -281,20 +272,20 @@ std::optional<std::vector<std::uint8_t>> GvcpClient::request(std::uint16_t comma
         ::send(socket_.get(), packet.data(), packet.size(), 0);
         const HostTime again = std::min(deadline, host_now() + repeat_after_);
         while (readable(polled, again, cancelled)) {
-            std::uint8_t answer[header_size + block + 4];
+            std::uint8_t answer[gvcp_header_size + read_size + 4];
             const ssize_t size = ::recv(socket_.get(), answer, sizeof answer, 0);
             if (size < 0) break;  // nobody listens there: it may boot
-            const bool ours = size >= static_cast<ssize_t>(header_size) &&
+            const bool ours = size >= static_cast<ssize_t>(gvcp_header_size) &&
                               half_at(answer + 2) == command + 1 && half_at(answer + 6) == id_;
             if (!ours) continue;  // late, or "pending"
             repeat_after_ = std::max(answer_time, (host_now() - asked) * 2);
-            if (half_at(answer) != 0 || size < static_cast<ssize_t>(header_size + answer_size))
+            if (half_at(answer) != 0 || size < static_cast<ssize_t>(gvcp_header_size + answer_size))
                 return std::nullopt;
-            return std::vector<std::uint8_t>(answer + header_size,
-                                             answer + header_size + answer_size);
+            return std::vector<std::uint8_t>(answer + gvcp_header_size,
+                                             answer + gvcp_header_size + answer_size);
         }
         if (host_now() < again) {  // refused at once
-            const timespec pause{0, look_interval.ns};
+            const timespec pause{0, cancelled_interval.ns};
             nanosleep(&pause, nullptr);
         }
     }
@@ -307,7 +298,7 @@ Expected<std::vector<std::uint8_t>> GvcpClient::read(std::uint32_t address, std:
     std::vector<std::uint8_t> all;
     all.reserve(size);
     while (all.size() < size) {
-        const std::size_t left = std::min(block, (size - all.size() + 3) / 4 * 4);
+        const std::size_t left = std::min(read_size, (size - all.size() + 3) / 4 * 4);
         std::vector<std::uint8_t> body;
         put(body, address + static_cast<std::uint32_t>(all.size()), 4);
         put(body, static_cast<std::uint32_t>(left), 4);

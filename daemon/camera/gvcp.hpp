@@ -17,8 +17,25 @@
 
 namespace versavis::daemon {
 
-/// Asked often by what waits: true ends it.
+/// Each message begins with the key, in a header of so many bytes.
+constexpr std::uint8_t gvcp_key = 0x42;
+constexpr std::size_t gvcp_header_size = 8;
+
+/// Appends a field in network order.
+inline void put(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned bytes) {
+    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
+}
+
+/// Until a camera that is asked by its address is taken for absent: some answer after a third of a
+/// second.
+constexpr Duration address_patience = seconds(1);
+
+/// For the answer with one register.
+constexpr Duration register_patience = milliseconds(500);
+
+/// Asked by what waits, so often: true ends it.
 using Cancelled = std::function<bool()>;
+constexpr Duration cancelled_interval = milliseconds(20);
 
 /// What a device says of itself when it is looked for.
 struct NetworkDevice {

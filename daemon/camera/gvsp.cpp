@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "camera/gvsp.hpp"
 
+#include "camera/gvcp.hpp"
+
 namespace versavis::daemon::gvsp {
 
 namespace {
@@ -27,10 +29,6 @@ std::uint64_t number(Bytes bytes, std::size_t at, unsigned size) {
 
 std::uint32_t word(Bytes bytes, std::size_t at) {
     return static_cast<std::uint32_t>(number(bytes, at, 4));
-}
-
-void put(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned bytes) {
-    while (bytes-- > 0) out.push_back(static_cast<std::uint8_t>(value >> (8 * bytes)));
 }
 
 }  // namespace
@@ -79,7 +77,8 @@ std::size_t data_per_packet(std::size_t packet_size, bool extended) {
 }
 
 std::vector<std::uint8_t> resend_request(const PacketRange& range, std::uint16_t request) {
-    std::vector<std::uint8_t> packet{0x42, static_cast<std::uint8_t>(range.extended ? 0x10 : 0)};
+    std::vector<std::uint8_t> packet{gvcp_key,
+                                     static_cast<std::uint8_t>(range.extended ? 0x10 : 0)};
     put(packet, 0x0040, 2);
     put(packet, range.extended ? 20 : 12, 2);
     put(packet, request, 2);

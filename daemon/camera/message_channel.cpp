@@ -15,12 +15,10 @@ namespace versavis::daemon {
 
 namespace {
 
-constexpr std::uint8_t key = 0x42;
 constexpr std::uint8_t wants_acknowledge = 0x01;
 constexpr std::uint8_t extended_ids = 0x10;
 constexpr std::uint16_t event_command = 0x00C0;
 constexpr std::uint16_t event_data_command = 0x00C2;
-constexpr std::size_t header_size = 8;
 
 /// An item: reserved or its size, event, stream channel and block id in 16 bits each, with extended
 /// ids a block id of 64 bits, and the time stamp.
@@ -47,7 +45,7 @@ EventItem item_at(std::span<const std::uint8_t> bytes, bool extended) {
 }  // namespace
 
 std::optional<EventPacket> parse_events(std::span<const std::uint8_t> packet) {
-    if (packet.size() < header_size || packet[0] != key) return std::nullopt;
+    if (packet.size() < gvcp_header_size || packet[0] != gvcp_key) return std::nullopt;
     EventPacket parsed;
     parsed.command = static_cast<std::uint16_t>(number(packet, 2, 2));
     parsed.request = static_cast<std::uint16_t>(number(packet, 6, 2));
@@ -57,9 +55,9 @@ std::optional<EventPacket> parse_events(std::span<const std::uint8_t> packet) {
     const bool data = parsed.command == event_data_command;
     const std::size_t length = number(packet, 4, 2);
     if ((!data && parsed.command != event_command) || parsed.request == 0 ||
-        length > packet.size() - header_size)
+        length > packet.size() - gvcp_header_size)
         return std::nullopt;
-    auto body = packet.subspan(header_size, length);
+    auto body = packet.subspan(gvcp_header_size, length);
     // Data of a length that only the event's maker knows follow the first item.
     const std::size_t items =
         data ? std::min<std::size_t>(body.size() / size, 1) : body.size() / size;

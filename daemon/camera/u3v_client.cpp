@@ -15,7 +15,7 @@ namespace versavis::daemon {
 namespace {
 
 /// For one answer.
-constexpr Duration answer_patience = milliseconds(500);
+constexpr Duration command_patience = milliseconds(500);
 
 /// The same for a camera that says that its answer takes longer.
 constexpr Duration longest_patience = seconds(5);
@@ -24,11 +24,11 @@ constexpr Duration longest_patience = seconds(5);
 constexpr unsigned most_tries = 3;
 
 /// Between looks at whether it is cancelled.
-constexpr Duration look_interval = milliseconds(20);
+constexpr Duration read_interval = milliseconds(20);
 
 /// Aravis divides what it reads by the room in a packet: a header, and the longest text of GenCP.
 constexpr std::uint64_t smallest_packet = 12 + 8 + 64;
-constexpr std::uint64_t largest_packet = 65536;  ///< that Aravis makes use of
+constexpr std::uint64_t largest_u3v_packet = 65536;  ///< that Aravis makes use of
 
 /// Aravis takes the leader and the trailer of a frame into memory of 1 MiB.
 constexpr std::uint64_t largest_frame_part = 65536;
@@ -36,10 +36,10 @@ constexpr std::uint64_t largest_frame_part = 65536;
 /// Power of two that the size of a transfer is a multiple of: Aravis' has 1 MiB.
 constexpr std::uint64_t largest_alignment = 20;
 
-constexpr std::size_t header_size = 12;
+constexpr std::size_t u3v_header_size = 12;
 constexpr std::uint32_t magic = 0x43563355;  // "U3VC"
-constexpr std::uint16_t acknowledge = 1U << 14U;
-constexpr std::uint16_t read_memory = 0x0800;
+constexpr std::uint16_t u3v_acknowledge = 1U << 14U;
+constexpr std::uint16_t u3v_read_memory = 0x0800;
 constexpr std::uint16_t pending = 0x0805;
 constexpr std::size_t usb_packet = 1024;  ///< of SuperSpeed: a buffer holds a number of them
 
@@ -59,7 +59,7 @@ const char* const replug = "unplug it and plug it in";
 
 using Bytes = std::vector<std::uint8_t>;
 
-void put(Bytes& bytes, std::uint64_t value, std::size_t size) {
+void put_little_endian(Bytes& bytes, std::uint64_t value, std::size_t size) {
     for (std::size_t i = 0; i < size; ++i)
         bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
@@ -109,15 +109,15 @@ class ControlChannel {
     std::optional<Bytes> ask(std::uint64_t address, std::uint64_t size) {
         for (unsigned i = 0; i < most_tries && !cancelled_(); ++i) {
             Bytes question;
-            put(question, magic, 4);
-            put(question, acknowledge, 2);
-            put(question, read_memory, 2);
-            put(question, header_size, 2);
-            put(question, ++id_, 2);
-            put(question, address, 8);
-            put(question, 0, 2);
-            put(question, size, 2);
-            if (!handle_.write(control_.endpoint_out, question, answer_patience))
+            put_little_endian(question, magic, 4);
+            put_little_endian(question, u3v_acknowledge, 2);
+            put_little_endian(question, u3v_read_memory, 2);
+            put_little_endian(question, u3v_header_size, 2);
+            put_little_endian(question, ++id_, 2);
+            put_little_endian(question, address, 8);
+            put_little_endian(question, 0, 2);
+            put_little_endian(question, size, 2);
+            if (!handle_.write(control_.endpoint_out, question, command_patience))
                 static_cast<void>(handle_.clear_halt(control_.endpoint_out));
             else if (auto answer = receive(size))
                 return answer;
@@ -128,26 +128,26 @@ class ControlChannel {
     /// What it holds, or none: it does not come, or it is a refusal.
     std::optional<Bytes> receive(std::uint64_t size) {
         const HostTime asked = host_now();
-        HostTime until = asked + answer_patience;
-        Bytes buffer((header_size + size + usb_packet - 1) / usb_packet * usb_packet);
+        HostTime until = asked + command_patience;
+        Bytes buffer((u3v_header_size + size + usb_packet - 1) / usb_packet * usb_packet);
         while (host_now() < until && !cancelled_()) {
-            const auto got = handle_.read(control_.endpoint_in, buffer, look_interval);
+            const auto got = handle_.read(control_.endpoint_in, buffer, read_interval);
             if (!got && got.error().fault == device::UsbFault::late) continue;
             if (!got && got.error().fault == device::UsbFault::stalled)
                 static_cast<void>(handle_.clear_halt(control_.endpoint_in));
             if (!got) return std::nullopt;
             const std::size_t length = *got;
-            if (length < header_size || number_in(buffer, 0, 4) != magic ||
+            if (length < u3v_header_size || number_in(buffer, 0, 4) != magic ||
                 number_in(buffer, 10, 2) != id_)
                 continue;  // left over
             if (number_in(buffer, 6, 2) == pending) {
                 until = asked + longest_patience;
                 continue;
             }
-            if (number_in(buffer, 4, 2) != 0 || number_in(buffer, 6, 2) != read_memory + 1 ||
-                length != header_size + size)
+            if (number_in(buffer, 4, 2) != 0 || number_in(buffer, 6, 2) != u3v_read_memory + 1 ||
+                length != u3v_header_size + size)
                 return std::nullopt;
-            return Bytes(buffer.begin() + header_size,
+            return Bytes(buffer.begin() + u3v_header_size,
                          buffer.begin() + static_cast<std::ptrdiff_t>(length));
         }
         return std::nullopt;
@@ -207,7 +207,8 @@ CameraResult<Description> read_checked(const std::string& device, ControlChannel
     if (size == 0 || size > largest_description)
         return refused(fmt::format("its description has {} bytes, more than {} or none", size,
                                    largest_description));
-    auto bytes = channel.read(address, size, std::min(answer, largest_packet) - header_size);
+    auto bytes =
+        channel.read(address, size, std::min(answer, largest_u3v_packet) - u3v_header_size);
     if (!bytes) return mute;
     return Description{std::move(*bytes), (schema >> 10U & 0x3FU) == 1};
 }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <system_error>
 
 #include "board/board_event.hpp"
 #include "engine/board/firmware_file.hpp"
@@ -780,6 +781,14 @@ Diagnosis diagnose_board(const Status& status) {
 /// Of a clock whose estimate is good: who names the seconds?
 Diagnosis diagnose_seconds(const Status& status) {
     const clock::PpsReport& pps = status.clock.pps;
+    if (status.pps_labels == clock::PpsLabels::host && status.clock.kernel.error != 0)
+        return conclude(Fault::host_undisciplined,
+                        fmt::format("PPS is not used: whether the host's clock, which names its "
+                                    "seconds, is disciplined cannot be read ({}); leave the "
+                                    "container or remove the drop-in closed.conf that forbids it, "
+                                    "or set pps = \"nmea\"",
+                                    std::generic_category().message(status.clock.kernel.error)),
+                        false, false);
     if (status.pps_labels == clock::PpsLabels::host && !status.clock.kernel.synchronised)
         return conclude(Fault::host_undisciplined,
                         "PPS is not used: the kernel reports that the host's clock, which names "

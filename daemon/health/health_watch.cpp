@@ -67,14 +67,14 @@ bool outlasts_reopening(const Diagnosis& before, const CameraStatus& camera, Hos
 }
 
 /// A camera that delivers again is trusted after so long.
-constexpr Duration recovery = seconds(4);
+constexpr Duration recovery_proof = seconds(4);
 
 /// What it lacked is seen, and not why.
 bool unexplained(Fault fault) { return fault == Fault::too_slow || fault == Fault::unproved; }
 
 /// What it lacked a moment ago has ended, and it is not yet trusted.
 bool recovers(const CameraStatus& camera, HostTime explained, HostTime now) {
-    return unexplained(camera.diagnosis.fault) && now - explained < recovery &&
+    return unexplained(camera.diagnosis.fault) && now - explained < recovery_proof &&
            camera.pipeline.pairing == pairing::State::locked && camera.recent.received > 0;
 }
 

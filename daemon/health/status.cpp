@@ -94,6 +94,7 @@ json board_json(const BoardReport& board, bool needed, bool outdated) {
 json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
     const bool clock_known =
         clock.state != clock::ClockState::init && clock.state != clock::ClockState::reset;
+    const bool readable = clock.kernel.error == 0;
     return {{"state", clock::to_string(clock.state)},
             {"output", clock::to_string(clock.output)},
             {"sigma_ns", known(clock_known, clock.sigma)},
@@ -114,8 +115,8 @@ json clock_json(const clock::ClockReport& clock, const GridReport& grid) {
             {"output_minus_host_ns", clock.output_minus_host.ns},
             {"output_steps", clock.output_steps},
             {"host_suspends", clock.host_suspends},
-            {"host_synchronised", clock.kernel.synchronised},
-            {"host_max_error_ns", clock.kernel.max_error.ns},
+            {"host_synchronised", readable ? json(clock.kernel.synchronised) : json(nullptr)},
+            {"host_max_error_ns", known(readable, clock.kernel.max_error)},
             {"tai_offset_s", clock.kernel.tai_offset_s},
             {"tai_valid", clock.kernel.tai_offset_s != 0},
             {"asymmetry_ns", clock.asymmetry.offset.ns},

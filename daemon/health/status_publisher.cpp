@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "base/log.hpp"
 
@@ -38,10 +39,9 @@ Expected<StatusPublisher> StatusPublisher::create(const ring::Place& place) {
 bool StatusPublisher::make_room(std::size_t size) {
     if (size <= ring_.slot_size()) return true;
     auto larger = make_ring(place_, 2 * size);
-    if (larger)
-        ring_ = std::move(*larger);
-    else
+    if (!std::exchange(too_small_, !larger) && too_small_)
         log(LogLevel::error, "status", "{}", larger.error().message());
+    if (larger) ring_ = std::move(*larger);
     return larger.has_value();
 }
 

@@ -39,6 +39,7 @@ class StatusPublisher {
 
     ring::Place place_;
     ring::Writer ring_;
+    bool too_small_ = false;  ///< the ring, and there is no room for a larger one
     HostTime next_;
     std::map<std::string, std::pair<std::uint64_t, HostTime>> last_items_;
     HealthWatch watch_;

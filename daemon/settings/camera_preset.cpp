@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/lower_case.hpp"
 #include "engine/toml/table_reader.hpp"
 
 namespace versavis::daemon {
@@ -17,16 +18,10 @@ const std::vector<std::string> preset_groups{
 
 namespace {
 
-std::string lower(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
-    return text;
-}
-
 /// True when `parts` is empty or one of them is in the text.
 bool fits(const std::vector<std::string>& parts, const std::string& text) {
     return parts.empty() || std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
-               return lower(text).find(lower(part)) != std::string::npos;
+               return lower_case(text).find(lower_case(part)) != std::string::npos;
            });
 }
 

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "base/lower_case.hpp"
+
 namespace versavis::daemon {
 
 namespace {
@@ -21,13 +23,6 @@ constexpr std::string_view host_suffixes[]{"localhost", ".local", ".localdomain"
 const char* other_names =
     "set the camera's IP address, MAC address, serial number or name; "
     "versavis discover lists them";
-
-std::string lower(std::string_view text) {
-    std::string all(text);
-    std::transform(all.begin(), all.end(), all.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return all;
-}
 
 std::optional<in_addr> ipv4_address(const std::string& text) {
     in_addr address{};
@@ -59,7 +54,7 @@ bool meant_as_address(const std::string& host) {
 }
 
 bool is_host_name(const std::string& host) {
-    const std::string name = lower(host);
+    const std::string name = lower_case(host);
     return std::any_of(std::begin(host_suffixes), std::end(host_suffixes), [&](auto suffix) {
         return name.size() >= suffix.size() &&
                std::string_view(name).substr(name.size() - suffix.size()) == suffix;
@@ -93,7 +88,7 @@ std::optional<std::string> mac_address(std::string_view text) {
     if (digits.size() != mac_digits || marks.find_first_not_of(":-. ") != std::string::npos ||
         marks != std::string(marks.size(), marks.empty() ? ' ' : marks.front()))
         return std::nullopt;
-    std::string address = lower(digits);
+    std::string address = lower_case(digits);
     for (std::size_t at = mac_digits - 2; at > 0; at -= 2) address.insert(at, 1, ':');
     return address;
 }

@@ -52,7 +52,8 @@ bool FrameSet::valid() const {
                        [](const auto& frame) { return !frame || frame->valid(); });
 }
 
-struct SetReader::State {
+/// Not part of the interface, as its class is.
+struct [[gnu::visibility("hidden")]] SetReader::State {
     std::vector<FrameStream> cameras;
     std::optional<ImuWindow> imu;
     SetOptions options;

@@ -243,7 +243,8 @@ class Build:
         if not (self.directory / "build.ninja").is_file():
             self.processes.output_of(
                 ["cmake", "-S", self.source, "-B", self.directory, "-G", "Ninja",
-                 "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1", "-DVERSAVIS_WERROR=OFF"])
+                 "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1", "-DVERSAVIS_WERROR=OFF",
+                 "-DVERSAVIS_UNITY=OFF"])
         progress.say("mutants: builds what they are compared with (1 to 3 minutes, if new)")
         self.ninja(f"-j{self.jobs}", self.area.program)
         self.read()

@@ -222,7 +222,7 @@ class Copy:
             self.write()
             if not (self.build / "build.ninja").is_file():
                 self.run(["cmake", "-S", self.source, "-B", self.build, "-G", "Ninja",
-                          "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
+                          "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DVERSAVIS_UNITY=OFF",
                           "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O2"], environment)
             built = subprocess.run(["ninja", "-k", "0", "-C", self.build,
                                     *(f"sensitivity_{folder}" for folder in folders)],

@@ -2,6 +2,7 @@
 #include "health/diagnosis.hpp"
 
 #include <catch2/catch.hpp>
+#include <cerrno>
 #include <fstream>
 #include <set>
 
@@ -233,6 +234,12 @@ TEST_CASE("diagnosis: a host that names the seconds of PPS must be disciplined")
     CHECK(diagnose_clock(bench.status).health == Health::starting);  // so may be its discipline
     bench.status.clock.kernel.synchronised = true;
     CHECK(diagnose_clock(bench.status).health == Health::ok);
+    bench.status.clock.kernel = {};
+    bench.status.clock.kernel.error = EPERM;
+    check_fault(diagnose_clock(bench.status), Fault::host_undisciplined,
+                "PPS is not used: whether the host's clock, which names its seconds, is "
+                "disciplined cannot be read (Operation not permitted); leave the container or "
+                "remove the drop-in closed.conf that forbids it, or set pps = \"nmea\"");
 }
 
 TEST_CASE("diagnosis: a start in progress is reported, and is no fault of a young service") {

@@ -189,16 +189,17 @@ TEST_CASE("doctor: how an interface takes packets in") {
     settings.ring = 256;
     settings.longest_ring = 4096;
     settings.moderation_us = 3;
-    settings.large_receive = false;
+    settings.merging = {{"lro", false}, {"rx-gro-list", false}};
     for (const Finding& finding : check_interface_settings("eth7", settings, false))
         CHECK(finding.verdict == Verdict::good);
     const Findings lossy = check_interface_settings("eth7", settings, true);
     CHECK(get(lossy, "rx_ring").cure == "sudo ethtool -G eth7 rx 4096");
     settings.moderation_us = 0;
-    settings.large_receive = true;
+    settings.merging["lro"] = true;
     const Findings findings = check_interface_settings("eth7", settings, true);
     CHECK(get(findings, "moderation").verdict == Verdict::warning);
     CHECK(get(findings, "offload").verdict == Verdict::warning);
+    CHECK(get(findings, "offload").cure == "sudo ethtool -K eth7 lro off");
     check_complete(findings);
     settings.adaptive_moderation = true;
     CHECK(get(check_interface_settings("eth7", settings, true), "moderation").verdict ==

@@ -2,6 +2,7 @@
 #include "health/status.hpp"
 
 #include <catch2/catch.hpp>
+#include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -124,6 +125,11 @@ TEST_CASE("status: what the kernel says of its clock, and whether its TAI is wor
     CHECK(clock["tai_valid"] == true);
     CHECK(clock["tai_offset_s"] == 37);
     CHECK(clock["host_suspends"] == 2);
+    status.clock.kernel.error = EPERM;
+    clock = nlohmann::json::parse(to_json(status))["clock"];
+    CHECK(clock["host_synchronised"].is_null());
+    CHECK(clock["host_max_error_ns"].is_null());
+    CHECK(clock["tai_offset_s"] == 37);
 }
 
 TEST_CASE("status: every key of the document is in its manual") {

@@ -12,6 +12,11 @@
 
 namespace versavis::client {
 
+/// The same bytes, as long as they are there.
+inline std::string_view as_text(std::span<const std::byte> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 /// After a field that is not wholly there, all that follow are zero or empty, and good() is false.
 class ByteCursor {
  public:

@@ -6,6 +6,7 @@
 #include <array>
 #include <string_view>
 
+#include "base/json_text.hpp"
 #include "board/board_access.hpp"
 #include "engine/board/board_words.hpp"
 
@@ -98,8 +99,6 @@ Expected<json> from_board(const FoundBoard& found, const std::string& instance) 
     if (*heard) add_health(info, health);
     return info;
 }
-
-std::string text(const json& info, const char* key) { return info.value(key, std::string()); }
 
 }  // namespace
 

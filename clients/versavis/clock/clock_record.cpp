@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "base/fail.hpp"
 #include "engine/clock/recording.hpp"
 #include "posix/file.hpp"
 #include "versavis/stream.hpp"
@@ -125,11 +126,6 @@ bool run(clock::ClockStream& stream, Recording& recording, const ClockRecordSett
         if (item && item->number + 1 >= head) break;
     }
     return true;
-}
-
-int fail(const Error& error) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return EX_UNAVAILABLE;
 }
 
 }  // namespace

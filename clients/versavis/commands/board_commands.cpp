@@ -12,6 +12,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "base/fail.hpp"
 #include "board/board_info.hpp"
 #include "board/bring_up.hpp"
 #include "commands/progress_line.hpp"
@@ -20,11 +21,6 @@
 namespace versavis::client {
 
 namespace {
-
-int fail(const Error& error) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return EX_UNAVAILABLE;
-}
 
 /// One line of whoever sits at the terminal; none: nobody does, or the program is to end.
 std::optional<std::string> answer(const std::string& question, const std::function<bool()>& stop) {

@@ -7,17 +7,13 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
+#include "base/fail.hpp"
 #include "status/status_document.hpp"
 #include "status/status_view.hpp"
 
 namespace versavis::client {
 
 namespace {
-
-int fail(const Error& error) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return EX_UNAVAILABLE;
-}
 
 void add_inputs(CLI::App& command, std::string& exchanges, std::string& oneway) {
     command

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "base/fail.hpp"
 #include "discovery/found_devices.hpp"
 #include "discovery/service_program.hpp"
 #include "engine/imu/imu_model.hpp"
@@ -31,11 +32,6 @@ constexpr int exit_nothing = 1;
 constexpr double usual_rate_hz = 20;
 constexpr double slowest_hz = 0.1;
 constexpr double fastest_hz = 1000;
-
-int fail(const Error& error, int code) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return code;
-}
 
 /// A line of the user, `usual` for an empty one. None: the input has ended.
 std::optional<std::string> answer(const std::string& question, const std::string& usual) {
@@ -73,7 +69,7 @@ Expected<json> table_of_keys() {
 }
 
 /// What the service says of it before it is written.
-Expected<> check(const std::string& text) {
+Expected<> checked(const std::string& text) {
     // The child opens it by the same number.
     const FileDescriptor file(::memfd_create("versavis.toml", 0));
     const std::string path = fmt::format("/proc/self/fd/{}", file.get());
@@ -207,7 +203,7 @@ int DiscoverCommands::init(const std::string& instance) {
              "see 'versavis discover' for what stands in the way, or name an IMU with --imu"},
             EX_UNAVAILABLE);
     const std::string text = to_toml(*configuration, *keys);
-    if (const auto good = check(text); !good) return fail(good.error(), EX_CONFIG);
+    if (const auto good = checked(text); !good) return fail(good.error(), EX_CONFIG);
     return write(*configuration, text);
 }
 

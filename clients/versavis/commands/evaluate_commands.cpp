@@ -12,16 +12,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/fail.hpp"
+
 namespace versavis::client {
 
 namespace {
 
 constexpr double published_rate_hz = 1000;
-
-int fail(const Error& error, int code) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return code;
-}
 
 /// "NAME=1,2.5" with so many numbers.
 Expected<std::pair<std::string, std::vector<double>>> named_numbers(const std::string& option,

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <map>
 
+#include "base/fail.hpp"
 #include "commands/progress_line.hpp"
 #include "export/time_shift.hpp"
 #include "recording/recording_info.hpp"
@@ -20,11 +21,6 @@ namespace versavis::client {
 namespace {
 
 constexpr auto default_replay = "replay";
-
-int fail(const Error& error) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return EX_UNAVAILABLE;
-}
 
 /// None: no recording was named.
 Expected<std::optional<Duration>> filter_delay(const std::string& path, const std::string& imu) {

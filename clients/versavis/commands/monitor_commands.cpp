@@ -32,7 +32,8 @@ bool may_live(const std::string& instance) {
 int check(const std::string& instance) {
     const auto status = read_status(instance);
     const CheckResult result =
-        status ? check_status(*status) : check_failed(status.error(), may_live(instance));
+        status ? check_status(*status)
+               : check_failed(explain_silence(status.error()), may_live(instance));
     fmt::print("{}\n", result.line);
     return static_cast<int>(result.state);
 }

@@ -48,7 +48,7 @@ std::string progress_text(const RecordReport& report, std::uint64_t room) {
                  : "");
 }
 
-nlohmann::ordered_json to_json(const RecordReport& report) {
+nlohmann::ordered_json report_json(const RecordReport& report) {
     nlohmann::ordered_json streams = nlohmann::ordered_json::object();
     for (const auto& [name, stream] : report.streams)
         streams[name] = {{"items", stream.items},       {"lost", stream.lost},
@@ -87,7 +87,7 @@ Expected<> read_split(const std::string& text, RecordSettings& settings) {
 }
 
 std::string to_text(const RecordReport& report, bool json) {
-    if (json) return to_json(report).dump() + "\n";
+    if (json) return report_json(report).dump() + "\n";
     std::string text =
         fmt::format("{:.1f} s, {:.1f} MB in {}\n", in_seconds(report.duration),
                     static_cast<double>(report.bytes) * 1e-6, fmt::join(report.files, ", "));

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/fail.hpp"
 #include "discovery/found_devices.hpp"
 #include "discovery/service_program.hpp"
 #include "posix/file.hpp"
@@ -20,11 +21,6 @@ namespace versavis::client {
 namespace {
 
 using nlohmann::json;
-
-int fail(const Error& error, int code) {
-    fmt::print(stderr, "versavis: {}\n", error.message());
-    return code;
-}
 
 /// What the service set a camera up by; without one, what is connected.
 class Presets {

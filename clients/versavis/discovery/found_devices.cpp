@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/json_text.hpp"
 #include "base/shallow_json.hpp"
 #include "base/wrapped_line.hpp"
 #include "board/board_search.hpp"
@@ -21,11 +22,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t indent = 4;
-
-std::string text(const json& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_string() ? found->get<std::string>() : "";
-}
 
 std::vector<json> all_statuses() {
     std::vector<json> statuses;

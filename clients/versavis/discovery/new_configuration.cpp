@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/json_text.hpp"
 #include "discovery/found_devices.hpp"
 #include "engine/imu/imu_model.hpp"
 
@@ -18,11 +19,6 @@ using nlohmann::json;
 
 /// Of a period, for exposures: the rest is for readout.
 constexpr double exposure_of_period = 0.8;
-
-std::string text(const json& object, const char* key) {
-    const auto found = object.find(key);
-    return found != object.end() && found->is_string() ? found->get<std::string>() : "";
-}
 
 /// As a text of TOML, whose escapes are those of JSON.
 std::string quoted(const std::string& value) {

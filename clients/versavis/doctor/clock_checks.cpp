@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <sstream>
+#include <system_error>
 
 #include "posix/child_process.hpp"
 
@@ -218,14 +219,20 @@ Findings check_clock(const Subject& subject, const clock::KernelState& kernel) {
     const std::vector<std::string> services = running_time_services(subject.files);
     const bool used = output != "monotonic_raw";
     Finding ntp{"host_clock", "", ""};
-    ntp.value = kernel.synchronised ? fmt::format("synchronised to {:.6f} s",
-                                                  static_cast<double>(kernel.max_error.ns) * 1e-9)
-                                    : "not synchronised";
+    ntp.value = kernel.error != 0     ? fmt::format("cannot be read: {}",
+                                                    std::generic_category().message(kernel.error))
+                : kernel.synchronised ? fmt::format("synchronised to {:.6f} s",
+                                                    static_cast<double>(kernel.max_error.ns) * 1e-9)
+                                      : "not synchronised";
     if (!services.empty()) ntp.value += fmt::format(", by {}", fmt::join(services, ", "));
     if (services.size() > 1) {
         ntp.verdict = Verdict::bad;
         ntp.reason = "two programs steer one clock, against each other";
         ntp.cure = fmt::format("sudo systemctl disable --now {}", services.back());
+    } else if (kernel.error != 0) {
+        ntp.verdict = Verdict::unknown;
+        ntp.reason = "a sandbox or container keeps the kernel's state from this program";
+        ntp.cure = "run it outside";
     } else if (!kernel.synchronised && used) {
         ntp.verdict = Verdict::warning;
         ntp.reason = fmt::format(

@@ -117,6 +117,11 @@ Findings check_space(const Subject& subject, const std::string& check, const std
         finding.verdict = Verdict::bad;
         finding.reason = consequence;
         finding.cure = cure;
+    } else if ((space.f_flag & ST_RDONLY) != 0) {
+        finding.value += ", read-only";
+        finding.verdict = Verdict::warning;
+        finding.reason = consequence;
+        finding.cure = "mount a file system there that can be written, or set 'state_directory'";
     }
     return {finding};
 }

@@ -9,8 +9,11 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <cstring>
 #include <set>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "posix/file_descriptor.hpp"
 
@@ -212,6 +215,43 @@ bool ask(const FileDescriptor& socket, const std::string& interface, Question& q
     return ::ioctl(socket.get(), SIOCETHTOOL, &request) == 0;
 }
 
+/// Features that merge UDP packets: as the kernel names them, and as ethtool -K does.
+constexpr std::pair<const char*, const char*> merging_features[] = {
+    {"rx-lro", "lro"},
+    {"rx-gro-list", "rx-gro-list"},
+    {"rx-udp-gro-forwarding", "rx-udp-gro-forwarding"}};
+
+/// An ioctl's structure, with words for the array at its end.
+std::vector<std::uint32_t> question(std::uint32_t command, std::size_t words) {
+    std::vector<std::uint32_t> memory(words);
+    memory[0] = command;
+    return memory;
+}
+
+/// Features of an interface that the kernel knows, and whether they are on.
+std::map<std::string, bool> read_features(const FileDescriptor& socket,
+                                          const std::string& interface) {
+    auto count = question(ETHTOOL_GSSET_INFO, 5);
+    count[2] = 1U << ETH_SS_FEATURES;  // of the mask's 64 bits, on a little-endian machine
+    if (!ask(socket, interface, *count.data()) || count[2] == 0) return {};
+    const std::uint32_t features = count[4];
+    auto names = question(ETHTOOL_GSTRINGS, 3 + std::size_t{features} * ETH_GSTRING_LEN / 4);
+    names[1] = ETH_SS_FEATURES;
+    names[2] = features;
+    const std::uint32_t blocks = (features + 31) / 32;
+    auto states = question(ETHTOOL_GFEATURES, 2 + std::size_t{blocks} * 4);
+    states[1] = blocks;
+    if (!ask(socket, interface, *names.data()) || !ask(socket, interface, *states.data()))
+        return {};
+    std::map<std::string, bool> found;
+    for (std::uint32_t i = 0; i < features; ++i) {
+        const auto* name = reinterpret_cast<const char*>(&names[3 + i * ETH_GSTRING_LEN / 4]);
+        const std::uint32_t active = states[2 + i / 32 * 4 + 2];
+        found[{name, ::strnlen(name, ETH_GSTRING_LEN)}] = ((active >> (i % 32)) & 1U) != 0;
+    }
+    return found;
+}
+
 }  // namespace
 
 LossCounters read_losses(const Subject& subject) {
@@ -240,9 +280,10 @@ InterfaceSettings read_interface_settings(const std::string& interface) {
         settings.ring = ring.rx_pending;
         settings.longest_ring = ring.rx_max_pending;
     }
-    ethtool_value flags{};
-    flags.cmd = ETHTOOL_GFLAGS;
-    if (ask(socket, interface, flags)) settings.large_receive = (flags.data & ETH_FLAG_LRO) != 0;
+    const auto features = read_features(socket, interface);
+    for (const auto& [kernel_name, name] : merging_features)
+        if (const auto found = features.find(kernel_name); found != features.end())
+            settings.merging[name] = found->second;
     return settings;
 }
 
@@ -272,12 +313,17 @@ Findings check_interface_settings(const std::string& interface, const InterfaceS
         }
         findings.push_back(finding);
     }
-    if (settings.large_receive) {
-        Finding finding{"offload", interface, *settings.large_receive ? "LRO is on" : "LRO is off"};
-        if (*settings.large_receive) {
+    if (!settings.merging.empty()) {
+        std::string on;
+        for (const auto& [name, is_on] : settings.merging)
+            if (is_on) on += (on.empty() ? "" : " ") + name;
+        Finding finding{"offload", interface, on.empty() ? "packets are not merged" : on + " on"};
+        if (!on.empty()) {
             finding.verdict = Verdict::warning;
-            finding.reason = "the interface merges packets, which receivers of single ones miss";
-            finding.cure = fmt::format("sudo ethtool -K {} lro off", interface);
+            finding.reason = "packets are merged, which receivers of single ones miss";
+            finding.cure = "sudo ethtool -K " + interface;
+            for (const auto& [name, is_on] : settings.merging)
+                if (is_on) finding.cure += fmt::format(" {} off", name);
         }
         findings.push_back(finding);
     }

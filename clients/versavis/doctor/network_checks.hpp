@@ -27,7 +27,8 @@ struct InterfaceSettings {
     std::optional<bool> adaptive_moderation{};
     std::optional<std::uint32_t> ring{};  ///< packets that it may receive ahead
     std::optional<std::uint32_t> longest_ring{};
-    std::optional<bool> large_receive{};  ///< LRO: it merges packets
+    /// What merges packets, as ethtool names it, and whether it is on.
+    std::map<std::string, bool> merging{};
 };
 
 InterfaceSettings read_interface_settings(const std::string& interface);

@@ -33,6 +33,9 @@ Findings check_life(const Subject& subject) {
         return {{"service", service,
                  fmt::format("process {}, release {}", subject.pid(),
                              subject.status->value("release", "?"))}};
+    if (subject.silence.what.rfind("waiting: ", 0) == 0)
+        return {{"service", service, "runs, but serves nothing yet", Verdict::bad,
+                 subject.silence.what, subject.silence.cure}};
     return {{"service", service, "not running", Verdict::bad, subject.silence.what,
              "sudo systemctl start versavisd; journalctl -u versavisd says why it ended"}};
 }

@@ -19,7 +19,7 @@ constexpr double flicker_share = 0.4412712;
 
 // Relative sigma up to which a random walk counts as seen. If lower, recordings must be longer; if
 // higher, the value says little more than its order of magnitude.
-constexpr double seen = 0.25;
+constexpr double seen_sigma = 0.25;
 
 // A slope of -1/2 +- this is white noise. If lower, chance looks like another noise; if higher,
 // more of a filter's flat shoulder is fitted, and the density comes out too small.
@@ -143,7 +143,7 @@ double walk_square_sigma(const Noises& noises, double n, double interval_s, std:
 double needed_s(Noises noises, double walk_square, double n, double interval_s, std::size_t first) {
     noises.squares[2] = walk_square;
     for (int doubling = 0; doubling < 40; ++doubling, n *= std::sqrt(2))
-        if (walk_square_sigma(noises, n, interval_s, first) < 2 * seen * walk_square) break;
+        if (walk_square_sigma(noises, n, interval_s, first) < 2 * seen_sigma * walk_square) break;
     return n * interval_s;
 }
 
@@ -222,7 +222,7 @@ Expected<AxisNoise> axis_noise(std::span<const float> rates, double interval_s) 
     const double square_sigma = walk_square_sigma(*noises, n, interval_s, first_m);
     const double walk_square = noises->squares[2];
     axis.walk_limit = std::sqrt(walk_square + 2 * square_sigma);
-    if (walk_square > 0 && square_sigma <= 2 * seen * walk_square)
+    if (walk_square > 0 && square_sigma <= 2 * seen_sigma * walk_square)
         axis.walk = Measured{std::sqrt(walk_square), square_sigma / (2 * std::sqrt(walk_square))};
     else
         axis.walk_needs_s = needed_s(*noises, square(axis.walk_limit), n, interval_s, first_m);

@@ -12,7 +12,7 @@ namespace versavis::client {
 
 namespace {
 
-constexpr int gaps = 9;  // between ten LEDs
+constexpr int led_gaps = 9;  // between ten LEDs
 /// Light of an LED is summed up within this part of the distance from LED to LED. If lower, light
 /// is lost when the place is a little off; if higher, neighbours shine in.
 constexpr double aperture = 0.45;
@@ -184,14 +184,14 @@ double contrast(const GreyPicture& darkest, const GreyPicture& brightest, const 
     if (!first || !last) return 0;
     const double on = std::min(*first, *last);
     double gap = 0;
-    for (int i = 0; i < gaps; ++i) {
-        const auto level = mean(brightest, between(place, (i + 0.5) / gaps), small);
+    for (int i = 0; i < led_gaps; ++i) {
+        const auto level = mean(brightest, between(place, (i + 0.5) / led_gaps), small);
         if (!level || *level >= on) return 0;
         gap = std::max(gap, *level);
     }
     bool any = false;
-    for (int led = 1; led < gaps; ++led) {
-        const auto level = mean(brightest, between(place, double{1} * led / gaps), small);
+    for (int led = 1; led < led_gaps; ++led) {
+        const auto level = mean(brightest, between(place, double{1} * led / led_gaps), small);
         any = any || (level && *level > gap + 0.25 * (on - gap));
     }
     return any ? (on - gap) / on : 0;
@@ -216,9 +216,9 @@ Point centred(const GreyPicture& picture, Point centre, double radius, double da
 
 double median_gap(const GreyPicture& picture, const LedPlace& place) {
     std::vector<double> levels;
-    for (int i = 0; i < gaps; ++i)
+    for (int i = 0; i < led_gaps; ++i)
         if (const auto level =
-                mean(picture, between(place, (i + 0.5) / gaps), gap_radius * place.pitch()))
+                mean(picture, between(place, (i + 0.5) / led_gaps), gap_radius * place.pitch()))
             levels.push_back(*level);
     if (levels.empty()) return 0;
     std::nth_element(levels.begin(), levels.begin() + levels.size() / 2, levels.end());
@@ -227,7 +227,7 @@ double median_gap(const GreyPicture& picture, const LedPlace& place) {
 
 }  // namespace
 
-double LedPlace::pitch() const { return std::hypot(x2 - x1, y2 - y1) / gaps; }
+double LedPlace::pitch() const { return std::hypot(x2 - x1, y2 - y1) / led_gaps; }
 
 void LedSearch::add(const GreyPicture& picture) {
     if (pictures_ == 0) darkest_ = brightest_ = picture;
@@ -277,7 +277,7 @@ LedPicture measure_leds(const GreyPicture& picture, const LedPlace& place) {
     bool saturated = false;
     const auto light = [&](int led) {
         double sum = 0;
-        within(picture, between(place, double{1} * led / gaps), radius,
+        within(picture, between(place, double{1} * led / led_gaps), radius,
                [&](double, double, double value) {
                    sum += value - dark;
                    saturated = saturated || value >= limit;
@@ -285,13 +285,13 @@ LedPicture measure_leds(const GreyPicture& picture, const LedPlace& place) {
         return sum;
     };
     const double first = light(0);
-    const double last = light(gaps);
+    const double last = light(led_gaps);
     LedPicture seen;
     // At least a grey level brighter than dark, over the whole circle.
     const double least = 3.14159265358979 * radius * radius;
     if (std::min(first, last) < std::max(least, least_balance * std::max(first, last))) return seen;
-    for (int led = 1; led < gaps; ++led) {
-        const double share = double{1} * led / gaps;
+    for (int led = 1; led < led_gaps; ++led) {
+        const double share = double{1} * led / led_gaps;
         seen.levels.at(static_cast<std::size_t>(led - 1)) =
             light(led) / (first * (1 - share) + last * share);
     }

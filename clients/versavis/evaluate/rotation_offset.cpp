@@ -158,12 +158,13 @@ class Problem {
 /// How far the camera's turns are from the gyro's at this offset, with the rotation and the bias
 /// that fit best, and that rotation: W. Kabsch, A solution for the best rotation to relate two sets
 /// of vectors, 1976.
-struct Fit {
+struct OffsetFit {
     double misfit;
     Eigen::Quaterniond rotation;
 };
 
-Fit fit_rotation(const Problem& problem, const GyroTrack& track, double offset, double longest) {
+OffsetFit fit_rotation(const Problem& problem, const GyroTrack& track, double offset,
+                       double longest) {
     Eigen::Vector3d camera_sum = Eigen::Vector3d::Zero();
     Eigen::Vector3d gyro_sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
@@ -199,7 +200,7 @@ std::vector<State> starts(const Problem& problem, double range) {
                                                 track.orientation(turn.to))
                                         .norm());
     const auto steps = static_cast<int>(std::floor(range / scan_step_s));
-    std::vector<std::pair<Fit, double>> fits;
+    std::vector<std::pair<OffsetFit, double>> fits;
     for (int i = -steps; i <= steps; ++i)
         fits.emplace_back(fit_rotation(problem, track, i * scan_step_s, 2 * longest),
                           i * scan_step_s);
@@ -228,7 +229,7 @@ struct Solution {
 };
 
 /// Solves by own sizes of the unknowns; none where they are not determined at all.
-Matrix7 inverse(const Matrix7& information) {
+Matrix7 inverse_of(const Matrix7& information) {
     Vector7 size;
     for (int i = 0; i < 7; ++i) size[i] = 1 / std::sqrt(std::max(information(i, i), 1e-30));
     Matrix7 scaled = size.asDiagonal() * information * size.asDiagonal();
@@ -249,7 +250,7 @@ std::optional<Solution> follow(const Problem& problem, State state, double range
             information += weight * at.jacobians[i].transpose() * at.jacobians[i];
             right += weight * at.jacobians[i].transpose() * at.residuals[i];
         }
-        const Matrix7 spread = inverse(information);
+        const Matrix7 spread = inverse_of(information);
         // An offset that nothing shows would run away; the caller refuses it as it is.
         if (scale * std::sqrt(spread(offset_at, offset_at)) > 0.1 * range) break;
         const Vector7 change = -spread * right;
@@ -296,7 +297,7 @@ Matrix7 covariance(const Solution& solution) {
         }
     }
     lagged *= count / (count - 7);
-    const Matrix7 outer = inverse(bread);
+    const Matrix7 outer = inverse_of(bread);
     const Matrix7 by_plain = outer * plain * outer;
     const Matrix7 by_lagged = outer * lagged * outer;
     Matrix7 result = by_plain;

@@ -30,7 +30,7 @@ struct Frame {
     bool afterwards = false;
 };
 
-struct Stream {
+struct ProvedStream {
     Limits limits;
     std::vector<Frame> frames;
     std::vector<Exposure> spare;  ///< no frame was proved of them
@@ -38,7 +38,7 @@ struct Stream {
 
 class Collector final : public Outcome {
  public:
-    std::vector<Stream> streams;
+    std::vector<ProvedStream> streams;
 
  private:
     void paired(const Arrival& arrival, const Exposure& exposure) override {
@@ -111,7 +111,7 @@ bool proves(const Anchors& by, const Arrival& arrival, const Exposure& exposure,
     return by.around && first && second;
 }
 
-void prove_afterwards(Stream& stream) {
+void prove_afterwards(ProvedStream& stream) {
     for (std::size_t i = 0; i < stream.frames.size(); ++i) {
         Frame& frame = stream.frames[i];
         if (frame.exposure) continue;
@@ -143,7 +143,7 @@ FrameProof& FrameProof::operator=(FrameProof&&) noexcept = default;
 FrameProof::~FrameProof() = default;
 
 void FrameProof::add(const Evidence& evidence) {
-    std::vector<Stream>& streams = run_->collector.streams;
+    std::vector<ProvedStream>& streams = run_->collector.streams;
     if (const auto* limits = std::get_if<Limits>(&evidence)) {
         run_->replay.finish();  // gives back what it holds, to its own stream
         streams.push_back({*limits, {}, {}});
@@ -158,7 +158,7 @@ bool FrameProof::begun() const { return run_->replay.begun(); }
 std::vector<ProvedFrame> FrameProof::finish() {
     run_->replay.finish();
     std::vector<ProvedFrame> proved;
-    for (Stream& stream : run_->collector.streams) {
+    for (ProvedStream& stream : run_->collector.streams) {
         std::stable_sort(
             stream.frames.begin(), stream.frames.end(),
             [](const auto& a, const auto& b) { return a.arrival.arrived < b.arrival.arrived; });

@@ -32,10 +32,6 @@ void put_record(std::string& text, McapOpcode opcode, std::string_view content) 
     text += content;
 }
 
-std::string_view as_text(std::span<const std::byte> bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 std::uint32_t crc_of(std::string_view text) {
     return static_cast<std::uint32_t>(
         crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size()));

@@ -23,14 +23,14 @@ constexpr std::int64_t status_period_ns = 900'000'000;
 constexpr const char* any_object = R"({"type":"object"})";
 
 Json item_json(ring::StreamKind kind, const ring::Item& item) {
-    Json json{{"time_ns", item.time.ns}, {"life", fmt::format("{:016x}", item.life)}};
-    add_fields(json, kind, item.metadata, item.payload.attributes());
-    return json;
+    Json document{{"time_ns", item.time.ns}, {"life", fmt::format("{:016x}", item.life)}};
+    add_fields(document, kind, item.metadata, item.payload.attributes());
+    return document;
 }
 
 /// A name in it may be no UTF-8: it must not end the recording.
-std::string dump(const Json& json) {
-    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string dump(const Json& document) {
+    return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace

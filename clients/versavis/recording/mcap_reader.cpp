@@ -43,7 +43,7 @@ constexpr std::uint64_t chunk_limit = 0xFFFFFFFF;
 
 std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
 
-std::uint32_t crc_of(std::uint32_t crc, std::span<const std::byte> bytes) {
+std::uint32_t crc_read(std::uint32_t crc, std::span<const std::byte> bytes) {
     return static_cast<std::uint32_t>(
         crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
@@ -58,10 +58,6 @@ std::map<std::string, std::string> text_map(ByteCursor& cursor) {
     }
     if (!entries.good()) cursor.bytes(~std::uint64_t{0});  // what is damaged inside is damaged
     return map;
-}
-
-std::string_view as_text(std::span<const std::byte> bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
@@ -252,12 +248,12 @@ Expected<> McapReader::check_summary(std::uint64_t begin, std::uint64_t end,
     if (crc == 0) return {};
     constexpr std::uint64_t until_crc = footer_record - 4;
     std::vector<std::byte> block(glance_size);
-    std::uint32_t sum = crc_of(0, {});
+    std::uint32_t sum = crc_read(0, {});
     for (std::uint64_t at = begin; at < end + until_crc;) {
         const auto part =
             std::span(block).first(std::min<std::uint64_t>(block.size(), end + until_crc - at));
         if (auto got = read(at, part); !got) return got;
-        sum = crc_of(sum, part);
+        sum = crc_read(sum, part);
         at += part.size();
     }
     if (sum != crc) return failure({}, "its summary is damaged");
@@ -425,7 +421,7 @@ Expected<> McapReader::add_attachment(Window& window, std::uint64_t offset) {
         attachment.content = as_text(cursor.bytes(size));
         const std::size_t until = cursor.at();
         const auto crc = cursor.number<std::uint32_t>();
-        const auto sum = crc_of(crc_of(0, {}), std::span(*content).first(until));
+        const auto sum = crc_read(crc_read(0, {}), std::span(*content).first(until));
         if (!cursor.good() || (crc != 0 && crc != sum))
             return damaged(offset, "an attachment differs from its checksum");
     }
@@ -470,7 +466,7 @@ Expected<std::span<const std::byte>> McapReader::load(const McapChunk& chunk,
         return failure(path_, fmt::format("the chunk at byte {} needs {} MiB of memory",
                                           chunk.offset, chunk.records_size >> 20U));
     if (auto got = read(chunk.records_offset, *records); !got) return Unexpected(got.error());
-    if (chunk.crc != 0 && crc_of(crc_of(0, {}), *records) != chunk.crc)
+    if (chunk.crc != 0 && crc_read(crc_read(0, {}), *records) != chunk.crc)
         return damaged(chunk.offset, "the chunk differs from its checksum");
     return std::span<const std::byte>(*records);
 }

@@ -76,8 +76,10 @@ class Groups {
 
 std::string message_index(std::uint16_t channel, const std::vector<MessagePlace>& messages) {
     std::string list;
-    for (const MessagePlace& one : messages)
-        list += mcap_number(one.log_time) + mcap_number(one.offset);
+    for (const MessagePlace& one : messages) {
+        list += mcap_number(one.log_time);
+        list += mcap_number(one.offset);
+    }
     return mcap_record(McapOpcode::message_index, mcap_number(channel) + mcap_text(list));
 }
 

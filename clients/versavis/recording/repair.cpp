@@ -25,11 +25,7 @@ namespace {
 /// What is copied at a time. More would not be faster.
 constexpr std::size_t copy_size = 1 << 20U;
 
-std::string reason(int error) { return std::generic_category().message(error); }
-
-std::string as_text(std::span<const std::byte> bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
+std::string reason_of(int error) { return std::generic_category().message(error); }
 
 /// Reads what the file holds once more, and says what its end must be.
 class Stock {
@@ -105,9 +101,9 @@ class Stock {
         const auto id = cursor.number<std::uint16_t>();
         if (!cursor.good()) return reader_.damaged(record.offset, "a record is too short");
         if (record.opcode == McapOpcode::schema)
-            summary_.schemas.insert_or_assign(id, as_text(record.content));
+            summary_.schemas.insert_or_assign(id, std::string(as_text(record.content)));
         if (record.opcode == McapOpcode::channel)
-            summary_.channels.insert_or_assign(id, as_text(record.content));
+            summary_.channels.insert_or_assign(id, std::string(as_text(record.content)));
         if (record.opcode != McapOpcode::message) return true;
         const auto message = parse_message(record.content);
         if (!message) return reader_.damaged(record.offset, "a message is too short");
@@ -191,7 +187,7 @@ Expected<FileDescriptor> lock(const std::string& path, bool in_place) {
     if (!file)
         return failure(
             path,
-            std::string(in_place ? "cannot be written: " : "cannot be read: ") + reason(errno),
+            std::string(in_place ? "cannot be written: " : "cannot be read: ") + reason_of(errno),
             in_place ? "repair it into a new file with -o" : "");
     if (::flock(file.get(), (in_place ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0)
         return failure(path, "is being written by another process",

@@ -2,8 +2,14 @@
 #include "status/status_document.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <map>
+#include <sstream>
 
 #include "base/shallow_json.hpp"
+#include "posix/child_process.hpp"
 
 namespace versavis::client {
 
@@ -32,6 +38,42 @@ Expected<nlohmann::json> read_status(const std::string& instance) {
                        "the status document has another version",
                        "install service and clients of the same release");
     return document;
+}
+
+std::optional<Error> why_silent(const std::string& units) {
+    std::istringstream lines(units);
+    std::map<std::string, std::string> unit;
+    std::optional<Error> failed;
+    for (std::string line; std::getline(lines, line);) {
+        const std::size_t equals = line.find('=');
+        if (equals == std::string::npos) {  // an empty one: the next unit
+            unit.clear();
+            continue;
+        }
+        unit[line.substr(0, equals)] = line.substr(equals + 1);
+        if (unit.size() < 3) continue;
+        const std::string& id = unit["Id"];
+        const std::string& status = unit["StatusText"];
+        const std::string log = fmt::format("see 'journalctl -u {}'", id);
+        if (unit["ActiveState"] == "active" && status.rfind("waiting: ", 0) == 0)
+            return Error{id, status, log};
+        if (unit["ActiveState"] == "failed") failed = {id, "it has failed", log};
+    }
+    return failed;
+}
+
+Error explain_silence(const Error& error) {
+    auto systemctl =
+        ChildProcess::start({"systemctl", "show", "--property=Id,ActiveState,StatusText",
+                             "versavisd.service", "versavisd@*.service"},
+                            ChildProcess::Errors::dropped);
+    if (!systemctl) return error;
+    std::string text;
+    std::array<char, 4096> piece{};
+    for (ssize_t size = 0; (size = ::read(systemctl->socket(), piece.data(), piece.size())) > 0;)
+        text.append(piece.data(), static_cast<std::size_t>(size));
+    systemctl->wait();
+    return why_silent(text).value_or(error);
 }
 
 std::string configuration_path(const std::string& named,

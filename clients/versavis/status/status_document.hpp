@@ -14,6 +14,14 @@ namespace versavis::client {
 /// its heart has not beaten for three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
 
+/// Why there is no status: what a service that has not started to serve waits for, or that it
+/// failed, if systemd knows that, else `error`.
+Error explain_silence(const Error& error);
+
+/// The same by what 'systemctl show' says of Id, ActiveState and StatusText of the services; none:
+/// nothing.
+std::optional<Error> why_silent(const std::string& units);
+
 /// The file that is named, else the one that the service has read, else the installed one.
 std::string configuration_path(const std::string& named,
                                const std::optional<nlohmann::json>& status);

@@ -136,13 +136,13 @@ constexpr Family healthy{"versavis_device_healthy",
                          "",
                          1,
                          "1 if a device delivers all that is configured, with proof."};
-constexpr Family fault{"versavis_device_fault_info",
-                       "",
-                       Type::gauge,
-                       Part::top,
-                       "",
-                       1,
-                       "1 for the fault that a device has, by its name."};
+constexpr Family device_fault{"versavis_device_fault_info",
+                              "",
+                              Type::gauge,
+                              Part::top,
+                              "",
+                              1,
+                              "1 for the fault that a device has, by its name."};
 constexpr Family link_load{"versavis_camera_link_load_ratio",
                            "ratio",
                            Type::gauge,
@@ -150,8 +150,8 @@ constexpr Family link_load{"versavis_camera_link_load_ratio",
                            "",
                            1,
                            "What all cameras on its link need, of what the link carries."};
-constexpr const Family* computed[] = {&up,      &info,  &uptime,   &status_age,
-                                      &healthy, &fault, &link_load};
+constexpr const Family* computed[] = {&up,      &info,         &uptime,   &status_age,
+                                      &healthy, &device_fault, &link_load};
 
 using Label = std::pair<std::string_view, std::string>;
 using Labels = std::vector<Label>;
@@ -267,7 +267,7 @@ void add_service(Exposition& out, const json& status, HostTime now) {
     for_each_device(status, [&](const json& device, const std::string& name) {
         out.add(device.value("health", "") == "ok" ? 1 : 0, {{"device", name}});
     });
-    out.begin(fault);
+    out.begin(device_fault);
     for_each_device(status, [&](const json& device, const std::string& name) {
         const std::string word = device.value("fault", "");
         if (!word.empty()) out.add(1, {{"device", name}, {"fault", word}});

@@ -10,6 +10,7 @@
 #include <map>
 #include <string_view>
 
+#include "base/json_text.hpp"
 #include "base/wrapped_line.hpp"
 
 namespace versavis::client {
@@ -18,7 +19,6 @@ namespace {
 
 using nlohmann::json;
 
-std::string text(const json& object, const char* key) { return object.value(key, std::string()); }
 std::uint64_t count(const json& object, const char* key) {
     return object.value(key, std::uint64_t{0});
 }
@@ -29,9 +29,9 @@ constexpr std::size_t indent = 9;
 constexpr auto green = "\x1b[32m";
 constexpr auto yellow = "\x1b[33m";
 constexpr auto red = "\x1b[31m";
-constexpr auto plain = "\x1b[0m";
+constexpr auto no_colour = "\x1b[0m";
 
-std::string wrapped(std::string line) { return client::wrapped(std::move(line), indent); }
+std::string wrapped_part(std::string line) { return client::wrapped(std::move(line), indent); }
 
 /// Hints in lines of their own, after their word; what was said of another part already is not said
 /// again.
@@ -42,8 +42,8 @@ class Hints {
         const std::string hint = text(part, "hint");
         if (hint.empty()) return "";
         const auto [said, is_new] = said_of_.emplace(hint, name);
-        return wrapped(fmt::format("{:{}}{}{}{}", "", indent, fault, fault.empty() ? "" : ": ",
-                                   is_new ? hint : "as " + said->second));
+        return wrapped_part(fmt::format("{:{}}{}{}{}", "", indent, fault, fault.empty() ? "" : ": ",
+                                        is_new ? hint : "as " + said->second));
     }
 
  private:
@@ -58,8 +58,8 @@ std::string parts_line(const json& board) {
     for (const json& name : present)
         if (name.is_string()) names += (names.empty() ? "" : ", ") + name.get<std::string>();
     if (names.empty() || !fastest.is_number()) return "";
-    return wrapped(fmt::format("{:{}}it has {}; IMUs up to {:g} Hz", "", indent, names,
-                               fastest.get<double>()));
+    return wrapped_part(fmt::format("{:{}}it has {}; IMUs up to {:g} Hz", "", indent, names,
+                                    fastest.get<double>()));
 }
 
 /// Counters that should be zero; in a summary only those that are not.
@@ -83,7 +83,7 @@ std::string board_lines(const json& board, Detail detail, Hints& hints) {
                                      {"late outputs", count(board, "late_outputs")},
                                      {"IMU errors", count(board, "imu_errors")}},
                                     detail);
-    return wrapped(line) + hints.of(board, "board") +
+    return wrapped_part(line) + hints.of(board, "board") +
            (detail == Detail::full ? parts_line(board) : "");
 }
 
@@ -108,8 +108,8 @@ std::string clock_figures(const json& clock, Detail detail) {
 }
 
 std::string clock_lines(const json& clock, Detail detail, Hints& hints) {
-    return wrapped(fmt::format("clock    {:<10} {}  {}", text(clock, "state"),
-                               text(clock, "output"), clock_figures(clock, detail))) +
+    return wrapped_part(fmt::format("clock    {:<10} {}  {}", text(clock, "state"),
+                                    text(clock, "output"), clock_figures(clock, detail))) +
            hints.of(clock, "clock");
 }
 
@@ -125,16 +125,16 @@ std::string imu_lines(const json& imu, Detail detail, Hints& hints) {
     if (detail == Detail::full) line += fmt::format(", published {}", count(imu, "published"));
     line += listed({{"lost", count(imu, "lost")}, {"faulty", count(imu, "faulty")}}, detail);
     const std::string filter =
-        wrapped(fmt::format("{:{}}filter delay {} us ({})", "", indent,
-                            in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source")));
-    return wrapped(line) + hints.of(imu, text(imu, "name")) +
+        wrapped_part(fmt::format("{:{}}filter delay {} us ({})", "", indent,
+                                 in_us(imu, "filter_delay_ns"), text(imu, "filter_delay_source")));
+    return wrapped_part(line) + hints.of(imu, text(imu, "name")) +
            (detail == Detail::full ? filter : "");
 }
 
 /// What is taken off the middle of its exposures, before it is known: nothing.
 std::string delay_line(const json& camera) {
     if (text(camera, "line").empty()) return "";
-    return wrapped(fmt::format(
+    return wrapped_part(fmt::format(
         "{:{}}{}: start {} us late, end {} us, sigma {} us ({}); end less start, measured: {} us",
         "", indent, text(camera, "line"), in_us(camera, "line_delay_start_ns"),
         in_us(camera, "line_delay_end_ns"), in_us(camera, "line_delay_sigma_ns"),
@@ -150,7 +150,7 @@ std::string camera_lines(const json& camera, Detail detail, Hints& hints) {
                     {"triggers without frame", count(camera, "triggers_without_frame")},
                     {"slips", count(camera, "slips")}},
                    detail);
-    return wrapped(line) + hints.of(camera, text(camera, "name")) +
+    return wrapped_part(line) + hints.of(camera, text(camera, "name")) +
            (detail == Detail::full ? delay_line(camera) : "");
 }
 
@@ -164,7 +164,7 @@ const char* colour_of(const json& part) {
 
 std::string coloured(std::string lines, std::size_t begin, std::size_t size, const char* colour) {
     const std::size_t end = std::min(begin + size, lines.size());
-    lines.insert(end, plain);
+    lines.insert(end, no_colour);
     return lines.insert(begin, colour);
 }
 

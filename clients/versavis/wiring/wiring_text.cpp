@@ -18,8 +18,8 @@ constexpr auto rules =
     "When all is wired: versavis camera check\n";
 
 std::string row(const char* title, const std::string& text) {
-    constexpr std::size_t indent = 12;
-    return wrapped(fmt::format("  {:<10}{}", title, text), indent);
+    constexpr std::size_t text_column = 12;
+    return client::wrapped(fmt::format("  {:<10}{}", title, text), text_column);
 }
 
 std::string board_pin(const std::string& signal) {
@@ -76,7 +76,7 @@ std::string exposure_rows(const WiredCamera& camera) {
 
 std::string camera_text(const WiredCamera& camera) {
     const std::string name = camera.name.empty() ? "" : camera.name + ": ";
-    if (camera.circuit == nullptr) return wrapped(name + camera.problem, 2);
+    if (camera.circuit == nullptr) return client::wrapped(name + camera.problem, 2);
     const CameraCircuit& circuit = *camera.circuit;
     std::string text =
         fmt::format("{}{}\n", name, circuit.title) + row("connector", circuit.connector) +
@@ -93,7 +93,7 @@ std::string camera_text(const WiredCamera& camera) {
 
 std::string imu_text(const WiredImu& imu) {
     const std::string name = imu.name.empty() ? "" : imu.name + ": ";
-    if (imu.circuit == nullptr) return wrapped(name + imu.problem, 2);
+    if (imu.circuit == nullptr) return client::wrapped(name + imu.problem, 2);
     std::string text = fmt::format("{}{}\n", name, imu.circuit->title);
     for (const ImuWire& wire : imu.circuit->wires) {
         std::string line = fmt::format("{} - ", wire.imu);

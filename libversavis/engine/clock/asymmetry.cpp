@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "engine/clock/square.hpp"
+
 namespace versavis::clock {
 
 namespace {
@@ -18,8 +20,6 @@ constexpr double share_of_short = 0.08;
 // The most of that further share. Half: as above for links of more than 20 us. Twice: sigma of
 // delays of 50 us is a fifth larger.
 constexpr double most_of_short_ns = 3000.0;
-
-double square(double x) { return x * x; }
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/clock/gaussian_state_matrix.hpp"
+#include "engine/clock/square.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -110,8 +111,6 @@ OffsetSample to_host(const BoardTime sent, const HostTime arrived) {
 OffsetSample to_board(const HostTime sent, const BoardTime arrived) {
     return {arrived, {sent.ns - arrived.ns}};
 }
-
-double square(double x) { return x * x; }
 
 }  // namespace
 

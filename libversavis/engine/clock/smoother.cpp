@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/clock/gaussian_state_matrix.hpp"
+#include "engine/clock/square.hpp"
 #include "engine/rounding.hpp"
 
 namespace versavis::clock {
@@ -52,8 +53,6 @@ constexpr double overshoot_doubt = 0.45;
 // Windows after an instant that its shape of delays is averaged over, half of all. Half or twice
 // matters where a link changed within minutes.
 constexpr std::size_t later_windows = 128;
-
-double square(double x) { return x * x; }
 
 StateVector level_now(Direction direction) {
     return level_by_component(static_cast<double>(direction), {});

@@ -19,7 +19,7 @@ constexpr std::int64_t least_off_delay_ns = 1'000'000;
 
 // Records in a row that took no less until the quickest is believed. At half one delayed record
 // makes those after it look early; at twice a step soon after the start may pass.
-constexpr int records_to_confirm = 4;
+constexpr int delays_to_confirm = 4;
 
 // How fast the quickest is forgotten. At half an old one silences repairs for longer after the
 // clock's estimate has moved; at twice a step back is forgotten twice as soon.
@@ -45,7 +45,7 @@ std::int64_t RecordDelay::tolerance_ns() const {
 /// Least time from the end of an exposure until its record comes.
 double RecordDelay::earliest_ns() const {
     const auto least_ns = static_cast<double>(earliest_.ns);
-    if (confirmed_ < records_to_confirm) return least_ns;
+    if (confirmed_ < delays_to_confirm) return least_ns;
     return std::max(least_ns, static_cast<double>(*least_delay_ns_ - tolerance_ns()));
 }
 

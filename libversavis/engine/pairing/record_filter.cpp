@@ -50,7 +50,7 @@ constexpr Duration first_tolerance = milliseconds(1);
 constexpr int records_to_confirm = 3;
 
 /// 73 years: a grid point beyond it is a lie.
-constexpr double furthest_ns = 2.3e18;
+constexpr double furthest_grid_ns = 2.3e18;
 
 bool has_start(const wire::Exposure& record) { return record.start_ns != wire::no_time; }
 bool has_end(const wire::Exposure& record) { return record.end_ns != wire::no_time; }
@@ -163,7 +163,7 @@ std::optional<Implausibility> RecordHistory::grid_doubt(const wire::Exposure& re
 /// None: ticks that far apart cannot be.
 std::optional<RecordHistory::GridPoint> RecordHistory::predicted(std::uint64_t tick) const {
     const auto ticks = static_cast<std::int64_t>(tick - grid_->tick);
-    if (std::abs(static_cast<double>(ticks)) * static_cast<double>(period_.ns) > furthest_ns)
+    if (std::abs(static_cast<double>(ticks)) * static_cast<double>(period_.ns) > furthest_grid_ns)
         return std::nullopt;
     const Duration moved = period_ * ticks;
     const Duration rounding = grid_rounding * std::abs(ticks);
@@ -202,7 +202,7 @@ std::optional<Implausibility> RecordHistory::pace_doubt(const wire::Exposure& re
                                punctual_->trigger_ns + pace_.value().ns};
     // As real numbers: ticks may be a lie.
     const double expected_ns = static_cast<double>(ticks) * static_cast<double>(pace_.value().ns);
-    if (expected_ns > furthest_ns) return doubt;
+    if (expected_ns > furthest_grid_ns) return doubt;
     const Duration off = since - Duration{static_cast<std::int64_t>(expected_ns)};
     Duration tolerance = pace_.tolerance() + compensation(record);
     const std::int64_t skipped = rounded(expected_ns).ns / pace_.value().ns - 1;
