@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The project's own libraries, so that a part can be changed in KiCad, too: its symbols, footprints,
-and the tables that name them."""
+"""The project's own libraries, so that a part can be changed in KiCad, too: its symbols,
+footprints, and the tables that name them."""
 from __future__ import annotations
 
 from typing import Any

@@ -362,7 +362,8 @@ def pcb(board: Board, layout: Layout) -> str:
          ["comment", 1, q("CERN-OHL-P-2.0")]],
         ["layers", *([number, q(name), kind] for number, name, kind in LAYERS
                      if not name.startswith("In") or board.layers == 4)],
-        setup(), ["net", 0, q("")], *(["net", number, q(net)] for net, number in numbers.items())]
+        setup(board), ["net", 0, q("")],
+        *(["net", number, q(net)] for net, number in numbers.items())]
     rows += [footprint_sexpr(board, part, numbers, texts) for part in board.parts.values()]
     rows += rectangle("gr_line", "Edge.Cuts", 0.1, (0.0, 0.0, board.width, board.height), "edge")
     for x, y, turn, size, text in labels(board):
@@ -379,8 +380,10 @@ def pcb(board: Board, layout: Layout) -> str:
     return write(rows + zones(board, numbers)) + "\n"
 
 
-def setup() -> Sexpr:
+def setup(board: Board) -> Sexpr:
+    """The origin of production files is the lower left corner, as in the placement file."""
     return ["setup", ["pad_to_mask_clearance", 0.05],
+            ["aux_axis_origin", OFFSET, OFFSET + board.height],
             ["pcbplotparams", ["layerselection", "0x00010fc_ffffffff"],
              ["outputdirectory", q("production/")]]]
 

@@ -96,7 +96,9 @@ def plot(loaded: Any, board: Board, work: pathlib.Path) -> list[pathlib.Path]:
     options.SetUseGerberProtelExtensions(False)
     options.SetUseGerberX2format(True)
     options.SetSubtractMaskFromSilk(False)
-    options.SetUseAuxOrigin(False)
+    options.SetUseAuxOrigin(True)
+    options.SetDrillMarksType(pcbnew().PCB_PLOT_PARAMS.NO_DRILL_SHAPE)
+    options.SetPlotViaOnMaskLayer(False)  # vias are covered
     for name, layer in PLOTS:
         number = loaded.GetLayerID(layer)
         if layer.startswith("In") and board.layers == 2:
@@ -107,13 +109,28 @@ def plot(loaded: Any, board: Board, work: pathlib.Path) -> list[pathlib.Path]:
     controller.ClosePlot()
     drill = pcbnew().EXCELLON_WRITER(loaded)
     drill.SetFormat(True)
-    drill.SetOptions(False, False, pcbnew().wxPoint(0, 0), False)
+    drill.SetOptions(False, False, loaded.GetDesignSettings().GetAuxOrigin(), False)
     drill.CreateDrillandMapFilesSet(str(target), True, False)
     files = sorted(target.iterdir())
     for file in files:
         kept_lines = [line for line in file.read_text().splitlines() if not DATED.search(line)]
         file.write_text("\n".join(kept_lines) + "\n")
     return files
+
+
+def origin_faults(board: Board, work: pathlib.Path) -> list[str]:
+    """Gerbers and drills have the origin of the placement file: the lower left corner."""
+    edge = next((work / "gerbers").glob("*Edge_Cuts.gbr")).read_text()
+    spots = [(int(x) / 1e6, int(y) / 1e6) for x, y in re.findall(r"X(-?\d+)Y(-?\d+)D0[12]", edge)]
+    drill = "".join(path.read_text() for path in (work / "gerbers").glob("*-PTH.drl"))
+    holes = [(float(x), float(y)) for x, y in re.findall(r"^X([-\d.]+)Y([-\d.]+)", drill, re.M)]
+    faults = []
+    for name, points in (("the outline", spots), ("a hole", holes)):
+        wrong = [p for p in points if not (-0.01 <= p[0] <= board.width + 0.01 and
+                                           -0.01 <= p[1] <= board.height + 0.01)]
+        if wrong or not points:
+            faults.append(f"{name} is at {wrong[:1]}, outside of the board as the placement has it")
+    return faults
 
 
 def archive(files: list[pathlib.Path], path: pathlib.Path) -> None:
@@ -161,9 +178,10 @@ def produce(board: Board, loaded: Any, work: pathlib.Path, write: bool) -> list[
             images = kept.folder(board) / "images"
             images.mkdir(exist_ok=True)
             shutil.copy(work / f"{side}.png", images / f"{side}.png")
+    faults = origin_faults(board, work)
     old, new = content(target), content(work / "gerbers.zip")
-    return [f"{name} in gerbers.zip is not what KiCad plots" for name in sorted({*old, *new})
-            if old.get(name) != new.get(name)]
+    return faults + [f"{name} in gerbers.zip is not what KiCad plots"
+                     for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
 
 
 def one(name: str, write: bool) -> list[str]:
