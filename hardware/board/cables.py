@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cables from the carrier to cameras, LiDARs, IMUs and receivers, and whether each can work.
+
+What a camera's lines are is in hardware/wiring.json, the table of `versavis wiring`; what is not
+there, and how the carrier is set and wired, is in hardware/cables.json.
+"""
+from __future__ import annotations
+
+import dataclasses
+import json
+import pathlib
+import re
+from typing import Any
+
+PRESETS = pathlib.Path(__file__).resolve().parents[2] / "daemon/settings/presets"
+HARDWARE = pathlib.Path(__file__).resolve().parents[1]
+Table = dict[str, Any]
+# The carrier's outputs: V at the rail at least and at most, ohm of the driver and of what follows
+# it. 74LVC1T45: 2.4 V at 16 mA from 3.0 V, 3.8 V at 32 mA from 4.5 V, 1.2 V at 4 mA from 1.65 V.
+RAILS = {"1.8 V": (1.77, 1.83, 112.0), "3.3 V": (3.2, 3.4, 37.5), "5 V": (4.2, 5.25, 22.0)}
+SERIES = 47.0
+SCHMITT = {"1.8 V": (1.5, 0.25), "3.3 V": (2.26, 0.65), "5 V": (3.4, 0.93)}  # high, low
+PULL_UP, DROP = 1500.0, 0.32
+INPUT_MOST = 24.0
+SLOW_HIGH, SLOW_LOW = 2.2, 0.6  # the inputs for pulses and serial lines, at 3.3 V
+
+
+@dataclasses.dataclass(frozen=True)
+class Cable:
+    name: str
+    level: str
+    high_v: float
+    highest_v: float
+    draws_ma: float
+
+
+def tables() -> tuple[Table, Table]:
+    cables = json.loads((HARDWARE / "cables.json").read_text())
+    wiring = json.loads((HARDWARE / "wiring.json").read_text())
+    return cables, {camera["name"]: camera for camera in wiring["cameras"]}
+
+
+def camera_facts(row: Table, wiring: Table) -> tuple[Table, Table]:
+    """Of its trigger input and its exposure output."""
+    if row["name"] in wiring:
+        camera = wiring[row["name"]]
+        return camera["trigger"]["input"], camera["exposure"]["output"]
+    return row["input"], row["output"]
+
+
+def triggers() -> list[Cable]:
+    """Inputs whose levels are known, for the simulation."""
+    table, wiring = tables()
+    found = []
+    for row in table["cameras"]:
+        into, _ = camera_facts(row, wiring)
+        if "high_v" in into:
+            found.append(Cable(row["name"], row["level"], into["high_v"], into["highest_v"],
+                               into.get("draws_ma", into.get("needs_ma", 0.1))))
+    return found
+
+
+def given(level: str, milliamps: float) -> float:
+    """V that a trigger or a pulse still has at this current."""
+    least, _, inside = RAILS[level]
+    return least - (inside + SERIES) * milliamps / 1000
+
+
+def trigger_faults(row: Table, into: Table) -> list[str]:
+    faults, level = [], row["level"]
+    _, most, inside = RAILS[level]
+    if into.get("high_v") is None:
+        return [] if not row["known"] else ["its input's levels are not known"]
+    milliamps = into.get("draws_ma", into.get("needs_ma", 0.1))
+    if given(level, milliamps) < into["high_v"]:
+        faults.append(f"{given(level, milliamps):.2f} V arrive at {milliamps:g} mA, "
+                      f"{into['high_v']:g} V are high")
+    if most > into["highest_v"]:
+        faults.append(f"{most:g} V arrive, the input bears {into['highest_v']:g} V")
+    pull = into.get("pulls_up")
+    if pull:
+        low = pull["v"] * (inside + SERIES) / (inside + SERIES + pull["ohm"])
+        if low > into.get("low_v", 0.8):
+            faults.append(f"its pull-up leaves {low:.2f} V at low")
+    return faults
+
+
+def exposure_faults(row: Table, output: Table) -> list[str]:
+    faults, level = [], row["level"]
+    least, most, _ = RAILS[level]
+    high, low = SCHMITT[level]
+    if output["kind"] == "push-pull":
+        if output["high_v"][0] < high:
+            faults.append(f"{output['high_v'][0]:g} V arrive, {high:g} V are high at {level}")
+        if output["high_v"][1] > INPUT_MOST:
+            faults.append(f"{output['high_v'][1]:g} V arrive, the input bears {INPUT_MOST:g} V")
+        return faults
+    if row["pull"] != "up":
+        faults.append("the output only pulls down: its jumper must be at UP")
+    if least - DROP < high:
+        faults.append(f"the pull-up gives {least - DROP:.2f} V, {high:g} V are high")
+    milliamps = (most - DROP) / PULL_UP * 1000
+    pull = output.get("pulls_up")
+    milliamps += pull["v"] / pull["ohm"] * 1000 if pull else 0.0
+    if milliamps > output.get("sinks_ma", 25):
+        faults.append(f"the output bears {output['sinks_ma']:g} mA, the pull-up gives "
+                      f"{milliamps:.1f}")
+    if output.get("low"):
+        left = residual(output["low"], milliamps)
+        if left > low:
+            faults.append(f"the output leaves {left:.2f} V at low, {low:g} V are allowed")
+    return faults
+
+
+def residual(rows: list[Table], milliamps: float) -> float:
+    """On the line through the first and the last figure."""
+    first, last = rows[0], rows[-1]
+    if first["ma"] == last["ma"]:
+        return float(first["v"])
+    slope = (last["v"] - first["v"]) / (last["ma"] - first["ma"])
+    return float(first["v"] + slope * (milliamps - first["ma"]))
+
+
+def pin_faults(row: Table, wiring: Table) -> list[str]:
+    """No pin is driven and supply, and none contradicts the table of the wiring."""
+    faults = []
+    pins = row["camera_pins"]
+    for name in ("trigger", "exposure"):
+        numbers = [number for number, what in pins.items() if what == name]
+        if row["known"] and len(numbers) != 1:
+            faults.append(f"{name} is at {len(numbers)} pins")
+        camera = wiring.get(row["name"])
+        if camera and numbers and camera[name].get("pin") != int(numbers[0]):
+            faults.append(f"{name} is at pin {numbers[0]}, in wiring.json at "
+                          f"{camera[name].get('pin')}")
+    camera = wiring.get(row["name"])
+    if camera and str(camera.get("supply_pin", "")) in pins and \
+            pins[str(camera["supply_pin"])] != "supply":
+        faults.append(f"pin {camera['supply_pin']} is the camera's supply, and "
+                      f"{pins[str(camera['supply_pin'])]} here")
+    return faults
+
+
+def line_faults(row: Table) -> list[str]:
+    """Its lines are those that its preset uses; others have to be configured, and it says so."""
+    if "lines" not in row:
+        return []
+    text = (PRESETS / f"{row['preset']}.toml").read_text()
+    found = []
+    for key, what in (("trigger_lines", "trigger"), ("strobe_lines", "exposure")):
+        first = re.search(rf'^{key} = \["(\w+)"', text, re.M)
+        if first and first[1] != row["lines"][what] and not row.get("configure"):
+            found.append(f"preset '{row['preset']}' uses {first[1]} for the {what}, not "
+                         f"{row['lines'][what]}")
+    return found
+
+
+def shared_pins(table: Table) -> list[str]:
+    """A pin that one camera uses for a signal and another one of the same plug for its supply may
+    not be wired to both in one cable; the carrier has no such connector."""
+    return [f"{name}: supply and a signal are on one connector"
+            for name, connector in table["connectors"].items()
+            if "supply" in connector["pins"].values() and
+            {"trigger", "exposure"} & set(connector["pins"].values())]
+
+
+def lidar_faults(row: Table) -> list[str]:
+    pps, level = row["pps"], row["level"]
+    faults = []
+    if "high_v" in pps and given(level, pps["needs_ma"]) < pps["high_v"]:
+        faults.append(f"{given(level, pps['needs_ma']):.2f} V arrive at {pps['needs_ma']:g} mA, "
+                      f"{pps['high_v']:g} V are high")
+    if RAILS[level][1] > pps["highest_v"]:
+        faults.append(f"{RAILS[level][1]:g} V arrive, the input bears {pps['highest_v']:g} V")
+    return faults
+
+
+def other_faults(row: Table, table: Table) -> list[str]:
+    faults = []
+    pins = table["connectors"][row["at"]]["pins"].values()
+    faults += [f"{signal} is no pin of {row['at']}" for signal in row["wires"]
+               if signal not in pins]
+    if row["gives_v"][0] < SLOW_HIGH and row["at"] != "imu_spi":
+        faults.append(f"gives {row['gives_v'][0]:g} V, {SLOW_HIGH:g} V are high")
+    if row["at"] == "imu_spi" and row["gives_v"][1] > 3.6:
+        faults.append(f"gives {row['gives_v'][1]:g} V to a pin that bears 3.6 V")
+    return faults
+
+
+def faults(table: Table | None = None) -> list[str]:
+    kept, wiring = tables()
+    table = table or kept
+    found = shared_pins(table)
+    for row in table["cameras"]:
+        into, output = camera_facts(row, wiring)
+        found += [f"{row['name']}: {fault}" for fault in
+                  [*trigger_faults(row, into), *exposure_faults(row, output),
+                   *pin_faults(row, wiring), *line_faults(row)]]
+    for row in table["others"]:
+        wrong = lidar_faults(row) if row["at"] == "lidar" else other_faults(row, table)
+        found += [f"{row['name']}: {fault}" for fault in wrong]
+    return found + [f"{name} of wiring.json has no cable" for name in wiring
+                    if name not in {row["name"] for row in table["cameras"]}]
