@@ -425,8 +425,17 @@ TEST_CASE("doctor: service, releases and devices") {
     host.subject.silence = {"instance x", "the service has died or hangs", "restart it"};
     host.subject.configuration_error = {"x.toml", "cannot be read", "check its name"};
     Findings findings = check_service(host.subject);
+    CHECK(get(findings, "service").value == "not running");
+    CHECK(get(findings, "service").reason == "the service has died or hangs");
     CHECK(get(findings, "service").verdict == Verdict::bad);
     CHECK(get(findings, "configuration").verdict == Verdict::bad);
+    host.subject.unit = Error{"versavisd.service", "waiting: no memory", "see its log"};
+    CHECK(get(check_service(host.subject), "service").value == "serves nothing yet");
+    CHECK(get(check_service(host.subject), "service").reason ==
+          "versavisd.service: waiting: no memory");
+    host.subject.unit->what = "it has failed";
+    CHECK(get(check_service(host.subject), "service").value == "not running");
+    host.subject.unit.reset();
     check_complete(findings);
     host.subject.status = proved_status();
     CHECK(get(check_service(host.subject), "firmware").verdict == Verdict::good);

@@ -33,9 +33,9 @@ Findings check_life(const Subject& subject) {
         return {{"service", service,
                  fmt::format("process {}, release {}", subject.pid(),
                              subject.status->value("release", "?"))}};
-    if (subject.silence.what.rfind("waiting: ", 0) == 0)
-        return {{"service", service, "runs, but serves nothing yet", Verdict::bad,
-                 subject.silence.what, subject.silence.cure}};
+    if (subject.unit && subject.unit->what.rfind("waiting: ", 0) == 0)
+        return {{"service", service, "serves nothing yet", Verdict::bad,
+                 subject.unit->where + ": " + subject.unit->what, subject.unit->cure}};
     return {{"service", service, "not running", Verdict::bad, subject.silence.what,
              "sudo systemctl start versavisd; journalctl -u versavisd says why it ended"}};
 }
@@ -267,7 +267,10 @@ Findings check_service(const Subject& subject) {
 Conclusion conclude(const Subject& subject) {
     using State = Conclusion::State;
     if (!subject.status)
-        return because(State::unknown, "there is no living service: " + subject.silence.what);
+        return because(
+            State::unknown,
+            "there is no living service: " + subject.silence.what +
+                (subject.unit ? "; " + subject.unit->where + ": " + subject.unit->what : ""));
     const json& status = *subject.status;
     const std::string degraded = first_cause(status, "degraded");
     if (!degraded.empty()) return because(State::wrong, degraded);

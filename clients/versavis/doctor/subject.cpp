@@ -87,7 +87,8 @@ Subject examine(const std::string& instance, const std::string& configuration,
     if (status)
         subject.status = std::move(*status);
     else
-        subject.silence = explain_silence(status.error());
+        subject.silence = status.error();
+    if (!status) subject.unit = why_silent();
     auto parts = read_configured_parts(configuration_path(configuration, subject.status));
     if (parts)
         subject.configuration = std::move(*parts);

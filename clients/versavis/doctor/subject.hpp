@@ -38,6 +38,7 @@ struct Subject {
     std::string release;                   ///< of this program
     std::optional<nlohmann::json> status;  ///< none: there is no living service, see `silence`
     Error silence;
+    std::optional<Error> unit;  ///< what the service manager says of it
     std::optional<ConfiguredParts> configuration;
     Error configuration_error;
     std::vector<LinkedCamera> cameras;

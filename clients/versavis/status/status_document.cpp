@@ -62,18 +62,23 @@ std::optional<Error> why_silent(const std::string& units) {
     return failed;
 }
 
-Error explain_silence(const Error& error) {
+std::optional<Error> why_silent() {
     auto systemctl =
         ChildProcess::start({"systemctl", "show", "--property=Id,ActiveState,StatusText",
                              "versavisd.service", "versavisd@*.service"},
                             ChildProcess::Errors::dropped);
-    if (!systemctl) return error;
+    if (!systemctl) return std::nullopt;
     std::string text;
     std::array<char, 4096> piece{};
     for (ssize_t size = 0; (size = ::read(systemctl->socket(), piece.data(), piece.size())) > 0;)
         text.append(piece.data(), static_cast<std::size_t>(size));
     systemctl->wait();
-    return why_silent(text).value_or(error);
+    return why_silent(text);
+}
+
+Error explain_silence(Error error) {
+    if (const auto why = why_silent()) error.cure += "; " + why->message();
+    return error;
 }
 
 std::string configuration_path(const std::string& named,

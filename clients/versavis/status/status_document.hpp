@@ -14,13 +14,15 @@ namespace versavis::client {
 /// its heart has not beaten for three seconds.
 Expected<nlohmann::json> read_status(const std::string& instance);
 
-/// Why there is no status: what a service that has not started to serve waits for, or that it
-/// failed, if systemd knows that, else `error`.
-Error explain_silence(const Error& error);
+/// What a service of this host waits for before it serves, or that one failed, as systemd has it;
+/// none: neither. Units and instances may have different names, so it may be of another instance.
+std::optional<Error> why_silent();
 
-/// The same by what 'systemctl show' says of Id, ActiveState and StatusText of the services; none:
-/// nothing.
+/// The same by what 'systemctl show' says of Id, ActiveState and StatusText of the services.
 std::optional<Error> why_silent(const std::string& units);
+
+/// The error of read_status, with that beside its cure.
+Error explain_silence(Error error);
 
 /// The file that is named, else the one that the service has read, else the installed one.
 std::string configuration_path(const std::string& named,
