@@ -28,12 +28,14 @@ struct TransferDeleter {
     void operator()(libusb_transfer* transfer) const { libusb_free_transfer(transfer); }
 };
 
-Unexpected<> usb_failure(const std::string& what, int code) {
-    return failure("USB board", fmt::format("{}: {}", what, libusb_error_name(code)),
-                   code == LIBUSB_ERROR_ACCESS
-                       ? "install the udev rule and join the group 'versavis'"
-                   : code == LIBUSB_ERROR_BUSY ? "another program has the board open: close it"
-                                               : "");
+Unexpected<> usb_failure(const std::string& what, const device::UsbError& error) {
+    return Unexpected(error.as_error("USB board", what));
+}
+
+Unexpected<> not_read(int code) { return usb_failure("cannot be read", device::usb_error(code)); }
+
+Unexpected<> not_written(int code) {
+    return usb_failure("cannot be written to", device::usb_error(code));
 }
 
 class UsbStream final : public ByteStream {
@@ -60,7 +62,7 @@ class UsbStream final : public ByteStream {
         for (Slot& slot : slots_) {
             prepare(slot, port_.data().endpoint_in, &UsbStream::read_completed, 0);
             if (const int code = libusb_submit_transfer(slot.transfer.get()); code != 0)
-                return usb_failure("cannot read", code);
+                return not_read(code);
             slot.pending = true;
         }
         prepare(writing_, port_.data().endpoint_out, &UsbStream::write_completed, usb_timeout_ms);
@@ -77,26 +79,27 @@ class UsbStream final : public ByteStream {
             libusb_handle_events_timeout_completed(bus_.get(), &limit, nullptr);
         }
         if (!completed_.empty()) return take_first(into);
-        if (gone_) return failure("USB board", "the board was unplugged or reset");
+        if (gone_) return not_read(LIBUSB_ERROR_NO_DEVICE);
         return Chunk{};
     }
 
     Expected<> write(std::span<const std::uint8_t> bytes) override {
         std::unique_lock lock(write_mutex_);
-        if (writing_.pending || gone_ || bytes.size() > writing_.buffer.size())
-            return usb_failure("the board does not accept data", LIBUSB_ERROR_BUSY);
+        if (gone_) return not_written(LIBUSB_ERROR_NO_DEVICE);
+        if (writing_.pending) return not_written(LIBUSB_ERROR_TIMEOUT);
+        if (bytes.size() > writing_.buffer.size()) return not_written(LIBUSB_ERROR_OVERFLOW);
         libusb_transfer& transfer = *writing_.transfer;
         std::copy(bytes.begin(), bytes.end(), writing_.buffer.begin());
         transfer.length = static_cast<int>(bytes.size());
         if (const int code = libusb_submit_transfer(&transfer); code != 0)
-            return usb_failure("the board does not accept data", code);
+            return not_written(code);
         writing_.pending = true;
         // libusb ends it at its time-out: twice that is only waited for when nobody reads.
         written_.wait_for(lock, std::chrono::milliseconds(2 * usb_timeout_ms),
                           [this] { return !writing_.pending; });
         if (writing_.pending || transfer.status != LIBUSB_TRANSFER_COMPLETED ||
             transfer.actual_length != transfer.length)
-            return usb_failure("the board does not accept data", LIBUSB_ERROR_TIMEOUT);
+            return not_written(LIBUSB_ERROR_TIMEOUT);
         return {};
     }
 
@@ -186,12 +189,12 @@ std::optional<Error> boot_loader(const device::UsbBus& bus) {
 /// The first device of the vendor and product whose serial number fits.
 Expected<device::UsbHandle> find_board(const device::UsbBus& bus,
                                        const BoardConfiguration& wanted) {
-    std::optional<int> refused;
+    std::optional<device::UsbError> refused;
     bool hangs = false;
     for (const device::UsbDevice& candidate : bus.find(wanted.usb_vendor, wanted.usb_product)) {
         auto handle = candidate.open();
         if (!handle) {
-            refused = handle.error().code;
+            refused = handle.error();
             continue;
         }
         const auto serial = handle->serial();
@@ -224,7 +227,7 @@ Expected<std::unique_ptr<ByteStream>> open_usb_stream(const BoardConfiguration& 
     auto port = device::CdcPort::open(std::move(*handle));
     if (!port && port.error().fault == device::UsbFault::foreign)
         return failure("USB board", "has no CDC-ACM function", "update its firmware");
-    if (!port) return usb_failure("cannot be claimed", port.error().code);
+    if (!port) return usb_failure("cannot be claimed", port.error());
     auto stream = std::make_unique<UsbStream>(std::move(*bus), std::move(*port));
     if (auto started = stream->start(); !started) return Unexpected(started.error());
     return stream;

@@ -11,20 +11,7 @@ namespace versavis::device {
 
 namespace {
 
-UsbError error_of(int code) {
-    switch (code) {
-        case LIBUSB_ERROR_NO_DEVICE:
-        case LIBUSB_ERROR_NOT_FOUND:
-        case LIBUSB_ERROR_IO: return {UsbFault::gone, code};
-        case LIBUSB_ERROR_PIPE: return {UsbFault::stalled, code};
-        case LIBUSB_ERROR_TIMEOUT: return {UsbFault::late, code};
-        case LIBUSB_ERROR_BUSY: return {UsbFault::busy, code};
-        case LIBUSB_ERROR_ACCESS: return {UsbFault::denied, code};
-        default: return {UsbFault::other, code};
-    }
-}
-
-Unexpected<UsbError> usb_failure(int code) { return Unexpected<UsbError>(error_of(code)); }
+Unexpected<UsbError> usb_failure(int code) { return Unexpected<UsbError>(usb_error(code)); }
 
 /// libusb takes 0 for ever.
 unsigned milliseconds_of(Duration timeout) {
@@ -66,6 +53,19 @@ std::optional<std::string> text_of(libusb_device_handle* handle,
 }
 
 }  // namespace
+
+UsbError usb_error(int code) {
+    switch (code) {
+        case LIBUSB_ERROR_NO_DEVICE:
+        case LIBUSB_ERROR_NOT_FOUND:
+        case LIBUSB_ERROR_IO: return {UsbFault::gone, code};
+        case LIBUSB_ERROR_PIPE: return {UsbFault::stalled, code};
+        case LIBUSB_ERROR_TIMEOUT: return {UsbFault::late, code};
+        case LIBUSB_ERROR_BUSY: return {UsbFault::busy, code};
+        case LIBUSB_ERROR_ACCESS: return {UsbFault::denied, code};
+        default: return {UsbFault::other, code};
+    }
+}
 
 const char* UsbError::name() const { return libusb_error_name(code); }
 

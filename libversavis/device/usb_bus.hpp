@@ -38,6 +38,9 @@ struct UsbError {
     Error as_error(const std::string& where, const std::string& what) const;
 };
 
+/// The error that a code of libusb stands for.
+UsbError usb_error(int code);
+
 template <class T = void>
 using UsbExpected = Expected<T, UsbError>;
 
