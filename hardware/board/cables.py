@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Cables from the carrier to cameras, LiDARs, IMUs and receivers, and whether each can work.
 
-What a camera's lines are is in hardware/wiring.json, the table of `versavis wiring`; what is not
-there, and how the carrier is set and wired, is in hardware/cables.json.
+What a camera's lines are is in hardware/wiring.json, the table of `versavis wiring`; how the carrier
+is set and wired for it is in hardware/cables.json.
 """
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pathlib
 import re
 from typing import Any
 
-PRESETS = pathlib.Path(__file__).resolve().parents[2] / "daemon/settings/presets"
 HARDWARE = pathlib.Path(__file__).resolve().parents[1]
 Table = dict[str, Any]
 # The carrier's outputs: V at the rail at least and at most, ohm of the driver and of what follows
@@ -42,10 +41,8 @@ def tables() -> tuple[Table, Table]:
 
 def camera_facts(row: Table, wiring: Table) -> tuple[Table, Table]:
     """Of its trigger input and its exposure output."""
-    if row["name"] in wiring:
-        camera = wiring[row["name"]]
-        return camera["trigger"]["input"], camera["exposure"]["output"]
-    return row["input"], row["output"]
+    camera = wiring[row["name"]]
+    return camera["trigger"]["input"], camera["exposure"]["output"]
 
 
 def triggers() -> list[Cable]:
@@ -141,20 +138,6 @@ def pin_faults(row: Table, wiring: Table) -> list[str]:
     return faults
 
 
-def line_faults(row: Table) -> list[str]:
-    """Its lines are those that its preset uses; others have to be configured, and it says so."""
-    if "lines" not in row:
-        return []
-    text = (PRESETS / f"{row['preset']}.toml").read_text()
-    found = []
-    for key, what in (("trigger_lines", "trigger"), ("strobe_lines", "exposure")):
-        first = re.search(rf'^{key} = \["(\w+)"', text, re.M)
-        if first and first[1] != row["lines"][what] and not row.get("configure"):
-            found.append(f"preset '{row['preset']}' uses {first[1]} for the {what}, not "
-                         f"{row['lines'][what]}")
-    return found
-
-
 def shared_pins(table: Table) -> list[str]:
     """A pin that one camera uses for a signal and another one of the same plug for its supply may
     not be wired to both in one cable; the carrier has no such connector."""
@@ -187,15 +170,14 @@ def other_faults(row: Table, table: Table) -> list[str]:
     return faults
 
 
-def faults(table: Table | None = None) -> list[str]:
-    kept, wiring = tables()
-    table = table or kept
+def faults(table: Table, wiring: Table) -> list[str]:
+    """Of tables()."""
     found = shared_pins(table)
     for row in table["cameras"]:
         into, output = camera_facts(row, wiring)
         found += [f"{row['name']}: {fault}" for fault in
                   [*trigger_faults(row, into), *exposure_faults(row, output),
-                   *pin_faults(row, wiring), *line_faults(row)]]
+                   *pin_faults(row, wiring)]]
     for row in table["others"]:
         wrong = lidar_faults(row) if row["at"] == "lidar" else other_faults(row, table)
         found += [f"{row['name']}: {fault}" for fault in wrong]

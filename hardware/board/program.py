@@ -26,7 +26,7 @@ def check(quick: bool) -> list[str]:
         if name == "carrier" and not quick:
             found += mistakes.unnoticed(board, layout)
         faults += [f"{name}: {fault}" for fault in found]
-    faults += [f"cables.json: {fault}" for fault in cables.faults()]
+    faults += [f"cables.json: {fault}" for fault in cables.faults(*cables.tables())]
     faults += documents.faults()
     return faults if quick else faults + mistakes.unnoticed_cables()
 

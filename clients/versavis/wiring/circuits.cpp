@@ -20,8 +20,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ExposureCircuit, pull_up_ohm, di
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(TriggerWiring, line, pin, input, circuit)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ExposureWiring, line, pin, output, circuit)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(UnusedPin, pin, what)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(CameraCircuit, name, title, preset, source,
-                                                connector, ground_pin, supply_pin, trigger,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(CameraCircuit, name, title, preset, configure,
+                                                source, connector, ground_pin, supply_pin, trigger,
                                                 exposure, not_wired, notes, unknown)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ImuWire, imu, board, series_ohm, pull_up_ohm)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(ImuCircuit, name, title, models, bus, source, wires,

@@ -74,6 +74,7 @@ struct CameraCircuit {
     std::string name;
     std::string title;
     std::string preset;
+    bool configure = false;  ///< its lines are not the preset's: the configuration names them
     std::string source;
     std::string connector;
     int ground_pin = 0;

@@ -16,9 +16,9 @@ constexpr auto manual =
     "see the camera's manual; by the kind of its lines, 'versavis wiring flir' (without isolation) "
     "or 'versavis wiring flir-opto' (opto-isolated) shows what they need";
 
-/// Where the configuration names no line, the preset's first circuit has it.
-bool agrees(const std::string& wanted, const std::string& line, bool first) {
-    return wanted.empty() ? first : wanted == line;
+/// Where the configuration names no line, it is the preset's.
+bool agrees(const std::string& wanted, const std::string& line, const CameraCircuit& circuit) {
+    return wanted.empty() ? !circuit.configure : wanted == line;
 }
 
 std::string lines_of(const CameraCircuit& circuit) {
@@ -28,17 +28,21 @@ std::string lines_of(const CameraCircuit& circuit) {
 void choose_circuit(WiredCamera& camera, const std::string& preset, const std::string& trigger_line,
                     const std::string& strobe_line) {
     std::vector<std::string> others;
+    std::vector<std::string> fitting;
     for (const CameraCircuit& circuit : circuits().cameras) {
         if (circuit.preset != preset) continue;
-        const bool first = others.empty();
-        if (agrees(trigger_line, circuit.trigger.line, first) &&
-            agrees(strobe_line, circuit.exposure.line, first)) {
+        if (agrees(trigger_line, circuit.trigger.line, circuit) &&
+            agrees(strobe_line, circuit.exposure.line, circuit)) {
             camera.circuit = &circuit;
-            return;
+            fitting.push_back(fmt::format("'versavis wiring {}' ({})", circuit.name, circuit.title));
         }
         others.push_back(lines_of(circuit));
     }
-    if (preset.empty())
+    if (fitting.size() == 1) return;
+    camera.circuit = nullptr;
+    if (!fitting.empty())
+        camera.problem = fmt::format("its model decides: see {}", fmt::join(fitting, " or "));
+    else if (preset.empty())
         camera.problem =
             fmt::format("its preset is not known: connect the camera, or set 'preset'; {}", manual);
     else if (others.empty())

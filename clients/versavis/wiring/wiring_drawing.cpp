@@ -75,15 +75,6 @@ std::string named_level(const std::string& level) {
     return rail == rails.end() ? level : fmt::format("{}, pin {}", level, rail->second.pin);
 }
 
-/// Without a word in the configuration.
-bool of_preset(const CameraCircuit& circuit) {
-    const auto& all = circuits().cameras;
-    const auto first = std::find_if(all.begin(), all.end(), [&](const CameraCircuit& other) {
-        return other.preset == circuit.preset;
-    });
-    return &*first == &circuit;
-}
-
 std::string other_cameras() {
     const auto& signals = circuits().board.signals;
     std::vector<std::string> pairs;
@@ -253,7 +244,7 @@ Sheet drawing(const WiredCamera& camera) {
     sheet.end_at(y + 24);
     if (!circuit.unknown.empty())
         sheet.note(fmt::format("See the camera's manual for {}.", circuit.unknown));
-    if (!of_preset(circuit))
+    if (circuit.configure)
         sheet.note(fmt::format("In the configuration: trigger_line = \"{}\", strobe_line = \"{}\".",
                                circuit.trigger.line, circuit.exposure.line));
     for (const std::string& note : circuit.notes) sheet.note(note);
