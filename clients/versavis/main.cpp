@@ -26,6 +26,7 @@
 #include "commands/record_command.hpp"
 #include "commands/snapshot.hpp"
 #include "commands/tail.hpp"
+#include "commands/verify_command.hpp"
 #include "commands/wiring_command.hpp"
 #include "pairing/pair_replay.hpp"
 #include "posix/file.hpp"
@@ -185,6 +186,8 @@ int main(int argc, char** argv) {
 
     client::ProcessCommand process(app, [] { return stop_requested != 0; });
 
+    client::VerifyCommand verify(app, [] { return stop_requested != 0; });
+
     client::FileCommands files(app, [] { return stop_requested != 0; });
 
     client::RecordCommand recorder(app, [] { return stop_requested != 0; });
@@ -207,7 +210,7 @@ int main(int argc, char** argv) {
     }
     // Commands that run until they are stopped end tidily; all others end at once.
     if (watch || *tail_command || clock.records() || board.chosen() || evaluate.chosen() ||
-        process.chosen() || files.chosen() || recorder.chosen())
+        process.chosen() || verify.chosen() || files.chosen() || recorder.chosen())
         for (const int number : {SIGINT, SIGTERM}) signal(number, [](int) { stop_requested = 1; });
     signal(SIGXFSZ, SIG_IGN);  // a limit on files is reported like a full disk
     if (*status)
@@ -238,6 +241,7 @@ int main(int argc, char** argv) {
     if (files.chosen()) return files.run(instance_option->count() > 0 ? instance : "");
     if (evaluate.chosen()) return evaluate.run();
     if (process.chosen()) return process.run();
+    if (verify.chosen()) return verify.run();
     if (clock.chosen()) return clock.run(instance);
     const auto written =
         client::snapshot(instance, stream, output, {static_cast<std::int64_t>(timeout_s * 1e9)});

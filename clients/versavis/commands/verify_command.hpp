@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The command `versavis verify`.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace versavis::client {
+
+class VerifyCommand {
+ public:
+    /// Adds the command to the options of the program; `stop` returns true when it is to end.
+    VerifyCommand(CLI::App& app, std::function<bool()> stop);
+    VerifyCommand(const VerifyCommand&) = delete;  // options write to the members
+    VerifyCommand& operator=(const VerifyCommand&) = delete;
+
+    bool chosen() const;
+    int run() const;
+
+ private:
+    CLI::App* command_;
+    std::function<bool()> stop_;
+    std::vector<std::string> files_;
+    std::string html_;
+    bool json_ = false;
+};
+
+}  // namespace versavis::client

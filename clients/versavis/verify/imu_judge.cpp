@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "verify/imu_judge.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "verify/even_line.hpp"
+#include "verify/stream_order.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// What an IMU's own clock, or the board that asks it, may jitter: so many times what is usual, and
+/// so much in any case. A quarter of a period is another sample.
+constexpr std::int64_t usual_amounts = 12;
+constexpr Duration least_jitter = microseconds(50);
+
+/// A sample is sent within so many periods.
+constexpr std::int64_t periods_to_departure = 3;
+
+/// A stream of which fewer samples are followed by a message is not sent with the time of
+/// departure.
+constexpr double followed_share = 0.9;
+
+struct Found {
+    std::size_t sample;
+    Finding finding;
+    Duration by;
+};
+
+class ImuJudge {
+ public:
+    ImuJudge(const ImuEvidence& imu, const ClockWitness& clock) : imu_(imu), clock_(clock) {
+        std::size_t begin = 0;
+        for (std::size_t i = 1; i <= imu.samples.size(); ++i) {
+            if (i < imu.samples.size() && goes_on(imu.samples[i - 1], imu.samples[i])) continue;
+            judge_stretch(begin, i);
+            begin = i;
+        }
+        judge_departures();
+        std::sort(found_.begin(), found_.end(),
+                  [](const Found& a, const Found& b) { return a.sample < b.sample; });
+    }
+
+    StreamVerdict finish(HostTime begin) const;
+
+ private:
+    static bool goes_on(const StampedSample& last, const StampedSample& next) {
+        return last.life == next.life && last.epoch == next.epoch && last.sample < next.sample;
+    }
+    void judge_stretch(std::size_t begin, std::size_t end);
+    void judge_numbers(const std::vector<std::size_t>& which);
+    void judge_translation(const std::vector<std::size_t>& which);
+    void judge_departures();
+
+    const ImuEvidence& imu_;
+    const ClockWitness& clock_;
+    std::vector<Found> found_;
+    Duration period_;
+};
+
+bool judged(const StampedSample& sample) { return (sample.flags & flag_suspect) == 0; }
+
+/// Of samples whose numbers and clocks are continuous.
+void ImuJudge::judge_stretch(std::size_t begin, std::size_t end) {
+    std::vector<std::size_t> which;
+    for (std::size_t i = begin; i < end; ++i)
+        if (judged(imu_.samples[i]) && imu_.samples[i].sigma_ns != sigma_unknown)
+            which.push_back(i);
+    judge_numbers(which);
+    // What is out of bounds is wrong by that, and no measure for those beside it.
+    std::erase_if(which, [&](std::size_t i) {
+        const StampedSample& sample = imu_.samples[i];
+        return absolute(clock_.outside_bounds(sample.board - sample.filter_delay, sample.host)) >
+               allowed_error(sample.sigma_ns);
+    });
+    judge_translation(which);
+}
+
+void ImuJudge::judge_numbers(const std::vector<std::size_t>& which) {
+    std::vector<LinePoint> points;
+    std::vector<Duration> periods;
+    for (const std::size_t i : which) {
+        const StampedSample& sample = imu_.samples[i];
+        const LinePoint point{static_cast<std::int64_t>(sample.sample), sample.board.ns};
+        if (!points.empty())
+            periods.push_back({(point.y - points.back().y) / (point.x - points.back().x)});
+        points.push_back(point);
+    }
+    if (periods.empty()) return;
+    const auto median = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+    std::nth_element(periods.begin(), median, periods.end());
+    period_ = *median;
+    const auto off = off_line(points);
+    const std::int64_t jitter =
+        std::min(period_.ns / 4, std::max(least_jitter.ns, usual_amounts * usual_amount(off)));
+    for (std::size_t i = 0; i < which.size(); ++i)
+        if (std::llabs(off[i]) > jitter)
+            found_.push_back({which[i], Finding::sample_clock, {off[i]}});
+}
+
+void ImuJudge::judge_translation(const std::vector<std::size_t>& which) {
+    std::vector<LinePoint> points;
+    for (const std::size_t i : which) {
+        const StampedSample& sample = imu_.samples[i];
+        points.push_back({sample.board.ns, sample.host.ns - sample.board.ns});
+    }
+    const auto off = off_line(points);
+    for (std::size_t i = 0; i < which.size(); ++i) {
+        if (std::llabs(off[i]) > allowed_error(imu_.samples[which[i]].sigma_ns).ns)
+            found_.push_back({which[i], Finding::uneven, {off[i]}});
+    }
+}
+
+void ImuJudge::judge_departures() {
+    if (!clock_.has_messages() || period_.ns <= 0) return;
+    std::vector<std::size_t> without;
+    for (std::size_t i = 0; i < imu_.samples.size(); ++i) {
+        const StampedSample& sample = imu_.samples[i];
+        if (judged(sample) &&
+            !clock_.departed_between(sample.board, sample.board + period_ * periods_to_departure,
+                                     sample.host))
+            without.push_back(i);
+    }
+    const auto all = static_cast<double>(imu_.samples.size());
+    if (static_cast<double>(without.size()) > (1 - followed_share) * all) return;
+    for (const std::size_t i : without) found_.push_back({i, Finding::no_departure, {}});
+}
+
+StreamVerdict ImuJudge::finish(HostTime begin) const {
+    VerdictBuilder verdict(imu_.name, "imu");
+    StreamOrder order(imu_.gaps, begin);
+    auto found = found_.begin();
+    for (std::size_t i = 0; i < imu_.samples.size(); ++i) {
+        const StampedSample& sample = imu_.samples[i];
+        verdict.begin_item(order.second(sample.host), sample.sigma_ns);
+        order.judge(sample, sample.epoch, verdict);
+        for (; found != found_.end() && found->sample == i; ++found)
+            verdict.add(found->finding, found->by);
+        if (!judged(sample)) {
+            verdict.withhold();
+            continue;
+        }
+        clock_.judge({sample.board - sample.filter_delay, sample.host, sample.time, sample.sigma_ns,
+                      sample.epoch, sample.flags},
+                     verdict);
+    }
+    for (const RecordedGap& gap : imu_.gaps) verdict.add_lost(gap.items);
+    verdict.add_damaged(imu_.impossible);
+    return verdict.finish();
+}
+
+}  // namespace
+
+StreamVerdict judge_imu(const ImuEvidence& imu, const ClockWitness& clock, HostTime begin) {
+    return ImuJudge(imu, clock).finish(begin);
+}
+
+}  // namespace versavis::client

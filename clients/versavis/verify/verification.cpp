@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "verify/verification.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "recording/recording.hpp"
+#include "verify/camera_judge.hpp"
+#include "verify/clock_witness.hpp"
+#include "verify/imu_judge.hpp"
+
+namespace versavis::client {
+
+namespace {
+
+/// Of the first item of any stream: evidence may be older.
+HostTime begin_of(const RecordedEvidence& evidence) {
+    std::vector<HostTime> first;
+    for (const CameraEvidence& camera : evidence.cameras)
+        if (!camera.frames.empty()) first.push_back(camera.frames.front().frame.arrival);
+    for (const ImuEvidence& imu : evidence.imus)
+        if (!imu.samples.empty()) first.push_back(imu.samples.front().host);
+    if (first.empty()) return {};
+    return *std::min_element(first.begin(), first.end());
+}
+
+}  // namespace
+
+Grade Verification::grade() const {
+    if (streams.empty()) return Grade::plausible;
+    Grade worst = Grade::proved;
+    for (const StreamVerdict& stream : streams) worst = std::min(worst, stream.grade());
+    return worst;
+}
+
+Verification verify(const RecordedEvidence& evidence) {
+    const ClockWitness clock(evidence.clock, evidence.output_clock);
+    const HostTime begin = begin_of(evidence);
+    Verification verification;
+    for (const CameraEvidence& camera : evidence.cameras)
+        if (!camera.frames.empty() || camera.impossible > 0)
+            verification.streams.push_back(judge_camera(camera, clock, begin));
+    for (const ImuEvidence& imu : evidence.imus)
+        verification.streams.push_back(judge_imu(imu, clock, begin));
+    std::vector<Duration> widths;
+    for (const ClockBounds& life : clock.lives()) {
+        ++verification.board_lives;
+        verification.exchanges += life.exchanges();
+        verification.refused_exchanges += life.refused_exchanges();
+        verification.bounds_width = std::max(verification.bounds_width, life.usual_width());
+    }
+    for (const StreamVerdict& stream : verification.streams)
+        if (!stream.seconds.empty())
+            verification.seconds =
+                std::max(verification.seconds, stream.seconds.rbegin()->first + 1);
+    return verification;
+}
+
+Expected<Verification> verify_recording(const std::string& path,
+                                        const std::function<bool()>& go_on) {
+    const auto recording = Recording::open(path);
+    if (!recording) return Unexpected(recording.error());
+    const auto evidence = read_evidence(*recording, go_on);
+    if (!evidence) return Unexpected(evidence.error());
+    Verification verification = verify(*evidence);
+    verification.file = std::filesystem::path(path).filename().string();
+    if (!recording->facts().defect.empty())
+        verification.notes.push_back("the end of the file is missing: " +
+                                     recording->facts().defect);
+    if (verification.streams.empty())
+        verification.notes.emplace_back("there are no frames and no samples in it");
+    return verification;
+}
+
+}  // namespace versavis::client
