@@ -114,7 +114,8 @@ RecordCommand::RecordCommand(CLI::App& app, std::function<bool()> stop)
     settings_.stop = std::move(stop);
     command_->add_option("stream", settings_.streams, "Streams to record (default: all)");
     command_->add_option("-o,--output", settings_.output,
-                         "File to write (default: versavis-DATE-TIME.mcap)");
+                         "File to write (default: versavis-DATE-TIME.mcap); NAME/: a new folder "
+                         "that 'ros2 bag play' opens, with all files of --split");
     command_->add_option("--seconds", seconds_, "Stop after this many seconds")
         ->check(CLI::PositiveNumber);
     command_->add_option("--split", split_,

@@ -41,7 +41,9 @@ struct RecordReport {
 struct RecordSettings {
     std::string instance;
     std::vector<std::string> streams;  ///< none: all, also those that come later
-    std::string output;                ///< file; empty: `versavis-DATE-TIME.mcap`
+    /// File; empty: `versavis-DATE-TIME.mcap`. With '/' at its end a new folder: NAME/NAME.mcap,
+    /// further files, and metadata.yaml.
+    std::string output;
     std::optional<Duration> length;
     std::uint64_t split_bytes = 0;  ///< 0: one file
     std::optional<Duration> split_length;

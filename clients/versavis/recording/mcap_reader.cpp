@@ -281,7 +281,9 @@ Expected<> McapReader::take_summary_record(Window& window, const McapRecord& rec
         case McapOpcode::statistics: {
             McapStatistics statistics{};
             statistics.messages = cursor.number<std::uint64_t>();
-            cursor.bytes(2 + 4 * 4 + 2 * 8);
+            cursor.bytes(2 + 4 * 4);
+            statistics.start_time = cursor.number<std::uint64_t>();
+            statistics.end_time = cursor.number<std::uint64_t>();
             ByteCursor counts(cursor.bytes(cursor.number<std::uint32_t>()));
             while (counts.left() > 0 && counts.good()) {
                 const auto channel = counts.number<std::uint16_t>();

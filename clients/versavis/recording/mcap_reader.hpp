@@ -83,6 +83,8 @@ struct McapMetadata {
 
 struct McapStatistics {
     std::uint64_t messages;
+    std::uint64_t start_time;  ///< log times
+    std::uint64_t end_time;
     std::map<std::uint16_t, std::uint64_t> of_channel;
 };
 

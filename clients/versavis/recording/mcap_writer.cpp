@@ -42,6 +42,16 @@ std::uint32_t crc_of(std::uint32_t before, std::span<const std::byte> bytes) {
 
 }  // namespace
 
+std::string mcap_schema(std::uint16_t id, const McapTopic& topic) {
+    return mcap_number(id) + mcap_text(topic.schema) + mcap_text(topic.schema_encoding) +
+           mcap_text(topic.schema_text);
+}
+
+std::string mcap_channel(std::uint16_t id, std::uint16_t schema, const McapTopic& topic) {
+    return mcap_number(id) + mcap_number(schema) + mcap_text(topic.name) +
+           mcap_text(topic.encoding) + mcap_map(topic.metadata);
+}
+
 McapWriter::McapWriter(std::string path, FileDescriptor file)
     : path_(std::move(path)),
       file_(std::move(file)),
@@ -64,11 +74,8 @@ Expected<McapWriter> McapWriter::create(const std::string& path, const std::stri
 
 std::uint16_t McapWriter::add(const McapTopic& topic) {
     const std::uint16_t id = ++channels_;
-    const std::string number = mcap_number(id);
-    summary_.schemas[id] = number + mcap_text(topic.schema) + mcap_text(topic.schema_encoding) +
-                           mcap_text(topic.schema_text);
-    summary_.channels[id] = number + number + mcap_text(topic.name) + mcap_text(topic.encoding) +
-                            mcap_map(topic.metadata);
+    summary_.schemas[id] = mcap_schema(id, topic);
+    summary_.channels[id] = mcap_channel(id, id, topic);
     unwritten_channels_[id] = mcap_record(McapOpcode::schema, summary_.schemas[id]) +
                               mcap_record(McapOpcode::channel, summary_.channels[id]);
     summary_room_ += unwritten_channels_[id].size() + summary_entry;

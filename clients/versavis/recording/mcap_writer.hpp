@@ -25,6 +25,10 @@ struct McapTopic {
     std::map<std::string, std::string> metadata{};
 };
 
+/// Contents of the records that announce it.
+std::string mcap_schema(std::uint16_t id, const McapTopic& topic);
+std::string mcap_channel(std::uint16_t id, std::uint16_t schema, const McapTopic& topic);
+
 struct MessageHead {
     std::uint16_t channel = 0;
     std::uint32_t sequence = 0;

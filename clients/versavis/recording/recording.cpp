@@ -11,89 +11,17 @@
 
 #include "base/byte_cursor.hpp"
 #include "base/plausible_time.hpp"
-#include "base/shallow_json.hpp"
+#include "recording/item_messages.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/ros_image.hpp"
-#include "versavis/ring_path.hpp"
 
 namespace versavis::client {
 
 namespace {
 
-constexpr std::uint64_t item_size = 128;  ///< before its payload
-constexpr std::string_view item_encoding = "versavis_item";
-
 /// Chunks that at() keeps. Streams are written within some chunks of one another: with fewer, a
 /// recording with many cameras may be read twice.
 constexpr std::size_t kept_chunks = 8;
-
-enum class Role { other, item, image, compressed, gap };
-
-/// What the messages of a channel are.
-struct Part {
-    Role role = Role::other;
-    std::string stream;
-    ring::StreamKind kind{};
-};
-
-std::optional<ring::StreamKind> kind_of(const std::string& text) {
-    if (text.size() != 1 || text[0] < '1' || text[0] > '6') return std::nullopt;
-    return static_cast<ring::StreamKind>(text[0] - '0');
-}
-
-/// Between `begin` and `end` of a topic; empty: it is another.
-std::string inside(const std::string& topic, std::string_view begin, std::string_view end) {
-    if (topic.size() <= begin.size() + end.size() || !topic.starts_with(begin) ||
-        !topic.ends_with(end))
-        return {};
-    const auto name = topic.substr(begin.size(), topic.size() - begin.size() - end.size());
-    return is_stream_name(name) ? name : std::string();
-}
-
-Part part_of(const McapChannel& channel) {
-    if (auto name = inside(channel.topic, "/versavis/", "/item");
-        !name.empty() && channel.encoding == item_encoding) {
-        const auto found = channel.metadata.find("kind");
-        const auto kind = found == channel.metadata.end() ? std::nullopt : kind_of(found->second);
-        if (kind) return {Role::item, name, *kind};
-    }
-    if (auto name = inside(channel.topic, "/versavis/", "/gap");
-        !name.empty() && channel.encoding == "json")
-        return {Role::gap, name, {}};
-    if (channel.encoding != "cdr") return {};
-    if (auto name = inside(channel.topic, "/", "/image_raw/compressed"); !name.empty())
-        return {Role::compressed, name, {}};
-    if (auto name = inside(channel.topic, "/", "/image_raw"); !name.empty())
-        return {Role::image, name, {}};
-    return {};
-}
-
-struct Envelope {
-    std::uint64_t number;
-    std::uint64_t life;
-    OutputTime time;
-    std::uint32_t length;
-    ring::Metadata metadata;
-};
-
-std::optional<Envelope> parse_envelope(std::span<const std::byte> data) {
-    ByteCursor cursor(data);
-    Envelope envelope{};
-    envelope.number = cursor.number<std::uint64_t>();
-    envelope.life = cursor.number<std::uint64_t>();
-    envelope.time = {cursor.number<std::int64_t>()};
-    envelope.length = cursor.number<std::uint32_t>();
-    cursor.number<std::uint32_t>();
-    for (auto& word : envelope.metadata) word = cursor.number<std::uint64_t>();
-    if (!cursor.good()) return std::nullopt;
-    return envelope;
-}
-
-/// Of a frame; files before version 1.2 have none.
-std::uint64_t attributes_of(std::span<const std::byte> item) {
-    if (item.size() < item_size + sizeof(std::uint64_t)) return ring::no_attributes;
-    return ByteCursor(item.subspan(item_size)).number<std::uint64_t>();
-}
 
 /// The image that was met last, of one camera.
 struct Image {
@@ -105,7 +33,7 @@ struct Image {
 
 /// What one way through chunks knows; channels may be announced on the way.
 struct Walk {
-    std::map<std::uint16_t, Part> parts;
+    std::map<std::uint16_t, ChannelRole> parts;
     std::set<std::string, std::less<>> wanted;  ///< empty: all
     std::map<std::string, Image, std::less<>> images;
     std::vector<std::byte> pixels;
@@ -145,7 +73,7 @@ struct Recording::File {
     };
 
     McapReader reader;
-    std::map<std::uint16_t, Part> parts;
+    std::map<std::uint16_t, ChannelRole> parts;
     std::vector<RecordedStream> streams;
     std::vector<Attachment> attachments;
     RecordingFacts facts;
@@ -157,11 +85,11 @@ struct Recording::File {
 
     Expected<> take_stock();
     Expected<> count_items();
-    void count(const Part& part, std::uint64_t items);
+    void count(const ChannelRole& part, std::uint64_t items);
     Walk walk(const std::vector<std::string>& wanted) const;
     Expected<bool> visit(Walk& walk, std::uint32_t chunk, const McapRecord& record,
                          const Take& take, bool with_pixels) const;
-    Expected<bool> take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+    Expected<bool> take_item(Walk& walk, const ChannelRole& part, std::uint32_t chunk,
                              const McapRecord& record, const Take& take, bool with_pixels) const;
     Expected<bool> for_each(const std::vector<std::string>& wanted, const Take& take,
                             bool with_pixels) const;
@@ -253,7 +181,7 @@ const Attachment* Recording::attachment(const std::string& name) const {
     return found == all.end() ? nullptr : &*found;
 }
 
-void Recording::File::count(const Part& part, std::uint64_t items) {
+void Recording::File::count(const ChannelRole& part, std::uint64_t items) {
     if (part.role != Role::item) return;
     const auto found = std::find_if(streams.begin(), streams.end(),
                                     [&](const auto& one) { return one.name == part.stream; });
@@ -280,7 +208,7 @@ Expected<> Recording::File::take_stock() {
             ours = true;
         }
     for (const auto& channel : reader.channels())
-        parts.insert_or_assign(channel.id, part_of(channel));
+        parts.insert_or_assign(channel.id, role_of(channel));
     if (reader.defect().empty() && reader.statistics() && !reader.channels().empty()) {
         for (const auto& [channel, part] : parts) {
             const auto found = reader.statistics()->of_channel.find(channel);
@@ -328,7 +256,7 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     if (record.opcode == McapOpcode::channel) {
         const auto channel = parse_channel(record.content);
         if (!channel) return reader.damaged(record.offset, "a channel is not whole");
-        walk.parts.insert_or_assign(channel->id, part_of(*channel));
+        walk.parts.insert_or_assign(channel->id, role_of(*channel));
         return true;
     }
     if (record.opcode != McapOpcode::message) return true;
@@ -336,7 +264,7 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     if (!message) return reader.damaged(record.offset, "a message is too short");
     const auto found = walk.parts.find(message->channel);
     if (found == walk.parts.end()) return true;
-    const Part& part = found->second;
+    const ChannelRole& part = found->second;
     if (part.role == Role::item && walk.wants(part.stream))
         return take_item(walk, part, chunk, record, take, with_pixels);
     if (part.role == Role::image || part.role == Role::compressed) {
@@ -350,42 +278,48 @@ Expected<bool> Recording::File::visit(Walk& walk, std::uint32_t chunk, const Mca
     return true;
 }
 
-Expected<bool> Recording::File::take_item(Walk& walk, const Part& part, std::uint32_t chunk,
+Expected<bool> Recording::File::take_item(Walk& walk, const ChannelRole& part, std::uint32_t chunk,
                                           const McapRecord& record, const Take& take,
                                           bool with_pixels) const {
     const auto message = parse_message(record.content);
-    const auto envelope = parse_envelope(message->data);
-    if (!envelope) return reader.damaged(record.offset, "an item is too short");
-    if (!is_plausible(envelope->time.ns))
+    std::uint64_t payload_size = 0;
+    const auto parsed =
+        part.old ? parse_old_item(message->data, record.length - mcap_message_header, payload_size)
+                 : parse_item_message(message->data, payload_size);
+    if (!parsed) return reader.damaged(record.offset, "an item is too short");
+    if (!is_plausible(parsed->time.ns))
         return reader.damaged(record.offset, "the stamp of an item is no time");
     const auto place =
         static_cast<std::uint32_t>(record.offset - reader.chunks()[chunk].records_offset);
     RecordedItem item{part.stream,
                       part.kind,
-                      envelope->number,
-                      envelope->life,
-                      envelope->time,
-                      envelope->metadata,
+                      parsed->number,
+                      parsed->life,
+                      parsed->time,
+                      parsed->metadata,
                       {},
-                      envelope->length,
+                      parsed->length,
                       ring::no_attributes,
                       {index, chunk, place},
                       {}};
     if (part.kind != ring::StreamKind::frames) {
-        const std::uint64_t size = record.length - mcap_message_header - item_size;
-        if (size != envelope->length)
+        if (payload_size != parsed->length)
             return reader.damaged(record.offset, "an item's length differs from the one it states");
         std::vector<std::byte> rest;
-        item.payload = message->data.subspan(item_size);
-        if (item.payload.size() < size) {  // it was only glanced at
-            rest.resize(size);
-            if (auto got = reader.read(record.end() - size, rest); !got)
+        item.payload = parsed->payload;
+        if (item.payload.size() < payload_size) {  // it was only glanced at
+            if (payload_size > record.length)
+                return reader.damaged(record.offset, "an item is longer than its message");
+            rest.resize(payload_size);
+            if (auto got = reader.read(record.end() - payload_size, rest); !got)
                 return Unexpected(got.error());
             item.payload = rest;
         }
         return take(item);
     }
-    item.attributes = attributes_of(message->data);
+    ItemMessage frame = *parsed;
+    frame.kind = part.kind;
+    item.attributes = frame.attributes();
     const auto image = walk.images.find(part.stream);
     if (image != walk.images.end() && image->second.sequence == message->sequence) {
         item.place.image = image->second.place;
@@ -489,17 +423,12 @@ Expected<> Recording::File::add_gaps(std::vector<RecordedGap>& gaps) const {
             if (!message) return true;
             const auto part = parts.find(message->channel);
             if (part == parts.end() || part->second.role != Role::gap) return true;
-            const auto json = parse_shallow_json(
-                {reinterpret_cast<const char*>(message->data.data()), message->data.size()});
-            if (!json.is_object()) return reader.damaged(record.offset, "a gap is no JSON object");
-            const auto reason = json.find("reason");
-            const auto items = json.find("items");
+            const auto gap =
+                part->second.old ? parse_old_gap(message->data) : parse_gap_message(message->data);
+            if (!gap) return reader.damaged(record.offset, "a gap is damaged");
             gaps.push_back({part->second.stream,
-                            reason != json.end() && reason->is_string() ? reason->get<std::string>()
-                                                                        : "unknown",
-                            items != json.end() && items->is_number_unsigned()
-                                ? items->get<std::uint64_t>()
-                                : 0,
+                            gap->reason,
+                            gap->items,
                             {static_cast<std::int64_t>(message->log_time)}});
             return true;
         });
